@@ -4,7 +4,7 @@ use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::draws::DrawOptions;
 use dermis_golden::noise::{shape_study, study, Candidate, ShapeStudy, Study};
 use dermis_golden::scene::{EstimatorKind, ObjectiveKind};
-use dermis_sim::commands::noise::{shapes_named, AVERAGED};
+use dermis_sim::commands::noise::{by_name, shapes_named, AVERAGED};
 use pyo3::prelude::*;
 
 use crate::exceptions::{input, not_allowed};
@@ -13,11 +13,8 @@ use crate::scene::{count, Scene};
 
 /// The values of `names` that are wanted, called `field` in errors.
 fn named<T: Copy>(field: &str, wanted: Option<Vec<String>>, names: &[(&str, T)]) -> PyResult<Vec<T>> {
-    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    let one = |name: &String| {
-        let found = names.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
-        found.ok_or_else(|| not_allowed(field, format!("{name:?}"), &format!("of {}", known())))
-    };
+    let refused = |name: &str, known: &str| not_allowed(field, format!("{name:?}"), &format!("of {known}"));
+    let one = |name: &String| by_name(name, names).map_err(|known| refused(name, &known));
     wanted.unwrap_or_default().iter().map(one).collect()
 }
 

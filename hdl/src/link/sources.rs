@@ -111,8 +111,7 @@ fn kernel(registered: bool) -> Kernel {
     let word = k.wire("answer_word", index.at(3).mux(high, index.at(2).mux(middle, low)));
     let half = index.at(1).mux(word.slice(16, 16), word.low(16));
     // The block RAM of the counters is slow and far away: nothing stands between it and its register.
-    let both = is_answer.mux(stage("answer_half", half), stage("kept_entry", entry));
-    let both = k.wire("both", both);
+    let both = k.wire("both", is_answer.mux(stage("answer_half", half), stage("kept_entry", entry)));
     let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
     let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
     stage("octet", index.at(0).mux(both.slice(8, 8), both.low(8)));

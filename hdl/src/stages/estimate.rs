@@ -7,7 +7,7 @@
 //! A position outside the disc is reduced every fourth cycle: squares, their sum, comparison, reduction. μ is known after a
 //! fixed number of cycles, whatever it is.
 
-use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_SHIFT};
+use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_CYCLES, REDUCTION_SHIFT};
 use dermis_golden::fixed::stages::send::LN_SIGMA_BITS;
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};
@@ -59,9 +59,6 @@ kernel_block!(
     inputs [rst, start, enabled, quad, valid],
     outputs [operands, operands_valid, position_x, position_y, ln_sigma, saturations]
 );
-
-/// Cycles of a reduction, a power of two.
-const REDUCTION: usize = 4;
 
 /// What decides the circuit.
 #[derive(Clone, Copy, Debug)]
@@ -233,16 +230,16 @@ impl Shape {
         [restarts, enabled]: [Expr<'k>; 2],
     ) -> Expr<'k> {
         let axes: Vec<Net> = ["x", "y"].map(|name| k.register(name, Type::signed(POSITION_BITS as usize))).into();
-        let left = k.state("left", Type::unsigned(count_bits(REDUCTION * REDUCTIONS + 1)), restarts, 0);
+        let left = k.state("left", Type::unsigned(count_bits(REDUCTION_CYCLES * REDUCTIONS + 1)), restarts, 0);
         let runs = k.wire("runs", left.any());
         k.when(runs, || left.set(left.minus(1)));
-        k.when(second, || left.set(k.constant(left.bits(), (REDUCTION * REDUCTIONS) as u64)));
+        k.when(second, || left.set(k.constant(left.bits(), (REDUCTION_CYCLES * REDUCTIONS) as u64)));
         let squares =
             [0, 1].map(|axis| k.delay(&format!("square_{axis}"), axes[axis].get() * axes[axis].get()).unsigned());
         let square = k.delay("square", squares[0] + squares[1]);
         let outside = k.delay("outside", k.constant(square.bits(), (MU_STEPS * MU_STEPS) as u64).less(square));
         // In the last cycle of a reduction `outside` is that of the position, which has not changed since the first.
-        let reduces = k.wire("reduces", left.low(REDUCTION.trailing_zeros() as usize).is(1) & outside);
+        let reduces = k.wire("reduces", left.low(REDUCTION_CYCLES.trailing_zeros() as usize).is(1) & outside);
         for axis in [0, 1] {
             let position = axes[axis].get();
             let less = (position - position.round_shift(REDUCTION_SHIFT as usize)).low(POSITION_BITS as usize).signed();
@@ -268,7 +265,7 @@ mod tests {
     use crate::wire::Word;
 
     /// Cycles from a row to its operands, and from the second row of the last layer until μ is known.
-    const LATENCY: [usize; 2] = [4, 2 + REDUCTION * REDUCTIONS];
+    const LATENCY: [usize; 2] = [4, 2 + REDUCTION_CYCLES * REDUCTIONS];
 
     /// Inputs: reset, start, whether μ is wanted, a row, whether there is one.
     struct Rows<'a> {

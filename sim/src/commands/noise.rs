@@ -194,8 +194,16 @@ fn estimator(name: &str) -> Result<EstimatorKind, String> {
 }
 
 fn named<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
+    by_name(name, names).map_err(|known| format!("one of {known}"))
+}
+
+/// The value with a name.
+///
+/// # Errors
+/// For an unknown name all that are known, separated by commas.
+pub fn by_name<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
     let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
+    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(known)
 }
 
 /// Parses a list of shapes.

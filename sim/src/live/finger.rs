@@ -88,10 +88,10 @@ impl Hand {
             let begun = Instant::now();
             let received_s = seconds(SystemTime::now());
             let frame = self.frame(scene, noise, sequence)?;
-            let frames = vec![frame.clone(); scene.input.frames_per_result()];
+            let frames = vec![frame; scene.input.frames_per_result()];
             let result = engine.reconstruct(&frames)?;
             let answered_s = seconds(SystemTime::now());
-            let (line, frame, result) = (sequence + 1, &frame, &result);
+            let (line, frame, result) = (sequence + 1, &frames[0], &result);
             output(&Outcome::Answer(Answer { sequence, line, received_s, answered_s, dropped: 0, frame, result }))?;
             std::thread::sleep(period.saturating_sub(begun.elapsed()));
         }

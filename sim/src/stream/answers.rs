@@ -204,13 +204,13 @@ impl Stream<'_> {
     /// Hands on what a line gave; nothing for a frame that does not complete its block.
     fn answer(&mut self, received: &Received, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
-            self.waiting.push(frame.clone());
+            self.waiting.push(frame);
             if self.waiting.len() < self.scene.input.frames_per_result() {
                 return Ok(None);
             }
-            let frames = std::mem::take(&mut self.waiting);
+            let mut frames = std::mem::take(&mut self.waiting);
             let result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
-            Ok(Some((frame, result)))
+            Ok(frames.pop().map(|frame| (frame, result)))
         });
         let line = received.number;
         match result {

@@ -27,7 +27,7 @@ use super::serial;
 use super::storage::Storage;
 use crate::board::EngineKind;
 use crate::fixed::stages::choose;
-use crate::fixed::stages::estimate::REDUCTIONS;
+use crate::fixed::stages::estimate::{REDUCTIONS, REDUCTION_CYCLES};
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, HALVINGS};
 use crate::fixed::words::schedule::{accumulations, Operand, Product, Target};
@@ -52,8 +52,6 @@ const RELAX: u64 = 3;
 const IMAGES: u64 = 5;
 /// Cycles from the second row of the last layer until μ can be read, beyond its reductions: output 1, saturation 1, operand 1.
 const ESTIMATE: u64 = 3;
-/// Cycles of each reduction of μ.
-const REDUCTION: u64 = 4;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
@@ -313,7 +311,7 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
             Target::Layer(_) => {
                 // With one lane per parity it is the first of a group of its own.
                 let second_row = now - 1 + lanes + u64::from(per_parity > 1);
-                layers.push(second_row + ESTIMATE + REDUCTION * REDUCTIONS as u64);
+                layers.push(second_row + ESTIMATE + (REDUCTION_CYCLES * REDUCTIONS) as u64);
             }
         }
     }

@@ -18,6 +18,8 @@ use crate::symmetry::parity::hadamard;
 
 /// Times that a position may be reduced; a word of [`POSITION_BITS`] on both axes is in the disc after 22.
 pub const REDUCTIONS: usize = 24;
+/// Cycles of a reduction in hardware, a power of two: squares, their sum, comparison, reduction.
+pub const REDUCTION_CYCLES: usize = 4;
 /// Right shift of a position to the amount by which it is reduced.
 pub const REDUCTION_SHIFT: u32 = 5;
 
