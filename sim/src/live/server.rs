@@ -6,11 +6,11 @@
 //! | `GET /newest?after=N` | the newest picture once its number is above N, in the header `Number`; 204 after a second |
 //! | `POST /finger` | takes the finger, see [`Finger::read`]; 404 where no finger is drawn |
 
-use std::io::{ErrorKind, Result, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::io::{ErrorKind, Read, Result, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use dermis_golden::scene::Scene;
 use serde_json::json;
@@ -68,8 +68,9 @@ impl Server {
                 other => other?,
             };
             let server = Arc::clone(&server);
+            // Counted here, in the order of arrival: the threads may run in any.
+            let others = server.clients.fetch_add(1, Ordering::Relaxed);
             std::thread::spawn(move || {
-                let others = server.clients.fetch_add(1, Ordering::Relaxed);
                 // A client that goes away is no error.
                 let _ = server.connection(stream, others < CLIENTS);
                 server.clients.fetch_sub(1, Ordering::Relaxed);
@@ -83,12 +84,12 @@ impl Server {
         stream.set_nodelay(true)?;
         if !admitted {
             let text = format!("{CLIENTS} connections are open");
-            return answer(&mut stream, &plain("503 Service Unavailable", &text), false);
+            return last_answer(&mut stream, &plain("503 Service Unavailable", &text));
         }
         while let Some(request) = read(&mut stream)? {
             match request {
                 Ok(request) => self.respond(&mut stream, &request)?,
-                Err((status, text)) => return answer(&mut stream, &plain(status, &text), false),
+                Err((status, text)) => return last_answer(&mut stream, &plain(status, &text)),
             }
         }
         Ok(())
@@ -145,6 +146,18 @@ fn answer(stream: &mut TcpStream, answer: &Answer, more: bool) -> Result<()> {
     bytes.extend(b"\r\n");
     bytes.extend(*body);
     stream.write_all(&bytes)
+}
+
+/// Answers and ends the connection. What the client still sends is read for a while: a connection that is closed with
+/// bytes unread is reset, and the client may lose the answer.
+fn last_answer(stream: &mut TcpStream, last: &Answer) -> Result<()> {
+    answer(stream, last, false)?;
+    stream.shutdown(Shutdown::Write)?;
+    stream.set_read_timeout(Some(WAIT))?;
+    let end = Instant::now() + WAIT;
+    let mut unread = [0; 4096];
+    while Instant::now() < end && stream.read(&mut unread)? > 0 {}
+    Ok(())
 }
 
 /// The page: colours of the report, style, script, and what it must know of the scene.
