@@ -14,7 +14,8 @@
 //! | out: envelope | cells | N, 0 on cells left out |
 
 use super::cells::Cells;
-use crate::float::segment::smooth_window;
+use crate::segment::gaussian;
+use crate::sensor::Sensor;
 
 /// Smoothing of the pressure in units of ℓ.
 const SMOOTHING: f64 = 0.3;
@@ -57,10 +58,20 @@ pub(super) fn from_stress(cells: &Cells, b: &[f64], used: &[bool], sigma: f64) -
     (0..grid.taxels()).map(reading).collect()
 }
 
+/// The pressure under a Gaussian window of `sigma_mm`.
+fn smoothed(grid: &Sensor, p: &[f64], sigma_mm: f64) -> Vec<f64> {
+    let (rows, cols) = (grid.rows, grid.cols);
+    let [x, y] =
+        [(cols, grid.pitch_x_mm), (rows, grid.pitch_y_mm)].map(|(count, pitch)| gaussian(count, pitch, sigma_mm));
+    let along = |k: usize| (0..cols).map(|col| x[k % cols][col] * p[k - k % cols + col].max(0.0)).sum();
+    let along: Vec<f64> = (0..p.len()).map(along).collect();
+    (0..p.len()).map(|k| (0..rows).map(|row| y[k / cols][row] * along[row * cols + k % cols]).sum()).collect()
+}
+
 /// The envelope of the pressure `p` in N per cell; `sigma` is the noise in units of the stress' peak.
 pub(super) fn envelope(cells: &Cells, p: &[f64], length_mm: f64, sigma: f64) -> Vec<f64> {
     let least = (LEAST * sigma.cbrt()).clamp(LEAST_RANGE[0], LEAST_RANGE[1]);
-    let q = smooth_window(&cells.grid, p, [SMOOTHING * length_mm; 2]);
+    let q = smoothed(&cells.grid, p, SMOOTHING * length_mm);
     let peak = q.iter().copied().fold(0.0, f64::max);
     let shape = |q: &f64| {
         let share = q / peak;

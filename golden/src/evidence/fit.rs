@@ -18,8 +18,8 @@ use super::estimator::Evidence;
 use super::model::{Design, Products, Readings};
 use super::prior::factor;
 use super::{clipped, noise};
-use crate::float::segment::{neighbours, segment, WIDTH};
 use crate::frame::Forces;
+use crate::segment::{neighbours, segment, WIDTH};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Scale};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -176,7 +176,8 @@ impl<'a> Fit<'a> {
         let p: Vec<f64> = self.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
         let segments = segment(&cells.grid, &p, WIDTH);
         let mut strongest: Vec<Option<usize>> = vec![None; segments.count];
-        for (cell, &label) in segments.labels.iter().enumerate().filter(|(cell, _)| p[*cell] > 0.0) {
+        let loaded = segments.labels.iter().enumerate().filter(|(cell, _)| p[*cell] > 0.0);
+        for (cell, label) in loaded.filter_map(|(cell, label)| Some((cell, (*label)?))) {
             if strongest[label].is_none_or(|other| p[cell] > p[other]) {
                 strongest[label] = Some(cell);
             }
@@ -185,7 +186,7 @@ impl<'a> Fit<'a> {
         let kept: Vec<usize> = (0..segments.count).filter(|&label| strongest[label].is_some()).collect();
         let mu_of = |&label: &usize| strongest[label].map_or([0.0; 2], |cell| self.mu[self.labels[cell]]);
         self.mu = kept.iter().map(mu_of).collect();
-        let number = |label: &usize| kept.iter().position(|kept| kept == label).unwrap_or(0);
+        let number = |label: &Option<usize>| kept.iter().position(|kept| Some(*kept) == *label).unwrap_or(0);
         self.labels = segments.labels.iter().map(number).collect();
     }
 

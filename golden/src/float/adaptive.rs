@@ -26,11 +26,11 @@
 
 use super::contacts::Contacts;
 use super::golden::{CaseOutcome, EngineInput, Golden};
-use super::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame};
 use crate::partition::{Case, Subarray};
 use crate::reception::Received;
 use crate::reconstruct::{CaseChoice, Reconstruction, RejectedCase};
+use crate::segment::{segment, Segments, WIDTH};
 use crate::sensor::Sensor;
 
 /// Fraction of a contact's largest force from which a cell is part of it.

@@ -18,12 +18,12 @@ use super::objective::Objective;
 use super::objective::{relative_spread, Sparse};
 use super::pass::Polynomial;
 use super::search::search;
-use super::segment::Segments;
 use crate::checks::largest_spread;
 use crate::frame::{Forces, Frame};
 use crate::learned::Learned;
 use crate::reconstruct::{Reconstruction, Region, Resultant};
 use crate::scene::Condition;
+use crate::segment::Segments;
 use crate::sensor::Sensor;
 
 impl Golden {

@@ -40,9 +40,9 @@ use super::objective::taxels::Taxels;
 use super::objective::Objective;
 use super::pass::{term_index, Polynomial};
 use super::search::{search, SearchResult};
-use super::segment::{neighbours, segment, Segments, WIDTH};
 use crate::frame::Forces;
 use crate::matrices::{FoldedMatrices, Matrices};
+use crate::segment::{neighbours, segment, Segments, WIDTH};
 
 /// Maximum number of sweeps over one set of regions.
 pub const SWEEPS: usize = 6;
@@ -63,7 +63,7 @@ const RELAXATIONS: usize = 60;
 /// The contacts found in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts {
-    /// Region of each taxel.
+    /// Region of each taxel, if it belongs to one.
     pub segments: Segments,
     /// Result of the last search in each region, `None` where it was not searched or no candidate was admissible.
     pub found: Vec<Option<SearchResult>>,
@@ -108,11 +108,15 @@ impl Contacts {
         mu_of(&self.found[region])
     }
 
+    /// μ of a taxel: that of its region, 0 where it belongs to none.
+    fn mu_of_taxel(&self, taxel: usize) -> [f64; 2] {
+        self.segments.labels[taxel].map_or([0.0; 2], |region| self.mu(region))
+    }
+
     /// The force on each taxel in N, from p and the μ of its region.
     pub fn forces(&self) -> Forces {
-        let along = |axis: usize| {
-            self.p.iter().zip(&self.segments.labels).map(|(p, &region)| self.mu(region)[axis] * p).collect()
-        };
+        let along =
+            |axis: usize| (0..self.p.len()).map(|taxel| self.mu_of_taxel(taxel)[axis] * self.p[taxel]).collect();
         Forces { fx: along(0), fy: along(1), fz: self.p.clone() }
     }
 }
@@ -184,7 +188,8 @@ impl Solver<'_> {
     /// The state with new regions, each with the μ that its strongest taxel had.
     fn with_regions(&self, state: &Contacts, segments: Segments) -> Contacts {
         let strongest = |region: usize| segments.taxels(region).max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]));
-        let old = |region| strongest(region).and_then(|taxel| state.found[state.segments.labels[taxel]]);
+        let before = |taxel: usize| state.segments.labels[taxel].and_then(|region| state.found[region]);
+        let old = |region| strongest(region).and_then(before);
         Contacts { found: (0..segments.count).map(old).collect(), segments, ..state.clone() }
     }
 
@@ -217,9 +222,9 @@ impl Solver<'_> {
 
     /// The polynomial of one region's μ, the other regions held constant.
     fn family(&self, state: &Contacts, region: usize) -> Polynomial {
-        let inside = |k: usize| state.segments.labels[k] == region;
+        let inside = |k: usize| state.segments.labels[k] == Some(region);
         let other_mu: Vec<[f64; 2]> =
-            (0..state.p.len()).map(|k| if inside(k) { [0.0; 2] } else { state.mu(state.segments.labels[k]) }).collect();
+            (0..state.p.len()).map(|k| if inside(k) { [0.0; 2] } else { state.mu_of_taxel(k) }).collect();
         let mut coefficients = vec![self.iterate(&state.p, &other_mu)];
         let masked = |v: &[f64]| -> Vec<f64> { (0..v.len()).map(|k| if inside(k) { v[k] } else { 0.0 }).collect() };
         let FoldedMatrices { basis, ax, ay, .. } = &self.matrices.folded;
@@ -259,7 +264,7 @@ impl Solver<'_> {
 
     /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it converges.
     fn relax(&self, state: &mut Contacts) {
-        let mu: Vec<[f64; 2]> = state.segments.labels.iter().map(|&region| state.mu(region)).collect();
+        let mu: Vec<[f64; 2]> = (0..state.p.len()).map(|taxel| state.mu_of_taxel(taxel)).collect();
         for _ in 0..RELAXATIONS {
             let next = self.iterate(&state.p, &mu);
             let size = next.iter().fold(0.0f64, |size, p| p.abs().max(size));
@@ -276,6 +281,7 @@ impl Solver<'_> {
         let labels = &state.segments.labels;
         let sensor = &self.matrices.sensor;
         let pairs = (0..labels.len()).flat_map(|k| neighbours(sensor, k).map(move |other| (labels[k], labels[other])));
+        let pairs = pairs.filter_map(|(a, b)| a.zip(b));
         let distance = |&(a, b): &(usize, usize)| {
             let (a, b) = (state.mu(a), state.mu(b));
             (a[0] - b[0]).hypot(a[1] - b[1])

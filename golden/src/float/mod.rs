@@ -8,7 +8,7 @@
 //! | [`search`] | v_ij, objective | μ |
 //! | [`forces`] | p(μ), μ | fx, fy, fz |
 //!
-//! With `partition.case = "contacts"` there are two more: [`segment`] assigns a region to each contact, [`contacts`]
+//! With `partition.case = "contacts"` there are two more: [`segment`](crate::segment) assigns a region to each contact, [`contacts`]
 //! finds the μ of each region.
 //! With `search.form = "orthogonal"` the forces come from [`orthogonal`], Eq. 1 as printed.
 //!
@@ -25,7 +25,6 @@ pub mod objective;
 pub mod orthogonal;
 pub mod pass;
 pub mod search;
-pub mod segment;
 
 mod adaptive;
 #[cfg(test)]

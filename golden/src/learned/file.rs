@@ -22,7 +22,8 @@ use super::error::LearnedError;
 use super::features::Features;
 use super::network::{Layer, Network, OUTPUT_CHANNELS};
 use super::window::Window;
-use crate::scene::{Medium, Scene};
+use crate::partition::Case;
+use crate::scene::{EstimatorKind, Medium, Scene};
 use faer::{Mat, RowRef};
 use serde::{Deserialize, Serialize};
 
@@ -68,7 +69,10 @@ impl Signature {
             pitch_y_mm: scene.sensor.pitch_y_mm,
             thickness_mm: scene.sensor.thickness_mm,
             medium: scene.medium,
-            window: Window::of(&scene.sensor),
+            window: match scene.partition.case {
+                Case::Contacts => Window::around_contact(&scene.sensor),
+                _ => Window::of(&scene.sensor),
+            },
             unipolar: scene.input.unipolar,
             mu_max: scene.search.mu_max,
         }
@@ -79,7 +83,12 @@ impl Signature {
     /// # Errors
     /// [`LearnedError::Mismatch`] with the first field that differs.
     pub fn check(&self, scene: &Scene, file: &str) -> Result<(), LearnedError> {
-        let wanted = Signature::of(scene);
+        let mut wanted = Signature::of(scene);
+        // The adviser of `evidence` takes either window.
+        let either = [Window::of(&scene.sensor), Window::around_contact(&scene.sensor)];
+        if scene.estimator() != EstimatorKind::Network && either.contains(&self.window) {
+            wanted.window = self.window;
+        }
         let pairs = [
             ("sensor.pitch_x_mm", self.pitch_x_mm.to_string(), wanted.pitch_x_mm.to_string()),
             ("sensor.pitch_y_mm", self.pitch_y_mm.to_string(), wanted.pitch_y_mm.to_string()),

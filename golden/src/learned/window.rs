@@ -1,7 +1,8 @@
 //! Window: the rectangle of taxels that a network reads, and where it lies on an array.
 //!
-//! An array of at most [`WHOLE_UP_TO`] taxels is one window. On a larger one the window has a contact in its middle; it may
-//! reach beyond the array, where its readings are 0 and its mask is too.
+//! An array of at most [`WHOLE_UP_TO`] taxels is one window. On a larger one, and wherever the network is asked for each of
+//! several contacts, the window has a contact in its middle; it may reach beyond the array, where its readings are 0 and its
+//! mask is 1.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -42,11 +43,16 @@ pub struct Window {
 }
 
 impl Window {
-    /// The window for an array.
+    /// The window for an array with one contact.
     pub fn of(sensor: &Sensor) -> Window {
         if sensor.taxels() <= WHOLE_UP_TO {
             return Window { place: Place::Array, rows: sensor.rows, cols: sensor.cols };
         }
+        Window::around_contact(sensor)
+    }
+
+    /// The window around a contact of an array with several.
+    pub fn around_contact(sensor: &Sensor) -> Window {
         let lines = |pitch: f64| (2 * (REACH * sensor.thickness_mm / pitch).ceil() as usize + 1).min(LARGEST);
         Window { place: Place::Contact, rows: lines(sensor.pitch_y_mm), cols: lines(sensor.pitch_x_mm) }
     }

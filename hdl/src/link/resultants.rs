@@ -128,9 +128,14 @@ fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
     let was_taken = k.state("was_taken", bit, rst, 0).comment(
         "Registered to shorten the route from the packer; meanwhile the CRC processes the last byte of the word.",
     );
+    // The accumulators are far from here: they take a beat a cycle after it was accepted, long before its sums are sent.
+    let adds_late = k.state("adds_late", bit, rst, 0);
+    let beat_late = k.register("beat_late", Type::unsigned(96));
+    let [first_late, begins_late, finishes_late] =
+        ["first_late", "begins_late", "finishes_late"].map(|name| k.register(name, bit));
     let row = k.state("row", Type::unsigned(r), rst, 0);
     let col = k.state("col", Type::unsigned(c), rst, 0);
-    let more = k.register("more", Type::unsigned(m));
+    let [more, more_late] = ["more", "more_late"].map(|name| k.register(name, Type::unsigned(m)));
     let sum = |name: &str| k.register(name, Type::signed(bits));
     let totals = ["sum_x", "sum_y", "sum_z"].map(sum);
     let [moment_x, moment_y, line] = ["moment_x", "moment_y", "line"].map(sum);
@@ -151,29 +156,38 @@ fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
 
     let wrapped = |sum: Expr<'k>| sum.low(bits).signed();
     let nothing = k.signed_constant(bits, 0);
-    let forces = [0, 1, 2].map(|axis| beat.slice(32 * axis, 32).signed().extend(bits));
+    let (first_beat, begins_line) = (first_late.get(), begins_late.get());
+    let forces = [0, 1, 2].map(|axis| beat_late.slice(32 * axis, 32).signed().extend(bits));
     let [.., z] = forces;
     let sum_z = *totals[2];
+    adds_late.set(adds);
+    finishes_late.set(finishes);
+    more_late.set(*more);
     k.when(adds, || {
-        for (total, force) in totals.iter().zip(forces) {
-            total.set(first.mux(force, wrapped(**total + force)));
-        }
-        loaded.set((first.mux(k.constant(l, 0), *loaded) + beat.slice(64, 32).any()).low(l));
-        line.set(begins.mux(z, wrapped(*line + z)));
-        moment_x.set(first.mux(nothing, begins.mux(*moment_x, wrapped(*moment_x - *line))));
-        moment_y.set(first.mux(nothing, begins.mux(wrapped(*moment_y - sum_z), *moment_y)));
+        beat_late.set(beat);
+        first_late.set(first);
+        begins_late.set(begins);
         more.set(k.constant(m, 0));
         out.set(k.constant(2, 0));
         col.set(line_end.mux(k.constant(c, 0), col.plus(1)));
         k.when(line_end, || row.set(at_end.mux(k.constant(r, 0), row.plus(1))));
     });
-    k.when(finishes, || {
+    k.when(*adds_late, || {
+        for (total, force) in totals.iter().zip(forces) {
+            total.set(first_beat.mux(force, wrapped(**total + force)));
+        }
+        loaded.set((first_beat.mux(k.constant(l, 0), *loaded) + beat_late.slice(64, 32).any()).low(l));
+        line.set(begins_line.mux(z, wrapped(*line + z)));
+        moment_x.set(first_beat.mux(nothing, begins_line.mux(*moment_x, wrapped(*moment_x - *line))));
+        moment_y.set(first_beat.mux(nothing, begins_line.mux(wrapped(*moment_y - sum_z), *moment_y)));
+    });
+    k.when(*finishes_late, || {
         for (moment, side) in [(&moment_x, cols), (&moment_y, rows)] {
-            let counts = more.less(k.constant(m, side as u64 - 1));
+            let counts = more_late.less(k.constant(m, side as u64 - 1));
             k.when(counts, || moment.set(wrapped(**moment + sum_z)));
         }
-        more.set(more.plus(1));
     });
+    k.when(finishes, || more.set(more.plus(1)));
     let leaves = k.wire("leaves", sends & *was_taken);
     k.when(leaves, || out.set(out.plus(1)));
     let goes_to = |next: u64| stage.set(k.constant(2, next));

@@ -17,9 +17,9 @@
 
 use super::{Contacts, Solver};
 use crate::float::objective::Estimate;
-use crate::float::segment::{segment, WIDTH};
 use crate::learned::{Gaussian, Learned, OneContact};
 use crate::reconstruct::Resultant;
+use crate::segment::{segment, WIDTH};
 
 /// Contacts with the standard deviations of their μ.
 pub(crate) struct Told {

@@ -14,7 +14,7 @@ use super::{Contacts, MeasuredStress, Solver};
 use crate::float::objective::misfit_limit;
 use crate::float::objective::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use crate::float::search::{SearchResult, RADIUS};
-use crate::float::segment::{segment, Segments};
+use crate::segment::{segment, Segments};
 
 /// Relative tolerance by which the |μ| of an ellipse may exceed mu_max; it is then reduced to mu_max.
 const MU_TOLERANCE: f64 = 0.05;
@@ -60,15 +60,15 @@ impl Solver<'_> {
         let mut found = vec![None; segments.count];
         let mut filled = 0;
         for (ellipse, patch) in fitted.patches.iter().enumerate() {
-            let first = labels.iter().position(|&label| label == ellipse)?;
-            let region = segments.labels[first];
-            let sum: f64 = (0..p.len()).filter(|&k| labels[k] == ellipse).map(|k| p[k]).sum();
+            let first = labels.iter().position(|&label| label == Some(ellipse))?;
+            let region = segments.labels[first]?;
+            let sum: f64 = (0..p.len()).filter(|&k| labels[k] == Some(ellipse)).map(|k| p[k]).sum();
             let [x, y, load] = patch.force;
             let ratio = (x / load).hypot(y / load);
             if !(self.searched)(&segments, region) || sum <= 0.0 || ratio > (1.0 + MU_TOLERANCE) * self.mu_max {
                 return None;
             }
-            (0..p.len()).filter(|&k| labels[k] == ellipse).for_each(|k| p[k] *= load / sum);
+            (0..p.len()).filter(|&k| labels[k] == Some(ellipse)).for_each(|k| p[k] *= load / sum);
             let cut = if ratio > self.mu_max { self.mu_max / ratio } else { 1.0 };
             let mu = [x, y].map(|f| f / load * cut);
             let position = mu.map(|mu| (mu * f64::from(RADIUS) / self.mu_max) as i32);

@@ -97,7 +97,7 @@ fn ellipses_that_touch_are_told_apart() {
     let matrices = Matrices::new(&sensor(), 0.6).unwrap();
     let contacts = solve(&matrices, &touching("hertz-ellipse"), &|_, _| true);
     assert_eq!(contacts.segments.count, 2);
-    let left = contacts.segments.labels[8 * 16 + 6];
+    let left = contacts.segments.labels[8 * 16 + 6].unwrap();
     for (region, mu) in [(left, [0.3, 0.0]), (1 - left, [-0.1, 0.2])] {
         let found = contacts.mu(region);
         // The quadrature of the fit is good to 1e-4 of the peak.
@@ -126,7 +126,7 @@ fn contacts_that_are_no_ellipses_are_searched_in_the_best_regions() {
     let score = |contacts: &Contacts| objective.score(&contacts.p);
     // The ellipses' regions are one more segmentation; their forces come from the search, not from the fit.
     assert!(score(&contacts) >= score(&plain.solve(&family, found)));
-    let left = contacts.segments.labels[8 * 16 + 6];
+    let left = contacts.segments.labels[8 * 16 + 6].unwrap();
     for (region, mu) in [(left, [0.3, 0.0]), (1 - left, [-0.1, 0.2])] {
         let found = contacts.mu(region);
         assert!((found[0] - mu[0]).hypot(found[1] - mu[1]) < 0.005, "{found:?} {mu:?}");

@@ -18,7 +18,7 @@ use super::disc::Disc;
 use super::ellipse::{node_position, Ellipse, COARSE_NODES, FINE_NODES, PARAMETERS};
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
 use super::taxels::Taxels;
-use crate::float::segment::{Segments, WIDTH};
+use crate::segment::{Segments, WIDTH};
 use crate::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
@@ -270,7 +270,7 @@ impl EllipseFit {
     }
 
     /// The ellipse of each taxel: the one with the largest force on its cell, else the one with the nearest rim.
-    pub fn labels(&self, sensor: &Sensor) -> Vec<usize> {
+    pub fn labels(&self, sensor: &Sensor) -> Vec<Option<usize>> {
         let cells = self.cells(sensor);
         let label = |k: usize| {
             let [x, y] = sensor.position_mm(k / sensor.cols, k % sensor.cols);
@@ -284,7 +284,7 @@ impl EllipseFit {
             let all = 0..self.patches.len();
             let nearer = |&i: &usize, &j: &usize| beyond(&self.patches[i]).total_cmp(&beyond(&self.patches[j]));
             let strongest = all.clone().max_by(|&i, &j| cells[i][k].total_cmp(&cells[j][k]));
-            strongest.filter(|&i| cells[i][k] > 0.0).or(all.min_by(nearer)).unwrap_or(0)
+            strongest.filter(|&i| cells[i][k] > 0.0).or(all.min_by(nearer))
         };
         (0..sensor.taxels()).map(label).collect()
     }

@@ -24,8 +24,8 @@ use super::estimate::{Estimate, Objective, SearchInput, WIDE_FROM};
 use super::fit::{fit, misfit, misfit_limit, Fit, THOROUGH};
 use super::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use super::taxels::Taxels;
-use crate::float::segment::segment;
 use crate::scene::Medium;
+use crate::segment::segment;
 use crate::sensor::Sensor;
 use nalgebra::DVector;
 
