@@ -123,6 +123,28 @@ pub fn decimal(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or_else(empty_cell, |v| Cell { shown: format!("{v:.decimals$}"), number: Some(v) })
 }
 
+/// A value with two significant digits, without trailing zeros; below 10⁻⁴ as a multiple of a power of ten.
+pub fn two_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let trimmed = |text: String| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    };
+    if value.abs() < 1e-4 {
+        let text = format!("{value:.1e}");
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let raised = exponent.chars().map(|c| match c.to_digit(10) {
+            Some(digit) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize],
+            None => '⁻',
+        });
+        return format!("{}·10{}", trimmed(digits.to_owned()), raised.collect::<String>());
+    }
+    let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    trimmed(format!("{value:.decimals$}"))
+}
+
 /// A cell with a time in seconds, shown in s, ms or µs.
 pub fn seconds(s: Option<f64>) -> Cell {
     s.map_or_else(empty_cell, |s| Cell { shown: seconds_text(s), number: Some(s) })
@@ -157,5 +179,9 @@ mod tests {
         }
         assert_eq!([0.0107, -0.455, 1.75].map(percent_text), ["1.07 %", "-45.5 %", "175 %"]);
         assert_eq!(percent(None), empty_cell());
+        assert_eq!([100.0, 30.0, 3.0, 0.5, 0.015].map(two_digits), ["100", "30", "3", "0.5", "0.015"]);
+        // A difference far below an LSB is neither 0.0 nor in the notation of a program.
+        let small = [0.0, 0.00012, 1.23e-5, 2e-12, -3.1e-7].map(two_digits);
+        assert_eq!(small, ["0", "0.00012", "1.2·10⁻⁵", "2·10⁻¹²", "-3.1·10⁻⁷"]);
     }
 }

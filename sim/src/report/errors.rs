@@ -81,7 +81,14 @@ fn medians(rows: &[ErrorRow]) -> Vec<Medians> {
     rows.chunk_by(same).map(of).collect()
 }
 
-fn text(rows: &[ErrorRow]) -> String {
+/// Scene, case and frame, with which every row begins.
+fn names(row: &ErrorRow) -> Vec<String> {
+    let case = row.chosen_case.as_ref().map_or(row.case.clone(), |taken| format!("{}: {taken}", row.case));
+    vec![row.scene.clone(), case, row.frame.clone()]
+}
+
+/// Errors of both models against the truth.
+fn to_truth(rows: &[ErrorRow]) -> String {
     let head = [
         "scene",
         "case",
@@ -93,56 +100,77 @@ fn text(rows: &[ErrorRow]) -> String {
         "e_n",
         "ℓ2",
         "e_t of Σ|t|",
-        "to case 0: X1",
-        "X2",
-        "X3",
         "fixed X1",
         "X2",
         "X3",
         "e_t",
         "e_n",
-        "fixed − float max",
-        "RMS",
-        "paper X1",
-        "X2",
-        "X3",
-        "both signs",
-        "μ",
     ];
     let body = rows.iter().map(|row| {
-        let fixed = row.fixed.as_ref();
-        let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
-        let error = row.error.as_ref();
-        let case = row.chosen_case.as_ref().map_or(row.case.clone(), |taken| format!("{}: {taken}", row.case));
-        let mut cells = vec![row.scene.clone(), case, row.frame.clone()];
+        let (error, fixed) = (row.error.as_ref(), row.fixed.as_ref().and_then(|fixed| fixed.error.as_ref()));
+        let mut cells = names(row);
         cells.extend(axes(error).map(percent));
         cells.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), row.l2].map(percent));
         cells.push(percent(row.shear_over_all));
-        cells.extend(axes(row.error_case_0.as_ref()).map(percent));
-        cells.extend(axes(fixed_error).map(percent));
-        cells.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)].map(percent));
-        let words = |lsb: f64, share: f64| format!("{lsb:.0} LSB = {}", percent(Some(share)));
-        let gap = fixed.map(|fixed| &fixed.difference);
-        cells.push(gap.map_or("-".into(), |d| words(d.max_lsb, d.max_share)));
-        cells.push(gap.map_or("-".into(), |d| words(d.rms_lsb, d.rms_share)));
-        cells.extend((0..3).map(|k| percent(row.paper.map(|paper| paper[k]))));
-        cells.push(row.subarrays.iter().map(|part| if part.both_signs { "y" } else { "n" }).collect());
-        let mus = row.subarrays.iter().map(|part| format!("({:+.3}, {:+.3})", part.mu[0], part.mu[1]));
-        cells.push(mus.collect::<Vec<_>>().join(" "));
+        cells.extend(axes(fixed).map(percent));
+        cells.extend([fixed.and_then(|e| e.tangential), fixed.and_then(|e| e.normal)].map(percent));
         cells
     });
-    let head_of_medians = [
+    table(&head, body.collect())
+}
+
+/// Errors against case 0, the paper's, differences of the models, and the subarrays: of several only the largest |μ|, as
+/// sixteen pairs would make the lines wider than any window.
+fn to_others(rows: &[ErrorRow]) -> String {
+    let head = [
+        "scene",
+        "case",
+        "frame",
+        "to case 0: X1",
+        "X2",
+        "X3",
+        "paper X1",
+        "X2",
+        "X3",
+        "fixed − float max",
+        "RMS",
+        "both signs",
+        "largest |μ|",
+    ];
+    let body = rows.iter().map(|row| {
+        let words = |lsb: f64, share: f64| format!("{lsb:.0} LSB = {}", percent(Some(share)));
+        let gap = row.fixed.as_ref().map(|fixed| &fixed.difference);
+        let mut cells = names(row);
+        cells.extend(axes(row.error_case_0.as_ref()).map(percent));
+        cells.extend((0..3).map(|k| percent(row.paper.map(|paper| paper[k]))));
+        cells.push(gap.map_or("-".into(), |d| words(d.max_lsb, d.max_share)));
+        cells.push(gap.map_or("-".into(), |d| words(d.rms_lsb, d.rms_share)));
+        cells.push(row.subarrays.iter().map(|part| if part.both_signs { "y" } else { "n" }).collect());
+        let sizes = row.subarrays.iter().map(|part| part.mu[0].hypot(part.mu[1]));
+        cells.push(format!("{:.3}", sizes.fold(0.0, f64::max)));
+        cells
+    });
+    table(&head, body.collect())
+}
+
+/// Medians and 90 % quantiles over the frames.
+fn of_medians(medians: &[Medians]) -> String {
+    let head = ["scene", "case", "frames", "|X1|", "|X2|", "|X3|", "e_t", "90 %", "e_n", "90 %", "ℓ2"];
+    let body = medians.iter().map(|m| {
+        let mut row = vec![m.scene.clone(), m.case.clone(), m.frames.to_string()];
+        row.extend(m.axes.map(percent));
+        row.extend([m.tangential, m.tangential_ninety, m.normal, m.normal_ninety, m.l2].map(percent));
+        row
+    });
+    table(&head, body.collect())
+}
+
+/// Medians of frames with several contacts, and against case 0 and the paper.
+fn of_other_medians(medians: &[Medians]) -> String {
+    let head = [
         "scene",
         "case",
         "frames",
-        "|X1|",
-        "|X2|",
-        "|X3|",
-        "e_t",
-        "90 %",
-        "e_n",
-        "90 %",
-        "ℓ2",
         "several: e_t of Σ|t|",
         "90 %",
         "own e_t",
@@ -153,23 +181,33 @@ fn text(rows: &[ErrorRow]) -> String {
         "X2",
         "X3",
     ];
-    let of_medians = medians(rows).into_iter().map(|m| {
-        let mut row = vec![m.scene, m.case, m.frames.to_string()];
-        row.extend(m.axes.map(percent));
-        row.extend([m.tangential, m.tangential_ninety, m.normal, m.normal_ninety, m.l2].map(percent));
+    let body = medians.iter().map(|m| {
+        let mut row = vec![m.scene.clone(), m.case.clone(), m.frames.to_string()];
         row.extend([m.of_all, m.of_all_ninety, m.own].map(percent));
         row.extend(m.axes_case_0.map(percent));
         row.extend((0..3).map(|k| percent(m.paper.map(|paper| paper[k]))));
         row
     });
+    table(&head, body.collect())
+}
+
+/// A Markdown table; | in a header does not end its cell.
+fn table(head: &[&str], body: Vec<Vec<String>>) -> String {
+    let head: Vec<String> = head.iter().map(|name| name.replace('|', "\\|")).collect();
+    markdown(&head.iter().map(String::as_str).collect::<Vec<_>>(), body)
+}
+
+fn text(rows: &[ErrorRow]) -> String {
+    let medians = medians(rows);
     format!(
-        "{}\nMedians over the frames, and 90 % quantiles (90 %). several: frames with several contacts; own e_t: shear \
-         error of each contact, case contacts only. The paper's figures of sensors 3 and 4 are relative to case 0.\n\n{}",
-        markdown(&head, body.collect()),
-        markdown(
-            &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),
-            of_medians.collect()
-        ),
+        "Errors against the true force; fixed: the bit-true model.\n\n{}\nErrors against case 0, those of the paper, \
+         differences of the two models, and the subarrays; --format csv and json have the μ of each.\n\n{}\n\
+         Medians over the frames, and 90 % quantiles (90 %). several: frames with several contacts; own e_t: shear \
+         error of each contact, case contacts only. The paper's figures of sensors 3 and 4 are relative to case 0.\n\n{}\n{}",
+        to_truth(rows),
+        to_others(rows),
+        of_medians(&medians),
+        of_other_medians(&medians),
     )
 }
 
@@ -322,6 +360,27 @@ mod tests {
         assert_eq!((&medians[0]["axes"][0], &medians[0]["frames"]), (&Value::from(0.1), &Value::from(1)));
         assert_eq!((&medians[0]["of_all_ninety"], &medians[0]["own"]), (&Value::from(0.0625), &Value::from(0.75)));
         assert_eq!(medians[1]["tangential"], Value::Null);
+    }
+
+    #[test]
+    fn markdown_lines_fit_a_window() {
+        // The widest of the built-in scenes: sixteen subarrays, errors of four digits.
+        let wide = Errors { x1: Some(-12.3456), x2: Some(-12.3456), x3: Some(-12.3456), ..rows()[0].error.unwrap() };
+        let row = ErrorRow {
+            scene: "sensor-1-unipolar".into(),
+            frame: "s4-plantar-two-feet".into(),
+            error: Some(wide),
+            error_case_0: Some(wide),
+            subarrays: vec![part([0.123, -0.456], true); 16],
+            ..rows().remove(0)
+        };
+        let text = errors(&[row], Format::Markdown).unwrap();
+        let tables: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
+        assert_eq!(tables.len(), 4 * 3);
+        for line in tables {
+            assert!(line.chars().count() <= 200, "{} columns: {line}", line.chars().count());
+        }
+        assert!(text.contains("yyyyyyyyyyyyyyyy") && text.contains("0.472") && text.contains("e_t of Σ\\|t\\|"));
     }
 
     #[test]

@@ -136,7 +136,8 @@ pub fn time_picture(build: &Path) -> Result<PictureFile> {
     };
     let cases: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let measured = measure(&[Scene::builtin(FLOW_SCENE)?], &cases, &options)?;
-    let [Picture { id, caption, svg }, _] = time_pictures(FLOW_SCENE, &measured)?;
+    let picture = time_pictures(FLOW_SCENE, &measured)?.into_iter().next();
+    let Picture { id, caption, svg } = picture.ok_or_else(|| anyhow!("{FLOW_SCENE}: nothing was measured"))?;
     let description =
         "Both axes are logarithmic. Marks are named by their case: 0 the whole array, 1 to 3 subarrays. The \
                        hardware stands left of the 1 ms line, at the errors of the bit-true model.";

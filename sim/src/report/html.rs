@@ -27,7 +27,8 @@ summary{cursor:pointer;margin:.5rem 0}\n\
 .pictures.two{grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr))}\n\
 figure{margin:0;padding:.5rem;background:var(--panel);border-radius:.5rem}\n\
 svg{display:block;width:100%;height:auto;font-family:system-ui,'Segoe UI','DejaVu Sans',sans-serif}\n\
-@media(max-width:30rem){body{padding:.6rem}figure{padding:.2rem}}\n\
+@media(max-width:30rem){body{padding:.6rem}figure{padding:.2rem}\
+table{font-size:.75rem}td,th{padding:.2rem .3rem;white-space:normal}.n{white-space:nowrap}th.n{white-space:normal}}\n\
 @media print{figure,table{break-inside:avoid}}\n";
 
 /// Number of characters above which a cell's text is wrapped.

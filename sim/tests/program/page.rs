@@ -12,7 +12,7 @@ use serde_json::Value;
 /// Script that inspects the page: window, colours, pictures, labels.
 const INSPECT: &str = r#"
 <script>
-const found = { errors: [], pictures: 0, drawn: 0, labels: 0, cut: [] };
+const found = { errors: [], unseen: [], pictures: 0, drawn: 0, labels: 0, cut: [] };
 addEventListener("error", event => found.errors.push(String(event.message)));
 addEventListener("load", () => {
   document.querySelectorAll("details").forEach(details => { details.open = true; });
@@ -29,6 +29,10 @@ addEventListener("load", () => {
         found.cut.push(figure.id + ": " + text.textContent.trim());
       }
     }
+  }
+  for (const head of document.querySelectorAll("table")) {
+    const error = [...head.querySelectorAll("th")].find(cell => cell.textContent.includes("error"));
+    if (error && error.getBoundingClientRect().right > innerWidth) found.unseen.push(head.id);
   }
   const style = getComputedStyle(document.body);
   found.page = style.backgroundColor;
@@ -108,6 +112,13 @@ fn the_page_opens_in_desktop_and_phone_width_in_light_and_dark() {
     assert!(report.status.success(), "{}", String::from_utf8_lossy(&report.stderr));
     let page = fs::read_to_string(work.path().join("out/report.html")).unwrap();
     assert!(!page.contains("http://") && !page.contains("https://"), "the page points elsewhere");
+    // Of seven frames of sensor-3 two have one contact: no picture and no median has both kinds.
+    for (id, frames) in [("one", "2 frames with one contact"), ("several", "5 frames with several contacts")] {
+        assert!(page.contains(&format!("sensor-3: shear error, median of {frames}")), "{frames}");
+        assert!(
+            page.contains(&format!("id=\"margins-{id}\"")) && page.contains(&format!("id=\"stages-sensor-3-{id}\""))
+        );
+    }
     let pictures = fs::read_dir(work.path().join("out/report-pictures")).unwrap().count();
     let mut backgrounds = Vec::new();
     for (width, dark) in [(DESKTOP, false), (DESKTOP, true), (PHONE, false), (PHONE, true)] {
@@ -118,6 +129,8 @@ fn the_page_opens_in_desktop_and_phone_width_in_light_and_dark() {
             (&Value::from(Vec::<u8>::new()), &Value::from(Vec::<u8>::new())),
             "{what}"
         );
+        // The first error of each table is in sight before its table is scrolled.
+        assert_eq!(found["unseen"], Value::from(Vec::<u8>::new()), "{what}");
         assert_eq!(
             (found["pictures"].as_u64(), found["drawn"].as_u64()),
             (Some(pictures as u64), Some(pictures as u64)),
@@ -133,6 +146,9 @@ fn the_page_opens_in_desktop_and_phone_width_in_light_and_dark() {
         backgrounds.push(found["page"].clone());
         assert_eq!(found["window"].as_u64() == Some(u64::from(PHONE)), width == PHONE, "{what}");
     }
+    // A wide first column pushes the errors out of sight, which is found.
+    let pushed = page.replace("<th>sensor</th>", "<th style=\"min-width:30rem\">sensor</th>");
+    assert_ne!(inspect(work.path(), &pushed, PHONE, false)["unseen"], Value::from(Vec::<u8>::new()));
     assert_eq!((&backgrounds[0], &backgrounds[1]), (&backgrounds[2], &backgrounds[3]));
     assert_ne!(backgrounds[0], backgrounds[1]);
 }

@@ -27,6 +27,11 @@ fn table<'a>(report: &'a Value, id: &str) -> (Vec<&'a str>, &'a Vec<Value>) {
     (head, table[0]["rows"].as_array().unwrap())
 }
 
+/// Number of rows with one contact and with several.
+fn row_counts(rows: &[Value], column: usize) -> [usize; 2] {
+    ["one", "several"].map(|count| rows.iter().filter(|row| row[column] == count).count())
+}
+
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     all.sort();
@@ -72,8 +77,12 @@ fn all_formats_agree() {
     // Every engine has a time; the hardware's is its cycles at 100 MHz.
     let (head, rows) = table(&report, "time");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
-    assert_eq!(rows.len(), 4 * 4);
+    // Frames with one contact and with several are never in one row.
+    assert_eq!((rows.len(), row_counts(rows, at("contacts"))), (4 * 4, [16, 0]));
     for row in rows {
+        let ninety = row[at("shear error, median") + 1].as_f64().unwrap();
+        assert!(ninety >= row[at("shear error, median")].as_f64().unwrap(), "{row}");
+        assert_eq!(row[at("frames")].as_f64(), Some(5.0), "{row}");
         assert!(row[at("time of a frame")].as_f64().unwrap() > 0.0, "{row}");
         if row[at("engine")] == "hardware" {
             let seconds = row[at("cycles")].as_f64().unwrap() / 100e6;
@@ -82,6 +91,11 @@ fn all_formats_agree() {
     }
     let simulated: Vec<&Value> = rows.iter().filter(|row| row[at("RTL = bit-true")] == "yes").collect();
     assert_eq!(simulated.len(), 1);
+    // Hardware that was not co-simulated has hollow marks, and what needs no estimator has a line.
+    let svg = fs::read_to_string(out.join("report-pictures/time-eight-by-eight-shear.svg")).unwrap();
+    assert!(svg.contains("not co-simulated") && svg.contains("no shear"), "{svg}");
+    assert!(page.contains("Σ b·area\n</text>"), "the sum of the stress is not drawn in");
+    assert!(page.contains("<details><summary>Largest and RMS difference"), "the table of the stages is open");
 
     // The normal error is at most 1 % up to a condition number of 10⁶, and at most 5 % beyond.
     let (head, rows) = table(&report, "stability");
@@ -133,6 +147,7 @@ fn the_papers_figures() {
     let report: Value = serde_json::from_str(&fs::read_to_string(work.path().join("out/paper.json")).unwrap()).unwrap();
     let (head, rows) = table(&report, "table-2");
     assert_eq!((rows.len(), head[2], rows[0][2].as_f64()), (8, "paper X1", Some(0.1284)));
+    assert!(fs::read_to_string(work.path().join("out/paper.md")).unwrap().contains("the paper's centroid condition"));
     let (_, judged) = table(&report, "judged");
     // The paper's conclusion for a single Hertzian contact is confirmed.
     assert_eq!((judged.len(), &judged[0][1], &judged[0][7]), (4, &Value::from("0 (1×1)"), &Value::from("yes")));

@@ -70,7 +70,7 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
     let bit_true = match Model::for_frames(&scene, &frames) {
         Ok(model) => Ok(bit_true(model, &frames, options)?),
         Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
-            Err(error.to_string().lines().next().unwrap_or_default().to_owned())
+            Err(in_one_line(&error.to_string()))
         }
         Err(error) => return Err(error.into()),
     };
@@ -87,6 +87,14 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
         }
     };
     Ok(Measured { scene, frames, engine, golden, bit_true, baseline, times: BTreeMap::new(), literal })
+}
+
+/// A message of several lines for a cell of a table: the first line, then the others separated by semicolons.
+fn in_one_line(message: &str) -> String {
+    let mut lines = message.lines().map(str::trim);
+    let first = lines.next().unwrap_or_default();
+    let others = lines.collect::<Vec<_>>().join("; ");
+    format!("{first} {others}").trim_end().to_owned()
 }
 
 fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue> {
@@ -145,4 +153,21 @@ fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
         );
     }
     Ok(times)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_is_told_in_full() {
+        // 32×32 taxels in one subarray do not fit; what makes them fit is told too.
+        let mut scene = Scene::builtin("sensor-3").unwrap();
+        (scene.sensor.rows, scene.sensor.cols) = (32, 32);
+        let error = Model::new(&scene).unwrap_err().to_string();
+        let told = in_one_line(&error);
+        assert!(error.lines().count() > 1 && !told.contains('\n'), "{error}");
+        assert!(error.lines().all(|line| told.contains(line.trim())), "{told}");
+        assert_eq!(in_one_line("one"), "one");
+    }
 }

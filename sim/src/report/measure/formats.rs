@@ -24,6 +24,8 @@ pub struct FormatRow {
     pub tangential: Option<f64>,
     /// 90 % quantile of the tangential error.
     pub ninety: Option<f64>,
+    /// Number of frames.
+    pub frames: usize,
     /// Normal error, median over the frames.
     pub normal: Option<f64>,
     /// Cycles from the first input beat to the last output beat if every subarray is searched.
@@ -51,6 +53,7 @@ pub fn formats(scene: &Scene, frames: &[Frame]) -> Result<Vec<FormatRow>> {
             scene: scene.name.clone(),
             case: scene.partition.case.to_string(),
             bits,
+            frames: frames.len(),
             ninety: quantile(shear.clone(), 0.9),
             tangential: median(shear),
             normal: median(results.iter().filter_map(|result| result.error?.normal).collect()),

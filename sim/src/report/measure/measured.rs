@@ -16,7 +16,7 @@ use dermis_hdl::usage::StageUsage;
 
 use super::clock::clock;
 use super::timing::Timing;
-use crate::compare::median;
+use crate::compare::{median, quantile};
 use crate::jobs::Interrupt;
 
 /// Options of a measurement.
@@ -121,6 +121,12 @@ impl ContactCount {
         }
     }
 
+    /// Those of some frames, each once.
+    pub fn all_of(frames: &[Frame]) -> Vec<ContactCount> {
+        let present = |count: &ContactCount| frames.iter().any(|frame| ContactCount::of(frame) == *count);
+        [ContactCount::One, ContactCount::Several].into_iter().filter(present).collect()
+    }
+
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
@@ -141,6 +147,12 @@ pub struct Point {
     pub tangential: Option<f64>,
     /// Normal error of the resultant, median over the frames.
     pub normal: Option<f64>,
+    /// 90 % quantiles of the tangential and the normal error.
+    pub ninety: [Option<f64>; 2],
+    /// Number of frames.
+    pub frames: usize,
+    /// Whether it is the hardware's, and its cycles are the model's, not those of a co-simulation.
+    pub only_modelled: bool,
     /// Time per frame in s.
     pub seconds: f64,
 }
@@ -176,14 +188,26 @@ impl Measured {
         };
         let kept = self.frames.iter().zip(self.errors(engine)).filter(|(frame, _)| keep(frame));
         let errors: Vec<Option<Errors>> = kept.map(|(_, errors)| errors).collect();
-        let over = |value: fn(&Errors) -> Option<f64>| median(errors.iter().flatten().filter_map(value).collect());
+        let of = |value: fn(&Errors) -> Option<f64>| errors.iter().flatten().filter_map(value).collect::<Vec<_>>();
+        let simulated = self.bit_true.as_ref().is_ok_and(|bit_true| bit_true.equal.is_some());
         Some(Point {
             case: self.scene.partition.case,
             engine,
-            tangential: over(|e| e.tangential),
-            normal: over(|e| e.normal),
+            tangential: median(of(|e| e.tangential)),
+            normal: median(of(|e| e.normal)),
+            ninety: [quantile(of(|e| e.tangential), 0.9), quantile(of(|e| e.normal), 0.9)],
+            frames: errors.len(),
+            only_modelled: engine == Engine::Hardware && !simulated,
             seconds,
         })
+    }
+
+    /// Normal error of Σ b·area, which needs no estimator, median over the frames with a contact count.
+    pub fn error_of_sum(&self, contact_count: ContactCount) -> Option<f64> {
+        let area_mm2 = self.scene.sensor.pitch_x_mm * self.scene.sensor.pitch_y_mm;
+        let kept = self.frames.iter().filter(|frame| ContactCount::of(frame) == contact_count);
+        let sum = |frame: &Frame| [0.0, 0.0, area_mm2 * frame.stress_MPa.iter().sum::<f64>()];
+        median(kept.filter_map(|frame| Errors::new(frame.resultant_N?, sum(frame)).normal).collect())
     }
 
     /// Index of the frame with the id `id`, else 0.

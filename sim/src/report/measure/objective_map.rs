@@ -8,7 +8,7 @@ use dermis_golden::fixed::words::formats::{HALVINGS, MU_STEPS};
 use dermis_golden::float::objective::{Objective, Sparse};
 use dermis_golden::float::pass::Polynomial;
 
-use super::measured::Measured;
+use super::measured::{ContactCount, Measured};
 
 /// Grid points from the centre to mu_max along an axis.
 pub const HALF: i32 = 20;
@@ -22,6 +22,8 @@ pub struct ObjectiveMap {
     pub scene: String,
     /// Frame name.
     pub frame: String,
+    /// Whether the frame has one contact or several.
+    pub contacts: ContactCount,
     /// Largest |μ|.
     pub mu_max: f64,
     /// Π on a square grid of 2·[`HALF`] + 1 points per axis, row by row, μ2 constant in a row; `None` outside the disc
@@ -57,6 +59,7 @@ pub fn objective_map(measured: &Measured, index: usize) -> Option<ObjectiveMap> 
     Some(ObjectiveMap {
         scene: measured.scene.name.clone(),
         frame: frame.id.clone(),
+        contacts: ContactCount::of(frame),
         mu_max,
         margin: best - others.fold(f64::NEG_INFINITY, f64::max),
         values,

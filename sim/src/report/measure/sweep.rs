@@ -7,7 +7,7 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 
 use super::measured::Options;
-use crate::compare::median;
+use crate::compare::{median, quantile};
 use crate::jobs::parallel;
 
 /// Errors, cycles and resources of one setting.
@@ -25,6 +25,8 @@ pub struct SweepPoint {
     pub own: bool,
     /// Tangential error of the bit-true model, median over the frames.
     pub tangential: Option<f64>,
+    /// 90 % quantile of the tangential error.
+    pub ninety: Option<f64>,
     /// Normal error of the bit-true model, median over the frames.
     pub normal: Option<f64>,
     /// Cycles from the first input beat to the last output beat if every subarray is searched.
@@ -95,13 +97,15 @@ fn tasks(scene: &Scene) -> Vec<Task> {
 fn point(model: &Model, own: &Model, field: &'static str, value: String, frames: &[Frame]) -> Result<SweepPoint> {
     let results = frames.iter().map(|frame| model.reconstruct(frame)).collect::<Result<Vec<_>, _>>()?;
     let errors: Vec<_> = results.iter().filter_map(|result| result.error).collect();
+    let shear: Vec<f64> = errors.iter().filter_map(|e| e.tangential).collect();
     Ok(SweepPoint {
         scene: own.scene.name.clone(),
         case: own.scene.partition.case.to_string(),
         field,
         value,
         own: model.scene == own.scene && model.formats() == own.formats(),
-        tangential: median(errors.iter().filter_map(|e| e.tangential).collect()),
+        ninety: quantile(shear.clone(), 0.9),
+        tangential: median(shear),
         normal: median(errors.iter().filter_map(|e| e.normal).collect()),
         cycles: Cycles::longest(model).total,
         block_rams: model.resources.block_rams(),

@@ -14,6 +14,9 @@ const TOP: i32 = 10;
 /// Height of a bar, and space between groups.
 const BAR: i32 = 14;
 const GAP: i32 = 7;
+/// Height of the labels of a logarithmic axis, and the most of them.
+const TICKS: i32 = 18;
+const MOST_TICKS: f64 = 4.0;
 
 /// Content of a bar chart; bars start at zero.
 #[derive(Clone, Debug)]
@@ -51,8 +54,18 @@ pub fn bars(plot: &Bars) -> Result<String> {
     let zero = if plot.log { LEFT } else { at(0.0) };
     let group = BAR * plot.series.len() as i32 + GAP;
     let bottom = TOP + group * plot.groups.len() as i32;
-    svg((bottom + 30 + 20 * plot.series.len().div_ceil(2) as i32) as u32, |area| {
+    // A logarithmic axis has a labelled line per decade, of many every second, third, …
+    let exponents = plot.log.then(|| low.ceil() as i32..=high.floor() as i32).into_iter().flatten();
+    let every = ((high - low) / MOST_TICKS).ceil().max(1.0) as i32;
+    let ticks: Vec<f64> = exponents.filter(|e| e.rem_euclid(every) == 0).map(|e| 10f64.powi(e)).collect();
+    let below = bottom + if ticks.is_empty() { 0 } else { TICKS };
+    svg((below + 30 + 20 * plot.series.len().div_ceil(2) as i32) as u32, |area| {
         area.draw(&PathElement::new(vec![(zero, TOP - 4), (zero, bottom)], GRID.stroke_width(1)))?;
+        for tick in &ticks {
+            let x = at(*tick);
+            area.draw(&PathElement::new(vec![(x, TOP - 4), (x, bottom)], GRID.stroke_width(1)))?;
+            note(area, &(plot.text)(*tick), (x, bottom + 8), HPos::Center, VPos::Center)?;
+        }
         for (index, (name, values)) in plot.groups.iter().enumerate() {
             let top = TOP + group * index as i32;
             note(area, name, (LEFT - 6, top + (group - GAP) / 2), HPos::Right, VPos::Center)?;
@@ -73,13 +86,40 @@ pub fn bars(plot: &Bars) -> Result<String> {
             let x = at(limit);
             area.draw(&PathElement::new(vec![(x, TOP - 4), (x, bottom)], LIMIT.stroke_width(2)))?;
         }
-        note(area, &plot.axis, ((LEFT + RIGHT) / 2, bottom + 10), HPos::Center, VPos::Center)?;
+        let axis = if plot.log { format!("{}, logarithmic", plot.axis) } else { plot.axis.clone() };
+        note(area, &axis, (WIDTH as i32 / 2, below + 10), HPos::Center, VPos::Center)?;
         for (index, (name, colour)) in plot.series.iter().enumerate() {
             let x = 16 + (index % 2) as i32 * (WIDTH as i32 / 2 - 6);
-            let y = bottom + 32 + 20 * (index / 2) as i32;
+            let y = below + 32 + 20 * (index / 2) as i32;
             area.draw(&Rectangle::new([(x - 5, y - 5), (x + 5, y + 5)], colour.filled()))?;
             note(area, name, (x + 12, y), HPos::Left, VPos::Center)?;
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_logarithmic_axis_has_labelled_decades() {
+        let plot = |log: bool| Bars {
+            axis: "difference".into(),
+            groups: vec![("a".into(), vec![Some(0.002)]), ("b".into(), vec![Some(0.5)])],
+            series: vec![("max".into(), INK)],
+            text: |value| format!("<{value}>"),
+            limit: None,
+            log,
+        };
+        let texts = |log: bool| {
+            let drawn = bars(&plot(log)).unwrap();
+            let texts = drawn.lines().filter(|line| line.starts_with("&lt;") || line.starts_with("difference"));
+            texts.map(str::to_owned).collect::<Vec<_>>()
+        };
+        let ticks = ["&lt;0.001&gt;", "&lt;0.01&gt;", "&lt;0.1&gt;"].map(str::to_owned);
+        let values = ["&lt;0.002&gt;", "&lt;0.5&gt;"].map(str::to_owned);
+        assert_eq!(texts(true), [&ticks[..], &values, &["difference, logarithmic".to_owned()]].concat());
+        assert_eq!(texts(false), [&values[..], &["difference".to_owned()]].concat());
+    }
 }

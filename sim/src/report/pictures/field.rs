@@ -26,6 +26,9 @@ const LEAST_ARROW: f64 = 0.02;
 const CONTACT_ARROW: f64 = 60.0;
 /// Half the cap of an error bar.
 const CAP: i32 = 3;
+/// Radius of the mark of a centroid of compression, and half the side of that of tension: both show where they coincide.
+const ROUND: i32 = 9;
+const SQUARE: i32 = 5;
 /// Number of shades in the colour bar.
 const SHADES: i32 = 24;
 
@@ -137,7 +140,12 @@ fn frame(area: &Area, map: &Map, sensor: &Sensor, outline: Outline) -> Result<()
         if outline.centroids {
             for (centroid, sign) in [(part.compression_centroid_mm, "+"), (part.tension_centroid_mm, "−")] {
                 let Some(at) = centroid.map(|mm| map.of_mm(mm)) else { continue };
-                area.draw(&Circle::new(at, 7, SERIES[3].filled()))?;
+                if sign == "+" {
+                    area.draw(&Circle::new(at, ROUND, SERIES[3].filled()))?;
+                } else {
+                    let corners = [(at.0 - SQUARE, at.1 - SQUARE), (at.0 + SQUARE, at.1 + SQUARE)];
+                    area.draw(&Rectangle::new(corners, SERIES[2].filled()))?;
+                }
                 area.draw_text(sign, &label(16, &INK, HPos::Center, VPos::Center), at)?;
             }
         }
@@ -250,5 +258,29 @@ fn bar(area: &Area, map: &Map, [minus, plus]: [&str; 2], unit: &str, peak: &str)
         let edge = WIDTH as i32 - 4;
         note(area, &format!("{plus}, {unit}"), (edge, 8), HPos::Right, VPos::Center)?;
         note(area, minus, (edge, bottom + 16), HPos::Right, VPos::Center)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::float::Golden;
+    use dermis_golden::frame::Frame;
+    use dermis_golden::scene::Scene;
+
+    #[test]
+    fn centroids_of_compression_and_tension_differ_in_shape_and_colour() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let frame = &Frame::shipped(&scene)[0];
+        let result = Golden::new(&scene).unwrap().run(frame).unwrap();
+        let [part] = &result.subarrays[..] else { panic!("{:?}", result.subarrays) };
+        assert!(part.compression_centroid_mm.is_some() && part.tension_centroid_mm.is_some());
+        let outline = Outline { subarrays: &result.subarrays, centroids: true, contacts: &[] };
+        let drawn = stress_map(&scene.sensor, &frame.stress_MPa, outline).unwrap();
+        let marks = |shape: &str, RGBColor(r, g, b): RGBColor| {
+            let fill = format!("fill=\"#{r:02X}{g:02X}{b:02X}\"");
+            drawn.lines().filter(|line| line.starts_with(shape) && line.contains(&fill)).count()
+        };
+        assert_eq!((marks("<circle", SERIES[3]), marks("<rect", SERIES[2])), (1, 1), "{drawn}");
     }
 }

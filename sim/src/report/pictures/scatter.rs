@@ -16,6 +16,8 @@ const TOP: i32 = 12;
 const BOTTOM: i32 = 250;
 /// Height of a line of the legend.
 const LINE: i32 = 20;
+/// Length of a dash, and of the gap after it.
+const DASH: i32 = 5;
 
 /// A series of points.
 #[derive(Clone, Debug)]
@@ -26,6 +28,8 @@ pub struct Series {
     pub colour: RGBColor,
     /// Shape of its marks: 0 disc, 1 square, 2 triangle, 3 diamond.
     pub shape: usize,
+    /// Whether its marks are outlines.
+    pub hollow: bool,
     /// Points as x, y and label; an empty label is not drawn.
     pub points: Vec<(f64, f64, String)>,
     /// Whether the points are joined by a line.
@@ -37,6 +41,8 @@ pub struct Series {
 pub enum Guide {
     /// A vertical line at x, with its name.
     X(f64, String),
+    /// A dashed horizontal line at y, with its name in the legend.
+    Y(f64, String),
     /// A staircase through points from left to right, with its name in the legend.
     Front(Vec<(f64, f64)>, String),
     /// A ring around a point, with its name in the legend.
@@ -129,8 +135,9 @@ pub fn scatter(plot: &Scatter) -> Result<String> {
     let points = || plot.series.iter().flat_map(|series| &series.points);
     let at_x = plot.guides.iter().filter_map(|guide| if let Guide::X(x, _) = guide { Some(*x) } else { None });
     let x = Axis::new(points().map(|point| point.0).chain(at_x), plot.log[0], LEFT, RIGHT);
-    let y = Axis::new(points().map(|point| point.1), plot.log[1], BOTTOM, TOP);
-    let named = plot.guides.iter().filter(|guide| matches!(guide, Guide::Front(..) | Guide::Ring(..))).count();
+    let at_y = plot.guides.iter().filter_map(|guide| if let Guide::Y(y, _) = guide { Some(*y) } else { None });
+    let y = Axis::new(points().map(|point| point.1).chain(at_y), plot.log[1], BOTTOM, TOP);
+    let named = plot.guides.iter().filter(|guide| !matches!(guide, Guide::X(..))).count();
     let entries = plot.series.len() + named;
     svg(HEIGHT + (LINE as u32) * entries.div_ceil(2) as u32, |area| {
         axes(area, plot, &x, &y)?;
@@ -196,6 +203,12 @@ fn axes(area: &Area, plot: &Scatter, x: &Axis, y: &Axis) -> Result<()> {
     Ok(())
 }
 
+/// A dashed horizontal line.
+fn dashes(area: &Area, [left, right]: [i32; 2], y: i32) -> Result<()> {
+    let starts = (left..right).step_by(2 * DASH as usize);
+    starts.map(|x| vec![(x, y), ((x + DASH).min(right), y)]).try_for_each(|dash| line(area, dash, &LIMIT, 2))
+}
+
 /// Left and right end of the name of an upright guide, on the side of it that has room.
 fn beside(at: i32, name: &str) -> (i32, i32) {
     let width = text_width(name);
@@ -216,6 +229,7 @@ fn draw_guide(area: &Area, guide: &Guide, x: &Axis, y: &Axis) -> Result<()> {
             let (h, at) = if right < at { (HPos::Right, right) } else { (HPos::Left, left) };
             area.draw_text(name, &label(SMALL, &LIMIT, h, VPos::Top), (at, TOP))?;
         }
+        Guide::Y(value, _) => dashes(area, [LEFT, RIGHT], y.at(*value))?,
         Guide::Ring((px, py), _) => {
             area.draw(&Circle::new((x.at(*px), y.at(*py)), 9, INK.stroke_width(2)))?;
         }
@@ -258,13 +272,21 @@ impl Names {
 }
 
 fn mark(area: &Area, series: &Series, (x, y): (i32, i32)) -> Result<()> {
-    let fill = series.colour.filled();
-    let polygon = |points: Vec<(i32, i32)>| Polygon::new(points, fill);
+    let fill = if series.hollow { series.colour.stroke_width(2) } else { series.colour.filled() };
+    let polygon = |mut points: Vec<(i32, i32)>| -> Result<()> {
+        if series.hollow {
+            points.extend(points.first().copied());
+            area.draw(&PathElement::new(points, fill))?;
+        } else {
+            area.draw(&Polygon::new(points, fill))?;
+        }
+        Ok(())
+    };
     match series.shape {
         0 => area.draw(&Circle::new((x, y), 5, fill))?,
         1 => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill))?,
-        2 => area.draw(&polygon(vec![(x, y - 6), (x - 5, y + 4), (x + 5, y + 4)]))?,
-        _ => area.draw(&polygon(vec![(x, y - 6), (x - 6, y), (x, y + 6), (x + 6, y)]))?,
+        2 => polygon(vec![(x, y - 6), (x - 5, y + 4), (x + 5, y + 4)])?,
+        _ => polygon(vec![(x, y - 6), (x - 6, y), (x, y + 6), (x + 6, y)])?,
     }
     Ok(())
 }
@@ -279,16 +301,14 @@ fn legend(area: &Area, plot: &Scatter) -> Result<()> {
         mark(area, series, (x, y))?;
         note(area, &series.name, (x + 12, y), HPos::Left, VPos::Center)?;
     }
-    let named = plot.guides.iter().filter_map(|guide| match guide {
-        Guide::Front(_, name) => Some((name, false)),
-        Guide::Ring(_, name) => Some((name, true)),
-        Guide::X(..) => None,
-    });
-    for ((name, is_ring), index) in named.zip(plot.series.len()..) {
+    let named = plot.guides.iter().filter(|guide| !matches!(guide, Guide::X(..)));
+    for (guide, index) in named.zip(plot.series.len()..) {
         let (x, y) = place(index);
-        match is_ring {
-            true => area.draw(&Circle::new((x, y), 7, INK.stroke_width(2)))?,
-            false => line(area, vec![(x - 8, y), (x + 8, y)], &INK, 2)?,
+        let (Guide::X(_, name) | Guide::Y(_, name) | Guide::Front(_, name) | Guide::Ring(_, name)) = guide;
+        match guide {
+            Guide::Ring(..) => area.draw(&Circle::new((x, y), 7, INK.stroke_width(2)))?,
+            Guide::Y(..) => dashes(area, [x - 8, x + 8], y)?,
+            _ => line(area, vec![(x - 8, y), (x + 8, y)], &INK, 2)?,
         }
         note(area, name, (x + 12, y), HPos::Left, VPos::Center)?;
     }
@@ -319,6 +339,7 @@ mod tests {
             name: "s".into(),
             colour: INK,
             shape: 0,
+            hollow: false,
             points: vec![(0.0008, 1.0, String::new()), (0.08, 1.0, String::new())],
             joined: false,
         };
@@ -334,6 +355,36 @@ mod tests {
         let before = drawn.split("100 ms").next().unwrap().rsplit("<text x=\"").next().unwrap();
         let middle: i32 = before.split('"').next().unwrap().parse().unwrap();
         assert!(middle + text_width("100 ms") / 2 <= WIDTH as i32, "{middle}");
+    }
+
+    #[test]
+    fn hollow_marks_are_outlines_and_a_horizontal_guide_is_in_sight() {
+        let plot = |hollow: bool, guides: Vec<Guide>| Scatter {
+            x: "t".into(),
+            y: "e".into(),
+            log: [true, true],
+            ticks: [|v| v.to_string(); 2],
+            series: (0..4)
+                .map(|shape| Series {
+                    name: "s".into(),
+                    colour: LIMIT,
+                    shape,
+                    hollow,
+                    points: vec![(1.0, 0.01, String::new()), (2.0, 0.02, String::new())],
+                    joined: false,
+                })
+                .collect(),
+            guides,
+        };
+        let filled = |drawn: &str| drawn.matches("fill=\"#050505\"").count();
+        // Two marks and one in the legend, of each of four shapes.
+        assert_eq!(filled(&scatter(&plot(false, vec![])).unwrap()), 12);
+        assert_eq!(filled(&scatter(&plot(true, vec![])).unwrap()), 0);
+        // The axis reaches the guide, which no point comes near.
+        let drawn = scatter(&plot(false, vec![Guide::Y(1.0, "no shear".into())])).unwrap();
+        let y = Axis::new([0.01, 0.02, 1.0].into_iter(), true, BOTTOM, TOP).at(1.0);
+        let dash = format!("points=\"{LEFT},{y} {},{y} \"", LEFT + DASH);
+        assert!(drawn.contains("no shear") && drawn.contains(&dash) && y > TOP, "{dash}: {drawn}");
     }
 
     #[test]

@@ -12,8 +12,10 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
 use dermis_hdl::usage::{total, Usage};
 
-use super::super::document::{count, decimal, empty_cell, percent, seconds, text_cell, Cell, Item, Section, Table};
-use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options};
+use super::super::document::{
+    count, decimal, empty_cell, percent, percent_text, seconds, text_cell, Cell, Item, Section, Table,
+};
+use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options, Point};
 use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
 use crate::drawn_frames::{DrawnFrames, Shapes};
@@ -127,12 +129,14 @@ fn with_format(scene: &Scene, bits: [u32; 4]) -> Scene {
 pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let head = [
         "sensor",
-        "array",
         "contacts",
         "take case",
-        "bits: input / Cz⁺ / data / A",
         "shear error",
+        "nine of ten below",
         "normal error",
+        "frames",
+        "array",
+        "bits: input / Cz⁺ / data / A",
         "cycles",
         "µs",
         "block RAMs",
@@ -143,14 +147,14 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let mut rows: Vec<Vec<Cell>> = choices.iter().map(|choice| row(measured, choice)).collect();
     let chosen = |name: &&str| choices.iter().any(|choice| measured[choice.index].scene.name == *name);
     for name in scenes(measured).into_iter().filter(|name| !chosen(name)) {
-        let mut row = vec![text_cell(name), empty_cell(), empty_cell(), text_cell("no hardware fits")];
+        let mut row = vec![text_cell(name), empty_cell(), text_cell("no hardware fits")];
         row.resize(head.len(), empty_cell());
         rows.push(row);
     }
     let origin = choices.first().map_or("design clock", |choice| choice.clock.origin);
     let caption = format!(
         "Recommended case and format with errors, time and resources (in brackets: share of the board). Errors of the \
-         resultant: median over shipped and random frames; time: cycles divided by the clock ({origin})"
+         resultant: median over shipped and random frames, nine of ten below: 90 % quantile of the shear error; time: cycles divided by the clock ({origin})"
     );
     let rule = "Case: among the cases whose hardware fits the board and takes at most 1 ms, e is the smallest median \
                 shear error on the shipped frames; the fastest case with an error up to 1.1 e + 0.2 % is taken. \
@@ -166,13 +170,14 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
         "sensor",
         "contacts",
         "case",
+        "shear error, median",
+        "nine of ten below",
+        "normal error, median",
+        "frames",
         "input bits",
         "Cz⁺ bits",
         "data bits",
         "A bits",
-        "shear error, median",
-        "nine of ten below",
-        "normal error, median",
         "cycles",
         "block RAMs",
         "multipliers",
@@ -208,12 +213,14 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     let [input, inverse, data, coef] = format.bits;
     vec![
         text_cell(own.scene.name.clone()),
-        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
         text_cell(choice.contact_count.name()),
         text_cell(case_text(own.scene.partition.case)),
-        text_cell(format!("{input} / {inverse} / {data} / {coef}")),
         percent(format.tangential),
+        percent(format.ninety),
         percent(format.normal),
+        count(format.frames as u64),
+        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
+        text_cell(format!("{input} / {inverse} / {data} / {coef}")),
         count(format.cycles),
         decimal(Some(1e6 * seconds), 2),
         share(usage.block_rams, board.map(|board| board.block_rams)),
@@ -229,6 +236,7 @@ fn compared(measured: &[Measured]) -> Table {
     let head = [
         "sensor",
         "contacts",
+        "frames",
         "0: shear error",
         "time",
         "1: shear error",
@@ -244,17 +252,16 @@ fn compared(measured: &[Measured]) -> Table {
     for scene in scenes(measured) {
         for contact_count in [ContactCount::One, ContactCount::Several] {
             let own = || measured.iter().filter(|m| m.scene.name == scene);
-            if !own().any(|m| m.frames.iter().any(|frame| ContactCount::of(frame) == contact_count)) {
-                continue;
-            }
-            let mut row = vec![text_cell(scene), text_cell(contact_count.name())];
+            let kept = |m: &Measured| m.frames.iter().filter(|frame| ContactCount::of(frame) == contact_count).count();
+            let Some(frames) = own().map(kept).max().filter(|frames| *frames > 0) else { continue };
+            let mut row = vec![text_cell(scene), text_cell(contact_count.name()), count(frames as u64)];
             for case in cases {
                 let m = own().find(|m| m.scene.partition.case.to_string() == case);
                 let engine = if case == "contacts" { Engine::Golden } else { Engine::Hardware };
                 let point = m.and_then(|m| m.point_over(engine, |frame| ContactCount::of(frame) == contact_count));
                 let missing = if m.is_some() { "does not fit" } else { "–" };
                 row.extend(match point {
-                    Some(point) => [percent(point.tangential), seconds(Some(point.seconds))],
+                    Some(point) => [with_ninety(&point), seconds(Some(point.seconds))],
                     None => [text_cell(missing), empty_cell()],
                 });
             }
@@ -262,9 +269,18 @@ fn compared(measured: &[Measured]) -> Table {
         }
     }
     let caption =
-        "Comparison of cases on the shipped frames: median shear error and time per frame of the hardware in cases 0 \
+        "Comparison of cases on the shipped frames: median shear error (in brackets: 90 % quantile) and time per frame of the hardware in cases 0 \
                    to 3, of the golden model in case contacts";
     Table::new("cases", caption, &head, rows)
+}
+
+/// The median of a point's shear error, with the 90 % quantile in brackets.
+fn with_ninety(point: &Point) -> Cell {
+    let median = percent(point.tangential);
+    match point.ninety[0] {
+        Some(ninety) => Cell { shown: format!("{} ({})", median.shown, percent_text(ninety)), ..median },
+        None => median,
+    }
 }
 
 fn format_row(contact_count: ContactCount, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
@@ -273,13 +289,14 @@ fn format_row(contact_count: ContactCount, row: &FormatRow, taken: &FormatRow) -
         text_cell(row.scene.clone()),
         text_cell(contact_count.name()),
         text_cell(row.case.clone()),
+        percent(row.tangential),
+        percent(row.ninety),
+        percent(row.normal),
+        count(row.frames as u64),
         input,
         inverse,
         data,
         coef,
-        percent(row.tangential),
-        percent(row.ninety),
-        percent(row.normal),
         count(row.cycles),
         count(row.block_rams as u64),
         count(row.multipliers as u64),
@@ -299,6 +316,7 @@ mod tests {
             bits: [input, 24, 18, 18],
             tangential: Some(error),
             ninety: None,
+            frames: 1,
             normal: None,
             cycles: 1,
             block_rams,

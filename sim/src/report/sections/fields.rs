@@ -60,7 +60,7 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
     let outline = Outline { subarrays: &golden.subarrays, centroids: true, contacts: &[] };
     let mut pictures = vec![Picture {
         id: id("stress"),
-        caption: format!("{what}: stress"),
+        caption: format!("{what}: stress, with the centroids of compression (round, +) and tension (square, −)"),
         svg: stress_map(sensor, &frame.stress_MPa, outline)?,
     }];
     let outline = Outline { centroids: false, ..outline };

@@ -3,11 +3,11 @@
 use anyhow::Result;
 use dermis_golden::noise::ShapeRow;
 
-use super::super::document::{percent, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::document::{percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
 use super::super::measure::Measured;
 use super::super::pictures::{scatter, Scatter, Series};
 use super::super::style::SERIES;
-use super::time::{pictures as time_pictures, two_digits};
+use super::time::pictures as time_pictures;
 
 /// The section; `noise` is the scene's name with its rows.
 ///
@@ -15,8 +15,8 @@ use super::time::{pictures as time_pictures, two_digits};
 /// A picture that cannot be written.
 pub fn noise(measured: &[Measured], noise: Option<&(String, Vec<ShapeRow>)>) -> Result<Option<Section>> {
     let Some((scene, rows)) = noise else { return Ok(None) };
-    let [time, _] = time_pictures(scene, measured)?;
-    let time = Picture { id: format!("first-{}", time.id), ..time };
+    let time = time_pictures(scene, measured)?.into_iter().next();
+    let time = time.map(|time| Picture { id: format!("first-{}", time.id), ..time });
     let caption = format!(
         "Shear error of the resultant on {} drawn frames of {scene} (Hertz, punch, ring, rectangle and tilted pressures in \
          equal shares), noise stated in the scene; bound: Cramér–Rao for a smooth pressure on a known support; none: no \
@@ -41,7 +41,11 @@ pub fn noise(measured: &[Measured], noise: Option<&(String, Vec<ShapeRow>)>) -> 
     Ok(Some(Section {
         id: "noise",
         title: "Error against noise, and against run time".into(),
-        items: vec![Item::Text(text.into()), Item::Pictures(vec![picture(scene, rows)?, time]), Item::Table(table)],
+        items: vec![
+            Item::Text(text.into()),
+            Item::Pictures(std::iter::once(picture(scene, rows)?).chain(time).collect()),
+            Item::Table(table),
+        ],
     }))
 }
 
@@ -77,6 +81,7 @@ fn picture(scene: &str, rows: &[ShapeRow]) -> Result<Picture> {
         name: if *name == "none" { "none: no shear".into() } else { (*name).to_owned() },
         colour: SERIES[index % SERIES.len()],
         shape: index % 4,
+        hollow: false,
         points: own(name, |row| row.summary.tangential.median.value),
         joined: true,
     };
@@ -87,6 +92,7 @@ fn picture(scene: &str, rows: &[ShapeRow]) -> Result<Picture> {
             name: "Cramér–Rao bound".into(),
             colour: SERIES[index % SERIES.len()],
             shape: index % 4,
+            hollow: false,
             points: own(first, |row| row.bound.tangential[0]),
             joined: true,
         });

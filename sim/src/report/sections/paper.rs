@@ -11,7 +11,9 @@ use dermis_golden::matrices::cache;
 use dermis_golden::paper::conclusions;
 use dermis_golden::partition::Case;
 
-use super::super::document::{count, empty_cell, percent, seconds, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::document::{
+    count, empty_cell, percent, seconds, text_cell, two_digits, Cell, Item, Picture, Section, Table,
+};
 use super::super::measure::{Engine, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
@@ -156,7 +158,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     };
     let names = ["the paper", "first repeat", "second", "third"];
     let plot = Bars {
-        axis: "s, matrices and one frame, logarithmic".into(),
+        axis: "s, matrices and one frame".into(),
         groups: own.iter().zip(&all).map(group).collect(),
         series: names.iter().zip(&SERIES).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
         text: super::super::document::seconds_text,
@@ -172,7 +174,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     let whole = own.iter().zip(&all).find(|(m, _)| m.scene.partition.case == Case::WHOLE);
     let faster = |whole: Option<f64>, own: Option<f64>| match (whole, own) {
         (Some(whole), Some(own)) => {
-            Cell { shown: format!("{} ×", super::time::two_digits(whole / own)), number: Some(whole / own) }
+            Cell { shown: format!("{} ×", two_digits(whole / own)), number: Some(whole / own) }
         }
         _ => empty_cell(),
     };
@@ -232,7 +234,7 @@ fn operations(measured: &[Measured]) -> Table {
             count(matrices.degree as u64),
             count(ours),
             Cell {
-                shown: format!("{} ×", super::time::two_digits(literal as f64 / ours as f64)),
+                shown: format!("{} ×", two_digits(literal as f64 / ours as f64)),
                 number: Some(literal as f64 / ours as f64),
             },
         ]

@@ -1,11 +1,15 @@
 //! Comparison with published figures: Table 2 and run times, from the files in `golden/data/paper`.
 
-use dermis_golden::errors::Errors;
+use dermis_golden::errors::{Errors, SMALLEST_SHARE};
 use dermis_golden::paper::{run_times, table_2, RunTime};
 use dermis_golden::partition::Case;
+use dermis_golden::scene::Condition;
 use dermis_golden::sensor::Sensor;
 
-use super::super::document::{empty_cell, median_percent, percent, seconds, text_cell, Cell, Item, Section, Table};
+use super::super::document::{
+    count, empty_cell, median_percent, percent, percent_text, seconds, text_cell, two_digits, Cell, Item, Section,
+    Table,
+};
 use super::super::measure::{Engine, Measured};
 use super::lookup::{case_text, find};
 
@@ -35,6 +39,7 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         "bit-true |X1|",
         "bit-true |X2|",
         "bit-true |X3|",
+        "frames",
     ];
     let rows = measured.iter().filter_map(|m| {
         let number = m.scene.name.strip_prefix("sensor-")?.parse().ok()?;
@@ -52,11 +57,22 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
             row.extend((0..3).map(|k| median_percent(errors.iter().map(|e| e.as_ref()?.axes()[k].map(f64::abs)))));
         }
+        row.push(count(m.frames.len() as u64));
         Some(row)
     });
-    let caption =
+    let condition = match measured.first().map(|m| m.scene.partition.condition).unwrap_or_default() {
+        Condition::BothSigns => "compression and tension both exceed the noise floor, the paper's centroid condition",
+        Condition::Loaded => {
+            "some stress exceeds the noise floor, not under the paper's centroid condition (dermis report --paper has it)"
+        }
+    };
+    let caption = format!(
         "The paper's Table 2 (one frame; sensors 1, 2: against finite elements; 3, 4: against case 0) next to the \
-                   golden and the bit-true model (median of |X| over the frames)";
+         golden and the bit-true model (median of |X| over the frames, one and several contacts together). Condition \
+         here: a subarray is searched where {condition}. Left out of the relative errors: a component below {} of the \
+         reference force",
+        percent_text(SMALLEST_SHARE)
+    );
     Table::new("table-2", caption, &head, rows.collect())
 }
 
@@ -82,7 +98,7 @@ pub(super) fn times(measured: &[Measured]) -> Table {
             None => empty_cell(),
             Some(own) => {
                 let ratio = published.seconds / own;
-                Cell { shown: format!("{} ×", super::time::two_digits(ratio)), number: Some(ratio) }
+                Cell { shown: format!("{} ×", two_digits(ratio)), number: Some(ratio) }
             }
         };
         let case = published.case.map_or_else(empty_cell, |case| text_cell(case_text(case)));

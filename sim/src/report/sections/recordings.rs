@@ -214,6 +214,7 @@ fn pictures(recorded: &Recorded) -> Result<Vec<Picture>> {
         name: name.into(),
         colour: SERIES[colour],
         shape: colour % 4,
+        hollow: false,
         points: points.into_iter().map(|(x, y)| (x, y, String::new())).collect(),
         joined: true,
     };

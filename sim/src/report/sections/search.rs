@@ -3,11 +3,10 @@
 use anyhow::Result;
 use dermis_golden::partition::Case;
 
-use super::super::document::{decimal, percent, text_cell, Item, Picture, Section, Table};
-use super::super::measure::{objective_map, Measured, ObjectiveMap};
+use super::super::document::{decimal, percent, text_cell, two_digits, Item, Picture, Section, Table};
+use super::super::measure::{objective_map, ContactCount, Measured, ObjectiveMap};
 use super::super::pictures::{objective, scatter, Scatter, Series};
 use super::super::style::SERIES;
-use super::time::two_digits;
 
 /// The section with objective maps and margins.
 ///
@@ -22,10 +21,18 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
         let caption = format!("{}, case 0, frame {}: Π over μ", first.scene, first.frame);
         pictures.push(Picture { id: format!("plane-{}", first.scene), caption, svg: objective(first)? });
     }
-    pictures.push(margins(&maps)?);
-    let head = ["sensor", "frame", "margin, bits", "shear error"];
+    for contacts in [ContactCount::One, ContactCount::Several] {
+        pictures.extend(margins(&maps, contacts)?);
+    }
+    let head = ["sensor", "frame", "contacts", "shear error", "margin, bits"];
     let rows = maps.iter().flatten().map(|p| {
-        vec![text_cell(p.scene.clone()), text_cell(p.frame.clone()), decimal(Some(p.margin), 2), percent(p.tangential)]
+        vec![
+            text_cell(p.scene.clone()),
+            text_cell(p.frame.clone()),
+            text_cell(p.contacts.name()),
+            percent(p.tangential),
+            decimal(Some(p.margin), 2),
+        ]
     });
     Ok(Section {
         id: "search",
@@ -45,29 +52,37 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
     })
 }
 
-/// Shear error against margin, one mark per frame.
-fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
+/// Shear error against margin, one mark per frame with this contact count; `None` without such a frame.
+fn margins(maps: &[Vec<ObjectiveMap>], contacts: ContactCount) -> Result<Option<Picture>> {
     let series = maps.iter().zip(0..).filter_map(|(maps, index): (_, usize)| {
         let points = maps
             .iter()
-            .filter(|p| p.margin > 0.0)
+            .filter(|p| p.margin > 0.0 && p.contacts == contacts)
             .filter_map(|p| Some((p.margin, p.tangential.filter(|error| *error > 0.0)?, String::new())));
+        let points: Vec<_> = points.collect();
+        (!points.is_empty()).then_some(())?;
         Some(Series {
             name: maps.first()?.scene.clone(),
             colour: SERIES[1 + index % 7],
             shape: index % 4,
-            points: points.collect(),
+            hollow: false,
+            points,
             joined: false,
         })
     });
+    let series: Vec<Series> = series.collect();
+    if series.is_empty() {
+        return Ok(None);
+    }
     let plot = Scatter {
         x: "margin of Π's maximum, bits".into(),
         y: "shear error of the frame".into(),
         log: [true, true],
         ticks: [two_digits, |error| format!("{} %", two_digits(100.0 * error))],
-        series: series.collect(),
+        series,
         guides: Vec::new(),
     };
-    let caption = "Shear error against margin, one mark per frame, case 0, golden model".into();
-    Ok(Picture { id: "margins".into(), caption, svg: scatter(&plot)? })
+    let name = contacts.name();
+    let caption = format!("Shear error against margin, one mark per frame, case 0, golden model, contacts: {name}");
+    Ok(Some(Picture { id: format!("margins-{name}"), caption, svg: scatter(&plot)? }))
 }

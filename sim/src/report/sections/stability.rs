@@ -68,7 +68,14 @@ fn picture(rows: &[Row]) -> Result<String> {
                 Some((row.spectrum?.condition, error, name.to_owned())).filter(|point| point.0.is_finite())
             };
             let points = rows.iter().filter_map(point).collect();
-            Series { name: format!("{what}, {format}"), colour: SERIES[colour], shape, points, joined: false }
+            Series {
+                name: format!("{what}, {format}"),
+                colour: SERIES[colour],
+                shape,
+                hollow: false,
+                points,
+                joined: false,
+            }
         })
     });
     scatter(&Scatter {

@@ -2,12 +2,11 @@
 
 use anyhow::Result;
 
-use super::super::document::{count, decimal, percent, percent_text, text_cell, Cell, Item, Picture, Section, Table};
-use super::super::measure::{stages as trace, Measured, StageRow};
+use super::super::document::{count, percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
+use super::super::measure::{stages as trace, ContactCount, Measured, StageRow};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
 use super::choice::Choice;
-use super::lookup::scenes;
 
 /// The section with the differences of all stages.
 ///
@@ -17,11 +16,13 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let rows: Vec<StageRow> =
         measured.iter().flat_map(|m| (0..m.frames.len()).flat_map(|index| trace(m, index))).collect();
     let mut pictures = Vec::new();
-    for scene in scenes(measured) {
-        let Some(choice) = choices.iter().find(|choice| measured[choice.index].scene.name == scene) else { continue };
-        let case = measured[choice.index].scene.partition.case.to_string();
-        let own: Vec<&StageRow> = rows.iter().filter(|row| row.scene == scene && row.case == case).collect();
-        pictures.push(picture(scene, &case, &own)?);
+    for choice in choices {
+        let m = &measured[choice.index];
+        let (scene, case) = (&m.scene.name, m.scene.partition.case.to_string());
+        let kept = m.frames.iter().filter(|frame| ContactCount::of(frame) == choice.contact_count);
+        let kept: Vec<&str> = kept.map(|frame| frame.id.as_str()).collect();
+        let own = rows.iter().filter(|row| row.scene == *scene && row.case == case && kept.contains(&&*row.frame));
+        pictures.push(picture(scene, &case, choice.contact_count, kept.len(), &own.collect::<Vec<_>>())?);
     }
     let head = [
         "sensor",
@@ -58,7 +59,7 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("stages", caption, &head, summed(&rows))),
+            Item::Table(Table::new("stages", caption, &head, summed(&rows)).collapsed()),
             Item::Table(Table::new("stages-frames", "The same for each frame", &one_head, all.collect()).collapsed()),
         ],
     })
@@ -93,8 +94,8 @@ fn line(rows: &[StageRow]) -> Vec<Cell> {
         text_cell(first.scene.clone()),
         text_cell(first.case.clone()),
         text_cell(first.stage),
-        decimal(Some(largest(rows, |row| row.max_lsb)), 1),
-        decimal(Some(rms(rows, |row| row.rms_lsb)), 2),
+        lsb(largest(rows, |row| row.max_lsb)),
+        lsb(rms(rows, |row| row.rms_lsb)),
         small(largest(rows, |row| row.max_share)),
         small(rms(rows, |row| row.rms_share)),
         count(rows.iter().map(|row| u64::from(row.used_bits)).max().unwrap_or(0)),
@@ -103,13 +104,17 @@ fn line(rows: &[StageRow]) -> Vec<Cell> {
     ]
 }
 
-/// A share in percent, in scientific notation if small.
-fn small(share: f64) -> Cell {
-    let shown = if share < 1e-3 { format!("{:.1e} %", 100.0 * share) } else { percent_text(share) };
-    Cell { shown, ..percent(Some(share)) }
+/// A number of LSBs, which can be far below one.
+fn lsb(value: f64) -> Cell {
+    Cell { shown: two_digits(value), number: Some(value) }
 }
 
-fn picture(scene: &str, case: &str, own: &[&StageRow]) -> Result<Picture> {
+/// A share in percent, which can be far below 0.01 %.
+fn small(share: f64) -> Cell {
+    Cell { shown: format!("{} %", two_digits(100.0 * share)), ..percent(Some(share)) }
+}
+
+fn picture(scene: &str, case: &str, contacts: ContactCount, frames: usize, own: &[&StageRow]) -> Result<Picture> {
     let first = own.first().map_or("", |row| row.frame.as_str());
     let names = own.iter().filter(|row| row.frame == first).map(|row| row.stage);
     let groups = names.map(|stage| {
@@ -122,10 +127,13 @@ fn picture(scene: &str, case: &str, own: &[&StageRow]) -> Result<Picture> {
         axis: "difference, % of the stage's largest value".into(),
         groups: groups.collect(),
         series: vec![("max over the frames".into(), SERIES[2]), ("RMS".into(), SERIES[1])],
-        text: |value| if value < 0.1 { format!("{value:.0e}") } else { super::time::two_digits(value) },
+        text: two_digits,
         limit: None,
         log: true,
     };
-    let caption = format!("{scene}, case {case}: difference from floating point along the pipeline");
-    Ok(Picture { id: format!("stages-{scene}"), caption, svg: bars(&plot)? })
+    let name = contacts.name();
+    let caption = format!(
+        "{scene}, case {case}, contacts: {name}: difference from floating point along the pipeline, {frames} frames"
+    );
+    Ok(Picture { id: format!("stages-{scene}-{name}"), caption, svg: bars(&plot)? })
 }

@@ -2,11 +2,10 @@
 
 use anyhow::Result;
 
-use super::super::document::{count, percent, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::document::{count, percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
 use super::super::measure::{ContactCount, SweepPoint};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
-use super::time::two_digits;
 
 /// The section from the sweeps of each scene, given with contact count and number of frames.
 ///
@@ -35,15 +34,19 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section>
         "case",
         "field",
         "value",
-        "the scene's own",
+        "contacts",
         "shear error, median",
+        "nine of ten below",
         "normal error, median",
+        "frames",
         "cycles, total",
         "block RAMs",
         "multipliers",
         "fits the board",
+        "the scene's own",
     ];
-    let rows = all.iter().flat_map(|(points, ..)| points.iter().map(row));
+    let rows =
+        all.iter().flat_map(|(points, contacts, frames)| points.iter().map(|point| row(point, *contacts, *frames)));
     Ok(Section {
         id: "sweeps",
         title: "What each setting costs".into(),
@@ -56,27 +59,30 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section>
             ),
             Item::Pictures(pictures),
             Item::Table(
-                Table::new("sweeps", "All settings; the scene's own: the value in its file", &head, rows.collect())
+                Table::new("sweeps", "All settings; nine of ten below: 90 % quantile of the shear error; the scene's own: the value in its file", &head, rows.collect())
                     .collapsed(),
             ),
         ],
     })
 }
 
-fn row(p: &SweepPoint) -> Vec<Cell> {
+fn row(p: &SweepPoint, contacts: ContactCount, frames: usize) -> Vec<Cell> {
     let yes = |is: bool| text_cell(if is { "yes" } else { "" });
     vec![
         text_cell(p.scene.clone()),
         text_cell(p.case.clone()),
         text_cell(p.field),
         text_cell(p.value.clone()),
-        yes(p.own),
+        text_cell(contacts.name()),
         percent(p.tangential),
+        percent(p.ninety),
         percent(p.normal),
+        count(frames as u64),
         count(p.cycles),
         count(p.block_rams as u64),
         count(p.multipliers as u64),
         yes(p.fits),
+        yes(p.own),
     ]
 }
 
@@ -86,6 +92,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
         name: group[0].field.into(),
         colour: SERIES[index % 8],
         shape: index % 4,
+        hollow: false,
         points: group
             .iter()
             .filter_map(|p| Some((x(p), p.tangential.filter(|error| *error > 0.0)?, p.value.clone())))

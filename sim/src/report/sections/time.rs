@@ -1,15 +1,19 @@
 //! Error against run time of all engines in all cases, with the Pareto front and the 1 ms budget.
 
 use anyhow::Result;
+use dermis_golden::frame::Frame;
 
 use super::super::document::{
-    count, empty_cell, percent, seconds, seconds_text, text_cell, Cell, Item, Picture, Section, Table,
+    count, empty_cell, percent, seconds, seconds_text, text_cell, two_digits, Cell, Item, Picture, Section, Table,
 };
-use super::super::measure::{Engine, Measured, Point};
+use super::super::measure::{ContactCount, Engine, Measured, Point};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
+
+/// Name of the hollow marks in the legend.
+const NOT_SIMULATED: &str = "not co-simulated";
 
 /// The section with error against run time.
 ///
@@ -18,72 +22,90 @@ use super::lookup::{case_text, scenes};
 pub fn time(measured: &[Measured]) -> Result<Section> {
     let mut items = Vec::new();
     for scene in scenes(measured) {
-        items.push(Item::Pictures(pictures(scene, measured)?.to_vec()));
+        // Shear and normal error of a contact count side by side.
+        items.extend(pictures(scene, measured)?.chunks(2).map(|pair| Item::Pictures(pair.to_vec())));
     }
     let head = [
         "sensor",
         "case",
+        "contacts",
         "engine",
         "shear error, median",
+        "nine of ten below",
         "normal error, median",
+        "nine of ten below",
+        "frames",
         "time of a frame",
         "cycles",
         "RTL = bit-true",
         "why not",
     ];
-    let rows = measured.iter().flat_map(|m| Engine::ALL.into_iter().map(move |engine| row(m, engine)));
+    let rows = measured.iter().flat_map(|m| {
+        let counts = ContactCount::all_of(&m.frames);
+        counts.into_iter().flat_map(move |contacts| Engine::ALL.map(|engine| row(m, engine, contacts)))
+    });
     items.insert(
         0,
         Item::Text(
             "Each mark is an engine on a sensor in the case written next to it. Errors: resultant against the true \
              force, median over the shipped frames. Times: per frame; on the CPU the median over the frames and over \
              three repeats, for the hardware its cycles divided by its clock. Lower left is better; no mark is \
-             better than the Pareto front in both error and time."
+             better than the Pareto front in both error and time. Hollow marks: hardware that was not co-simulated in \
+             this run; its errors and cycles are the bit-true model's. Dashed lines need no estimator: no shear at \
+             all, and Σ b·area, the sum of the stress times the area of a taxel, for the normal force. Frames with one \
+             contact and with several stand in pictures and rows of their own. A frame without true shear has a normal error only."
                 .into(),
         ),
     );
     items.push(Item::Table(Table::new(
         "time",
-        "All engines in all cases; why not: reason for a missing result",
+        "All engines in all cases; nine of ten below: 90 % quantile of the error before it; why not: reason for a \
+         missing result",
         &head,
         rows.collect(),
     )));
     Ok(Section { id: "time", title: "Error against run time".into(), items })
 }
 
-/// Shear and normal error of a scene against the time of a frame.
+/// Shear and normal error of a scene against the time of a frame, for frames with one contact and for those with several.
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn pictures(scene: &str, measured: &[Measured]) -> Result<[Picture; 2]> {
-    let own = measured.iter().filter(|m| m.scene.name == scene);
-    let points: Vec<Point> = own.flat_map(|m| Engine::ALL.into_iter().filter_map(|engine| m.point(engine))).collect();
-    Ok([
-        picture(scene, "shear", &points, |point| point.tangential)?,
-        picture(scene, "normal", &points, |point| point.normal)?,
-    ])
+pub fn pictures(scene: &str, measured: &[Measured]) -> Result<Vec<Picture>> {
+    let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == scene).collect();
+    let mut pictures = Vec::new();
+    for contacts in own.first().map(|m| ContactCount::all_of(&m.frames)).unwrap_or_default() {
+        let keep = |frame: &Frame| ContactCount::of(frame) == contacts;
+        let all = own.iter().flat_map(|m| Engine::ALL.into_iter().filter_map(move |engine| m.point_over(engine, keep)));
+        let points: Vec<Point> = all.collect();
+        let sum = own.iter().find_map(|m| m.error_of_sum(contacts));
+        let shear = ("shear", "no shear", Some(1.0));
+        pictures.push(picture(scene, contacts, shear, &points, |point| point.tangential)?);
+        pictures.push(picture(scene, contacts, ("normal", "Σ b·area", sum), &points, |point| point.normal)?);
+    }
+    Ok(pictures)
 }
 
-fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
-    let mut row =
-        vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case)), text_cell(engine.name())];
+fn row(m: &Measured, engine: Engine, contacts: ContactCount) -> Vec<Cell> {
+    let mut row = vec![
+        text_cell(m.scene.name.clone()),
+        text_cell(case_text(m.scene.partition.case)),
+        text_cell(contacts.name()),
+        text_cell(engine.name()),
+    ];
     let bit_true = m.bit_true.as_ref();
-    let Some(point) = m.point(engine) else {
+    let Some(point) = m.point_over(engine, |frame| ContactCount::of(frame) == contacts) else {
         let reason = match engine {
             Engine::Baseline => m.baseline.as_ref().err(),
             _ => bit_true.err(),
         };
-        row.extend([
-            empty_cell(),
-            empty_cell(),
-            empty_cell(),
-            empty_cell(),
-            empty_cell(),
-            text_cell(reason.map_or("", |reason| reason)),
-        ]);
+        row.extend(std::iter::repeat_with(empty_cell).take(8));
+        row.push(text_cell(reason.map_or("", |reason| reason)));
         return row;
     };
-    row.extend([percent(point.tangential), percent(point.normal), seconds(Some(point.seconds))]);
+    let [shear, normal] = point.ninety.map(percent);
+    row.extend([percent(point.tangential), shear, percent(point.normal), normal]);
+    row.extend([count(point.frames as u64), seconds(Some(point.seconds))]);
     row.extend(match bit_true {
         Ok(bit_true) if engine == Engine::Hardware => {
             let equality = match bit_true.equal {
@@ -99,34 +121,54 @@ fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
     row
 }
 
-fn picture(scene: &str, what: &str, own: &[Point], error: fn(&Point) -> Option<f64>) -> Result<Picture> {
-    let of = |engine: Engine| {
-        let points = own.iter().filter(|point| point.engine == engine);
+/// Error against time; `baseline` is the error that needs no estimator, with the names of error and baseline.
+fn picture(
+    scene: &str,
+    contacts: ContactCount,
+    (what, baseline, at): (&str, &str, Option<f64>),
+    own: &[Point],
+    error: fn(&Point) -> Option<f64>,
+) -> Result<Picture> {
+    let of = |(engine, hollow): (Engine, bool)| {
+        let points = own.iter().filter(|point| point.engine == engine && point.only_modelled == hollow);
         // A logarithmic axis has no zero.
         let points = points
             .filter_map(|point| Some((point.seconds, error(point).filter(|e| *e > 0.0)?, point.case.to_string())));
         let index = engine as usize;
         Series {
-            name: engine.name().into(),
+            name: if hollow { NOT_SIMULATED } else { engine.name() }.into(),
             colour: SERIES[index],
             shape: index,
+            hollow,
             points: points.collect(),
             joined: false,
         }
     };
-    let series: Vec<Series> = Engine::ALL.into_iter().map(of).filter(|series| !series.points.is_empty()).collect();
+    let kinds = Engine::ALL.map(|engine| (engine, false)).into_iter().chain([(Engine::Hardware, true)]);
+    let series: Vec<Series> = kinds.map(of).filter(|series| !series.points.is_empty()).collect();
     let all = series.iter().flat_map(|series| &series.points).map(|(x, y, _)| (*x, *y)).collect();
     let budget = 1e-6 * BUDGET_US as f64;
+    let mut guides = vec![Guide::X(budget, "1 ms".into()), Guide::Front(pareto_front(all), "Pareto front".into())];
+    guides.extend(at.filter(|error| *error > 0.0).map(|error| Guide::Y(error, baseline.into())));
     let plot = Scatter {
         x: "time of a frame".into(),
         y: format!("{what} error, median"),
         log: [true, true],
         ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", two_digits(100.0 * e))],
         series,
-        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(pareto_front(all), "Pareto front".into())],
+        guides,
     };
-    let caption = format!("{scene}: {what} error against time per frame; marks are labelled with their case");
-    Ok(Picture { id: format!("time-{scene}-{what}"), caption, svg: scatter(&plot)? })
+    let frames = own.iter().map(|point| point.frames).max().unwrap_or(0);
+    let (id, frames) = match contacts {
+        ContactCount::One => (format!("time-{scene}-{what}"), format!("{frames} frames with one contact")),
+        ContactCount::Several => {
+            (format!("time-{scene}-several-{what}"), format!("{frames} frames with several contacts"))
+        }
+    };
+    let caption = format!(
+        "{scene}: {what} error, median of {frames}, against time per frame; marks are labelled with their case"
+    );
+    Ok(Picture { id, caption, svg: scatter(&plot)? })
 }
 
 /// Shortens a time: `1.00 ms` to `1 ms`.
@@ -136,17 +178,6 @@ fn tick(text: &str) -> String {
             format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
         }
         _ => text.to_owned(),
-    }
-}
-
-/// A value with two significant digits, without trailing zeros.
-pub(super) fn two_digits(value: f64) -> String {
-    let decimals = (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
     }
 }
 
@@ -176,6 +207,5 @@ mod tests {
     #[test]
     fn ticks_are_short() {
         assert_eq!(["1.00 ms", "30.0 µs", "300 s", "1.50 s"].map(tick), ["1 ms", "30 µs", "300 s", "1.5 s"]);
-        assert_eq!([100.0, 30.0, 3.0, 0.5, 0.015].map(two_digits), ["100", "30", "3", "0.5", "0.015"]);
     }
 }
