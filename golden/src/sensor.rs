@@ -52,6 +52,12 @@ impl Sensor {
         self.rows * self.cols
     }
 
+    /// Σ b·area in N of a stress in MPa, row-major: the normal force without any estimator. On half-space and layer alike
+    /// shear adds nothing to it.
+    pub fn sum_of_stress_N(&self, stress_MPa: &[f64]) -> f64 {
+        stress_MPa.iter().sum::<f64>() * self.pitch_x_mm * self.pitch_y_mm
+    }
+
     /// Position of a taxel's centre in mm, [x, y], from the array's centre.
     pub fn position_mm(&self, row: usize, col: usize) -> [f64; 2] {
         let from_middle = |index: usize, count: usize| index as f64 - (count as f64 - 1.0) / 2.0;

@@ -2,6 +2,7 @@ use super::*;
 use crate::float::Golden;
 use crate::generator::draws::{DrawOptions, Draws};
 use crate::noise::{shape_study, Candidate, ShapeStudy};
+use crate::partition::Case;
 use crate::scene::EstimatorKind;
 
 fn scene(name: &str) -> Scene {
@@ -100,6 +101,23 @@ fn answers_follow_the_symmetries() {
     let mut stuck = b.clone();
     stuck[44] = 9.0;
     assert_eq!(ask(&learned, b, &alive, [0.0; 2]), ask(&learned, &stuck, &alive, [0.0; 2]));
+}
+
+/// Where a network alone gives the μ of each contact, it has a window around each also on a small array; one that reads the
+/// whole array would give all of them the same μ. The adviser of `evidence`, which takes the others out, takes either.
+#[test]
+fn several_contacts_need_a_window_around_each() {
+    let mut scene = scene("sensor-1");
+    let whole = trained(&scene, 10).bytes;
+    scene.partition.case = Case::Contacts;
+    let Trained { learned, bytes, .. } = trained(&scene, 10);
+    assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
+    let fits = |scene: &Scene, bytes: &[u8]| Learned::from_bytes(scene, bytes, "n").map(|_| ());
+    assert!(fits(&scene, &whole).is_ok() && fits(&scene, &bytes).is_ok());
+    scene.search.estimator = EstimatorKind::Network;
+    assert!(fits(&scene, &bytes).is_ok());
+    let error = fits(&scene, &whole).unwrap_err();
+    assert!(matches!(&error, LearnedError::Mismatch { field: "sensor.rows and cols", .. }), "{error}");
 }
 
 /// A network for windows serves every place, and every array of that pitch.

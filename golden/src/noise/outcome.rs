@@ -73,11 +73,9 @@ impl Outcome {
         outcome
     }
 
-    /// The baseline that needs no estimator: no shear, and the integral of the stress as normal force. On half-space and
-    /// layer alike shear adds nothing to the integral.
+    /// The baseline that needs no estimator: no shear, and Σ b·area as normal force.
     pub fn baseline(drawn: &DrawnFrame, sensor: &Sensor, reading_MPa: &[f64]) -> Outcome {
-        let normal = reading_MPa.iter().sum::<f64>() * sensor.pitch_x_mm * sensor.pitch_y_mm;
-        let errors = Errors::new(drawn.total_N, [0.0, 0.0, normal]);
+        let errors = Errors::new(drawn.total_N, [0.0, 0.0, sensor.sum_of_stress_N(reading_MPa)]);
         let alone = |truth: &crate::generator::draws::ContactTruth| Errors::new(truth.force_N, [0.0; 3]).tangential;
         Outcome {
             shape: drawn.truth[0].shape,

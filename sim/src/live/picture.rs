@@ -72,7 +72,10 @@ impl<'a> Show<'a> {
         match outcome {
             Outcome::Refusal(refusal) => {
                 self.refused += 1;
-                self.refusal = Some(format!("line {}: {}", refusal.line, refusal.error));
+                // A frame without a name is named by its line already.
+                let line = format!("line {}: ", refusal.line);
+                let error = refusal.error.strip_prefix(&line).unwrap_or(&refusal.error);
+                self.refusal = Some(line.clone() + error);
             }
             Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frame, result, .. }) => {
                 let picture = Picture {

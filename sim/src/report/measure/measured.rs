@@ -204,9 +204,8 @@ impl Measured {
 
     /// Normal error of Σ b·area, which needs no estimator, median over the frames with a contact count.
     pub fn error_of_sum(&self, contact_count: ContactCount) -> Option<f64> {
-        let area_mm2 = self.scene.sensor.pitch_x_mm * self.scene.sensor.pitch_y_mm;
         let kept = self.frames.iter().filter(|frame| ContactCount::of(frame) == contact_count);
-        let sum = |frame: &Frame| [0.0, 0.0, area_mm2 * frame.stress_MPa.iter().sum::<f64>()];
+        let sum = |frame: &Frame| [0.0, 0.0, self.scene.sensor.sum_of_stress_N(&frame.stress_MPa)];
         median(kept.filter_map(|frame| Errors::new(frame.resultant_N?, sum(frame)).normal).collect())
     }
 
