@@ -94,11 +94,10 @@ def test_what_an_engine_does_not_give_is_absent() -> None:
     [contact] = regions.reconstruct(frame).contacts
     assert contact.sigma_N is None and contact.mu_covariance is None and contact.force_N[2] > 1
     assert contact.mu_sigma is None and np.allclose(again.mu_sigma**2, np.diag(again.mu_covariance))
-    # A network has the standard deviation of each region's mu.
+    # One network for the whole array would give all contacts the same mu.
     network = text + '[partition]\ncase = "contacts"\n[search]\nestimator = "network"\nnetwork = "dermis:sensor-1"\n'
-    result = dermis.Scene.from_toml(network).reconstruct(frame)
-    [contact], [region] = result.contacts, result.to_dict()["regions"]
-    assert contact.mu_sigma.tolist() == region["mu_sigma"] and (contact.mu_sigma > 0).all()
+    with pytest.raises(dermis.InputError, match="window around each contact"):
+        dermis.Scene.from_toml(network).reconstruct(frame)
     resultants = dermis.Scene.from_toml(text + '[output]\nforces = "resultants"\n').reconstruct(frame)
     assert resultants.forces_N is None and resultants.resultant_N[2] > 1
 

@@ -86,7 +86,9 @@ impl Frames {
             .collect::<Result<Vec<_>, _>>()?;
         let kernels = Kernels::new(&window.sensor(&scene.sensor), scene.medium);
         let frame = |number: usize| -> Result<Vec<Item>, GeneratorError> {
-            let contacts = draws[number % draws.len()].contacts(number as u64)?;
+            // Where so many do not fit on the array, fewer.
+            let mut fewer = (0..=number % draws.len()).rev().map(|most| draws[most].contacts(number as u64));
+            let contacts = fewer.find(Result::is_ok).unwrap_or_else(|| draws[0].contacts(number as u64))?;
             let supports = contacts.iter().map(Support::new).collect::<Result<Vec<_>, _>>()?;
             let mut random = Random::new((seed ^ (number as u64) << 24).wrapping_mul(SPREAD));
             let own = (0..supports.len()).map(|own| item(scene, window, &kernels, &supports, own, &mut random));
