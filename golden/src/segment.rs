@@ -363,7 +363,7 @@ mod tests {
     #[test]
     fn too_many_maxima_are_told() {
         let sensor = Sensor { rows: 16, cols: 16, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 0.5 };
-        let lone = |k: usize| if k / 16 % 2 == 0 && k % 2 == 0 { 1 << 20 } else { 0 };
+        let lone = |k: usize| if (k / 16).is_multiple_of(2) && k.is_multiple_of(2) { 1 << 20 } else { 0 };
         let p: Vec<i64> = (0..256).map(lone).collect();
         let found = Segmenter::new(&sensor, 0.3).segment(&p);
         assert_eq!((found.basins.iter().max(), found.overflow), (Some(&BASINS), true));

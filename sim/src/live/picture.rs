@@ -74,7 +74,7 @@ impl<'a> Show<'a> {
                 self.refused += 1;
                 // A frame without a name is named by its line already.
                 let line = format!("line {}: ", refusal.line);
-                let error = refusal.error.strip_prefix(&line).unwrap_or(&refusal.error);
+                let error = refusal.error.strip_prefix(&line).unwrap_or(refusal.error);
                 self.refusal = Some(line.clone() + error);
             }
             Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frame, result, .. }) => {
