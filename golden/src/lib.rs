@@ -49,7 +49,7 @@
 //! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
 //! | [`matrices`], [`degree`] | Cz⁺, Ax, Ay of a subarray; how many terms the series in μ needs |
 //! | [`symmetry`] | mirror images of a taxel, and the basis of parities, in which matrices are computed and stored |
-//! | [`segment`] | the contact to which each taxel belongs, in both models |
+//! | [`segment`] | the contact to which each taxel belongs |
 //! | [`float`] | the stages in floating point, the objectives, and the golden engine that runs them |
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |

@@ -1,7 +1,8 @@
 //! Segment: the contact to which each taxel belongs, from the normal forces alone.
 //!
-//! Floating-point and bit-true model take this one algorithm, in integers: the forces are words, floating-point ones are
-//! first brought to [`PEAK_BITS`] bits. Every step is one that hardware does with one multiplier, comparisons and memories.
+//! The algorithm is one of integers, so that hardware and its bit-true model, which have no contacts yet, can take the same:
+//! the forces are words, those of the floating-point model are first brought to [`PEAK_BITS`] bits. Every step is one that
+//! hardware does with one multiplier, comparisons and memories.
 //!
 //! ```text
 //! p ── compressive part ── smooth along x, y ── climb ── basins ── join ── contact of each taxel, or none
@@ -24,7 +25,7 @@
 //! | in: p | n, row-major | words, or N |
 //! | out: labels | n | contact of each taxel, 0 …, in the order of their largest taxels, or none |
 //!
-//! Feeds the contacts of both models and the choice of `adaptive`.
+//! Feeds the contacts of the golden model, its estimator `evidence` and the choice of `adaptive`.
 
 use crate::sensor::Sensor;
 
@@ -123,11 +124,24 @@ pub struct Window {
 /// is cut and normalised.
 pub(crate) fn gaussian(count: usize, pitch: f64, sigma: f64) -> Vec<Vec<f64>> {
     let gauss = |distance: usize| (-0.5 * (distance as f64 * pitch / sigma).powi(2)).exp();
+    let by_distance: Vec<f64> = (0..count).map(gauss).collect();
     let own = |at: usize| {
-        let sum: f64 = (0..count).map(|other| gauss(at.abs_diff(other))).sum();
-        (0..count).map(|other| gauss(at.abs_diff(other)) / sum).collect()
+        let sum: f64 = (0..count).map(|other| by_distance[at.abs_diff(other)]).sum();
+        (0..count).map(|other| by_distance[at.abs_diff(other)] / sum).collect()
     };
     (0..count).map(own).collect()
+}
+
+/// The values of a grid after a step along its rows and then one along its columns: `line(axis, at, value)` is the new value
+/// at place `at` of a line with the old ones `value(place)`; axis 0 is along a row.
+pub(crate) fn along_both_axes<T: Copy>(
+    grid: &Sensor,
+    values: &[T],
+    line: impl Fn(usize, usize, &dyn Fn(usize) -> T) -> T,
+) -> Vec<T> {
+    let cols = grid.cols;
+    let along: Vec<T> = (0..values.len()).map(|k| line(0, k % cols, &|col| values[k - k % cols + col])).collect();
+    (0..values.len()).map(|k| line(1, k / cols, &|row| along[row * cols + k % cols])).collect()
 }
 
 impl Window {
@@ -216,17 +230,13 @@ impl Segmenter {
 
     /// The compressive part of p, smoothed along the rows, then along the columns, each rounded half up.
     fn smooth(&self, p: &[i64]) -> Vec<i64> {
-        let (rows, cols) = (self.sensor.rows, self.sensor.cols);
-        let line = |axis: usize, at: usize, count: usize, value: &dyn Fn(usize) -> i64| {
+        let pressing: Vec<i64> = p.iter().map(|p| (*p).max(0)).collect();
+        along_both_axes(&self.sensor, &pressing, |axis, at, value| {
             let Window { reach, weights } = &self.windows[axis];
-            let taps = weights[at].iter().enumerate().filter_map(|(k, weight)| {
-                let other = (at + k).checked_sub(*reach).filter(|other| *other < count)?;
-                Some(weight * value(other))
-            });
-            (taps.sum::<i64>() + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS
-        };
-        let along: Vec<i64> = (0..p.len()).map(|k| line(0, k % cols, cols, &|c| p[k - k % cols + c].max(0))).collect();
-        (0..p.len()).map(|k| line(1, k / cols, rows, &|r| along[r * cols + k % cols])).collect()
+            let taps = weights[at].iter().enumerate().filter(|(_, weight)| **weight > 0);
+            let sum: i64 = taps.map(|(k, weight)| weight * value(at + k - reach)).sum();
+            (sum + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS
+        })
     }
 
     /// The maximum to which each taxel ascends.

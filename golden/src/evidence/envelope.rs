@@ -14,7 +14,7 @@
 //! | out: envelope | cells | N, 0 on cells left out |
 
 use super::cells::Cells;
-use crate::segment::gaussian;
+use crate::segment::{along_both_axes, gaussian};
 use crate::sensor::Sensor;
 
 /// Smoothing of the pressure in units of ℓ.
@@ -60,12 +60,12 @@ pub(super) fn from_stress(cells: &Cells, b: &[f64], used: &[bool], sigma: f64) -
 
 /// The pressure under a Gaussian window of `sigma_mm`.
 fn smoothed(grid: &Sensor, p: &[f64], sigma_mm: f64) -> Vec<f64> {
-    let (rows, cols) = (grid.rows, grid.cols);
-    let [x, y] =
-        [(cols, grid.pitch_x_mm), (rows, grid.pitch_y_mm)].map(|(count, pitch)| gaussian(count, pitch, sigma_mm));
-    let along = |k: usize| (0..cols).map(|col| x[k % cols][col] * p[k - k % cols + col].max(0.0)).sum();
-    let along: Vec<f64> = (0..p.len()).map(along).collect();
-    (0..p.len()).map(|k| (0..rows).map(|row| y[k / cols][row] * along[row * cols + k % cols]).sum()).collect()
+    let weights = [(grid.cols, grid.pitch_x_mm), (grid.rows, grid.pitch_y_mm)]
+        .map(|(count, pitch)| gaussian(count, pitch, sigma_mm));
+    let pressing: Vec<f64> = p.iter().map(|p| p.max(0.0)).collect();
+    along_both_axes(grid, &pressing, |axis, at, value| {
+        weights[axis][at].iter().enumerate().map(|(other, weight)| weight * value(other)).sum()
+    })
 }
 
 /// The envelope of the pressure `p` in N per cell; `sigma` is the noise in units of the stress' peak.

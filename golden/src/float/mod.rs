@@ -8,8 +8,8 @@
 //! | [`search`] | v_ij, objective | μ |
 //! | [`forces`] | p(μ), μ | fx, fy, fz |
 //!
-//! With `partition.case = "contacts"` there are two more: [`segment`](crate::segment) assigns a region to each contact, [`contacts`]
-//! finds the μ of each region.
+//! With `partition.case = "contacts"` there are two more: [`segment`](crate::segment) assigns a region to each contact,
+//! [`contacts`] finds the μ of each region.
 //! With `search.form = "orthogonal"` the forces come from [`orthogonal`], Eq. 1 as printed.
 //!
 //! The hardware's `normalise`, `fold` and `unfold` have no counterpart here: floating point has its own exponents, and

@@ -5,7 +5,7 @@
 //!
 //! | drawn | range |
 //! |---|---|
-//! | contacts | [`Draws`], all shapes in turn; one, or in windows around contacts one to four |
+//! | contacts | [`Draws`], all shapes in turn; one, or in windows around contacts one to four, as many as fit |
 //! | μ | 0 … 0.85 mu_max, any direction |
 //! | load | times 1 … 2, its logarithm evenly |
 //! | share of the others' stress that is left | 1 in half of the frames, −0.1 … 0.1 in the other half |
@@ -87,10 +87,12 @@ impl Frames {
         let kernels = Kernels::new(&window.sensor(&scene.sensor), scene.medium);
         let frame = |number: usize| -> Result<Vec<Item>, GeneratorError> {
             // Where so many do not fit on the array, fewer.
-            let mut fewer = (0..=number % draws.len()).rev().map(|most| draws[most].contacts(number as u64));
-            let contacts = fewer.find(Result::is_ok).unwrap_or_else(|| draws[0].contacts(number as u64))?;
+            let (most, number) = (number % draws.len(), number as u64);
+            let fewer = (0..most).rev();
+            let contacts = fewer
+                .fold(draws[most].contacts(number), |drawn, count| drawn.or_else(|_| draws[count].contacts(number)))?;
             let supports = contacts.iter().map(Support::new).collect::<Result<Vec<_>, _>>()?;
-            let mut random = Random::new((seed ^ (number as u64) << 24).wrapping_mul(SPREAD));
+            let mut random = Random::new((seed ^ number << 24).wrapping_mul(SPREAD));
             let own = (0..supports.len()).map(|own| item(scene, window, &kernels, &supports, own, &mut random));
             progress();
             Ok(own.collect())

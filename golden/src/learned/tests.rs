@@ -120,6 +120,18 @@ fn several_contacts_need_a_window_around_each() {
     assert!(matches!(&error, LearnedError::Mismatch { field: "sensor.rows and cols", .. }), "{error}");
 }
 
+/// On a small array four contacts do not always fit; then fewer are drawn.
+#[test]
+fn as_many_contacts_are_drawn_as_fit() {
+    let mut scene = scene("sensor-1");
+    scene.partition.case = Case::Contacts;
+    let options = DrawOptions { contacts: 4, seed: 1, ..Default::default() };
+    let draws = Draws::new(&scene, options).unwrap();
+    assert!((0..15).any(|frame| draws.contacts(4 * frame + 3).is_err()));
+    let training = Training { contacts: 60, seed: 1, ..small(2) };
+    assert!(Learned::train(&scene, &training, &|_| ()).is_ok());
+}
+
 /// A network for windows serves every place, and every array of that pitch.
 #[test]
 fn a_window_moves_with_its_contact() {
