@@ -75,7 +75,7 @@ def test_every_form_of_a_frame_gives_the_same() -> None:
         whole[5]
 
 
-def test_what_an_engine_does_not_give_is_absent() -> None:
+def test_what_an_engine_does_not_give_is_absent(tmp_path: Path) -> None:
     scene = dermis.Scene.from_name("sensor-1")
     frame = scene.generate([{"shape": "hertz-circle", "size_mm": [4], "normal_N": 5, "tangential_N": [1, -0.5]}], noise=1e-3)
     golden, fixed = scene.reconstruct(frame), scene.reconstruct(frame, "fixed")
@@ -94,10 +94,17 @@ def test_what_an_engine_does_not_give_is_absent() -> None:
     [contact] = regions.reconstruct(frame).contacts
     assert contact.sigma_N is None and contact.mu_covariance is None and contact.force_N[2] > 1
     assert contact.mu_sigma is None and np.allclose(again.mu_sigma**2, np.diag(again.mu_covariance))
-    # One network for the whole array would give all contacts the same mu.
-    network = text + '[partition]\ncase = "contacts"\n[search]\nestimator = "network"\nnetwork = "dermis:sensor-1"\n'
+    # A network has the standard deviation of each region's mu; one for the whole array would give all the same mu.
+    contacts = text + '[partition]\ncase = "contacts"\n'
+    network = contacts + '[search]\nestimator = "network"\nnetwork = "{}"\n'
     with pytest.raises(dermis.InputError, match="window around each contact"):
-        dermis.Scene.from_toml(network).reconstruct(frame)
+        dermis.Scene.from_toml(network.format("dermis:sensor-1")).reconstruct(frame)
+    (tmp_path / "own.toml").write_text(contacts)
+    small = "--steps 600 --contacts 600 --hidden 24,12 --batch 64 --rate 5e-3 --draws 20".split()
+    program("train", str(tmp_path / "own.toml"), *small, "--out", str(tmp_path / "own.network"))
+    result = dermis.Scene.from_toml(network.format(tmp_path / "own.network")).reconstruct(frame)
+    [contact], [region] = result.contacts, result.to_dict()["regions"]
+    assert contact.mu_sigma.tolist() == region["mu_sigma"] and (contact.mu_sigma > 0).all()
     resultants = dermis.Scene.from_toml(text + '[output]\nforces = "resultants"\n').reconstruct(frame)
     assert resultants.forces_N is None and resultants.resultant_N[2] > 1
 
