@@ -5,7 +5,7 @@ use dermis_golden::errors::Errors;
 use serde::Serialize;
 
 use super::csv::quoted;
-use super::table::{markdown, percent};
+use super::table::{escaped, markdown, percent};
 use super::tabulate::ErrorRow;
 use super::Format;
 use crate::compare::{median, quantile};
@@ -193,7 +193,7 @@ fn of_other_medians(medians: &[Medians]) -> String {
 
 /// A Markdown table; | in a header does not end its cell.
 fn table(head: &[&str], body: Vec<Vec<String>>) -> String {
-    let head: Vec<String> = head.iter().map(|name| name.replace('|', "\\|")).collect();
+    let head: Vec<String> = head.iter().map(|name| escaped(name)).collect();
     markdown(&head.iter().map(String::as_str).collect::<Vec<_>>(), body)
 }
 

@@ -2,18 +2,17 @@
 
 use dermis_hdl::describe::BlockText;
 
-use super::table::aligned;
+use super::table::{aligned, escaped};
 
 /// The ports of a block.
 pub fn ports(block: &BlockText) -> String {
     let row = |port: &dermis_hdl::describe::PortText| {
         let direction = if port.output { "out" } else { "in" };
-        let cell = |text: &str| text.replace('|', "\\|");
         vec![
             format!("`{}`", port.name),
             direction.to_owned(),
-            cell(&port.meaning),
-            cell(&port.valid),
+            escaped(&port.meaning),
+            escaped(&port.valid),
             port.bits.to_string(),
         ]
     };

@@ -168,6 +168,11 @@ pub(super) fn significant_digits(value: f64, largest: f64) -> String {
     }
 }
 
+/// A text in which no | ends the cell of a Markdown table.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
 /// A Markdown table with padded columns; the first one is left-aligned, the others right-aligned.
 pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     aligned(1, head, rows)

@@ -47,6 +47,9 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section>
     ];
     let rows =
         all.iter().flat_map(|(points, contacts, frames)| points.iter().map(|point| row(point, *contacts, *frames)));
+    let caption =
+        "All settings; nine of ten below: 90 % quantile of the shear error; the scene's own: the value in its \
+                   file";
     Ok(Section {
         id: "sweeps",
         title: "What each setting costs".into(),
@@ -58,10 +61,7 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section>
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(
-                Table::new("sweeps", "All settings; nine of ten below: 90 % quantile of the shear error; the scene's own: the value in its file", &head, rows.collect())
-                    .collapsed(),
-            ),
+            Item::Table(Table::new("sweeps", caption, &head, rows.collect()).collapsed()),
         ],
     })
 }

@@ -13,7 +13,7 @@ use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
 
 /// Name of the hollow marks in the legend.
-const NOT_SIMULATED: &str = "not co-simulated";
+const NOT_SIMULATED: &str = "hardware, not co-simulated";
 
 /// The section with error against run time.
 ///
