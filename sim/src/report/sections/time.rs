@@ -12,8 +12,8 @@ use super::super::style::SERIES;
 use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
 
-/// Name of the hollow marks in the legend.
-const NOT_SIMULATED: &str = "hardware, not co-simulated";
+/// Name of the hollow marks in the legend, and what the caption says of them.
+const MODELLED: [&str; 2] = ["hardware, modelled", "; hollow marks: not co-simulated"];
 
 /// The section with error against run time.
 ///
@@ -136,7 +136,7 @@ fn picture(
             .filter_map(|point| Some((point.seconds, error(point).filter(|e| *e > 0.0)?, point.case.to_string())));
         let index = engine as usize;
         Series {
-            name: if hollow { NOT_SIMULATED } else { engine.name() }.into(),
+            name: if hollow { MODELLED[0] } else { engine.name() }.into(),
             colour: SERIES[index],
             shape: index,
             hollow,
@@ -165,8 +165,9 @@ fn picture(
             (format!("time-{scene}-several-{what}"), format!("{frames} frames with several contacts"))
         }
     };
+    let hollow = if own.iter().any(|point| point.only_modelled) { MODELLED[1] } else { "" };
     let caption = format!(
-        "{scene}: {what} error, median of {frames}, against time per frame; marks are labelled with their case"
+        "{scene}: {what} error, median of {frames}, against time per frame; marks are labelled with their case{hollow}"
     );
     Ok(Picture { id, caption, svg: scatter(&plot)? })
 }
