@@ -5,7 +5,7 @@ use dermis_golden::errors::Errors;
 use serde::Serialize;
 
 use super::csv::quoted;
-use super::table::{escaped, markdown, percent};
+use super::table::{markdown, percent};
 use super::tabulate::ErrorRow;
 use super::Format;
 use crate::compare::{median, quantile};
@@ -116,7 +116,7 @@ fn to_truth(rows: &[ErrorRow]) -> String {
         cells.extend([fixed.and_then(|e| e.tangential), fixed.and_then(|e| e.normal)].map(percent));
         cells
     });
-    table(&head, body.collect())
+    markdown(&head, body.collect())
 }
 
 /// Errors against case 0, the paper's, differences of the models, and the subarrays: of several only the largest |μ|, as
@@ -150,7 +150,7 @@ fn to_others(rows: &[ErrorRow]) -> String {
         cells.push(format!("{:.3}", sizes.fold(0.0, f64::max)));
         cells
     });
-    table(&head, body.collect())
+    markdown(&head, body.collect())
 }
 
 /// Medians and 90 % quantiles over the frames.
@@ -162,7 +162,7 @@ fn of_medians(medians: &[Medians]) -> String {
         row.extend([m.tangential, m.tangential_ninety, m.normal, m.normal_ninety, m.l2].map(percent));
         row
     });
-    table(&head, body.collect())
+    markdown(&head, body.collect())
 }
 
 /// Medians of frames with several contacts, and against case 0 and the paper.
@@ -188,13 +188,7 @@ fn of_other_medians(medians: &[Medians]) -> String {
         row.extend((0..3).map(|k| percent(m.paper.map(|paper| paper[k]))));
         row
     });
-    table(&head, body.collect())
-}
-
-/// A Markdown table; | in a header does not end its cell.
-fn table(head: &[&str], body: Vec<Vec<String>>) -> String {
-    let head: Vec<String> = head.iter().map(|name| escaped(name)).collect();
-    markdown(&head.iter().map(String::as_str).collect::<Vec<_>>(), body)
+    markdown(&head, body.collect())
 }
 
 fn text(rows: &[ErrorRow]) -> String {

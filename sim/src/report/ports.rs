@@ -2,7 +2,7 @@
 
 use dermis_hdl::describe::BlockText;
 
-use super::table::{aligned, escaped};
+use super::table::aligned;
 
 /// The ports of a block.
 pub fn ports(block: &BlockText) -> String {
@@ -11,8 +11,8 @@ pub fn ports(block: &BlockText) -> String {
         vec![
             format!("`{}`", port.name),
             direction.to_owned(),
-            escaped(&port.meaning),
-            escaped(&port.valid),
+            port.meaning.clone(),
+            port.valid.clone(),
             port.bits.to_string(),
         ]
     };

@@ -168,19 +168,16 @@ pub(super) fn significant_digits(value: f64, largest: f64) -> String {
     }
 }
 
-/// A text in which no | ends the cell of a Markdown table.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('|', "\\|")
-}
-
-/// A Markdown table with padded columns; the first one is left-aligned, the others right-aligned.
+/// A Markdown table with padded columns; the first one is left-aligned, the others right-aligned. A | in a cell is escaped.
 pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     aligned(1, head, rows)
 }
 
 /// The same with the first `texts` columns left-aligned.
 pub(crate) fn aligned(texts: usize, head: &[&str], rows: Vec<Vec<String>>) -> String {
-    let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
+    let escaped = |cell: &str| cell.replace('|', "\\|");
+    let head: Vec<String> = head.iter().map(|head| escaped(head)).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();
     let width = |column: usize| {
         let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());
         cells.max().unwrap_or(0)
@@ -234,5 +231,11 @@ mod tests {
     fn columns_are_padded_by_characters_not_bytes() {
         let table = markdown(&["frame", "µs"], vec![vec!["a".into(), "12.50".into()]]);
         assert_eq!(table, "| frame |    µs |\n|-------|------:|\n| a     | 12.50 |\n");
+    }
+
+    #[test]
+    fn a_bar_does_not_end_a_cell() {
+        let table = markdown(&["frame", "|X1|"], vec![vec!["a|b".into(), "1".into()]]);
+        assert_eq!(table, "| frame | \\|X1\\| |\n|-------|-------:|\n| a\\|b  |      1 |\n");
     }
 }

@@ -12,5 +12,6 @@ pub mod relax;
 pub mod rescale;
 pub mod resultants;
 pub mod search;
+pub mod segment;
 pub mod send;
 pub mod unfold;

@@ -72,14 +72,18 @@ pub fn tables(text: &str) -> Vec<Table> {
     tables
 }
 
-/// The cells of a table's line; a `\|` is part of a cell.
+/// The cells of a table's line; a `\|` is a | in a cell.
 fn cells(line: &str) -> Option<Vec<String>> {
     let inner = line.trim().strip_prefix('|')?.strip_suffix('|')?;
     let mut cells = vec![String::new()];
     let mut escaped = false;
     for character in inner.chars() {
         match (character, cells.last_mut()) {
-            ('|', _) if !escaped => cells.push(String::new()),
+            ('|', Some(cell)) if escaped => {
+                cell.pop();
+                cell.push('|');
+            }
+            ('|', _) => cells.push(String::new()),
             (_, Some(cell)) => cell.push(character),
             _ => {}
         }

@@ -16,6 +16,12 @@ const TOP: i32 = 12;
 const BOTTOM: i32 = 250;
 /// Height of a line of the legend.
 const LINE: i32 = 20;
+/// Middle of the legend's marks from the left edge, distance of the second column's marks from them, distance of a name from
+/// its mark, and half the width of a mark.
+const MARGIN: i32 = 16;
+const COLUMN: i32 = WIDTH as i32 / 2 - 6;
+const NAME: i32 = 12;
+const MARK: i32 = 8;
 /// Length of a dash, and of the gap after it.
 const DASH: i32 = 5;
 
@@ -137,9 +143,8 @@ pub fn scatter(plot: &Scatter) -> Result<String> {
     let x = Axis::new(points().map(|point| point.0).chain(at_x), plot.log[0], LEFT, RIGHT);
     let at_y = plot.guides.iter().filter_map(|guide| if let Guide::Y(y, _) = guide { Some(*y) } else { None });
     let y = Axis::new(points().map(|point| point.1).chain(at_y), plot.log[1], BOTTOM, TOP);
-    let named = plot.guides.iter().filter(|guide| !matches!(guide, Guide::X(..))).count();
-    let entries = plot.series.len() + named;
-    svg(HEIGHT + (LINE as u32) * entries.div_ceil(2) as u32, |area| {
+    let (entries, columns) = legend_size(plot);
+    svg(HEIGHT + (LINE as u32) * entries.div_ceil(columns) as u32, |area| {
         axes(area, plot, &x, &y)?;
         for guide in &plot.guides {
             draw_guide(area, guide, &x, &y)?;
@@ -291,26 +296,39 @@ fn mark(area: &Area, series: &Series, (x, y): (i32, i32)) -> Result<()> {
     Ok(())
 }
 
+/// Guides with a name in the legend, each with its name.
+fn named_guides(plot: &Scatter) -> impl Iterator<Item = (&Guide, &String)> {
+    plot.guides.iter().filter_map(|guide| match guide {
+        Guide::X(..) => None,
+        Guide::Y(_, name) | Guide::Front(_, name) | Guide::Ring(_, name) => Some((guide, name)),
+    })
+}
+
+/// Number of entries of the legend, and of its columns: one where a name is too long for two.
+fn legend_size(plot: &Scatter) -> (usize, usize) {
+    let names = || plot.series.iter().map(|series| &series.name).chain(named_guides(plot).map(|(_, name)| name));
+    let widest = names().map(|name| text_width(name)).max().unwrap_or(0);
+    (names().count(), if NAME + widest > COLUMN - MARK { 1 } else { 2 })
+}
+
 fn legend(area: &Area, plot: &Scatter) -> Result<()> {
+    let (_, columns) = legend_size(plot);
     let place = |index: usize| {
-        let column = (index % 2) as i32 * (WIDTH as i32 / 2 - 6);
-        (16 + column, HEIGHT as i32 + LINE * (index / 2) as i32 + 4)
+        (MARGIN + (index % columns) as i32 * COLUMN, HEIGHT as i32 + LINE * (index / columns) as i32 + 4)
     };
     for (index, series) in plot.series.iter().enumerate() {
         let (x, y) = place(index);
         mark(area, series, (x, y))?;
-        note(area, &series.name, (x + 12, y), HPos::Left, VPos::Center)?;
+        note(area, &series.name, (x + NAME, y), HPos::Left, VPos::Center)?;
     }
-    let named = plot.guides.iter().filter(|guide| !matches!(guide, Guide::X(..)));
-    for (guide, index) in named.zip(plot.series.len()..) {
+    for ((guide, name), index) in named_guides(plot).zip(plot.series.len()..) {
         let (x, y) = place(index);
-        let (Guide::X(_, name) | Guide::Y(_, name) | Guide::Front(_, name) | Guide::Ring(_, name)) = guide;
         match guide {
             Guide::Ring(..) => area.draw(&Circle::new((x, y), 7, INK.stroke_width(2)))?,
-            Guide::Y(..) => dashes(area, [x - 8, x + 8], y)?,
-            _ => line(area, vec![(x - 8, y), (x + 8, y)], &INK, 2)?,
+            Guide::Y(..) => dashes(area, [x - MARK, x + MARK], y)?,
+            _ => line(area, vec![(x - MARK, y), (x + MARK, y)], &INK, 2)?,
         }
-        note(area, name, (x + 12, y), HPos::Left, VPos::Center)?;
+        note(area, name, (x + NAME, y), HPos::Left, VPos::Center)?;
     }
     Ok(())
 }
@@ -385,6 +403,29 @@ mod tests {
         let y = Axis::new([0.01, 0.02, 1.0].into_iter(), true, BOTTOM, TOP).at(1.0);
         let dash = format!("points=\"{LEFT},{y} {},{y} \"", LEFT + DASH);
         assert!(drawn.contains("no shear") && drawn.contains(&dash) && y > TOP, "{dash}: {drawn}");
+    }
+
+    #[test]
+    fn a_long_name_has_a_line_of_the_legend_of_its_own() {
+        let series = |name: &str| Series {
+            name: name.into(),
+            colour: INK,
+            shape: 0,
+            hollow: false,
+            points: vec![(1.0, 1.0, String::new())],
+            joined: false,
+        };
+        let plot = |names: [&str; 3]| Scatter {
+            x: "t".into(),
+            y: "e".into(),
+            log: [false; 2],
+            ticks: [|v| v.to_string(); 2],
+            series: names.into_iter().map(series).collect(),
+            guides: vec![],
+        };
+        let height = |lines: i32| format!("height=\"{}\"", HEIGHT as i32 + lines * LINE);
+        assert!(scatter(&plot(["one", "two", "three"])).unwrap().contains(&height(2)));
+        assert!(scatter(&plot(["one", "two", "hardware, modelled and not simulated"])).unwrap().contains(&height(3)));
     }
 
     #[test]
