@@ -37,6 +37,15 @@ pub const LOUD: f64 = 0.1;
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
 
+/// Ratio to the normal force below which a shear counts as none.
+const NO_SHEAR: f64 = 0.01;
+
+/// Standard deviation `sigma` of the shear, [x, y], over its size. Below 0.01 of `normal` a shear counts as none, and its
+/// standard deviation is taken over that.
+pub(crate) fn relative_spread(shear: [f64; 2], sigma: [f64; 2], normal: f64) -> f64 {
+    sigma[0].hypot(sigma[1]) / shear[0].hypot(shear[1]).max(NO_SHEAR * normal)
+}
+
 /// The largest relative spread of a shear among contacts that count, each with its normal force in N and its spread, where
 /// that is known.
 pub(crate) fn largest_spread(contacts: &[(f64, Option<f64>)]) -> Option<f64> {

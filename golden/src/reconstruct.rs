@@ -15,6 +15,7 @@ mod figures;
 mod found_noise;
 mod output;
 
+pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
 pub use output::Resultant;
@@ -141,6 +142,12 @@ impl Reconstruction {
 }
 
 impl SubarrayResult {
+    /// The array as one subarray that is not searched, whose regions have a μ each; its own is the ratio of the resultants.
+    pub(crate) fn of_regions(part: &Subarray, received: &Received, [x, y, normal]: [f64; 3]) -> Self {
+        let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
+        SubarrayResult::new(part, received, mu, None)
+    }
+
     /// The result of subarray `part`.
     pub(crate) fn new(part: &Subarray, received: &Received, mu: [f64; 2], objective_value: Option<f64>) -> Self {
         SubarrayResult {

@@ -168,7 +168,13 @@ pub struct PartitionSpec {
     pub listed: Option<[bool; 4]>,
     /// The condition under which a subarray is searched.
     pub condition: Condition,
+    /// For [`Case::Contacts`] with a network: how many contacts get a μ, 1 to [`MAX_CONTACTS`]; of more those with the
+    /// largest loads.
+    pub max_contacts: usize,
 }
+
+/// Largest and default number of contacts that get a μ of their own.
+pub const MAX_CONTACTS: usize = 8;
 
 /// Table `[search]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -371,7 +377,7 @@ impl Default for InputSpec {
 impl Default for PartitionSpec {
     fn default() -> Self {
         let condition = Condition::default();
-        PartitionSpec { case: Case::WHOLE, listed: None, condition }
+        PartitionSpec { case: Case::WHOLE, listed: None, condition, max_contacts: MAX_CONTACTS }
     }
 }
 

@@ -93,12 +93,17 @@ impl Segments {
 /// Segments the array into contacts; `p` in N, row-major; `width` of the smoothing in units of h, above 0. Without a
 /// contact the whole array is one.
 pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
+    basins(sensor, p, width).segments
+}
+
+/// The same with what led to it.
+pub fn basins(sensor: &Sensor, p: &[f64], width: f64) -> Basins {
     let peak = p.iter().copied().fold(0.0, f64::max);
     let word = |p: &f64| if *p > 0.0 { (p / peak * 2f64.powi(PEAK_BITS)).round() as i64 } else { 0 };
     let words: Vec<i64> = p.iter().map(word).collect();
     match Segmenter::new(sensor, width).segment(&words) {
-        Basins { segments, .. } if segments.count > 0 => segments,
-        _ => Segments::whole(p.len()),
+        found if found.segments.count > 0 => found,
+        found => Basins { segments: Segments::whole(p.len()), ..found },
     }
 }
 
@@ -185,6 +190,16 @@ pub struct Basins {
     pub segments: Segments,
     /// Whether there were more than [`BASINS`] basins.
     pub overflow: bool,
+}
+
+impl Basins {
+    /// The contacts by their loads, sums of the smoothed forces, the largest first; of equal ones the first comes first.
+    pub fn by_load(&self) -> Vec<usize> {
+        let load = |contact: usize| -> i64 { self.segments.taxels(contact).map(|taxel| self.smoothed[taxel]).sum() };
+        let mut order: Vec<usize> = (0..self.segments.count).collect();
+        order.sort_by_key(|&contact| std::cmp::Reverse(load(contact)));
+        order
+    }
 }
 
 /// Load, largest q and saddles of each basin.

@@ -5,8 +5,8 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::resultants;
 use super::stages::send::{
-    ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT,
-    STATUS_BEATS,
+    labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
+    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;
@@ -15,9 +15,18 @@ use crate::flags::{frame_flags, Flag};
 use crate::float::objective::Estimate;
 use crate::frame::{Forces, Frame};
 use crate::input::Input;
-
+use crate::partition::Subarray;
 use crate::reception::{noise_floor_codes, receive, Received};
-use crate::reconstruct::{assemble, CaseChoice, Reconstruction, Resultant, SubarrayResult};
+use crate::reconstruct::{assemble, shear_spread_of, CaseChoice, Reconstruction, Region, Resultant, SubarrayResult};
+
+/// What a status says of μ.
+struct Told {
+    condition: bool,
+    found: bool,
+    mu: [f64; 2],
+    /// What the network said, where there is one.
+    estimate: Option<Estimate>,
+}
 
 impl Model {
     /// Reconstructs one frame; for scenes with `input.average = 0`, or the first frame of a sliding mean.
@@ -56,11 +65,15 @@ impl Model {
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
         }
-        let expected = case.status_beats();
+        let expected = if self.by_contact.is_some() { self.status_beats() } else { case.status_beats() };
         if status.len() != expected {
             return Err(FixedError::Beats { what: "status", got: status.len(), expected });
         }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
+        let (beats, labels) = match self.by_contact {
+            Some(_) => beats.split_at(self.scene.sensor.taxels()),
+            None => (beats, &[][..]),
+        };
         let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
         let forces = match self.sends_resultants() {
             false => Forces { fx: axis(0), fy: axis(1), fz: axis(2) },
@@ -73,30 +86,46 @@ impl Model {
         if !resultant_N.iter().all(|sum| sum.is_finite()) {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
-        let step = self.scene.search.mu_max / MU_STEPS as f64;
         let sensor = &self.scene.sensor;
         let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_of_mean_MPa(readings.len()));
         let mut subarrays = Vec::with_capacity(case.parts.len());
         let mut shear_spread = None;
-        for (part, beats) in case.parts.iter().zip(status.chunks(STATUS_BEATS)) {
-            let Some(status) = Status::of_beats(beats) else { continue };
-            let own = part.gather(sensor, &codes.codes);
-            let floor = noise_floor_codes(&self.scene, &codes);
-            let received = receive(sensor, part, &own, floor, self.scene.partition.condition);
-            let met = status.flags & FLAG_CONDITION != 0;
-            let found = status.flags & FLAG_FOUND != 0;
-            if met && self.searches() && !found {
-                flags.push(Flag::NoCompression);
-            }
+        let all: Vec<Status> = status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
+        for status in &all {
             if status.rescale_saturations + status.force_saturations > 0 {
                 flags.push(Flag::Saturated);
             }
             if status.flags & FLAG_COEFFICIENTS != 0 {
                 flags.push(Flag::CoefficientsDamaged);
             }
-            let received = Received { condition_met: met, ..received };
-            let mu = status.position.map(|x| f64::from(x) * step);
-            let estimate = (found && self.has_network()).then(|| self.estimate(&status, mu));
+            if status.flags & FLAG_MORE_CONTACTS != 0 {
+                flags.push(Flag::TooManyContacts);
+            }
+        }
+        let floor = noise_floor_codes(&self.scene, &codes);
+        let received = |part: &Subarray| {
+            receive(sensor, part, &part.gather(sensor, &codes.codes), floor, self.scene.partition.condition)
+        };
+        let mut regions = None;
+        if self.by_contact.is_some() {
+            let labels = labels_of_beats(labels, sensor.taxels());
+            let own: Vec<Region> = all
+                .iter()
+                .enumerate()
+                .filter_map(|(slot, status)| self.region(&labels, slot, status, &forces))
+                .collect();
+            shear_spread = shear_spread_of(&own);
+            subarrays
+                .extend(case.parts.iter().map(|part| SubarrayResult::of_regions(part, &received(part), resultant_N)));
+            regions = Some(own);
+        }
+        let of_subarrays = if regions.is_some() { &[][..] } else { &all };
+        for (part, status) in case.parts.iter().zip(of_subarrays) {
+            let Told { condition, found, mu, estimate } = self.told(status);
+            if condition && self.searches() && !found {
+                flags.push(Flag::NoCompression);
+            }
+            let received = Received { condition_met: condition, ..received(part) };
             shear_spread = shear_spread.or(estimate.and_then(|estimate| estimate.shear_spread()));
             let score = match estimate {
                 Some(estimate) => Some(estimate.found.objective),
@@ -106,6 +135,7 @@ impl Model {
             subarrays.push(SubarrayResult { mu_sigma, ..SubarrayResult::new(part, &received, mu, score) });
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
+        result.extra.regions = regions;
         if self.sends_resultants() {
             // Without forces per taxel only the device knows whether there is a contact.
             let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
@@ -128,11 +158,28 @@ impl Model {
         Ok(result)
     }
 
-    /// What the network said of μ, from a status with this `mu`.
-    fn estimate(&self, status: &Status, mu: [f64; 2]) -> Estimate {
+    /// What a status says of μ.
+    fn told(&self, status: &Status) -> Told {
+        let [condition, found] = [FLAG_CONDITION, FLAG_FOUND].map(|flag| status.flags & flag != 0);
         let unit = 1.0 / MU_STEPS as f64;
+        let mu = status.position.map(|x| f64::from(x) * unit * self.scene.search.mu_max);
         let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
-        Estimate::told(mu, sigma, status.position)
+        let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position));
+        Told { condition, found, mu, estimate }
+    }
+
+    /// The contact with the status in this slot, if there is one; `labels` are those of the taxels.
+    fn region(&self, labels: &[usize], slot: usize, status: &Status, forces: &Forces) -> Option<Region> {
+        let taxels: Vec<usize> = (0..labels.len()).filter(|&taxel| labels[taxel] == slot + 1).collect();
+        let Told { condition, mu, estimate, .. } = self.told(status);
+        let own = Region {
+            centroid_condition: condition,
+            mu,
+            mu_sigma: estimate.and_then(|estimate| estimate.sigma),
+            objective_value: estimate.map(|estimate| estimate.found.objective),
+            ..Region::of_taxels(&self.scene.sensor, forces, taxels)
+        };
+        (!own.taxels.is_empty()).then_some(own)
     }
 
     /// The case that a frame's status names; of a scene with one case, that case.

@@ -24,12 +24,14 @@ pub mod plan;
 pub mod stages;
 pub mod words;
 
+mod contacts;
 mod decode;
 mod error;
 mod model;
 mod run;
 mod subarray;
 
+pub use contacts::{Contact, Contacts};
 pub use error::{FitSuggestion, FixedError, Shortage};
 pub use model::Model;
 pub use plan::contents::{CasePlan, Dropped, Plan};

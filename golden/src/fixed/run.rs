@@ -4,6 +4,7 @@
 //! prepare ── receive ── choose ── each subarray of the chosen case ── force ── send
 //! ```
 
+use super::contacts::Contacts;
 use super::model::Model;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
@@ -12,8 +13,11 @@ use super::stages::prepare::Prepared;
 use super::stages::receive::mask;
 use super::stages::resultants::{self, sums};
 use super::stages::search::Best;
-use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT};
-use super::subarray::SubarrayTrace;
+use super::stages::send::{
+    labels_to_beats, ln_sigma_word, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS,
+    FLAG_NO_CONTACT, FRAMES_SHIFT,
+};
+use super::subarray::{Streams, SubarrayTrace};
 use crate::board::EngineKind;
 use crate::partition::Subarray;
 
@@ -72,27 +76,48 @@ impl Model {
         let contact = forces.iter().any(|f| f.words[2] != 0);
         let force_saturations = forces.iter().map(|f| f.saturations).sum();
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
-        let status = solved.iter().flat_map(|s| {
-            let status = Status {
-                position: s.found.position,
-                flags: flag(s.condition, FLAG_CONDITION)
-                    | flag(s.found.score.is_some(), FLAG_FOUND)
-                    | flag(!contact, FLAG_NO_CONTACT)
-                    | number << CASE_SHIFT
-                    | frames << FRAMES_SHIFT,
-                score: s.found.score.unwrap_or(0) as i32,
-                rescale: s.rescale,
-                normalise: s.normalise,
-                rescale_saturations: s.saturations,
-                force_saturations,
-                cycles: sending.counted as u32,
-            };
-            status.beats()
-        });
-        let status = status.collect();
+        let common = |s: &SubarrayTrace| Status {
+            flags: flag(!contact, FLAG_NO_CONTACT) | number << CASE_SHIFT | frames << FRAMES_SHIFT,
+            rescale: s.rescale,
+            normalise: s.normalise,
+            rescale_saturations: s.saturations,
+            force_saturations,
+            cycles: sending.counted as u32,
+            ..Status::default()
+        };
+        let of = |s: &SubarrayTrace, position: [i32; 2], condition: bool, score: Option<i32>| Status {
+            position,
+            flags: common(s).flags | flag(condition, FLAG_CONDITION) | flag(score.is_some(), FLAG_FOUND),
+            score: score.unwrap_or(0),
+            ..common(s)
+        };
+        let of_contact = |s: &SubarrayTrace, contacts: &Contacts, slot: usize| {
+            let own = contacts.all.get(slot).map_or_else(
+                || common(s),
+                |contact| {
+                    let score = contact.condition.then(|| ln_sigma_word(contact.ln_sigma));
+                    of(s, contact.position, contact.condition, score)
+                },
+            );
+            Status { flags: own.flags | flag(contacts.overflow, FLAG_MORE_CONTACTS), ..own }
+        };
+        let all_of = |s: &SubarrayTrace| -> Vec<Status> {
+            match &s.contacts {
+                Some(contacts) => {
+                    (0..self.scene.partition.max_contacts).map(|slot| of_contact(s, contacts, slot)).collect()
+                }
+                None => vec![of(s, s.found.position, s.condition, s.found.score.map(|score| score as i32))],
+            }
+        };
+        let status = solved.iter().flat_map(all_of).flat_map(|status| status.beats()).collect();
+        let labels = solved.iter().filter_map(|s| s.contacts.as_ref()).flat_map(|c| labels_to_beats(&c.labels));
         let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
             name,
             words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
+        };
+        let later = |name, stream: fn(&Streams) -> &[[i64; 4]]| Stage {
+            name,
+            words: solved.iter().flat_map(|s| stream(&s.streams)).map(|quad| quad.to_vec()).collect(),
         };
         let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
         let candidate =
@@ -102,11 +127,14 @@ impl Model {
             Stage { name: "choose", words: vec![vec![chosen as i64]] },
             quads("normalise", |s| &s.normalised),
             quads("fold", |s| &s.folded),
-            quads("pass", |s| &s.passed),
-            quads("estimate", |s| &s.estimated),
-            quads("rescale", |s| &s.rescaled),
-            quads("relax", |s| &s.relaxed),
-            quads("unfold", |s| &s.unfolded),
+            later("pass", |s| &s.passed),
+            later("segment", |s| &s.segmented),
+            later("window", |s| &s.windows),
+            later("estimate", |s| &s.estimated),
+            later("shear", |s| &s.sheared),
+            later("rescale", |s| &s.rescaled),
+            later("relax", |s| &s.relaxed),
+            later("unfold", |s| &s.unfolded),
             Stage { name: "search", words: sweeps.map(candidate).collect() },
             quads("forces", |s| &s.found.values),
         ];
@@ -115,11 +143,13 @@ impl Model {
         stages.retain(|stage| match stage.name {
             "choose" => self.chooses(),
             "estimate" | "relax" => self.has_network(),
+            "segment" | "window" | "shear" => self.by_contact.is_some(),
+            "search" => self.by_contact.is_none(),
             _ => true,
         });
         Trace {
             beats: match self.sends_resultants() {
-                false => forces.iter().map(|f| f.words).collect(),
+                false => forces.iter().map(|f| f.words).chain(labels).collect(),
                 true => case.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
             },
             status,

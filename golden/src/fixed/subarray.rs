@@ -1,5 +1,12 @@
 //! One subarray: the stages from frame buffer to force memory.
+//!
+//! ```text
+//! receive ── normalise ── fold ── v_00 ─┬─ v_ij of the polynomial ── search
+//!                                       ├─ network: one μ ── steps of relax
+//!                                       └─ contacts: a μ for each ── steps of relax
+//! ```
 
+use super::contacts::Contacts;
 use super::plan::contents::{CasePlan, Plan};
 use super::stages::estimate::{estimate, images, Estimate};
 use super::stages::pass::{join_limbs, pass, swap, Operands};
@@ -9,12 +16,13 @@ use super::stages::{fold, forces, normalise, receive, relax, rescale, unfold};
 use super::words::formats::{force_shift, Formats};
 use super::words::network::WordNetwork;
 use super::words::quantised::Quantised;
-use super::words::schedule::{by_limbs, is_transposed, layer, schedule, EXPONENTS};
+use super::words::schedule::{by_limbs, is_transposed, layer, schedule, Product, EXPONENTS};
 use crate::board::EngineKind;
+use crate::segment::NONE;
 use crate::symmetry::quads::Quads;
 
 /// The quads that a stage passes on.
-type QuadStream = Vec<[i64; 4]>;
+pub type QuadStream = Vec<[i64; 4]>;
 
 /// The result for a subarray and the words that each stage passed on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,25 +33,66 @@ pub struct SubarrayTrace {
     pub normalise: u32,
     /// Right shift of `rescale`.
     pub rescale: u32,
-    /// Number of words that `rescale` saturated, with a network also `estimate` and `relax`.
+    /// Number of words that `rescale` saturated, with a network also `estimate`, `shear` and `relax`.
     pub saturations: u32,
     /// Result of the search, with p(μ*).
     pub found: SearchResult,
+    /// The contacts, where each has a μ of its own.
+    pub contacts: Option<Contacts>,
     /// Output of `normalise`.
     pub normalised: QuadStream,
     /// Output of `fold`.
     pub folded: QuadStream,
+    /// What each of the stages after them passed on.
+    pub streams: Streams,
+}
+
+/// What the stages from `pass` on passed on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Streams {
     /// Output of `pass`: one quad per row and accumulation.
     pub passed: QuadStream,
-    /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros; empty without a
-    /// network.
+    /// Output of `segment`: the contact of each lane of each quad; empty but for contacts.
+    pub segmented: QuadStream,
+    /// Output of `window`: for each contact the quads of its operand, then those of its mask; empty but for contacts.
+    pub windows: QuadStream,
+    /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros, for each contact
+    /// where there are several μ; empty without a network.
     pub estimated: QuadStream,
+    /// Output of `shear`: for each step and quad the operand for Ax and that for Ay; empty but for contacts.
+    pub sheared: QuadStream,
     /// Output of `rescale`.
     pub rescaled: QuadStream,
     /// Output of `relax`: p after each step; empty without a network.
     pub relaxed: QuadStream,
     /// Output of `unfold`.
     pub unfolded: QuadStream,
+}
+
+/// The passes of a subarray: their operands, and what the stages passed on so far.
+pub struct Passes<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// Widths and scales.
+    pub formats: &'a Formats,
+    /// The matrices.
+    pub quantised: &'a Quantised,
+    /// Layout of the subarray.
+    pub layout: Quads,
+    /// What the products read.
+    pub operands: Operands,
+    /// Right shift of `rescale`, known from v_00 on.
+    pub shift: u32,
+    /// Saturated words so far.
+    pub saturations: u32,
+    /// What the stages passed on.
+    pub streams: Streams,
+}
+
+/// What comes after v_00.
+struct Outcome {
+    found: SearchResult,
+    contacts: Option<Contacts>,
 }
 
 impl SubarrayTrace {
@@ -57,48 +106,145 @@ impl SubarrayTrace {
         let left = normalise::shift(received.magnitude, formats.input_bits);
         let normalised = normalise::normalise(&layout.pack(&samples), left);
         let folded = fold::fold(&normalised);
+        let operands = Operands::of_input(&folded, formats);
+        let mut passes = Passes {
+            plan,
+            formats,
+            quantised,
+            layout,
+            operands,
+            shift: 0,
+            saturations: 0,
+            streams: Streams::default(),
+        };
+        let Outcome { found, contacts } = match (&quantised.network, &plan.by_contact) {
+            (None, _) => passes.search(condition && plan.searches()),
+            (Some(network), None) => passes.by_network(network, condition),
+            (Some(network), Some(plan)) => {
+                let (contacts, values) = passes.by_contact(network, plan, codes);
+                let found = SearchResult { values, ..SearchResult::default() };
+                Outcome { found, contacts: Some(contacts) }
+            }
+        };
+        let Passes { shift, saturations, streams, .. } = passes;
+        SubarrayTrace {
+            condition,
+            normalise: left,
+            rescale: shift,
+            saturations,
+            found,
+            contacts,
+            normalised,
+            folded,
+            streams,
+        }
+    }
 
-        let mut operands = Operands::of_input(&folded, formats);
-        let (mut passed, mut rescaled, mut unfolded) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut estimated, mut relaxed) = (Vec::new(), Vec::new());
-        let (mut right, mut saturations) = (0, 0);
-        let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
-        let mut told = Estimate::default();
-        let (mut first, mut values) = (Vec::new(), Vec::new());
-        for (k, products) in schedule(formats).iter().enumerate() {
-            let limbs: Vec<QuadStream> =
-                by_limbs(products).iter().map(|part| pass(formats, quantised, layout, part, &operands)).collect();
-            let accumulators = join_limbs(formats, &limbs);
-            if k == 0 {
-                right = rescale::shift(formats, rescale::raw_length(&accumulators));
-            }
-            let shift = if k == 0 { right } else { formats.a_shift };
-            let (words, clipped) = rescale::rescale(formats, &accumulators, shift);
-            saturations += clipped;
-            match plan.board.engine {
-                EngineKind::Parallel => passed.extend(limbs.concat()),
-                EngineKind::Serial => passed.extend(accumulators),
-            }
-            rescaled.extend(&words);
-            if let Some(network) = &quantised.network {
-                let previous = if k == 0 { vec![[0; 4]; formats.quads] } else { first.clone() };
-                let (sums, next, clipped) = relax::relax(formats, &previous, &words);
-                saturations += clipped;
-                operands.vectors.push(next);
-                relaxed.extend(&sums);
-                values = unfold::unfold(&sums, 0);
-                unfolded.extend(&values);
-                if k == 0 {
-                    first = sums;
-                    told = ask(formats, network, layout, quantised, &mut operands, &mut estimated);
-                    saturations += told.saturations;
-                    told.position = if condition { told.position } else { [0; 2] };
-                    operands.position = told.position.map(i64::from);
-                    estimated.push([operands.position[0], operands.position[1], 0, 0]);
-                }
-                continue;
-            }
-            operands.vectors.push(rescale::operand(formats, &words));
+    /// Forces of the subarray's taxels, row-major in it; `threshold` is in force LSBs.
+    pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<forces::Force> {
+        let formats = &case.formats;
+        let word = |position: [i32; 2]| position.map(|x| forces::mu_word(formats, x));
+        let mu = |taxel: usize| match &self.contacts {
+            None => word(self.found.position),
+            Some(contacts) => match contacts.labels[taxel] {
+                NONE => [0; 2],
+                label => word(contacts.all[label - 1].position),
+            },
+        };
+        let shift = force_shift(formats, self.normalise, self.rescale);
+        let values = case.layout().unpack(&self.found.values);
+        let force = |(taxel, value)| forces::force(formats, value, mu(taxel), shift, threshold);
+        values.into_iter().enumerate().map(force).collect()
+    }
+}
+
+impl Passes<'_> {
+    /// The products of vector number `k`, rescaled.
+    pub fn vector(&mut self, k: usize, products: &[Product]) -> QuadStream {
+        let of = |part: &Vec<Product>| pass(self.formats, self.quantised, self.layout, part, &self.operands);
+        let limbs: Vec<QuadStream> = by_limbs(products).iter().map(of).collect();
+        let accumulators = join_limbs(self.formats, &limbs);
+        if k == 0 {
+            self.shift = rescale::shift(self.formats, rescale::raw_length(&accumulators));
+        }
+        let shift = if k == 0 { self.shift } else { self.formats.a_shift };
+        let (words, clipped) = rescale::rescale(self.formats, &accumulators, shift);
+        self.saturations += clipped;
+        match self.plan.board.engine {
+            EngineKind::Parallel => self.streams.passed.extend(limbs.concat()),
+            EngineKind::Serial => self.streams.passed.extend(accumulators),
+        }
+        self.streams.rescaled.extend(&words);
+        words
+    }
+
+    /// v_00 plus these products of a step of `relax`: the sums and their operands.
+    pub fn relax(&mut self, first: &[[i64; 4]], words: &[[i64; 4]]) -> (QuadStream, QuadStream) {
+        let (sums, operands, clipped) = relax::relax(self.formats, first, words);
+        self.saturations += clipped;
+        self.streams.relaxed.extend(&sums);
+        self.streams.unfolded.extend(unfold::unfold(&sums, 0));
+        (sums, operands)
+    }
+
+    /// v_00 where a network gives μ, and its operands.
+    pub fn first(&mut self, products: &[Product]) -> (QuadStream, QuadStream) {
+        let words = self.vector(0, products);
+        self.relax(&vec![[0; 4]; self.formats.quads], &words)
+    }
+
+    /// What the layers of the network say; the images of each become operands. Those of whole groups of rows are passed on,
+    /// zeros beyond the last.
+    pub fn ask(&mut self, network: &WordNetwork) -> Estimate {
+        let (formats, last) = (self.formats, self.formats.layers.len() - 1);
+        self.operands.layers.clear();
+        for (index, rows) in formats.hidden_rows().enumerate() {
+            let products = layer(formats, index);
+            let accumulators = pass(formats, self.quantised, self.layout, &products, &self.operands);
+            let (next, clipped) = images(formats, network.shift, &accumulators);
+            self.saturations += clipped;
+            self.streams.estimated.extend(&next);
+            self.streams.estimated.extend(vec![[0; 4]; rows - next.len()]);
+            self.operands.layers.push(next);
+        }
+        let rows = pass(formats, self.quantised, self.layout, &layer(formats, last), &self.operands);
+        let told = estimate(network.shift, &rows);
+        self.saturations += told.saturations;
+        told
+    }
+
+    /// Passes on a position of μ.
+    pub fn tell(&mut self, position: [i32; 2]) {
+        let [x, y] = position.map(i64::from);
+        self.streams.estimated.push([x, y, 0, 0]);
+    }
+
+    /// One μ for the subarray by the network.
+    fn by_network(&mut self, network: &WordNetwork, condition: bool) -> Outcome {
+        let steps = schedule(self.formats);
+        let (first, mut operands) = self.first(&steps[0]);
+        let mut values = unfold::unfold(&first, 0);
+        let told = self.ask(network);
+        let position = if condition { told.position } else { [0; 2] };
+        self.operands.position = position.map(i64::from);
+        self.tell(position);
+        for (k, products) in steps.iter().enumerate().skip(1) {
+            self.operands.vectors.push(operands);
+            let words = self.vector(k, products);
+            let (sums, next) = self.relax(&first, &words);
+            (values, operands) = (unfold::unfold(&sums, 0), next);
+        }
+        let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
+        Outcome { found: SearchResult { sweeps: Vec::new(), position, score, values }, contacts: None }
+    }
+
+    /// The polynomial p(μ), and the search, if the subarray is `searched`.
+    fn search(&mut self, searched: bool) -> Outcome {
+        let layout = self.layout;
+        let mut polynomials = vec![[[0i64; 10]; 4]; self.formats.quads];
+        for (k, products) in schedule(self.formats).iter().enumerate() {
+            let words = self.vector(k, products);
+            self.operands.vectors.push(rescale::operand(self.formats, &words));
             // A transposed result is transposed back on its way to the search memory.
             let transposed = is_transposed(products);
             let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
@@ -111,61 +257,8 @@ impl SubarrayTrace {
                     w[k] = value;
                 }
             }
-            unfolded.extend(taxels);
+            self.streams.unfolded.extend(taxels);
         }
-        let found = match plan.has_network() {
-            true => {
-                let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
-                SearchResult { sweeps: Vec::new(), position: told.position, score, values }
-            }
-            false => search(layout, Block::new(layout, polynomials), condition && plan.searches()),
-        };
-        SubarrayTrace {
-            condition,
-            normalise: left,
-            rescale: right,
-            saturations,
-            found,
-            normalised,
-            folded,
-            passed,
-            estimated,
-            rescaled,
-            relaxed,
-            unfolded,
-        }
+        Outcome { found: search(layout, Block::new(layout, polynomials), searched), contacts: None }
     }
-
-    /// Forces of the subarray's taxels, row-major in it; `threshold` is in force LSBs.
-    pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<forces::Force> {
-        let formats = &case.formats;
-        let mu = self.found.position.map(|x| forces::mu_word(formats, x));
-        let shift = force_shift(formats, self.normalise, self.rescale);
-        let values = case.layout().unpack(&self.found.values);
-        values.into_iter().map(|value| forces::force(formats, value, mu, shift, threshold)).collect()
-    }
-}
-
-/// μ by the network; the images of its layers become operands. Those of whole groups of rows are passed on, zeros beyond the
-/// last.
-fn ask(
-    formats: &Formats,
-    network: &WordNetwork,
-    layout: Quads,
-    quantised: &Quantised,
-    operands: &mut Operands,
-    estimated: &mut QuadStream,
-) -> Estimate {
-    let mut saturations = 0;
-    for (index, rows) in formats.hidden_rows().enumerate() {
-        let accumulators = pass(formats, quantised, layout, &layer(index), operands);
-        let (next, clipped) = images(formats, network.shift, &accumulators);
-        saturations += clipped;
-        estimated.extend(&next);
-        estimated.extend(vec![[0; 4]; rows - next.len()]);
-        operands.layers.push(next);
-    }
-    let rows = pass(formats, quantised, layout, &layer(formats.layers.len() - 1), operands);
-    let told = estimate(network.shift, &rows);
-    Estimate { saturations: saturations + told.saturations, ..told }
 }

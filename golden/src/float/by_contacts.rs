@@ -15,13 +15,13 @@ use super::contacts::{Contacts, MeasuredStress, Solver};
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use super::objective::Objective;
-use super::objective::{relative_spread, Sparse};
+use super::objective::Sparse;
 use super::pass::Polynomial;
 use super::search::search;
-use crate::checks::largest_spread;
+use crate::flags::Flag;
 use crate::frame::{Forces, Frame};
 use crate::learned::Learned;
-use crate::reconstruct::{Reconstruction, Region, Resultant};
+use crate::reconstruct::{shear_spread_of, Reconstruction, Region};
 use crate::scene::Condition;
 use crate::segment::Segments;
 use crate::sensor::Sensor;
@@ -47,7 +47,8 @@ impl Golden {
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
         let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
-        solver.by_network(network, input.stress_MPa, &scene.input.alive(&scene.sensor))
+        let alive = scene.input.alive(&scene.sensor);
+        solver.by_network(network, input.stress_MPa, &alive, scene.partition.max_contacts)
     }
 
     /// Whether the taxels of a region meet the scene's condition.
@@ -65,8 +66,10 @@ impl Golden {
         let scene = &self.scene;
         let (mut outcome, contacts, sigma) = match &self.network {
             Some(network) => {
-                let Told { contacts, sigma } = self.ask_contacts(network, input);
-                (CaseOutcome::default(), contacts, Some(sigma))
+                let Told { contacts, sigma, too_many } = self.ask_contacts(network, input);
+                let mut outcome = CaseOutcome::default();
+                outcome.flags.extend(too_many.then_some(Flag::TooManyContacts));
+                (outcome, contacts, Some(sigma))
             }
             None => {
                 let outcome = self.subarrays(input, self.whole());
@@ -86,10 +89,7 @@ impl Golden {
         if let Some(sigma) = sigma {
             outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
             own.iter_mut().zip(sigma).for_each(|(region, sigma)| region.mu_sigma = sigma);
-            let spread = |region: &Region| {
-                (region.load_N[2], region.mu_sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0)))
-            };
-            outcome.shear_spread = largest_spread(&own.iter().map(spread).collect::<Vec<_>>());
+            outcome.shear_spread = shear_spread_of(&own);
         }
         let mut result = self.finish(frame, outcome);
         result.extra.regions = Some(own);
@@ -102,18 +102,11 @@ impl Golden {
 /// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
 /// condition.
 fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
-    let region = |k: usize| {
-        let taxels: Vec<usize> = contacts.segments.taxels(k).collect();
-        let Resultant { force_N: load_N, centre_mm } = Resultant::of(sensor, forces, taxels.iter().copied());
-        Region {
-            centroid_condition: met[k],
-            mu: contacts.mu(k),
-            mu_sigma: None,
-            objective_value: contacts.found[k].map(|found| found.objective),
-            centre_mm,
-            load_N,
-            taxels,
-        }
+    let region = |k: usize| Region {
+        centroid_condition: met[k],
+        mu: contacts.mu(k),
+        objective_value: contacts.found[k].map(|found| found.objective),
+        ..Region::of_taxels(sensor, forces, contacts.segments.taxels(k).collect())
     };
     (0..contacts.segments.count).map(region).collect()
 }

@@ -5,8 +5,7 @@
 
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
-use super::objective::relative_spread;
-use crate::checks::largest_spread;
+use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::{ContactEstimate, Evidence};
 use crate::frame::Frame;
 use crate::partition::Subarray;
@@ -27,11 +26,10 @@ impl Golden {
     }
 
     /// The array as one subarray that is not searched; its μ is the ratio of the resultants.
-    pub(super) fn array_of(&self, input: &EngineInput, [x, y, normal]: [f64; 3]) -> SubarrayResult {
+    pub(super) fn array_of(&self, input: &EngineInput, resultant_N: [f64; 3]) -> SubarrayResult {
         let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
         let part = Subarray { row0: 0, col0: 0, rows, cols };
-        let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
-        SubarrayResult::new(&part, &self.receive(input, &part), mu, None)
+        SubarrayResult::of_regions(&part, &self.receive(input, &part), resultant_N)
     }
 }
 

@@ -31,7 +31,6 @@ pub(crate) mod taxels;
 
 pub use auto::Auto;
 pub use compressive::Compressive;
-pub(crate) use estimate::relative_spread;
 pub use estimate::{Estimate, Objective, SearchInput};
 pub(crate) use fit::misfit_limit;
 pub use patch::Patch;

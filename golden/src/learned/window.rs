@@ -63,7 +63,7 @@ impl Window {
     }
 
     /// Its quads of mirror images.
-    pub(super) fn quads(&self) -> Quads {
+    pub(crate) fn quads(&self) -> Quads {
         Quads { rows: self.rows, cols: self.cols }
     }
 

@@ -12,7 +12,10 @@
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::Resultant;
+use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::ContactEstimate;
+use crate::frame::Forces;
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// Optional fields of a result.
@@ -80,6 +83,29 @@ pub struct RejectedCase {
     pub case: String,
     /// Why it was rejected.
     pub reason: String,
+}
+
+impl Region {
+    /// A region with these taxels, ascending, and their `forces`; nothing is known of its μ.
+    pub(crate) fn of_taxels(sensor: &Sensor, forces: &Forces, taxels: Vec<usize>) -> Region {
+        let Resultant { force_N: load_N, centre_mm } = Resultant::of(sensor, forces, taxels.iter().copied());
+        Region {
+            centroid_condition: false,
+            mu: [0.0; 2],
+            mu_sigma: None,
+            objective_value: None,
+            centre_mm,
+            load_N,
+            taxels,
+        }
+    }
+}
+
+/// Standard deviation of the shear over its size, the largest of all regions with a share of the load, from that of μ.
+pub(crate) fn shear_spread_of(regions: &[Region]) -> Option<f64> {
+    let spread =
+        |region: &Region| (region.load_N[2], region.mu_sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0)));
+    largest_spread(&regions.iter().map(spread).collect::<Vec<_>>())
 }
 
 /// One contact and its region.

@@ -4,7 +4,7 @@ use super::reader::Reader;
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
     InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec,
-    ThresholdSpec, PLAUSIBLE_MPA,
+    ThresholdSpec, MAX_CONTACTS, PLAUSIBLE_MPA,
 };
 use crate::board::{Board, SEARCH_WIDTHS};
 use crate::link::LinkKind;
@@ -20,7 +20,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
-    ("partition", &["case", "cases", "condition", "rows", "cols"]),
+    ("partition", &["case", "cases", "condition", "rows", "cols", "max_contacts"]),
     ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree", "network"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
@@ -168,10 +168,16 @@ fn medium(reader: &Reader) -> Result<Medium, SceneError> {
 fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneError> {
     let names = [("loaded", Condition::Loaded), ("both-signs", Condition::BothSigns)];
     let condition = reader.choice("partition.condition", &names)?;
+    let max_contacts = match reader.value("partition.max_contacts") {
+        Some(value) if reader.value("partition.case").and_then(Value::as_str) != Some("contacts") => {
+            return Err(reader.wrong("partition.max_contacts", value, "left out beside any case but \"contacts\""));
+        }
+        _ => reader.integer("partition.max_contacts", 1..=MAX_CONTACTS as i64, Some(MAX_CONTACTS as i64))? as usize,
+    };
     let own = ["partition.rows", "partition.cols"].map(|path| reader.value(path));
     if let Some(value) = reader.value("partition.cases") {
         let listed = Some(listed_cases(reader, value, sensor)?);
-        return Ok(PartitionSpec { case: Case::Adaptive, listed, condition });
+        return Ok(PartitionSpec { case: Case::Adaptive, listed, condition, max_contacts });
     }
     let (field, case) = match (reader.value("partition.case"), own) {
         (None, [None, None]) => return Ok(PartitionSpec { condition, ..Default::default() }),
@@ -192,7 +198,7 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
             reader.wrong(field, value, format!("a partition of {sensor} ({error})"))
         })?;
     }
-    Ok(PartitionSpec { case, listed: None, condition })
+    Ok(PartitionSpec { case, listed: None, condition, max_contacts })
 }
 
 /// The cases 0 to 3 that `partition.cases` lists.

@@ -3,8 +3,9 @@
 //! | field | golden model | hardware, bit-true model |
 //! |---|---|---|
 //! | `medium.kind` | all | "half-space" |
-//! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more cases, if they fit the device |
-//! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
+//! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more cases, if they fit the device; "contacts" with `search.estimator` "learned", in the bit-true model only |
+//! | `partition.condition` | all | with "contacts" "loaded" |
+//! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels", with "contacts" "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.degree` | all | 1 … 3 |
 //! | `search.estimator` | all; "evidence" and "learned" as below | "search", which they take for the others as well, and "learned" as "network" |
@@ -14,8 +15,8 @@
 //!
 //! The estimators "evidence" and "learned" take no objective but the default, no "orthogonal" form, mu_max above 0,
 //! partition 0 or "contacts", since they find the contacts themselves, and a pitch of up to 3 thicknesses, on a bonded
-//! layer 1.5. "network", and "learned" in hardware, takes case 0 of up to 144 taxels, mu_max above 0, no "search_width", not the
-//! serial engine. "auto" takes "evidence" for these scenes and "search" for the others.
+//! layer 1.5. "network", and "learned" in hardware, takes case 0 of up to 144 taxels or "contacts", mu_max above 0, no
+//! "search_width", not the serial engine. "auto" takes "evidence" for these scenes and "search" for the others.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
 //! mirror symmetry takes up to four products instead of one ([`crate::fixed::words::coefficients`]). A subarray with a
@@ -25,7 +26,7 @@
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
 
-use super::{CoefficientCheck, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use super::{CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::learned::{Place, Window};
 use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
@@ -59,10 +60,10 @@ impl Scene {
         self.require([
             rule(self.medium != Medium::HalfSpace, "medium.kind", self.medium.to_string(), "half-space"),
             rule(
-                self.partition.case == Case::Contacts,
+                self.partition.case == Case::Contacts && self.for_hardware().estimator() != EstimatorKind::Network,
                 "partition.case",
                 self.partition.case.to_string(),
-                "0, 1, 2, 3, adaptive, rows and cols",
+                "0, 1, 2, 3, adaptive, rows and cols; contacts with search.estimator = learned",
             ),
             rule(
                 several && self.partition.choices(&self.sensor).len() < 2,
@@ -70,12 +71,18 @@ impl Scene {
                 self.partition.case.to_string(),
                 "0: no other of the paper's cases divides the array",
             ),
+            rule(
+                self.partition.case == Case::Contacts && self.partition.condition == Condition::BothSigns,
+                "partition.condition",
+                "both-signs".to_string(),
+                "loaded, with contacts",
+            ),
             rule(several && search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with adaptive"),
             rule(
-                several && self.output.forces == ForceOutput::Resultants,
+                self.partition.case.grid().is_none() && self.output.forces == ForceOutput::Resultants,
                 "output.forces",
                 "resultants".to_string(),
-                "taxels, with adaptive",
+                "taxels, with adaptive or contacts",
             ),
             rule(
                 several && self.hardware.search_width.is_some_and(|width| width < Quads::LANES),
@@ -97,10 +104,10 @@ impl Scene {
                 "1 to 3",
             ),
             rule(
-                !input.dead.is_empty() && self.partition.case != Case::WHOLE,
+                !input.dead.is_empty() && !matches!(self.partition.case, Case::WHOLE | Case::Contacts),
                 "input.dead",
                 self.dead(),
-                "none, or partition.case = 0",
+                "none, or partition.case = 0 or contacts",
             ),
             rule(
                 input.unipolar && self.for_hardware().estimator() != EstimatorKind::Network,

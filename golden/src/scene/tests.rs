@@ -256,6 +256,10 @@ fn choices_not_built_yet_say_so() {
     let cases = [
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, adaptive, rows and"),
+        (
+            "[partition]\ncase = \"contacts\"\ncondition = \"both-signs\"\n[search]\nestimator = \"learned\"",
+            "partition.condition = both-signs; available: loaded, with contacts",
+        ),
         ("[partition]\ncase = \"adaptive\"\n[search]\nmu_max = 0", "search.mu_max = 0; available: above 0, with"),
         (
             "[partition]\ncases = [0, 1]\n[output]\nforces = \"resultants\"",
@@ -263,7 +267,7 @@ fn choices_not_built_yet_say_so() {
         ),
         (
             "[input]\ndead = [[0, 1]]\n[partition]\ncase = 1",
-            "input.dead = [[0, 1]]; available: none, or partition.case = 0",
+            "input.dead = [[0, 1]]; available: none, or partition.case = 0 or contacts",
         ),
         ("[input]\ndead = [[0, 1]]\n[partition]\ncases = [0, 1]", "input.dead = [[0, 1]]; available: none, or"),
         (

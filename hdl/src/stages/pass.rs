@@ -231,7 +231,7 @@ mod tests {
                         Operand::Vector(index) => index + layers + 1,
                         Operand::Layer(index) => index + 2,
                         Operand::InputHigh | Operand::InputLow => usize::from(layer),
-                        Operand::One => 0,
+                        _ => 0,
                     };
                     let input = matches!(product.operand, Operand::InputHigh | Operand::InputLow);
                     let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false };

@@ -7,16 +7,19 @@
 //! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
 //! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
 
-use super::contents::{CasePlan, Dropped, Plan};
+use super::contents::{CasePlan, ContactPlan, Dropped, Plan};
 use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::widths::{widths, Shape};
 use crate::board::{Board, EngineKind};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::{Prepare, Scale};
+use crate::learned::Window;
 use crate::matrices::{Matrices, MAX_DEGREE};
-use crate::partition::{subarrays, Case, Subarray};
+use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::scene::Scene;
+use crate::segment::{self, Segmenter};
+use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 
 /// The plan of a scene, whether it fits its board or not.
@@ -106,7 +109,7 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
         if cases.len() > 1 && !is_large(&scene, case) {
             return Err(FixedError::SmallCase { case, quads: formats.quads, least: SHORTEST_SWEEP });
         }
-        planned.push(CasePlan { case, parts: subarrays(case, &scene.sensor)?, formats, quantised, storage });
+        planned.push(CasePlan { case, parts: parts(case, &scene.sensor)?, formats, quantised, storage });
     }
     if let [only] = cases[..] {
         scene.partition.case = only;
@@ -132,6 +135,10 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
         // Scenes with dead taxels have a single subarray.
         dead: planned[0].parts[0].local_indices(&scene.input.dead),
         resources,
+        by_contact: (scene.partition.case == Case::Contacts).then(|| ContactPlan {
+            segmenter: Segmenter::new(&scene.sensor, segment::WIDTH),
+            window: Window::around_contact(&scene.sensor).quads(),
+        }),
         board: board.clone(),
         scene,
         cases: planned,
@@ -139,10 +146,15 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
     })
 }
 
+/// The subarrays of a case; contacts are found on the whole array.
+fn parts(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {
+    subarrays(if case == Case::Contacts { Case::WHOLE } else { case }, sensor)
+}
+
 /// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
 /// needs.
 fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
-    let parts = subarrays(case, &scene.sensor)?;
+    let parts = parts(case, &scene.sensor)?;
     // Scenes with dead taxels have a single subarray.
     let dead = parts[0].local_indices(&scene.input.dead);
     let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;

@@ -6,11 +6,12 @@ use crate::board::Board;
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::prepare::Prepare;
 use crate::fixed::stages::resultants;
-use crate::fixed::stages::send::STATUS_BEATS;
+use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
 use crate::partition::{Case, Grid, Subarray};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene};
+use crate::segment::Segmenter;
 use crate::symmetry::quads::Quads;
 
 /// The hardware of one scene. What differs between partition cases is in [`CasePlan`]; the methods without a case give
@@ -29,6 +30,8 @@ pub struct Plan {
     pub threshold: i64,
     /// Dead taxels, row-major in the array, ascending.
     pub dead: Vec<usize>,
+    /// Segmentation and window, where each contact has a μ of its own.
+    pub by_contact: Option<ContactPlan>,
     /// Memories and multipliers.
     pub resources: Resources,
     /// Cases that divide the array but were left out; empty if the scene lists its cases.
@@ -50,6 +53,15 @@ pub struct CasePlan {
     pub quantised: Quantised,
     /// The case's part of the coefficient memory.
     pub storage: Storage,
+}
+
+/// How the contacts of the array are found, and what is read around each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactPlan {
+    /// The constants of the segmentation.
+    pub segmenter: Segmenter,
+    /// Layout of the window around a contact.
+    pub window: Quads,
 }
 
 /// A case that divides the array but was left out, because a design with it exceeds the board.
@@ -107,9 +119,13 @@ impl Plan {
         self.first().grid()
     }
 
-    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays.
+    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays, or for each contact
+    /// that may have a μ of its own.
     pub fn status_beats(&self) -> usize {
-        self.first().status_beats()
+        match self.by_contact {
+            Some(_) => STATUS_BEATS * self.scene.partition.max_contacts,
+            None => self.first().status_beats(),
+        }
     }
 
     /// Whether the hardware has several cases and chooses one per frame.
@@ -152,11 +168,13 @@ impl Plan {
         self.scene.output.forces == ForceOutput::Resultants
     }
 
-    /// Number of output beats of a frame before its status.
+    /// Number of output beats of a frame before its status: forces and labels, or resultants.
     pub fn force_beats(&self) -> usize {
-        match self.sends_resultants() {
-            false => self.scene.sensor.taxels(),
-            true => resultants::BEATS * self.parts().len(),
+        let taxels = self.scene.sensor.taxels();
+        match (self.sends_resultants(), &self.by_contact) {
+            (true, _) => resultants::BEATS * self.parts().len(),
+            (false, None) => taxels,
+            (false, Some(_)) => taxels + label_beats(taxels),
         }
     }
 

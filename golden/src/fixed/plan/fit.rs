@@ -61,7 +61,7 @@ fn parallel(
         Kind::InverseHigh | Kind::InverseLow => largest(quantised) >> prune_bits,
         Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
-        Kind::Layer(_) | Kind::Bias(_) => 0,
+        Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => 0,
     };
     let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1;
     let with = |groups: usize, narrow: bool| {

@@ -78,7 +78,8 @@ pub fn operand_index(formats: &Formats, product: &Product) -> usize {
     match product.operand {
         Operand::InputLow => 1,
         Operand::Vector(index) => first_vector(formats) + index,
-        Operand::InputHigh | Operand::Layer(_) | Operand::One => 0,
+        // No network on the serial engine.
+        _ => 0,
     }
 }
 

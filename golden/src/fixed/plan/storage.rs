@@ -66,7 +66,7 @@ fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize>
 /// The matrices of the passes in the order of their first use, then those of the network.
 pub fn storage_order(formats: &Formats) -> Vec<Matrix> {
     let mut order = Vec::new();
-    let layers: Vec<Product> = (0..formats.layers.len()).flat_map(layer).collect();
+    let layers: Vec<Product> = (0..formats.layers.len()).flat_map(|index| layer(formats, index)).collect();
     for product in schedule(formats).iter().flatten().chain(&layers) {
         if !order.contains(&product.matrix) {
             order.push(product.matrix);
@@ -186,7 +186,7 @@ impl Storage {
     /// Whether any column was pruned; `quads` is the number of columns of a matrix of the passes. Those of a network are
     /// never pruned.
     pub fn is_pruned(&self, quads: usize) -> bool {
-        let of_passes = |kind| !matches!(kind, Kind::Layer(_) | Kind::Bias(_));
+        let of_passes = |kind| !matches!(kind, Kind::Layer(_) | Kind::Mask | Kind::Bias(_));
         let own = self.matrices.iter().zip(&self.columns).filter(|(matrix, _)| of_passes(matrix.kind));
         own.flat_map(|(_, groups)| groups).any(|columns| columns.len() < quads)
     }

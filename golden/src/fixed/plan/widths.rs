@@ -16,8 +16,9 @@ use crate::fixed::words::formats::{
 use crate::fixed::words::network::WordNetwork;
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
-use crate::learned::{ComposedLayer, Learned};
+use crate::learned::{ComposedLayer, Learned, Window};
 use crate::matrices::Matrices;
+use crate::partition::Case;
 use crate::scene::{EstimatorKind, Scene};
 use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 use crate::symmetry::quads::Quads;
@@ -164,6 +165,10 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         groups: 1,
         search_width: if composed.is_empty() { search_width(scene, board, degree, shapes) } else { Quads::LANES },
         layers: composed.iter().map(|layer| layer.bias[0].len()).collect(),
+        window_quads: match (composed.is_empty(), scene.partition.case) {
+            (false, Case::Contacts) => Window::around_contact(&scene.sensor).quads().len(),
+            _ => 0,
+        },
         headroom,
         shared_a,
         flips,

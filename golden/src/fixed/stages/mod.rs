@@ -14,4 +14,6 @@ pub mod resultants;
 pub mod search;
 pub mod segment;
 pub mod send;
+pub mod shear;
 pub mod unfold;
+pub mod window;

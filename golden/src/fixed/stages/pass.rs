@@ -36,6 +36,10 @@ pub struct Operands {
     pub vectors: Vec<Vector>,
     /// Images of the network's finished layers, as operands.
     pub layers: Vec<Vector>,
+    /// High limbs of the folded window of a contact, and its folded mask.
+    pub window: [Vector; 2],
+    /// p times the μ of each taxel's contact, for Ax and Ay, after each step of `relax`.
+    pub sheared: Vec<[Vector; 2]>,
     /// Position of μ, [x, y], by which the operands of `relax` are multiplied.
     pub position: [i64; 2],
 }
@@ -60,6 +64,9 @@ impl Operands {
             Operand::InputLow => &self.input_low,
             Operand::Vector(index) => &self.vectors[index],
             Operand::Layer(index) => &self.layers[index],
+            Operand::Window => &self.window[0],
+            Operand::Mask => &self.window[1],
+            Operand::Shear(step, axis) => &self.sheared[step][axis as usize],
             Operand::One => return Cow::Owned(vec![[ONE; 4]]),
         };
         let of_axis = |axis: usize| quads.iter().map(|&quad| scaled(quad, self.position[axis])).collect();
@@ -75,9 +82,14 @@ impl Operands {
 /// Right shift of an operand times a position.
 pub const POSITION_SHIFT: u32 = 9;
 
+/// A word times μ.
+pub fn times(word: i64, position: i64) -> i64 {
+    round_shift(word * position, POSITION_SHIFT)
+}
+
 /// An operand times μ.
 pub fn scaled(quad: [i64; 4], position: i64) -> [i64; 4] {
-    quad.map(|word| round_shift(word * position, POSITION_SHIFT))
+    quad.map(|word| times(word, position))
 }
 
 /// Adds up the `products` of one accumulation without a shift: one accumulator per row and parity, in order.

@@ -39,7 +39,7 @@ pub struct Best {
 }
 
 /// Result of the search in one subarray.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SearchResult {
     /// The best candidate after each sweep; empty if the search was skipped.
     pub sweeps: Vec<Best>,

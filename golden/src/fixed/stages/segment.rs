@@ -37,10 +37,7 @@ pub fn word(formats: &Formats, p: i64) -> i64 {
 pub fn segment(sensor: &Sensor, segmenter: &Segmenter, words: &[i64], most: usize) -> Segmented {
     let basins = segmenter.segment(words);
     let segments = &basins.segments;
-    let load = |contact: usize| -> i64 { segments.taxels(contact).map(|taxel| basins.smoothed[taxel]).sum() };
-    let mut order: Vec<usize> = (0..segments.count).collect();
-    // Stable: of equal loads the first comes first.
-    order.sort_by_key(|&contact| std::cmp::Reverse(load(contact)));
+    let mut order = basins.by_load();
     order.truncate(most);
     let name = |contact: usize| order.iter().position(|own| *own == contact).map_or(NONE, |index| index + 1);
     let middle = |&contact: &usize| {

@@ -10,6 +10,10 @@
 //! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
 //! | 2 | saturations of `rescale` | saturations of `forces` | cycles to the first output beat, see [`Status::cycles`] |
 //!
+//! With a μ for each contact there are [`label_beats`] between forces and status, and the status of each of
+//! `partition.max_contacts` contacts follows, the contact with the largest load first; those beyond the last have neither
+//! condition nor μ.
+//!
 //! With a network the score is a word of two ln σ instead, that of μ1 in the lower half, in 1/384, σ in units of mu_max
 //! ([`ln_sigma_word`]); the saturations of `estimate` and `relax` are counted with those of `rescale`.
 
@@ -26,6 +30,8 @@ pub const FLAG_FOUND: u32 = 1 << 1;
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
 /// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
+/// Flag bit: there are more contacts than get a μ; only with `partition.case = "contacts"`.
+pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
 /// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
 /// "signature"` ([`crate::fixed::plan::check`]).
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
@@ -33,6 +39,36 @@ pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
 pub const CASE_SHIFT: u32 = 8;
 /// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.
 pub const FRAMES_SHIFT: u32 = 16;
+
+/// Width of a label on the stream: 0 or the number of a contact.
+pub const LABEL_BITS: u32 = 4;
+/// Labels in a word of a beat, the first in the lowest bits.
+const LABELS_PER_WORD: usize = (32 / LABEL_BITS) as usize;
+
+/// Number of beats with the labels of so many taxels.
+pub fn label_beats(taxels: usize) -> usize {
+    taxels.div_ceil(3 * LABELS_PER_WORD)
+}
+
+/// The beats with these labels, row-major, each below 16; zeros after the last.
+pub fn labels_to_beats(labels: &[usize]) -> Vec<[i32; 3]> {
+    let word = |labels: &[usize]| {
+        let place = |(at, label): (usize, &usize)| (*label as u32) << (LABEL_BITS as usize * at);
+        labels.iter().enumerate().map(place).fold(0, |word, label| word | label) as i32
+    };
+    let words: Vec<i32> = labels.chunks(LABELS_PER_WORD).map(word).collect();
+    let beat = |words: &[i32]| std::array::from_fn(|k| words.get(k).copied().unwrap_or(0));
+    words.chunks(3).map(beat).collect()
+}
+
+/// The labels of so many taxels from their beats.
+pub fn labels_of_beats(beats: &[[i32; 3]], taxels: usize) -> Vec<usize> {
+    let of_word = |word: &i32| {
+        let word = *word as u32;
+        (0..LABELS_PER_WORD).map(move |at| (word >> (LABEL_BITS as usize * at) & ((1 << LABEL_BITS) - 1)) as usize)
+    };
+    beats.iter().flatten().flat_map(of_word).take(taxels).collect()
+}
 
 /// Width of ln σ in the word of two.
 pub const LN_SIGMA_BITS: u32 = 16;
@@ -108,6 +144,16 @@ mod tests {
         for pair in [[-1200, 190], [3, -2688], [0, -1]] {
             assert_eq!(ln_sigma_of_word(ln_sigma_word(pair)), pair);
         }
+    }
+
+    #[test]
+    fn labels_read_back() {
+        for taxels in [1, 24, 25, 400] {
+            let labels: Vec<usize> = (0..taxels).map(|taxel| taxel * 7 % 9).collect();
+            let beats = labels_to_beats(&labels);
+            assert_eq!((beats.len(), labels_of_beats(&beats, taxels)), (label_beats(taxels), labels));
+        }
+        assert_eq!(labels_to_beats(&[8, 1, 0, 0, 0, 0, 0, 15, 2]), [[0xf000_0018u32 as i32, 2, 0]]);
     }
 
     #[test]

@@ -9,7 +9,8 @@
 //!
 //! | word | bits | LSB |
 //! |---|---|---|
-//! | operand of the first layer: high limb of the folded input | 18 | 2^−(`input_bits` − `input_low_bits`) |
+//! | operand of the first layer: high limb of the folded input, or of the folded window of a contact | 18 | 2^−(`input_bits` − `input_low_bits`) |
+//! | the same, for a contact: folded mask, of [`MASKED`] on taxels beyond the array and dead ones | 17 | 1 / [`MASKED`] |
 //! | weight, bias | 18 | of the layer |
 //! | image of a hidden neuron | `image_bits`, no sign | largest image on drawn frames over 2^`image_bits`, with [`MARGIN`] |
 //! | operand of a later layer | `data_bits` | the same / 2 |
@@ -19,9 +20,12 @@
 use super::coefficients::Flipped;
 use super::formats::{Formats, MULTIPLIER_BITS, MU_STEPS};
 use crate::learned::ComposedLayer;
+use faer::Mat;
 
 /// The operand of the biases.
 pub const ONE: i64 = 1 << (MULTIPLIER_BITS - 2);
+/// The word of a masked taxel in the window of a contact; that of the others is 0. A folded mask is at most [`ONE`].
+pub const MASKED: i64 = ONE / 4;
 /// Width of an output, signed.
 pub const OUTPUT_BITS: u32 = 13;
 /// Width of the position of μ, signed.
@@ -40,6 +44,8 @@ pub struct WordLayer {
     pub inputs: usize,
     /// Weights of each parity, outputs × inputs, row-major.
     pub weights: Flipped<i64>,
+    /// Weights of the mask of a contact's window, outputs × quads, row-major; in the first layer, where there is one.
+    pub mask: Option<Flipped<i64>>,
     /// Biases of each parity, one column.
     pub bias: Flipped<i64>,
 }
@@ -73,16 +79,22 @@ impl WordNetwork {
             let scale = outputs_per_unit * 2f64.powi(own_shift as i32);
             let word = |value: f64, per_unit: f64| (value * scale / per_unit).round() as i64;
             let (outputs, inputs) = (layer.bias[0].len(), layer.weights[0].ncols());
-            let weights = |parity: usize| -> Vec<i64> {
-                let own = &layer.weights[parity];
-                let entry = |k: usize| word(own[(k / inputs, k % inputs)], inputs_per_unit);
-                (0..outputs * inputs).map(entry).collect()
+            let block = |own: &Mat<f64>, per_unit: f64| -> Vec<i64> {
+                let cols = own.ncols();
+                (0..outputs * cols).map(|k| word(own[(k / cols, k % cols)], per_unit)).collect()
+            };
+            let weights = |parity: usize| block(&layer.weights[parity], inputs_per_unit);
+            // The transform is twice the orthonormal one.
+            let mask = |own: &[Mat<f64>; 4]| Flipped {
+                flip: 0,
+                parity: std::array::from_fn(|parity| block(&own[parity], 2.0 * MASKED as f64)),
             };
             let bias = |parity: usize| layer.bias[parity].iter().map(|&bias| word(bias, ONE as f64)).collect();
             let own = WordLayer {
                 outputs,
                 inputs,
                 weights: Flipped { flip: 0, parity: std::array::from_fn(weights) },
+                mask: layer.mask.as_ref().map(mask),
                 bias: Flipped { flip: 0, parity: std::array::from_fn(bias) },
             };
             // Half the transform of images that are twice as large.
@@ -96,12 +108,17 @@ impl WordNetwork {
     fn fits(&self, formats: &Formats) -> bool {
         let limit = 1i64 << (MULTIPLIER_BITS - 1);
         let coefficients = |layer: &WordLayer| {
-            layer.weights.parity.iter().chain(&layer.bias.parity).flatten().all(|word| word.abs() < limit)
+            let mask = layer.mask.iter().flat_map(|mask| &mask.parity);
+            layer.weights.parity.iter().chain(&layer.bias.parity).chain(mask).flatten().all(|word| word.abs() < limit)
         };
         let sums = |layer: &WordLayer| {
             let row = |parity: usize, row: usize| -> i64 {
-                let weights = &layer.weights.parity[parity][row * layer.inputs..][..layer.inputs];
-                weights.iter().map(|word| word.abs() * limit).sum::<i64>() + layer.bias.parity[parity][row].abs() * ONE
+                let of = |own: &Flipped<i64>, largest: i64| -> i64 {
+                    let cols = own.parity[parity].len() / layer.outputs;
+                    own.parity[parity][row * cols..][..cols].iter().map(|word| word.abs() * largest).sum()
+                };
+                let mask = layer.mask.as_ref().map_or(0, |mask| of(mask, ONE));
+                of(&layer.weights, limit) + mask + of(&layer.bias, ONE)
             };
             (0..4).all(|parity| (0..layer.outputs).all(|i| row(parity, i) < 1 << (formats.lane_bits - 1)))
         };

@@ -27,6 +27,7 @@ impl Quantised {
             Kind::Ax => &self.ax.flips,
             Kind::Ay => &self.ay.flips,
             Kind::Layer(index) => layer(index).map_or(&[], |layer| std::slice::from_ref(&layer.weights)),
+            Kind::Mask => layer(0).and_then(|layer| layer.mask.as_ref()).map_or(&[], std::slice::from_ref),
             Kind::Bias(index) => layer(index).map_or(&[], |layer| std::slice::from_ref(&layer.bias)),
         }
     }
@@ -46,7 +47,7 @@ impl Quantised {
             Kind::InverseHigh | Kind::InverseLow => &mut self.inverse,
             Kind::Ax => &mut self.ax,
             Kind::Ay => &mut self.ay,
-            Kind::Layer(_) | Kind::Bias(_) => return None,
+            Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => return None,
         };
         blocks.flips.iter_mut().find(|own| own.flip == matrix.flip)
     }
@@ -57,6 +58,7 @@ impl Quantised {
         let size = match matrix.kind {
             Kind::InverseHigh | Kind::InverseLow | Kind::Ax | Kind::Ay => Some([quads; 2]),
             Kind::Layer(layer) => own(layer).map(|layer| [layer.outputs, layer.inputs]),
+            Kind::Mask => own(0).map(|layer| [layer.outputs, layer.inputs]),
             Kind::Bias(layer) => own(layer).map(|layer| [layer.outputs, 1]),
         };
         size.unwrap_or_default()
@@ -69,6 +71,6 @@ pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
     match kind {
         Kind::InverseHigh => c >> low,
         Kind::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
-        Kind::Ax | Kind::Ay | Kind::Layer(_) | Kind::Bias(_) => c,
+        Kind::Ax | Kind::Ay | Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => c,
     }
 }

@@ -10,7 +10,9 @@
 //! of `rescale`. The serial engine has one accumulator of each parity and shifts in front of it.
 //!
 //! With a network there is no polynomial: after v_00 come the layers of the [network](super::network), each a product and
-//! its bias, then the steps of [`relax`](crate::fixed::stages::relax), whose operands are multiplied by μ1 or μ2.
+//! its bias, then the steps of [`relax`](crate::fixed::stages::relax), whose operands are multiplied by μ1 or μ2. Where every
+//! contact has a μ of its own, the layers are computed for each contact, their first takes the mask of its window as well,
+//! and the operands of the steps are those of [`shear`](crate::fixed::stages::shear).
 
 use super::coefficients::Flips;
 pub use super::formats::vectors;
@@ -33,6 +35,8 @@ pub enum Kind {
     Ay,
     /// Weights of a layer of the network.
     Layer(usize),
+    /// Weights of the mask of a contact's window, in the first layer.
+    Mask,
     /// Biases of a layer of the network, one column.
     Bias(usize),
 }
@@ -57,6 +61,12 @@ pub enum Operand {
     Vector(usize),
     /// Images of a hidden layer's neurons, after ReLU.
     Layer(usize),
+    /// High limb of the folded window of a contact.
+    Window,
+    /// Folded mask of that window.
+    Mask,
+    /// p after so many steps of `relax`, times the μ of each taxel's contact.
+    Shear(usize, Axis),
     /// One quad of [`ONE`](super::network::ONE)s, the operand of the biases.
     One,
 }
@@ -102,24 +112,34 @@ pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
         false => products(formats.degree, limbs, formats.shared_a, &formats.flips),
         true => {
             let first = products(0, limbs, false, &formats.flips);
-            first.into_iter().chain((0..formats.degree).map(|step| shear(step, &formats.flips))).collect()
+            first.into_iter().chain((0..formats.degree).map(|step| shear(formats, step))).collect()
         }
     }
 }
 
 /// The products of a step of `relax`: −(μ1 Ax + μ2 Ay) p.
-fn shear(step: usize, flips: &Flips) -> Vec<Product> {
+fn shear(formats: &Formats, step: usize) -> Vec<Product> {
     let of = |kind, axis, flips: &[usize]| -> Vec<Product> {
-        let product = |&flip| Product { factor: Some(axis), ..Product::of(kind, flip, Operand::Vector(step)) };
+        let product = |&flip| match formats.by_contact() {
+            true => Product::of(kind, flip, Operand::Shear(step, axis)),
+            false => Product { factor: Some(axis), ..Product::of(kind, flip, Operand::Vector(step)) },
+        };
         flips.iter().map(product).collect()
     };
-    [of(Kind::Ax, Axis::X, &flips.ax), of(Kind::Ay, Axis::Y, &flips.ay)].concat()
+    [of(Kind::Ax, Axis::X, &formats.flips.ax), of(Kind::Ay, Axis::Y, &formats.flips.ay)].concat()
 }
 
 /// The products of a layer of the network.
-pub fn layer(layer: usize) -> Vec<Product> {
-    let inputs = layer.checked_sub(1).map_or(Operand::InputHigh, Operand::Layer);
-    vec![Product::of(Kind::Layer(layer), 0, inputs), Product::of(Kind::Bias(layer), 0, Operand::One)]
+pub fn layer(formats: &Formats, layer: usize) -> Vec<Product> {
+    let inputs = match layer.checked_sub(1) {
+        Some(before) => Operand::Layer(before),
+        None if formats.by_contact() => Operand::Window,
+        None => Operand::InputHigh,
+    };
+    let weights = Product::of(Kind::Layer(layer), 0, inputs);
+    let mask = (layer == 0 && formats.by_contact()).then(|| Product::of(Kind::Mask, 0, Operand::Mask));
+    let bias = Product::of(Kind::Bias(layer), 0, Operand::One);
+    [weights].into_iter().chain(mask).chain([bias]).collect()
 }
 
 /// The products of every accumulation of the parallel engine's lanes, with their result; of v_00 that of the low limbs
@@ -130,7 +150,7 @@ pub fn accumulations(formats: &Formats) -> Vec<(Target, Vec<Product>)> {
     };
     let mut vectors = schedule(formats).into_iter().enumerate();
     let mut all: Vec<_> = vectors.by_ref().take(1).flat_map(of).collect();
-    all.extend((0..formats.layers.len()).map(|index| (Target::Layer(index), layer(index))));
+    all.extend((0..formats.layers.len()).map(|index| (Target::Layer(index), layer(formats, index))));
     all.extend(vectors.flat_map(of));
     all
 }
@@ -188,7 +208,13 @@ impl Product {
     pub fn operand_index(&self) -> usize {
         match self.operand {
             Operand::Vector(index) => index,
-            Operand::InputHigh | Operand::InputLow | Operand::Layer(_) | Operand::One => 0,
+            Operand::Shear(step, _) => step,
+            Operand::InputHigh
+            | Operand::InputLow
+            | Operand::Layer(_)
+            | Operand::Window
+            | Operand::Mask
+            | Operand::One => 0,
         }
     }
 }

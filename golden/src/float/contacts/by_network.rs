@@ -19,7 +19,7 @@ use super::{Contacts, Solver};
 use crate::float::objective::Estimate;
 use crate::learned::{Gaussian, Learned, OneContact};
 use crate::reconstruct::Resultant;
-use crate::segment::{segment, WIDTH};
+use crate::segment::{basins, WIDTH};
 
 /// Contacts with the standard deviations of their μ.
 pub(crate) struct Told {
@@ -27,26 +27,32 @@ pub(crate) struct Told {
     pub contacts: Contacts,
     /// Standard deviation of the μ of each region, [x, y]; `None` where it was not asked.
     pub sigma: Vec<Option<[f64; 2]>>,
+    /// Whether there are more contacts than were asked for.
+    pub too_many: bool,
 }
 
 impl Solver<'_> {
-    /// Finds the contacts of the stress `b` in MPa; `alive` says which taxels are not dead.
-    pub(crate) fn by_network(&self, network: &Learned, b: &[f64], alive: &[bool]) -> Told {
-        let sensor = &self.matrices.sensor;
-        let segments = segment(sensor, self.p0, WIDTH);
+    /// Finds the contacts of the stress `b` in MPa; `alive` says which taxels are not dead. The network is asked for at most
+    /// `most` of them, those with the largest loads.
+    pub(crate) fn by_network(&self, network: &Learned, b: &[f64], alive: &[bool], most: usize) -> Told {
+        let found = basins(&self.matrices.sensor, self.p0, WIDTH);
+        let (largest, overflow) = (found.by_load(), found.overflow);
+        let segments = found.segments;
         let mut contacts =
             Contacts { found: vec![None; segments.count], segments, p: self.p0.to_vec(), sweeps: 1, converged: true };
         let ask = |region: usize| {
             let centre_mm = self.centre_mm(&contacts, region);
             network.shear(&OneContact { b, alive, centre_mm })
         };
-        let searched = |region: usize| (self.searched)(&contacts.segments, region);
+        let is_large = |region: usize| largest.iter().take(most).any(|large| *large == region);
+        let searched = |region: usize| is_large(region) && (self.searched)(&contacts.segments, region);
         let told: Vec<Option<Gaussian>> =
             (0..contacts.segments.count).map(|region| searched(region).then(|| ask(region))).collect();
         let found = |told: &Gaussian| Estimate::of_network(told, self.mu_max).found;
         contacts.found = told.iter().map(|told| told.as_ref().map(found)).collect();
         self.relax(&mut contacts);
-        Told { contacts, sigma: told.iter().map(|told| told.map(|told| told.sigma)).collect() }
+        let sigma = told.iter().map(|told| told.map(|told| told.sigma)).collect();
+        Told { too_many: overflow || contacts.segments.count > most, contacts, sigma }
     }
 
     /// Centre of the compressive forces on a region in mm from the array's centre, which stands for that of none.

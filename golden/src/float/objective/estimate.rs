@@ -7,6 +7,7 @@
 //! | out: load | scalar | N, where the objective knows it more accurately than Σp |
 
 use super::fit::misfit_limit;
+use crate::checks::relative_spread;
 use crate::float::pass::Polynomial;
 use crate::float::search::{search, SearchResult, RADIUS};
 use crate::learned::Gaussian;
@@ -55,15 +56,6 @@ pub struct Estimate {
 const RIM: f64 = 1.05;
 /// Radius in depths from which on a contact is wide: the fits of ellipses then take more nodes and a wider start.
 pub(super) const WIDE_FROM: f64 = 2.5;
-
-/// Ratio to the normal force below which a shear counts as none.
-const NO_SHEAR: f64 = 0.01;
-
-/// Standard deviation `sigma` of the shear, [x, y], over its size. Below 0.01 of `normal` a shear counts as none, and its
-/// standard deviation is taken over that.
-pub(crate) fn relative_spread(shear: [f64; 2], sigma: [f64; 2], normal: f64) -> f64 {
-    sigma[0].hypot(sigma[1]) / shear[0].hypot(shear[1]).max(NO_SHEAR * normal)
-}
 
 /// Fraction of the largest p₀ that a taxel must exceed to count for the centre.
 const COUNTS_FROM: f64 = 0.3;

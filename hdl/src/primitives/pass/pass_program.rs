@@ -59,6 +59,8 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
                     (Operand::InputHigh, Target::Vector(_)) => (1, 0, 0),
                     (Operand::InputLow, _) => (2, 0, 0),
                     (Operand::One, _) => (3, 0, 0),
+                    // Refused before any block is built.
+                    (Operand::Window | Operand::Mask | Operand::Shear(..), _) => (0, 0, 0),
                 };
                 steps.push(Step {
                     coefficients: storage.address_of(product.matrix, group),

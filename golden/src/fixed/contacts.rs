@@ -1,0 +1,88 @@
+//! Contacts: a μ for each contact of the array, and p with the μ of each taxel's contact.
+//!
+//! ```text
+//! v_00 ── unfold ── segment ── for each contact: window ── network ── μ
+//! p ← v_00 − (Ax (m1∘p) + Ay (m2∘p))                  m: μ of each taxel's contact, as many steps as for one μ
+//! ```
+//! As [`crate::float::contacts`] does it with a network, in words.
+
+use super::plan::contents::ContactPlan;
+use super::stages::segment::{self, segment};
+use super::stages::shear::shear;
+use super::stages::unfold::unfold;
+use super::stages::window::{window, Array};
+use super::subarray::{Passes, QuadStream};
+use super::words::network::WordNetwork;
+use super::words::schedule::schedule;
+
+/// The contacts of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contacts {
+    /// Contact of each taxel, row-major, as [`segment`](segment::Segmented::labels) numbers them.
+    pub labels: Vec<usize>,
+    /// The contacts, that with the largest load first.
+    pub all: Vec<Contact>,
+    /// Whether there were more contacts or basins than there may be.
+    pub overflow: bool,
+}
+
+/// One contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Contact {
+    /// Row and column of the taxel in its middle.
+    pub middle: [usize; 2],
+    /// Whether its taxels in the window meet the scene's condition.
+    pub condition: bool,
+    /// Position of μ in mu_max/384, [x, y]; 0 where the condition is not met.
+    pub position: [i32; 2],
+    /// ln of the standard deviation of μ over mu_max in 1/384, [x, y].
+    pub ln_sigma: [i32; 2],
+}
+
+impl Passes<'_> {
+    /// The contacts of the array, whose words in the frame buffer are `codes`, and p in words of the search.
+    pub fn by_contact(
+        &mut self,
+        network: &WordNetwork,
+        contacts: &ContactPlan,
+        codes: &[i32],
+    ) -> (Contacts, QuadStream) {
+        let (plan, formats, layout) = (self.plan, self.formats, self.layout);
+        let steps = schedule(formats);
+        let (first, mut operands) = self.first(&steps[0]);
+        let mut values = unfold(&first, 0);
+        let words: Vec<i64> = layout.unpack(&values).iter().map(|p| segment::word(formats, *p)).collect();
+        let sensor = &plan.scene.sensor;
+        let found = segment(sensor, &contacts.segmenter, &words, plan.scene.partition.max_contacts);
+        let labels = layout.pack(&found.labels);
+        self.streams.segmented = labels.iter().map(|quad| quad.map(|label| label as i64)).collect();
+
+        let array = Array { sensor, codes, dead: &plan.dead, floor: plan.noise_floor };
+        let mut all = Vec::with_capacity(found.middles.len());
+        for (index, &middle) in found.middles.iter().enumerate() {
+            let read = window(formats, contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);
+            self.streams.windows.extend(read.input.iter().chain(&read.mask));
+            self.operands.window = [read.input, read.mask];
+            let told = self.ask(network);
+            let condition = read.own.meets(plan.scene.partition.condition);
+            let position = if condition { told.position } else { [0; 2] };
+            self.tell(position);
+            all.push(Contact { middle, condition, position, ln_sigma: told.ln_sigma });
+        }
+        let positions: Vec<[i64; 2]> = all.iter().map(|contact| contact.position.map(i64::from)).collect();
+        for (k, products) in steps.iter().enumerate().skip(1) {
+            let (sheared, clipped) = shear(formats, &operands, &labels, &positions);
+            self.saturations += clipped;
+            let [x, y] = &sheared;
+            self.streams.sheared.extend(x.iter().zip(y).flat_map(|(x, y)| [x, y]));
+            self.operands.sheared.push(sheared);
+            let words = self.vector(k, products);
+            let (sums, next) = self.relax(&first, &words);
+            (values, operands) = (unfold(&sums, 0), next);
+        }
+        (Contacts { labels: found.labels, all, overflow: found.overflow }, values)
+    }
+}
+
+#[cfg(test)]
+mod tests;

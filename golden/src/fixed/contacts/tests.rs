@@ -1,0 +1,150 @@
+use crate::fixed::stages::receive::mask;
+use crate::fixed::stages::send::{Status, FLAG_FOUND, STATUS_BEATS};
+use crate::fixed::subarray::SubarrayTrace;
+use crate::fixed::words::formats::MU_STEPS;
+use crate::fixed::Model;
+use crate::flags::Flag;
+use crate::float::Golden;
+use crate::frame::Frame;
+use crate::generator::draws::{DrawOptions, Draws};
+use crate::learned::{Learned, OneContact, Training};
+use crate::reconstruct::{Reconstruction, Region};
+use crate::scene::Scene;
+use tempfile::NamedTempFile;
+
+/// A scene of 13 × 18 taxels with a network of a few steps: as good as any to compare the models.
+fn scene(more: &str, partition: &str) -> (Scene, NamedTempFile) {
+    let sensor = "[sensor]\nrows = 13\ncols = 18\npitch_x_mm = 2\npitch_y_mm = 2.5\nthickness_mm = 2\n";
+    let text = format!(
+        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"learned\"\n{more}"
+    );
+    let mut scene = Scene::parse(&text, "pad.toml").unwrap();
+    let training = Training { steps: 30, batch: 16, contacts: 60, hidden: vec![16, 8], ..Training::default() };
+    let trained = Learned::train(&scene, &training, &|_| ()).unwrap();
+    let file = NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), trained.bytes).unwrap();
+    scene.search.network = Some(file.path().to_owned());
+    (scene, file)
+}
+
+/// The contacts by their load in the golden model.
+fn by_load(result: &Reconstruction) -> Vec<&Region> {
+    let mut regions: Vec<&Region> = result.extra.regions.iter().flatten().collect();
+    regions.sort_by(|a, b| b.load_N[2].total_cmp(&a.load_N[2]));
+    regions
+}
+
+/// The contact with the most taxels in common.
+fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
+    let common = |other: &&Region| other.taxels.iter().filter(|taxel| region.taxels.contains(taxel)).count();
+    of.extra.regions.iter().flatten().max_by_key(common).unwrap()
+}
+
+/// Every contact has the μ and σ that the network says of the window around its middle, up to rounding.
+#[test]
+fn a_contact_has_what_the_network_says_of_its_window() {
+    let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
+    let model = Model::without_fit_check(&scene).unwrap();
+    let (network, alive) = (Learned::of_scene(&scene).unwrap(), scene.input.alive(&scene.sensor));
+    let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 9, ..Default::default() }).unwrap();
+    let mut asked = 0;
+    for number in 0..8 {
+        let frame = draws.frame(number).unwrap().frame;
+        let codes = mask(&model.codes(&frame).unwrap().codes, &model.dead, false);
+        let stress: Vec<f64> = codes.iter().map(|code| f64::from(*code)).collect();
+        let contacts = SubarrayTrace::new(&model, model.first(), &codes).contacts.unwrap();
+        for contact in contacts.all {
+            let [row, col] = contact.middle;
+            let centre_mm = scene.sensor.position_mm(row, col);
+            // The codes in place of the stress: the network divides either by a power of two.
+            let told = network.shear(&OneContact { b: &stress, alive: &alive, centre_mm });
+            for axis in [0, 1] {
+                let unit = 1.0 / MU_STEPS as f64;
+                let mu = f64::from(contact.position[axis]) * unit * scene.search.mu_max;
+                assert!((mu - told.mean[axis]).abs() < 0.004, "{mu} {told:?} at {row}, {col}");
+                let ln = f64::from(contact.ln_sigma[axis]) * unit;
+                assert!((ln - (told.sigma[axis] / scene.search.mu_max).ln()).abs() < 0.01, "{ln} {told:?}");
+            }
+            asked += 1;
+        }
+    }
+    assert!(asked >= 14, "{asked} contacts");
+}
+
+/// The same contacts as in the golden model, and forces that differ by little.
+#[test]
+fn contacts_are_those_of_the_golden_model() {
+    let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
+    // Dead taxels break the symmetry, so that the matrices are too large for the board.
+    let model = Model::without_fit_check(&scene).unwrap();
+    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let draws = Draws::new(&scene, DrawOptions { contacts: 3, seed: 5, ..Default::default() }).unwrap();
+    let (mut taxels, mut other, mut compared, mut moved) = (0, 0, 0, 0);
+    for number in 0..12 {
+        let Ok(drawn) = draws.frame(number) else { continue };
+        let frame = drawn.frame;
+        let (fixed, float) = (model.reconstruct(&frame).unwrap(), golden.run(&frame).unwrap());
+        let regions = fixed.extra.regions.as_ref().unwrap();
+        assert_eq!(regions.len(), by_load(&float).len(), "frame {number}");
+        for region in regions {
+            let twin = twin(region, &float);
+            taxels += region.taxels.len();
+            other += region.taxels.iter().filter(|taxel| !twin.taxels.contains(taxel)).count();
+            // A middle half way between two taxels may be rounded otherwise: another window, another μ.
+            let off = (region.mu[0] - twin.mu[0]).hypot(region.mu[1] - twin.mu[1]);
+            compared += 1;
+            moved += usize::from(off > 0.005);
+            let normal = region.load_N[2] / twin.load_N[2];
+            assert!((normal - 1.0).abs() < 0.02, "frame {number}: {normal}");
+        }
+        let [sum, total] = [fixed.resultant_N, float.resultant_N].map(|force| force[2]);
+        assert!((sum / total - 1.0).abs() < 5e-3, "frame {number}: {sum} N and {total} N");
+        assert_eq!(fixed.flags, float.flags, "frame {number}");
+    }
+    // Ties and quantisation decide for a taxel now and then.
+    assert!(compared >= 20 && 5 * moved < compared, "{moved} of {compared} contacts have another μ");
+    assert!(50 * other < taxels, "{other} of {taxels} taxels are in another contact");
+}
+
+/// Of more contacts than the scene allows the largest have a μ; the others keep their normal force, and a flag tells it.
+#[test]
+fn of_more_contacts_the_largest_have_shear() {
+    let (scene, _file) = scene("", "max_contacts = 1\n");
+    let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+    let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 3, ..Default::default() }).unwrap();
+    let frame = draws.frame(1).unwrap().frame;
+    let (fixed, float) = (model.reconstruct(&frame).unwrap(), golden.run(&frame).unwrap());
+    let all = by_load(&float);
+    assert_eq!((fixed.extra.regions.as_ref().unwrap().len(), all.len()), (1, 2));
+    assert!(all[0].mu != [0.0; 2] && all[1].mu == [0.0; 2] && all[1].mu_sigma.is_none());
+    for result in [&fixed, &float] {
+        assert!(result.flags.contains(&Flag::TooManyContacts), "{:?}", result.flags);
+        let second = all[1].taxels.iter();
+        assert!(second.clone().all(|&taxel| result.forces_N.fx[taxel] == 0.0));
+        assert!(second.map(|&taxel| result.forces_N.fz[taxel]).sum::<f64>() > 0.5 * all[1].load_N[2]);
+    }
+    let trace = model.run(&model.readings(&[frame]).unwrap());
+    assert_eq!((trace.status.len(), trace.beats.len()), (STATUS_BEATS, 13 * 18 + 10));
+}
+
+/// Frames without a contact, and codes at the end of their range.
+#[test]
+fn nothing_and_the_largest_codes() {
+    let (scene, _file) = scene("", "");
+    let model = Model::new(&scene).unwrap();
+    let largest = (1 << (model.formats().code_bits - 1)) - 1;
+    for codes in [vec![0; 234], vec![-largest; 234], vec![largest; 234]] {
+        let trace = model.run(&codes);
+        let found: Vec<Status> = trace.status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
+        assert_eq!(found.len(), 8);
+        // Pressure alone is a contact.
+        let contacts = found.iter().filter(|status| status.flags & FLAG_FOUND != 0).count();
+        assert_eq!(contacts == 0, codes[0] <= 0, "{contacts} contacts for {}", codes[0]);
+    }
+    let quiet = Frame {
+        stress_MPa: vec![0.0; 234],
+        ..Draws::new(&scene, DrawOptions::default()).unwrap().frame(0).unwrap().frame
+    };
+    let result = model.reconstruct(&quiet).unwrap();
+    assert!(result.flags.contains(&Flag::NoContact) && result.extra.regions == Some(Vec::new()));
+}

@@ -1,0 +1,104 @@
+//! Stage `window`: what the network reads around a contact, from the frame buffer.
+//!
+//! ```text
+//! codes of the window ── magnitude ── normalise ── fold ── high limb: operands of the first layer
+//! mask of the window ────────────────────────── fold: operands of its mask
+//! ```
+//! The window has the contact's middle in its own. Beyond the array and on dead taxels the code is 0 and the mask
+//! [`MASKED`]. The shift of `normalise` is the window's own.
+
+use super::fold;
+use super::normalise;
+use super::pass::Vector;
+use super::receive::{receive, Received};
+use crate::fixed::words::formats::Formats;
+use crate::fixed::words::network::MASKED;
+use crate::sensor::Sensor;
+use crate::symmetry::quads::Quads;
+
+/// The window of a contact.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WindowWords {
+    /// High limbs of the folded codes.
+    pub input: Vector,
+    /// The folded mask.
+    pub mask: Vector,
+    /// Magnitude and signs of the codes of the contact's own taxels in the window.
+    pub own: Received,
+}
+
+/// An array whose windows are read.
+#[derive(Clone, Copy, Debug)]
+pub struct Array<'a> {
+    /// Rows and columns.
+    pub sensor: &'a Sensor,
+    /// Words of the frame buffer, row-major.
+    pub codes: &'a [i32],
+    /// Dead taxels, row-major, ascending.
+    pub dead: &'a [usize],
+    /// Noise floor in codes.
+    pub floor: i32,
+}
+
+/// The window with this `layout` around the contact in `middle`, [row, column]; `is_own` tells its taxels, row-major.
+pub fn window(
+    formats: &Formats,
+    layout: Quads,
+    array: &Array,
+    middle: [usize; 2],
+    is_own: &dyn Fn(usize) -> bool,
+) -> WindowWords {
+    let Array { sensor, codes, dead, floor } = *array;
+    let line = |own: usize, middle: usize, lines: usize, all: usize| {
+        (middle + own).checked_sub(lines / 2).filter(|line| *line < all)
+    };
+    let taxel = |own: usize| {
+        let row = line(own / layout.cols, middle[0], layout.rows, sensor.rows)?;
+        let col = line(own % layout.cols, middle[1], layout.cols, sensor.cols)?;
+        Some(row * sensor.cols + col).filter(|taxel| dead.binary_search(taxel).is_err())
+    };
+    let taxels: Vec<Option<usize>> = (0..layout.rows * layout.cols).map(taxel).collect();
+    let words: Vec<i64> = taxels.iter().map(|taxel| taxel.map_or(0, |taxel| i64::from(codes[taxel]))).collect();
+    let mask: Vec<i64> = taxels.iter().map(|taxel| if taxel.is_none() { MASKED } else { 0 }).collect();
+    let magnitude = receive(&words.iter().map(|word| *word as i32).collect::<Vec<_>>(), floor).magnitude;
+    let own: Vec<i32> = taxels.iter().flatten().filter(|taxel| is_own(**taxel)).map(|taxel| codes[*taxel]).collect();
+    let shift = normalise::shift(magnitude, formats.input_bits);
+    let folded = fold::fold(&normalise::normalise(&layout.pack(&words), shift));
+    WindowWords {
+        input: folded.iter().map(|quad| quad.map(|f| f >> formats.input_low_bits)).collect(),
+        mask: fold::fold(&layout.pack(&mask)),
+        own: receive(&own, floor),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::symmetry::parity::hadamard;
+
+    /// A window in the corner: what is beyond the array is masked, its own loudest code sets the shift.
+    #[test]
+    fn a_window_in_the_corner() {
+        let model = crate::fixed::Model::new(&Scene::builtin("sensor-1-noisy").unwrap()).unwrap();
+        let formats = model.formats();
+        let sensor = Sensor { rows: 4, cols: 4, ..model.scene.sensor.clone() };
+        let codes: Vec<i32> = (0..16).map(|taxel| if taxel < 8 { 100 + taxel } else { 100_000 }).collect();
+        let layout = Quads { rows: 3, cols: 3 };
+        let array = Array { sensor: &sensor, codes: &codes, dead: &[1], floor: 103 };
+        let found = window(formats, layout, &array, [0, 0], &|taxel| taxel == 4);
+        // Rows −1 to 1: codes 100, dead, 104, 105 in the lower right; all shifted to the full width.
+        let shift = formats.input_bits - 1 - 7;
+        let word = |code: i64| code << shift;
+        let middle = found.input[3];
+        assert_eq!(middle, [4 * word(100) >> formats.input_low_bits, 0, 0, 0]);
+        // The quad of the corners: (−1, −1), (−1, 1), (1, −1), (1, 1), of which only the last is on the array.
+        let corners = hadamard([0, 0, 0, word(105)]).map(|f| f >> formats.input_low_bits);
+        assert_eq!((found.input[0], found.mask[0]), (corners, hadamard([MASKED, MASKED, MASKED, 0])));
+        assert_eq!((found.mask[3], found.own.positive), ([0; 4], true));
+        // (0, −1) is beyond the array, (0, 1) dead: both sides of the middle line are masked.
+        assert_eq!(found.mask[2], [4 * MASKED, 0, 0, 0]);
+        let loud = window(formats, layout, &array, [1, 1], &|_| false);
+        assert!(!loud.own.positive && loud.input[0] != found.input[0]);
+    }
+}
