@@ -17,7 +17,7 @@ use crate::frame::{Forces, Frame};
 use crate::input::Input;
 
 use crate::reception::{noise_floor_codes, receive, Received};
-use crate::reconstruct::{assemble, CaseChoice, Reconstruction, Resultant, SubarrayResult};
+use crate::reconstruct::{assemble, shear_sigma_N, CaseChoice, Reconstruction, Resultant, SubarrayResult};
 
 impl Model {
     /// Reconstructs one frame; for scenes with `input.average = 0`, or the first frame of a sliding mean.
@@ -112,6 +112,9 @@ impl Model {
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
+            for (own, of) in result.subarrays.iter_mut().zip(resultants.iter().flatten()) {
+                own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+            }
             result.extra.resultants = resultants;
         }
         if self.scene.input.slides() {

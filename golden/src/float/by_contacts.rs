@@ -21,7 +21,7 @@ use super::search::search;
 use crate::checks::largest_spread;
 use crate::frame::{Forces, Frame};
 use crate::learned::Learned;
-use crate::reconstruct::{Reconstruction, Region, Resultant};
+use crate::reconstruct::{shear_sigma_N, Reconstruction, Region, Resultant};
 use crate::scene::Condition;
 use crate::segment::Segments;
 use crate::sensor::Sensor;
@@ -85,7 +85,10 @@ impl Golden {
         outcome.forces = forces;
         if let Some(sigma) = sigma {
             outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
-            own.iter_mut().zip(sigma).for_each(|(region, sigma)| region.mu_sigma = sigma);
+            for (region, sigma) in own.iter_mut().zip(sigma) {
+                region.mu_sigma = sigma;
+                region.shear_sigma_N = shear_sigma_N(sigma, region.load_N[2]);
+            }
             let spread = |region: &Region| {
                 (region.load_N[2], region.mu_sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0)))
             };
@@ -109,6 +112,7 @@ fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) 
             centroid_condition: met[k],
             mu: contacts.mu(k),
             mu_sigma: None,
+            shear_sigma_N: None,
             objective_value: contacts.found[k].map(|found| found.objective),
             centre_mm,
             load_N,

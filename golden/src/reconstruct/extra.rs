@@ -92,6 +92,10 @@ pub struct Region {
     /// Standard deviation of μ, [x, y]; absent where the estimator gives none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mu_sigma: Option<[f64; 2]>,
+    /// Standard deviation of the shear in N, [x, y]; absent where the estimator gives none, see
+    /// [`shear_sigma_N`](super::shear_sigma_N).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear_sigma_N: Option<[f64; 2]>,
     /// The objective at μ over the whole array; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
     /// Centre of the reported compressive forces in mm from the array's centre; `None` if there are none.

@@ -142,7 +142,7 @@ impl From<&Region> for dermis_contact {
     fn from(region: &Region) -> dermis_contact {
         let figures = Figures {
             force_N: region.load_N,
-            shear_sigma_N: None,
+            shear_sigma_N: region.shear_sigma_N,
             normal_sigma_N: None,
             mu: region.mu,
             mu_sigma: region.mu_sigma,
