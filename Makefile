@@ -17,7 +17,7 @@ VENV       = $(BUILD)/python
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick python docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick python c docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -68,6 +68,10 @@ python: setup ## build the Python package, install it into a new environment, bu
 	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
+
+c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
+	$(CARGO) build --release --package dermis-c
+	$(CARGO) test --release --package dermis-c
 
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'

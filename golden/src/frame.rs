@@ -20,6 +20,7 @@ mod shipped;
 #[cfg(test)]
 mod tests;
 
+pub use csv::csv_hint;
 pub use error::FrameError;
 
 use crate::scene::{Medium, Scene};

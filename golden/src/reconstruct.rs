@@ -18,7 +18,7 @@ mod output;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
-pub use output::Resultant;
+pub use output::{shear_sigma_N, Resultant};
 
 use crate::checks::Checks;
 use crate::errors::Errors;
@@ -53,6 +53,9 @@ pub struct SubarrayResult {
     /// Standard deviation of μ, [x, y]; absent where the estimator gives none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mu_sigma: Option<[f64; 2]>,
+    /// Standard deviation of the shear in N, [x, y]; absent where the estimator gives none, see [`shear_sigma_N`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear_sigma_N: Option<[f64; 2]>,
     /// The objective at μ; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
 }
@@ -86,17 +89,23 @@ pub struct Reconstruction {
     pub extra: Extra,
 }
 
-/// Assembles a result: adds the resultant, the errors relative to the frame's known resultant, and the flags
-/// `no-contact` and `condition-unmet`; `flags` are all others.
+/// Assembles a result: adds the resultant, standard deviations of the shear of subarrays, the errors relative to the frame's
+/// known resultant, and the flags `no-contact` and `condition-unmet`; `flags` are all others.
 pub fn assemble(
     scene: &Scene,
     frame: &Frame,
     engine: &str,
-    subarrays: Vec<SubarrayResult>,
+    mut subarrays: Vec<SubarrayResult>,
     forces: Forces,
     flags: Vec<Flag>,
 ) -> Reconstruction {
     let resultant_N = forces.resultant();
+    if !forces.fz.is_empty() {
+        for own in &mut subarrays {
+            let normal_N = own.part().indices(&scene.sensor).map(|k| forces.fz[k]).sum();
+            own.shear_sigma_N = shear_sigma_N(own.mu_sigma, normal_N);
+        }
+    }
     let mut flags: BTreeSet<Flag> = flags.into_iter().collect();
     if forces.fz.iter().all(|&fz| fz == 0.0) {
         flags.insert(Flag::NoContact);
@@ -160,6 +169,7 @@ impl SubarrayResult {
             tension_centroid_mm: received.tension_centroid_mm,
             mu,
             mu_sigma: None,
+            shear_sigma_N: None,
             objective_value,
         }
     }

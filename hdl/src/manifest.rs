@@ -118,7 +118,7 @@ pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
     }
 }
 
-/// Checks the manifest in `folder` and every file it lists; returns the number of files.
+/// Checks the manifest in `folder` and every file it lists; returns their number, the manifest among them.
 ///
 /// # Errors
 /// [`ManifestError`] for the first file that is missing or differs.
@@ -148,7 +148,7 @@ pub fn check(folder: &Path) -> Result<usize, ManifestError> {
             return Err(ManifestError::Damaged { file, field: "crc32", says, has });
         }
     }
-    Ok(files.len())
+    Ok(files.len() + 1)
 }
 
 /// The first `most` bytes of a file, so that a wrong file cannot exhaust the memory.

@@ -36,3 +36,11 @@ pub fn fixed(error: FixedError) -> PyErr {
         error => input(error),
     }
 }
+
+/// The exception for an error of a model.
+pub fn model(error: anyhow::Error) -> PyErr {
+    match error.downcast::<FixedError>() {
+        Ok(error) => fixed(error),
+        Err(error) => input(error),
+    }
+}

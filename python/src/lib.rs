@@ -13,7 +13,6 @@
 //! | [`exceptions`] | errors of the crates as Python exceptions |
 //! | [`frame`] | frames with known forces, and frames from arrays |
 //! | [`contact`] | contacts as dictionaries |
-//! | [`engine`] | the two models of a scene, built when they are first needed |
 //! | [`reconstruction`] | results |
 //! | [`scene`] | scenes, and what is computed of them |
 //! | [`trace`] | the stages of a frame, integers beside floating point |
@@ -29,7 +28,6 @@
 pub mod arrays;
 pub mod board;
 pub mod contact;
-pub mod engine;
 pub mod errors;
 pub mod exceptions;
 pub mod frame;

@@ -42,6 +42,7 @@ pub struct Contact {
     mu_sigma: Option<[f64; 2]>,
     force_N: [f64; 3],
     sigma_N: Option<[f64; 3]>,
+    shear_sigma_N: Option<[f64; 2]>,
     /// xx, xy, yy.
     mu_covariance: Option<[f64; 3]>,
 }
@@ -54,6 +55,7 @@ impl From<&ContactEstimate> for Contact {
             mu_sigma: Some([0, 2].map(|axis| found.mu_covariance[axis].sqrt())),
             force_N: found.force_N,
             sigma_N: Some(found.sigma_N),
+            shear_sigma_N: Some([found.sigma_N[0], found.sigma_N[1]]),
             mu_covariance: Some(found.mu_covariance),
         }
     }
@@ -67,6 +69,7 @@ impl From<&Region> for Contact {
             mu_sigma: region.mu_sigma,
             force_N: region.load_N,
             sigma_N: None,
+            shear_sigma_N: region.shear_sigma_N,
             mu_covariance: None,
         }
     }
@@ -102,6 +105,13 @@ impl Contact {
     #[getter]
     fn sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.sigma_N.map(|sigma| array(py, sigma))
+    }
+
+    /// Standard deviation of the shear in N, shape (2,): x, y; also of an estimator that knows that of mu alone, from the normal
+    /// force; None where the estimator gives none.
+    #[getter]
+    fn shear_sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.shear_sigma_N.map(|sigma| array(py, sigma))
     }
 
     /// Covariance of mu, shape (2, 2); None where the estimator gives none.
@@ -173,7 +183,8 @@ impl Reconstruction {
     }
 
     /// The contacts: with standard deviations of the force from the estimators "evidence" and "learned"; with
-    /// partition.case = "contacts" of mu alone, where the estimator has them; None where the contacts are not told apart.
+    /// partition.case = "contacts" of mu and of the shear, where the estimator has them; None where the contacts are not told
+    /// apart.
     #[getter]
     fn contacts(&self) -> Option<Vec<Contact>> {
         contacts(&self.result)

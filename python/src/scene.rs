@@ -6,14 +6,14 @@ use dermis_golden::frame::{Frame as Stress, FrameError};
 use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::scene::Scene as Spec;
+use dermis_sim::engine::{Engine, Models};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
 use crate::arrays::cube;
 use crate::contact::contacts;
-use crate::engine::{Engine, Models};
-use crate::exceptions::{input, not_allowed};
+use crate::exceptions::{input, model, not_allowed};
 use crate::frame::{frames, Frame, Frames};
 use crate::reconstruction::{Reconstruction, Reconstructions};
 
@@ -204,10 +204,10 @@ impl Scene {
         engine: &str,
         find_noise: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let engine: Engine = engine.parse()?;
+        let engine: Engine = engine.parse().map_err(model)?;
         let Frames { frames, single } = self::frames(&self.spec, frames)?;
-        let ready = py.detach(|| self.models.ready(engine, &self.spec, &frames))?;
-        let one = |frames: &[Stress]| py.detach(|| ready.reconstruct(&self.spec, frames, find_noise));
+        let ready = py.detach(|| self.models.ready(engine, &self.spec, &frames)).map_err(model)?;
+        let one = |frames: &[Stress]| py.detach(|| ready.reconstruct(&self.spec, frames, find_noise)).map_err(model);
         if single {
             let result = Reconstruction::new(Arc::new(one(&frames)?), self.lengths());
             return Ok(Bound::new(py, result)?.into_any());

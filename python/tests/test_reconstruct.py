@@ -93,6 +93,7 @@ def test_what_an_engine_does_not_give_is_absent(tmp_path: Path) -> None:
     regions = dermis.Scene.from_toml(text + '[partition]\ncase = "contacts"\n[search]\nestimator = "search"\n')
     [contact] = regions.reconstruct(frame).contacts
     assert contact.sigma_N is None and contact.mu_covariance is None and contact.force_N[2] > 1
+    assert contact.shear_sigma_N is None and again.shear_sigma_N.tolist() == again.sigma_N[:2].tolist()
     assert contact.mu_sigma is None and np.allclose(again.mu_sigma**2, np.diag(again.mu_covariance))
     # A network has the standard deviation of each region's mu; one for the whole array would give all the same mu.
     contacts = text + '[partition]\ncase = "contacts"\n'
@@ -105,6 +106,8 @@ def test_what_an_engine_does_not_give_is_absent(tmp_path: Path) -> None:
     result = dermis.Scene.from_toml(network.format(tmp_path / "own.network")).reconstruct(frame)
     [contact], [region] = result.contacts, result.to_dict()["regions"]
     assert contact.mu_sigma.tolist() == region["mu_sigma"] and (contact.mu_sigma > 0).all()
+    assert contact.shear_sigma_N.tolist() == region["shear_sigma_N"] and contact.sigma_N is None
+    assert np.allclose(contact.shear_sigma_N, contact.mu_sigma * contact.force_N[2])
     resultants = dermis.Scene.from_toml(text + '[output]\nforces = "resultants"\n').reconstruct(frame)
     assert resultants.forces_N is None and resultants.resultant_N[2] > 1
 

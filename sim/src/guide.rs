@@ -33,6 +33,7 @@ pages! {
     "live.md" live,
     "files.md" files,
     "python.md" python,
+    "c.md" c,
     "accuracy.md" accuracy,
     "limits.md" limits,
     "partitions.md" partitions,

@@ -16,6 +16,7 @@
 //! |---|---|
 //! | [`compare`] | differences between two force fields |
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
+//! | [`engine`] | the models of a scene, built when they are first needed, for Python and C |
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`mod@run_log`] | counts of long test runs, saved for the report |
@@ -28,6 +29,7 @@ pub mod commands;
 pub mod compare;
 pub mod cosim;
 pub mod drawn_frames;
+pub mod engine;
 pub mod flow;
 pub mod guide;
 pub mod jobs;

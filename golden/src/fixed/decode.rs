@@ -17,7 +17,9 @@ use crate::frame::{Forces, Frame};
 use crate::input::Input;
 use crate::partition::Subarray;
 use crate::reception::{noise_floor_codes, receive, Received};
-use crate::reconstruct::{assemble, shear_spread_of, CaseChoice, Reconstruction, Region, Resultant, SubarrayResult};
+use crate::reconstruct::{
+    assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, Resultant, SubarrayResult,
+};
 
 /// What a status says of μ.
 struct Told {
@@ -142,6 +144,9 @@ impl Model {
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
+            for (own, of) in result.subarrays.iter_mut().zip(resultants.iter().flatten()) {
+                own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+            }
             result.extra.resultants = resultants;
         }
         if self.scene.input.slides() {
@@ -175,9 +180,8 @@ impl Model {
         let own = Region {
             centroid_condition: condition,
             mu,
-            mu_sigma: estimate.and_then(|estimate| estimate.sigma),
             objective_value: estimate.map(|estimate| estimate.found.objective),
-            ..Region::of_taxels(&self.scene.sensor, forces, taxels)
+            ..Region::of_taxels(&self.scene.sensor, forces, taxels).with_sigma(estimate.and_then(|told| told.sigma))
         };
         (!own.taxels.is_empty()).then_some(own)
     }

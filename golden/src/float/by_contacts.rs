@@ -88,7 +88,7 @@ impl Golden {
         outcome.forces = forces;
         if let Some(sigma) = sigma {
             outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
-            own.iter_mut().zip(sigma).for_each(|(region, sigma)| region.mu_sigma = sigma);
+            own = own.into_iter().zip(sigma).map(|(region, sigma)| region.with_sigma(sigma)).collect();
             outcome.shear_spread = shear_spread_of(&own);
         }
         let mut result = self.finish(frame, outcome);

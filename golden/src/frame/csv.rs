@@ -32,7 +32,7 @@ fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a S
     let mut stress = Vec::with_capacity(sensor.taxels());
     let filled = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     for (index, line) in filled {
-        let hint = hint(line, stress.is_empty());
+        let hint = csv_hint(line, sensor.cols, stress.is_empty());
         let (got, wanted) = (line.split(',').count(), sensor.cols);
         if got != wanted {
             return Err(FrameError::CsvRagged { file: file.to_string(), line: index + 1, got, wanted, hint });
@@ -51,15 +51,21 @@ fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a S
     Ok((sensor, stress))
 }
 
-/// A likely reason why a line has the wrong values; `first` is whether no line with values came before.
-fn hint(line: &str, first: bool) -> &'static str {
-    // Decimal commas come with another separator.
+/// A likely reason why a line of numbers separated by commas, of which `wanted` are expected, is none, as the end of an error;
+/// empty if none is known. `first` is whether no line with values came before.
+pub fn csv_hint(line: &str, wanted: usize, first: bool) -> &'static str {
+    // Decimal commas come with another separator, or with commas as separators too: twice as many whole numbers.
     let decimal_comma = |cell: &str| matches!(cell.trim().split_once(','), Some((a, b)) if number(a) && number(b));
+    let separator = [';', '\t'];
+    let mut cells = line.split(',');
     match line {
-        _ if line.contains([';', '\t']) && line.split([';', '\t']).any(decimal_comma) => {
+        _ if line.contains(separator) && line.split(separator).any(decimal_comma) => {
             "; values are separated by commas, and a decimal mark is a point"
         }
-        _ if line.contains([';', '\t']) => "; values are separated by commas",
+        _ if line.contains(separator) => "; values are separated by commas",
+        _ if line.split(',').count() == 2 * wanted && cells.all(|cell| number(cell.trim())) => {
+            "; a decimal mark is a point, not a comma"
+        }
         _ if first && line.split(',').all(|cell| !number(cell) && cell.trim().parse::<f64>().is_err()) => {
             "; a frame has no header line"
         }
@@ -79,12 +85,14 @@ mod tests {
 
     #[test]
     fn likely_reasons_are_named() {
-        assert_eq!(hint("0,1;0,25", true), "; values are separated by commas, and a decimal mark is a point");
-        assert_eq!(hint("1;2", true), "; values are separated by commas");
-        assert_eq!(hint("col 0,col 1", true), "; a frame has no header line");
+        assert_eq!(csv_hint("0,1;0,25", 2, true), "; values are separated by commas, and a decimal mark is a point");
+        assert_eq!(csv_hint("1;2", 2, true), "; values are separated by commas");
+        assert_eq!(csv_hint("0,1, -0,25", 2, false), "; a decimal mark is a point, not a comma");
+        assert_eq!(csv_hint("col 0,col 1", 2, true), "; a frame has no header line");
         // Later lines are no header; a value that is missing or not finite is none either.
-        for (line, first) in [("a,b", false), ("1,x", true), ("nan,0.1", true), ("0.1,0.2", true)] {
-            assert_eq!(hint(line, first), "", "{line}");
+        for (line, first) in [("a,b", false), ("1,x", true), ("nan,0.1", true), ("0.1,0.2", true), ("0,1,0.5,2", true)]
+        {
+            assert_eq!(csv_hint(line, 2, first), "", "{line}");
         }
     }
 }

@@ -33,10 +33,9 @@ pub struct ForceSigma {
 }
 
 impl ForceSigma {
-    /// That of the shear μ·`normal_N` for the standard deviation of μ; that of the normal force, which is a few tenths of a
-    /// percent, is not in it.
-    fn of_mu(mu_sigma: Option<[f64; 2]>, normal_N: f64) -> Option<ForceSigma> {
-        mu_sigma.map(|sigma| ForceSigma { shear: sigma.map(|sigma| sigma * normal_N), normal: None })
+    /// That of an estimator that knows μ alone.
+    fn of_shear(shear_sigma_N: Option<[f64; 2]>) -> Option<ForceSigma> {
+        shear_sigma_N.map(|shear| ForceSigma { shear, normal: None })
     }
 }
 
@@ -53,18 +52,17 @@ pub fn found(result: &Reconstruction) -> Vec<FoundContact> {
     match &result.extra.regions {
         Some(regions) => {
             let contact = |region: &crate::reconstruct::Region| {
-                let sigma_N = ForceSigma::of_mu(region.mu_sigma, region.load_N[2]);
+                let sigma_N = ForceSigma::of_shear(region.shear_sigma_N);
                 Some(FoundContact { centre_mm: region.centre_mm?, force_N: region.load_N, sigma_N })
             };
             regions.iter().filter_map(contact).collect()
         }
         None => {
             // Of several subarrays each has a μ of its own.
-            let mu_sigma = match result.subarrays.as_slice() {
-                [one] => one.mu_sigma,
+            let sigma_N = match result.subarrays.as_slice() {
+                [one] => ForceSigma::of_shear(one.shear_sigma_N),
                 _ => None,
             };
-            let sigma_N = ForceSigma::of_mu(mu_sigma, result.resultant_N[2]);
             vec![FoundContact { centre_mm: [0.0; 2], force_N: result.resultant_N, sigma_N }]
         }
     }

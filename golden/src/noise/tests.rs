@@ -191,3 +191,19 @@ fn standard_deviations_of_the_network_are_honest() {
         assert_eq!((coverage.frames, coverage.normal_within_1), (100, None));
     }
 }
+
+/// Hardware that sends resultants gives the same standard deviation of the shear as with a force per taxel.
+#[test]
+fn resultants_have_the_standard_deviation_of_the_shear() {
+    let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
+    let frame = crate::frame::Frame::shipped(&scene).remove(1);
+    let sigma = |scene: &Scene| {
+        let result = crate::fixed::Model::new(scene).unwrap().reconstruct(&frame).unwrap();
+        (result.forces_N.fz.len(), result.subarrays[0].shear_sigma_N.unwrap())
+    };
+    let (taxels, wanted) = sigma(&scene);
+    scene.output.forces = crate::scene::ForceOutput::Resultants;
+    let (none, found) = sigma(&scene);
+    assert_eq!((taxels, none), (100, 0));
+    assert!((0..2).all(|axis| wanted[axis] > 0.0 && (found[axis] / wanted[axis] - 1.0).abs() < 1e-9), "{found:?}");
+}

@@ -11,7 +11,7 @@
 //! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
-use super::output::Resultant;
+use super::output::{shear_sigma_N, Resultant};
 use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::ContactEstimate;
 use crate::frame::Forces;
@@ -93,11 +93,17 @@ impl Region {
             centroid_condition: false,
             mu: [0.0; 2],
             mu_sigma: None,
+            shear_sigma_N: None,
             objective_value: None,
             centre_mm,
             load_N,
             taxels,
         }
+    }
+
+    /// The region with this standard deviation of μ, and that of the shear which follows from it.
+    pub(crate) fn with_sigma(self, mu_sigma: Option<[f64; 2]>) -> Region {
+        Region { mu_sigma, shear_sigma_N: shear_sigma_N(mu_sigma, self.load_N[2]), ..self }
     }
 }
 
@@ -118,6 +124,10 @@ pub struct Region {
     /// Standard deviation of μ, [x, y]; absent where the estimator gives none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mu_sigma: Option<[f64; 2]>,
+    /// Standard deviation of the shear in N, [x, y]; absent where the estimator gives none, see
+    /// [`shear_sigma_N`](super::shear_sigma_N).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear_sigma_N: Option<[f64; 2]>,
     /// The objective at μ over the whole array; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
     /// Centre of the reported compressive forces in mm from the array's centre; `None` if there are none.

@@ -21,6 +21,12 @@ pub struct Resultant {
     pub centre_mm: Option<[f64; 2]>,
 }
 
+/// Standard deviation of the shear μ·`normal_N` of one contact, [x, y], from that of its μ. That of the normal force, which is
+/// a few tenths of a percent, is not in it; an estimator that knows μ alone does not give it.
+pub fn shear_sigma_N(mu_sigma: Option<[f64; 2]>, normal_N: f64) -> Option<[f64; 2]> {
+    mu_sigma.map(|sigma| sigma.map(|sigma| sigma * normal_N.abs()))
+}
+
 impl Resultant {
     /// The resultant of `forces`, row-major over the array, on some of its taxels.
     pub(crate) fn of(sensor: &Sensor, forces: &Forces, taxels: impl Iterator<Item = usize>) -> Resultant {

@@ -23,7 +23,7 @@ use crate::cosim::hardware::{DeviceTimeout, Hardware};
 use crate::cosim::verilator::VerilatorError;
 use crate::flow::tools::ToolError;
 use crate::jobs::Interrupted;
-use crate::link::{HostError, PseudoTerminal};
+use crate::link::{HostError, IdentityError, PseudoTerminal};
 
 /// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
 #[derive(Parser, Debug)]
@@ -150,7 +150,10 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     );
     let hardware = error.is::<DeviceTimeout>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
     let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
-    let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
+    let board = matches!(
+        error.downcast_ref::<HostError>(),
+        Some(HostError::Answer { .. } | HostError::Identity { reason: IdentityError::Length { .. }, .. })
+    );
     let flow = matches!(
         error.downcast_ref::<ToolError>(),
         Some(ToolError::Failed { .. } | ToolError::Late { .. } | ToolError::Output { .. })
@@ -228,7 +231,8 @@ mod tests {
             stuck.into(),
             answer.into(),
         ];
-        let version = HostError::Version { port: "p".into(), has: 2, wants: 1 };
+        let reason = IdentityError::Version { has: 2, wants: 1 };
+        let version = HostError::Identity { port: "p".into(), reason };
         let input: [anyhow::Error; 7] = [
             VerilatorError::Missing.into(),
             VerilatorError::MissingCompiler.into(),

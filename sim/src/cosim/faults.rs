@@ -18,6 +18,7 @@
 
 mod bit_flip;
 mod classify;
+pub mod interval;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -197,19 +198,13 @@ pub struct Shares {
     pub hang: f64,
     /// A wrong beat that the device does not report.
     pub silent: f64,
-    /// 95 % confidence interval of `silent`.
+    /// 95 % confidence interval of `silent`, see [`interval`].
     pub silent_interval: [f64; 2],
     /// Silent, with a force error above [`LARGE`].
     pub large: f64,
     /// 95 % confidence interval of `large`.
     pub large_interval: [f64; 2],
 }
-
-/// Standard deviations from the middle to the ends of an interval of 95 %.
-const NORMAL_95: f64 = 1.96;
-/// Hits, and as many misses, that are added to those of a stage for its variance (Agresti and Coull): a stage without a
-/// hit is not taken for one that has none.
-const ADDED: f64 = 2.0;
 
 impl Shares {
     /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
@@ -221,13 +216,11 @@ impl Shares {
             flipped().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / weight as f64
         };
         let interval = |count: fn(&Row) -> usize| {
-            let variance = |row: &Row| {
-                let trials = row.flips as f64 + 2.0 * ADDED;
-                let likely = (count(row) as f64 + ADDED) / trials;
-                (row.bits as f64 / weight as f64).powi(2) * likely * (1.0 - likely) / trials
+            let of = |row: &Row| {
+                let weight = row.bits as f64 / weight as f64;
+                interval::Stratum { weight, hits: count(row), trials: row.flips }
             };
-            let half = NORMAL_95 * flipped().map(variance).sum::<f64>().sqrt();
-            [share(count) - half, share(count) + half].map(|end| end.clamp(0.0, 1.0))
+            interval::weighted(&flipped().map(of).collect::<Vec<_>>())
         };
         (weight > 0).then(|| Shares {
             bits: of_class().map(|row| row.bits).sum(),

@@ -7,7 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
 
 use super::answer::Answer;
-use super::error::HostError;
+use super::error::{HostError, IdentityError};
 
 /// Number of times a request is sent before it fails.
 const ATTEMPTS: u32 = 8;
@@ -45,28 +45,7 @@ impl<P: Read + Write> Client<P> {
     /// No answer, another version, another scene.
     pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
         let bytes = self.request(Kind::Identify, Vec::new())?;
-        let port = || self.name.clone();
-        // All versions of the packets start with the version.
-        let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
-        if let Some(has) = has.filter(|&has| has != VERSION) {
-            return Err(HostError::Version { port: port(), has, wants: VERSION });
-        }
-        let wrong = HostError::Answer { port: port(), what: "identity", bytes: bytes.len() };
-        let has = Identity::of_bytes(&bytes).ok_or(wrong)?;
-        let sensor = &model.scene.sensor;
-        let wants = dermis_golden::link::scene_hash(model);
-        if has.scene == wants {
-            return Ok(has);
-        }
-        let describe = |rows: usize, cols: usize, bits: u32, hash: u32| {
-            format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
-        };
-        Err(HostError::OtherScene {
-            port: port(),
-            has: describe(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
-            scene: model.scene.name.clone(),
-            wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
-        })
+        check_identity(model, &bytes).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })
     }
 
     /// Reads the board's packet counters.
@@ -146,4 +125,30 @@ impl<P: Read + Write> Client<P> {
     fn port_error(&self, error: &std::io::Error) -> HostError {
         HostError::Port { port: self.name.clone(), reason: error.to_string() }
     }
+}
+
+/// The identity in an answer of a board, if the board was built for `model`.
+///
+/// # Errors
+/// Another version, another scene, another number of bytes.
+pub fn check_identity(model: &Model, bytes: &[u8]) -> Result<Identity, IdentityError> {
+    // All versions of the packets start with the version.
+    let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
+    if let Some(has) = has.filter(|&has| has != VERSION) {
+        return Err(IdentityError::Version { has, wants: VERSION });
+    }
+    let has = Identity::of_bytes(bytes).ok_or(IdentityError::Length { bytes: bytes.len() })?;
+    let sensor = &model.scene.sensor;
+    let wants = dermis_golden::link::scene_hash(model);
+    if has.scene == wants {
+        return Ok(has);
+    }
+    let describe = |rows: usize, cols: usize, bits: u32, hash: u32| {
+        format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
+    };
+    Err(IdentityError::OtherScene {
+        has: describe(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
+        scene: model.scene.name.clone(),
+        wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
+    })
 }

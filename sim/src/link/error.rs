@@ -28,27 +28,13 @@ pub enum HostError {
         /// Timeout of each attempt in ms.
         milliseconds: u128,
     },
-    /// The board uses another packet version.
-    #[error("--port {port}: the board uses packet version {has}, this program version {wants}")]
-    Version {
+    /// The board is another one.
+    #[error("--port {port}: {reason}")]
+    Identity {
         /// The port.
         port: String,
-        /// The board's version.
-        has: u16,
-        /// This program's version.
-        wants: u16,
-    },
-    /// The board's bitstream was built for another scene.
-    #[error("--port {port}: the board was built for another scene: {has}; {scene} is {wants}")]
-    OtherScene {
-        /// The port.
-        port: String,
-        /// Description of the board's scene.
-        has: String,
-        /// Name of the expected scene.
-        scene: String,
-        /// Description of the expected scene.
-        wants: String,
+        /// What is another.
+        reason: IdentityError,
     },
     /// An answer has the wrong length: a defect of the board or of this program.
     #[error("--port {port}: {what} answer has a wrong length: {bytes} bytes")]
@@ -57,6 +43,35 @@ pub enum HostError {
         port: String,
         /// The answer.
         what: &'static str,
+        /// Its length in bytes.
+        bytes: usize,
+    },
+}
+
+/// Why a board does not belong to a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum IdentityError {
+    /// The board uses another packet version.
+    #[error("the board uses packet version {has}, this program version {wants}")]
+    Version {
+        /// The board's version.
+        has: u16,
+        /// This program's version.
+        wants: u16,
+    },
+    /// The board's bitstream was built for another scene.
+    #[error("the board was built for another scene: {has}; {scene} is {wants}")]
+    OtherScene {
+        /// Description of the board's scene.
+        has: String,
+        /// Name of the expected scene.
+        scene: String,
+        /// Description of the expected scene.
+        wants: String,
+    },
+    /// The identity has the wrong length: a defect of the board or of this program.
+    #[error("identity answer has a wrong length: {bytes} bytes")]
+    Length {
         /// Its length in bytes.
         bytes: usize,
     },

@@ -22,9 +22,9 @@ pub(crate) mod stream;
 mod terminal;
 
 pub use answer::{Answer, PhysicalAnswer};
-pub use client::{Client, LinkErrors};
+pub use client::{check_identity, Client, LinkErrors};
 pub use controller::SpiController;
-pub use error::HostError;
+pub use error::{HostError, IdentityError};
 pub use host_uart::{require_uart, HostUart, UartSymbol};
 pub use noisy_channel::{ChannelFaults, NoisyChannel};
 pub use session::{open, Session};

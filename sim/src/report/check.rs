@@ -18,7 +18,7 @@ pub struct BuildCheck {
     pub target: String,
     /// `build`.
     pub checked_as: &'static str,
-    /// Number of files that match manifest.json.
+    /// Number of files of the build, as `dermis build` lists them: manifest.json and those that it lists.
     pub files: usize,
 }
 
@@ -126,7 +126,10 @@ impl HardwareCheck {
 
 /// One line on a folder that is intact.
 pub fn build_check(build: &BuildCheck) -> String {
-    format!("{}: {} files match manifest.json, and manifest.json its checksum\n", build.target, build.files)
+    let BuildCheck { target, files, .. } = build;
+    format!(
+        "{target}: {files} files are as built: manifest.json matches its checksum, the others match manifest.json\n"
+    )
 }
 
 /// What was found of a scene.

@@ -1,7 +1,7 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use crate::cosim::faults::{Row, Shares, LARGE};
+use crate::cosim::faults::{interval, Row, Shares, LARGE};
 use dermis_hdl::state::CLASSES;
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
@@ -61,5 +61,6 @@ pub fn faults(rows: &[Row]) -> String {
         Some(cells)
     };
     text.push_str(&aligned(1, &head, CLASSES.into_iter().filter_map(of).collect()));
+    text.push_str(&format!("95 %: {}\n", interval::METHOD));
     text
 }

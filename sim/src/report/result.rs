@@ -54,13 +54,20 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
             centroid(s.tension_centroid_mm),
         )?;
     }
-    for own in result.extra.contacts.iter().flatten() {
-        let [x, y] = own.centre_mm;
+    let mut contact = |centre_mm: Option<[f64; 2]>, force_N: [f64; 3], sigma_N: [Option<f64>; 3]| {
         let along = |axis: usize| {
-            let (force, sigma) = (own.force_N[axis], own.sigma_N[axis]);
-            format!("{}{} ± {}", sign(force), significant_digits(force, largest), significant_digits(sigma, largest))
+            let force = sign(force_N[axis]).to_owned() + &significant_digits(force_N[axis], largest);
+            force + &sigma_N[axis].map_or(String::new(), |sigma| format!(" ± {}", significant_digits(sigma, largest)))
         };
-        writeln!(text, "contact at ({x:+.2}, {y:+.2}) mm, N   x {}   y {}   normal {}", along(0), along(1), along(2))?;
+        let place = centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+        writeln!(text, "contact at {place}, N   x {}   y {}   normal {}", along(0), along(1), along(2))
+    };
+    for own in result.extra.contacts.iter().flatten() {
+        contact(Some(own.centre_mm), own.force_N, own.sigma_N.map(Some))?;
+    }
+    for own in result.extra.regions.iter().flatten() {
+        let [x, y] = own.shear_sigma_N.map_or([None; 2], |sigma| sigma.map(Some));
+        contact(own.centre_mm, own.load_N, [x, y, None])?;
     }
     let flag = |flag: &Flag| {
         let name = serde_json::to_value(flag).ok()?.as_str().map(str::to_owned)?;

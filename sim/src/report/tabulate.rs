@@ -219,6 +219,7 @@ mod tests {
             centroid_condition: true,
             mu: [0.0; 2],
             mu_sigma: None,
+            shear_sigma_N: None,
             objective_value: None,
             centre_mm: Some([x, 0.0]),
             load_N,

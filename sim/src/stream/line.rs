@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use dermis_golden::frame::Frame;
+use dermis_golden::frame::{csv_hint, Frame};
 use dermis_golden::sensor::Sensor;
 use serde::Deserialize;
 use serde_json::Value;
@@ -50,13 +50,15 @@ pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Op
 
 /// The frame in a line, of JSON or of numbers separated by commas, and its id; `number` names a frame without one.
 pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, Frame), NoFrame> {
-    let (id, stress_MPa) = match text.trim_start().starts_with('{') {
+    let json = text.trim_start().starts_with('{');
+    let hint = || if json { "" } else { csv_hint(text, sensor.taxels(), number == 1) };
+    let (id, stress_MPa) = match json {
         true => {
             let request: Request =
                 serde_json::from_str(text).map_err(|error| NoFrame { id: Value::Null, reason: error.to_string() })?;
             (request.id, request.stress_MPa)
         }
-        false => (Value::Null, numbers(text).map_err(|reason| NoFrame { id: Value::Null, reason })?),
+        false => (Value::Null, numbers(text).map_err(|reason| NoFrame { id: Value::Null, reason: reason + hint() })?),
     };
     let name = match &id {
         Value::Null => format!("line {number}"),
@@ -65,7 +67,7 @@ pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, 
     };
     match Frame::from_stress(&name, sensor, stress_MPa) {
         Ok(frame) => Ok((id, frame)),
-        Err(error) => Err(NoFrame { id, reason: error.to_string() }),
+        Err(error) => Err(NoFrame { id, reason: error.to_string() + hint() }),
     }
 }
 
@@ -73,8 +75,7 @@ pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, 
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |(index, cell): (usize, &str)| {
         let shown: String = cell.trim().chars().take(SHOWN).collect();
-        let hint = if cell.contains([';', '\t']) { "; values are separated by commas" } else { "" };
-        let wrong = || format!("value {}: {shown:?} is not a finite number{hint}", index + 1);
+        let wrong = || format!("value {}: {shown:?} is not a finite number", index + 1);
         cell.trim().parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
     };
     text.split(',').enumerate().map(number).collect()
@@ -102,6 +103,9 @@ mod tests {
             ("1,2,3", "line 1: stress_MPa has 3 values, wanted 4"),
             ("1,x,3,4", "value 2: \"x\" is not a finite number"),
             ("1;2;3;4", "value 1: \"1;2;3;4\" is not a finite number; values are separated by commas"),
+            ("0,1;0,2;0,3;0,4", "values are separated by commas, and a decimal mark is a point"),
+            ("0,1,0,2,0,3,0,4", "stress_MPa has 8 values, wanted 4; a decimal mark is a point, not a comma"),
+            ("a,b,c,d", "value 1: \"a\" is not a finite number; a frame has no header line"),
             ("1,nan,3,4", "value 2: \"nan\" is not a finite number"),
             ("{\"stress\": []}", "unknown field `stress`"),
         ];

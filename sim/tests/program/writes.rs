@@ -50,10 +50,20 @@ fn a_killed_write_leaves_the_old_file() {
 fn a_damaged_folder_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let check = || dermis(folder.path(), "", "check rtl");
-    assert_eq!(dermis(folder.path(), "", "build eight-by-eight --out rtl").0, Some(0));
+    let program = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_dermis")).current_dir(folder.path()).args(args).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let listed =
+        program(&["build", "eight-by-eight", "--out", "rtl"]).lines().filter(|l| l.ends_with(" bytes)")).count();
     assert_eq!(check(), (Some(0), String::new()));
     let files: Vec<_> = fs::read_dir(folder.path().join("rtl")).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert!(files.len() > 4);
+    // Both commands count all files of the folder.
+    assert_eq!(listed, files.len());
+    assert!(program(&["check", "rtl"]).starts_with(&format!("rtl: {listed} files are as built")));
+    let json: serde_json::Value = serde_json::from_str(&program(&["check", "rtl", "--json"])).unwrap();
+    assert_eq!(json["files"], listed);
     for path in files {
         let whole = fs::read(&path).unwrap();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();

@@ -343,6 +343,11 @@ fn python_has_none() {
     none(&modules("_dermis", "python"), 7);
 }
 
+#[test]
+fn c_has_none() {
+    none(&modules("dermis_c", "sim/c"), 4);
+}
+
 /// Asserts that each of `layers`, folders or files in `parent`, uses only itself and those before it, and what stands
 /// beside the layers no layer; with `above`, everything else may use all of them.
 fn in_order(modules: &Modules, parent: &[&str], layers: &[&str], above: bool) {

@@ -1,4 +1,4 @@
-//! The two models of a scene, built when they are first needed.
+//! The two models of a scene, built when they are first needed, for calls from other languages.
 //!
 //! | engine | model | kept |
 //! |---|---|---|
@@ -8,14 +8,12 @@
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use anyhow::{bail, Error, Result};
 use dermis_golden::fixed::Model;
 use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
-use pyo3::PyErr;
-
-use crate::exceptions::{fixed, input, not_allowed};
 
 /// Which model computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,13 +25,13 @@ pub enum Engine {
 }
 
 impl FromStr for Engine {
-    type Err = PyErr;
+    type Err = Error;
 
-    fn from_str(name: &str) -> Result<Engine, PyErr> {
+    fn from_str(name: &str) -> Result<Engine> {
         match name {
             "golden" => Ok(Engine::Golden),
             "fixed" => Ok(Engine::Fixed),
-            _ => Err(not_allowed("engine", format!("{name:?}"), "\"golden\" or \"fixed\"")),
+            _ => bail!("engine = {name:?} is not allowed; it must be \"golden\" or \"fixed\""),
         }
     }
 }
@@ -54,7 +52,7 @@ pub enum Ready {
 }
 
 /// The value kept, or a new one; `build` says whether the new one is to be kept.
-fn kept<T>(place: &Mutex<Option<Arc<T>>>, build: impl FnOnce() -> Result<(T, bool), PyErr>) -> Result<Arc<T>, PyErr> {
+fn kept<T>(place: &Mutex<Option<Arc<T>>>, build: impl FnOnce() -> Result<(T, bool)>) -> Result<Arc<T>> {
     let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(value) = place.as_ref() {
         return Ok(Arc::clone(value));
@@ -71,18 +69,18 @@ impl Models {
     /// The scene's floating-point model.
     ///
     /// # Errors
-    /// `InputError` if the model refuses the scene.
-    pub fn golden(&self, scene: &Scene) -> Result<Arc<Golden>, PyErr> {
-        kept(&self.golden, || Ok((Golden::new(scene).map_err(input)?, true)))
+    /// A scene that the model refuses.
+    pub fn golden(&self, scene: &Scene) -> Result<Arc<Golden>> {
+        kept(&self.golden, || Ok((Golden::new(scene)?, true)))
     }
 
     /// The scene's bit-true model for `frames`.
     ///
     /// # Errors
-    /// `InputError` if the model refuses the scene.
-    pub fn fixed(&self, scene: &Scene, frames: &[Frame]) -> Result<Arc<Model>, PyErr> {
+    /// A scene that the model refuses.
+    pub fn fixed(&self, scene: &Scene, frames: &[Frame]) -> Result<Arc<Model>> {
         kept(&self.fixed, || {
-            let model = Model::for_frames(scene, frames).map_err(fixed)?;
+            let model = Model::for_frames(scene, frames)?;
             // A scale that the scene does not state is that of these frames.
             let own = model.scene.input.full_scale_MPa == scene.input.full_scale_MPa;
             Ok((model, own))
@@ -93,7 +91,7 @@ impl Models {
     ///
     /// # Errors
     /// As the model's.
-    pub fn ready(&self, engine: Engine, scene: &Scene, frames: &[Frame]) -> Result<Ready, PyErr> {
+    pub fn ready(&self, engine: Engine, scene: &Scene, frames: &[Frame]) -> Result<Ready> {
         Ok(match engine {
             Engine::Golden => Ready::Golden(self.golden(scene)?),
             Engine::Fixed => Ready::Fixed(self.fixed(scene, frames)?),
@@ -105,18 +103,18 @@ impl Ready {
     /// The result of the frames of one reconstruction; with `find_noise` as `dermis reconstruct` has it.
     ///
     /// # Errors
-    /// `InputError` for frames that the model refuses.
-    pub fn reconstruct(&self, scene: &Scene, frames: &[Frame], find_noise: bool) -> Result<Reconstruction, PyErr> {
+    /// Frames that the model refuses.
+    pub fn reconstruct(&self, scene: &Scene, frames: &[Frame], find_noise: bool) -> Result<Reconstruction> {
         let (mut result, scene) = match self {
-            Ready::Golden(golden) => (golden.run_averaged(frames).map_err(input)?, scene),
-            Ready::Fixed(model) => (model.reconstruct_averaged(frames).map_err(fixed)?, &model.scene),
+            Ready::Golden(golden) => (golden.run_averaged(frames)?, scene),
+            Ready::Fixed(model) => (model.reconstruct_averaged(frames)?, &model.scene),
         };
         if find_noise {
             let stress = match self {
-                Ready::Golden(golden) => golden.stress(frames).map_err(input)?,
-                Ready::Fixed(model) => model.stress(frames).map_err(fixed)?,
+                Ready::Golden(golden) => golden.stress(frames)?,
+                Ready::Fixed(model) => model.stress(frames)?,
             };
-            result.find_noise(scene, &stress).map_err(input)?;
+            result.find_noise(scene, &stress)?;
         }
         Ok(result)
     }

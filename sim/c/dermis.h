@@ -1,0 +1,366 @@
+/* Dermis: forces from the normal stress of a tactile array, and the packets of a board's link.
+ *
+ * Written by cbindgen from sim/c/src; do not edit: DERMIS_ACCEPT=1 make c writes it anew.
+ *
+ * Functions return a dermis_status, or what they are asked for. The text of the last error on the same thread names field
+ * and value: dermis_last_error(). A pointer that must not be NULL and is, a wrong length and a number that is not finite
+ * are errors; a pointer to memory that is not there cannot be told apart from a good one.
+ *
+ * Memory: what a function gives through a pointer to a pointer belongs to the caller, who ends it with the function named
+ * there; arrays belong to the caller and are neither kept nor freed; texts that are returned belong to the library.
+ *
+ * Units are mm, N and MPa; compression is positive. Arrays are row-major: taxel (row, col) has index row * cols + col.
+ */
+
+#ifndef DERMIS_H
+#define DERMIS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/**
+ * What became of a call.
+ */
+typedef enum {
+  /**
+   * Done.
+   */
+  DERMIS_STATUS_OK = 0,
+  /**
+   * An argument, scene or frame cannot be used.
+   */
+  DERMIS_STATUS_INPUT = 1,
+  /**
+   * The result does not have what was asked for.
+   */
+  DERMIS_STATUS_ABSENT = 2,
+  /**
+   * Bytes from the link are not a valid packet; the next ones are read.
+   */
+  DERMIS_STATUS_DAMAGED = 3,
+  /**
+   * The board was built for another scene or version.
+   */
+  DERMIS_STATUS_BOARD = 4,
+  /**
+   * A defect of Dermis.
+   */
+  DERMIS_STATUS_INTERNAL = 5,
+} dermis_status;
+
+/**
+ * What dermis_link_receive found.
+ */
+typedef enum {
+  /**
+   * No packet is complete yet.
+   */
+  DERMIS_ANSWER_NONE = 0,
+  /**
+   * The board is the scene's.
+   */
+  DERMIS_ANSWER_IDENTITY = 1,
+  /**
+   * The result of a frame.
+   */
+  DERMIS_ANSWER_RESULT = 2,
+  /**
+   * An answer to no open request, such as a late one to a request that was made again; ignore it.
+   */
+  DERMIS_ANSWER_OTHER = 3,
+} dermis_answer;
+
+/**
+ * A limitation of a result, one bit of dermis_result_flags; the guide's page on robustness says when each is raised.
+ */
+typedef enum {
+  /**
+   * `no-contact`
+   */
+  DERMIS_FLAG_NO_CONTACT = 1,
+  /**
+   * `no-compression`
+   */
+  DERMIS_FLAG_NO_COMPRESSION = (1 << 1),
+  /**
+   * `condition-unmet`
+   */
+  DERMIS_FLAG_CONDITION_UNMET = (1 << 2),
+  /**
+   * `saturated`
+   */
+  DERMIS_FLAG_SATURATED = (1 << 3),
+  /**
+   * `load-outside`
+   */
+  DERMIS_FLAG_LOAD_OUTSIDE = (1 << 4),
+  /**
+   * `medium-mismatch`
+   */
+  DERMIS_FLAG_MEDIUM_MISMATCH = (1 << 5),
+  /**
+   * `shear-unreliable`
+   */
+  DERMIS_FLAG_SHEAR_UNRELIABLE = (1 << 6),
+  /**
+   * `coefficients-damaged`
+   */
+  DERMIS_FLAG_COEFFICIENTS_DAMAGED = (1 << 7),
+  /**
+   * `mu-at-bound`
+   */
+  DERMIS_FLAG_MU_AT_BOUND = (1 << 8),
+  /**
+   * `implausible-stress`
+   */
+  DERMIS_FLAG_IMPLAUSIBLE_STRESS = (1 << 9),
+  /**
+   * `load-mismatch`
+   */
+  DERMIS_FLAG_LOAD_MISMATCH = (1 << 10),
+  /**
+   * `shape-mismatch`
+   */
+  DERMIS_FLAG_SHAPE_MISMATCH = (1 << 11),
+  /**
+   * `shear-not-resolved`
+   */
+  DERMIS_FLAG_SHEAR_NOT_RESOLVED = (1 << 12),
+  /**
+   * `misfit`
+   */
+  DERMIS_FLAG_MISFIT = (1 << 13),
+} dermis_flag;
+
+/**
+ * The host end of a board's link. One thread at a time may use it.
+ */
+typedef struct dermis_link dermis_link;
+
+/**
+ * The forces of one frame. Any number of threads may read one at the same time.
+ */
+typedef struct dermis_result dermis_result;
+
+/**
+ * A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
+ */
+typedef struct dermis_scene dermis_scene;
+
+/**
+ * One contact of a result. A figure counts where its marker is true; else it is NaN.
+ */
+typedef struct {
+  /**
+   * Force in N: x, y, normal.
+   */
+  double force_N[3];
+  /**
+   * Standard deviation of the shear in N: x, y.
+   */
+  double shear_sigma_N[2];
+  /**
+   * Standard deviation of the normal force in N.
+   */
+  double normal_sigma_N;
+  /**
+   * Ratio of shear to normal force: x, y.
+   */
+  double mu[2];
+  /**
+   * Standard deviation of mu: x, y.
+   */
+  double mu_sigma[2];
+  /**
+   * Centre of pressure in mm from the array's centre: x, y.
+   */
+  double centre_mm[2];
+  /**
+   * Whether the estimator gives shear_sigma_N.
+   */
+  bool has_shear_sigma_N;
+  /**
+   * Whether the estimator gives normal_sigma_N.
+   */
+  bool has_normal_sigma_N;
+  /**
+   * Whether the estimator gives mu_sigma.
+   */
+  bool has_mu_sigma;
+  /**
+   * Whether there are compressive forces, which have a centre.
+   */
+  bool has_centre_mm;
+} dermis_contact;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * The text of the last error on this thread, with field and value; empty if there was none. It is overwritten by the next
+ * error on the same thread, and not freed.
+ */
+const char *dermis_last_error(void);
+
+/**
+ * The version of the library, as in Cargo.toml; not freed.
+ */
+const char *dermis_version(void);
+
+/**
+ * Load a scene by built-in name or by the path of its file, as the commands take it. The scene belongs to the caller:
+ * dermis_scene_free. After an error *scene is NULL.
+ */
+dermis_status dermis_scene_load(const char *name, dermis_scene **scene);
+
+/**
+ * Make a scene from the text of a scene file. origin is the path that stands in errors, and beside which the files are that
+ * the scene names. The scene belongs to the caller: dermis_scene_free. After an error *scene is NULL.
+ */
+dermis_status dermis_scene_parse(const char *toml,
+                                 const char *origin,
+                                 dermis_scene **scene);
+
+/**
+ * Free a scene; NULL is allowed. Its results and links stay valid.
+ */
+void dermis_scene_free(dermis_scene *scene);
+
+/**
+ * Number of rows, along y; 0 after an error.
+ */
+size_t dermis_scene_rows(const dermis_scene *scene);
+
+/**
+ * Number of columns, along x; 0 after an error.
+ */
+size_t dermis_scene_cols(const dermis_scene *scene);
+
+/**
+ * Number of frames that one result takes: 2^average of a block, 1 of a sliding mean, which takes any number; 0 after an
+ * error.
+ */
+size_t dermis_scene_frames_per_result(const dermis_scene *scene);
+
+/**
+ * Reconstruct the forces of a frame, or of the frames of one result in the order of time.
+ *
+ * engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
+ * values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With find_noise, where
+ * the search finds the shear and the scene states no noise, the noise is found from the frame, and the shear flagged that
+ * it hides: `dermis reconstruct` does it, a stream does not.
+ *
+ * The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
+ * builds the model, which takes longer than the others.
+ */
+dermis_status dermis_reconstruct(const dermis_scene *scene,
+                                 const char *engine,
+                                 const double *stress_MPa,
+                                 size_t count,
+                                 bool find_noise,
+                                 dermis_result **result);
+
+/**
+ * Free a result; NULL is allowed. Its JSON is freed with it.
+ */
+void dermis_result_free(dermis_result *result);
+
+/**
+ * Write the sum of the forces in N, x, y and normal, to the 3 values of force_N.
+ */
+dermis_status dermis_result_resultant(const dermis_result *result, double *force_N);
+
+/**
+ * Write the force on each taxel in N to fx_N, fy_N and fz_N, which have room for as many values as there are taxels.
+ * DERMIS_STATUS_ABSENT if the result has resultants only: output.forces = "resultants" in the scene, or a frame sent for its
+ * resultants.
+ */
+dermis_status dermis_result_forces(const dermis_result *result,
+                                   double *fx_N,
+                                   double *fy_N,
+                                   double *fz_N,
+                                   size_t taxels);
+
+/**
+ * Write the contacts, at most capacity of them, and the number that the result has to count. With capacity 0, contacts may be
+ * NULL. DERMIS_STATUS_ABSENT, and a count of 0, if the result does not tell contacts apart: those of the estimators
+ * "evidence" and "learned" and of partition.case = "contacts" do.
+ */
+dermis_status dermis_result_contacts(const dermis_result *result,
+                                     dermis_contact *contacts,
+                                     size_t capacity,
+                                     size_t *count);
+
+/**
+ * Write the limitations of the result to flags, a sum of dermis_flag.
+ */
+dermis_status dermis_result_flags(const dermis_result *result, uint32_t *flags);
+
+/**
+ * The result as `dermis reconstruct --json` prints it, or for a frame sent for its resultants as a line of
+ * `dermis host --stream`: subarrays, figures behind the flags and all else. The text belongs to the result; NULL after an
+ * error.
+ */
+const char *dermis_result_json(const dermis_result *result);
+
+/**
+ * Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene
+ * may be freed before it. After an error *link is NULL; DERMIS_STATUS_INPUT for a scene whose hardware cannot have a link.
+ */
+dermis_status dermis_link_new(const dermis_scene *scene,
+                              dermis_link **link);
+
+/**
+ * Free a link; NULL is allowed. Results that it gave stay valid.
+ */
+void dermis_link_free(dermis_link *link);
+
+/**
+ * The largest number of bytes that a request has on the wire; 0 after an error.
+ */
+size_t dermis_link_capacity(const dermis_link *link);
+
+/**
+ * Write the request for the board's identity to wire, which has room for capacity bytes, and their number to size. Send it
+ * first: its answer tells whether the board was built for the scene.
+ */
+dermis_status dermis_link_identify(dermis_link *link,
+                                   uint8_t *wire,
+                                   size_t capacity,
+                                   size_t *size);
+
+/**
+ * Write the request for the forces of a frame, or with forces = false for its resultants, to wire, which has room for
+ * capacity bytes, and their number to size. stress_MPa has count = rows * cols values, as for dermis_reconstruct. A board
+ * takes up to three requests before it has answered the first.
+ */
+dermis_status dermis_link_frame(dermis_link *link,
+                                const double *stress_MPa,
+                                size_t count,
+                                bool forces,
+                                uint8_t *wire,
+                                size_t capacity,
+                                size_t *size);
+
+/**
+ * Take the next bytes from the board, as many as are there. Writes to used how many were taken: all, or those up to the end
+ * of a packet; call it again with the others. answer says what the packet is. With DERMIS_ANSWER_RESULT *result belongs to
+ * the caller: dermis_result_free; else it is NULL.
+ *
+ * DERMIS_STATUS_DAMAGED: a packet was damaged on the wire; make the request again. DERMIS_STATUS_BOARD: the board was built
+ * for another scene or version. Both leave used written, and the link goes on.
+ */
+dermis_status dermis_link_receive(dermis_link *link,
+                                  const uint8_t *bytes,
+                                  size_t count,
+                                  size_t *used,
+                                  dermis_answer *answer,
+                                  dermis_result **result);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* DERMIS_H */

@@ -1,0 +1,28 @@
+//! The C interface: scenes, reconstructions and the packets of a board's link, as functions for C.
+//!
+//! ```text
+//! stress, doubles ── dermis_reconstruct ── dermis_result ── forces, contacts, flags
+//!        └── dermis_link_frame ── bytes ── port, board ── bytes ── dermis_link_receive ──┘
+//! ```
+//! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says is
+//! what the program `dermis` says of the same input. `sim/c/dermis.h` is written from this source by cbindgen, which a test
+//! compares; the guide's page on C shows its use.
+//!
+//! | module | does |
+//! |---|---|
+//! | [`guard`] | no panic reaches C: status codes, texts of errors, checks of pointers |
+//! | [`scene`] | scenes, and reconstruction of their frames |
+//! | [`result`] | results: forces, contacts with error bars, flags |
+//! | [`mod@link`] | requests to a board as bytes, and its answers |
+#![deny(missing_docs)]
+// Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
+#![allow(non_snake_case)]
+// Types have the names that C gives them.
+#![allow(non_camel_case_types)]
+// The text of a function is also that of the header; what holds for all pointers stands at the header's top.
+#![allow(clippy::missing_safety_doc)]
+
+pub mod guard;
+pub mod link;
+pub mod result;
+pub mod scene;

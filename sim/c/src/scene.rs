@@ -1,0 +1,136 @@
+//! Scenes, and reconstruction of their frames.
+
+use std::ffi::c_char;
+
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::engine::{Engine, Models};
+
+use crate::guard::{attempt, dermis_status, free, guarded, place, reference, text, values, Error};
+use crate::result::dermis_result;
+
+/// A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
+pub struct dermis_scene {
+    pub(crate) spec: Scene,
+    models: Models,
+}
+
+impl dermis_scene {
+    fn into_raw(spec: Scene) -> *mut dermis_scene {
+        Box::into_raw(Box::new(dermis_scene { spec, models: Models::default() }))
+    }
+}
+
+/// The frames of the argument `stress_MPa` of `count` values, which are whole frames of a scene's sensor, at least one.
+///
+/// # Errors
+/// Another number of values, one that is not finite.
+///
+/// # Safety
+/// As [`values`].
+pub(crate) unsafe fn frames(scene: &Scene, stress_MPa: *const f64, count: usize) -> Result<Vec<Frame>, Error> {
+    let sensor = &scene.sensor;
+    let taxels = sensor.taxels();
+    if count == 0 || !count.is_multiple_of(taxels) {
+        let (name, rows, cols) = (&scene.name, sensor.rows, sensor.cols);
+        return Err(Error::input(format!(
+            "count = {count} is not allowed; scene {name} has frames of {rows} * {cols} = {taxels} values"
+        )));
+    }
+    let stress = unsafe { values("stress_MPa", stress_MPa, count) }?;
+    let frame = |(time, stress): (usize, &[f64])| {
+        let id = if count == taxels { "frame".to_owned() } else { format!("frame {time}") };
+        Frame::from_stress(&id, sensor, stress.to_vec()).map_err(Error::input)
+    };
+    stress.chunks(taxels).enumerate().map(frame).collect()
+}
+
+/// Load a scene by built-in name or by the path of its file, as the commands take it. The scene belongs to the caller:
+/// dermis_scene_free. After an error *scene is NULL.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_load(name: *const c_char, scene: *mut *mut dermis_scene) -> dermis_status {
+    guarded(|| {
+        let scene = unsafe { place("scene", scene) }?;
+        scene.write(std::ptr::null_mut());
+        let spec = Scene::load(unsafe { text("name", name) }?).map_err(Error::input)?;
+        scene.write(dermis_scene::into_raw(spec));
+        Ok(())
+    })
+}
+
+/// Make a scene from the text of a scene file. origin is the path that stands in errors, and beside which the files are that
+/// the scene names. The scene belongs to the caller: dermis_scene_free. After an error *scene is NULL.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_parse(
+    toml: *const c_char,
+    origin: *const c_char,
+    scene: *mut *mut dermis_scene,
+) -> dermis_status {
+    guarded(|| {
+        let scene = unsafe { place("scene", scene) }?;
+        scene.write(std::ptr::null_mut());
+        let (toml, origin) = unsafe { (text("toml", toml)?, text("origin", origin)?) };
+        scene.write(dermis_scene::into_raw(Scene::parse(toml, origin).map_err(Error::input)?));
+        Ok(())
+    })
+}
+
+/// Free a scene; NULL is allowed. Its results and links stay valid.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_free(scene: *mut dermis_scene) {
+    unsafe { free(scene) }
+}
+
+fn number(scene: *const dermis_scene, of: impl FnOnce(&Scene) -> usize) -> usize {
+    attempt(|| Ok(of(&unsafe { reference("scene", scene) }?.spec))).unwrap_or(0)
+}
+
+/// Number of rows, along y; 0 after an error.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_rows(scene: *const dermis_scene) -> usize {
+    number(scene, |spec| spec.sensor.rows)
+}
+
+/// Number of columns, along x; 0 after an error.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_cols(scene: *const dermis_scene) -> usize {
+    number(scene, |spec| spec.sensor.cols)
+}
+
+/// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean, which takes any number; 0 after an
+/// error.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_scene) -> usize {
+    number(scene, |spec| spec.input.frames_per_result())
+}
+
+/// Reconstruct the forces of a frame, or of the frames of one result in the order of time.
+///
+/// engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
+/// values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With find_noise, where
+/// the search finds the shear and the scene states no noise, the noise is found from the frame, and the shear flagged that
+/// it hides: `dermis reconstruct` does it, a stream does not.
+///
+/// The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
+/// builds the model, which takes longer than the others.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_reconstruct(
+    scene: *const dermis_scene,
+    engine: *const c_char,
+    stress_MPa: *const f64,
+    count: usize,
+    find_noise: bool,
+    result: *mut *mut dermis_result,
+) -> dermis_status {
+    guarded(|| {
+        let result = unsafe { place("result", result) }?;
+        result.write(std::ptr::null_mut());
+        let scene = unsafe { reference("scene", scene) }?;
+        let engine: Engine = unsafe { text("engine", engine) }?.parse()?;
+        let frames = unsafe { frames(&scene.spec, stress_MPa, count) }?;
+        let ready = scene.models.ready(engine, &scene.spec, &frames)?;
+        let found = ready.reconstruct(&scene.spec, &frames, find_noise)?;
+        result.write(dermis_result::of_model(found).into_raw());
+        Ok(())
+    })
+}

@@ -1,0 +1,8 @@
+//! The C interface as C calls it: its header, an example that is compiled and run, wrong arguments, the link.
+// Names carry their unit, as in the library.
+#![allow(non_snake_case)]
+
+mod example;
+mod header;
+mod input;
+mod link;
