@@ -55,7 +55,8 @@ fn main() -> anyhow::Result<()> {
     let result = &Engine::new(&scene, false)?.reconstruct(std::slice::from_ref(frame))?;
     let newest = Arc::new(Newest::default());
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
-    let answer = Answer { sequence, line, received_s, answered_s, dropped, frame, result };
+    let (frames, received) = (std::slice::from_ref(frame), &[received_s][..]);
+    let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
     Show::new(&newest).outcome(&Outcome::Answer(answer))?;
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let url = format!("http://{}/", listener.local_addr()?);

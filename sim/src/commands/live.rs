@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
             hand.run(&scene, &engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
         }
         (None, Some((input, name))) => {
-            let options = StreamOptions { queue: 1, policy: Policy::Latest, brief: false };
+            let options = StreamOptions { queue: 1, policy: Policy::Latest };
             let counts = run_stream(&scene, &engine, (input, &name), options, &mut output)?;
             eprintln!("{}: {name} has ended after {} results; the last one is shown", scene.name, counts.answered);
         }

@@ -14,6 +14,7 @@ mod guide_links;
 mod host;
 mod live;
 mod page;
+mod recording;
 mod report;
 mod stream;
 mod testbench;
