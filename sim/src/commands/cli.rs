@@ -66,7 +66,7 @@ enum Command {
     Reconstruct(super::reconstruct::Arguments),
     /// Write the frames or the results of a recording, line by line.
     Replay(super::replay::Arguments),
-    /// Show the newest forces of a stream, or of a finger that the mouse moves, on a local page.
+    /// Show the newest forces of a stream, of a recording, or of a finger that the mouse moves, on a local page.
     Live(super::live::Arguments),
     /// Generate the Verilog of a scene.
     Build(super::build::Arguments),

@@ -16,7 +16,7 @@
 //! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
 //! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
 //! | [`inputs`] | scene and frames from command-line arguments |
-//! | [`live`] | `dermis live`: a local page with the newest forces of a stream, or of a finger that the mouse moves |
+//! | [`live`] | `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger |
 //! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |

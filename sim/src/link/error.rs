@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HostError {
     /// The port cannot be opened, or fails.
-    #[error("--port {port}: {reason}")]
+    #[error("port {port}: {reason}")]
     Port {
         /// The port, as given.
         port: String,
@@ -15,7 +15,7 @@ pub enum HostError {
     },
     /// No valid answer after several attempts.
     #[error(
-        "--port {port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a \
+        "port {port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a \
          Dermis board, configured, and at this bit rate?"
     )]
     NoAnswer {
@@ -29,7 +29,7 @@ pub enum HostError {
         milliseconds: u128,
     },
     /// The board uses another packet version.
-    #[error("--port {port}: the board uses packet version {has}, this program version {wants}")]
+    #[error("port {port}: the board uses packet version {has}, this program version {wants}")]
     Version {
         /// The port.
         port: String,
@@ -39,7 +39,7 @@ pub enum HostError {
         wants: u16,
     },
     /// The board's bitstream was built for another scene.
-    #[error("--port {port}: the board was built for another scene: {has}; {scene} is {wants}")]
+    #[error("port {port}: the board was built for another scene: {has}; {scene} is {wants}")]
     OtherScene {
         /// The port.
         port: String,
@@ -51,7 +51,7 @@ pub enum HostError {
         wants: String,
     },
     /// An answer has the wrong length: a defect of the board or of this program.
-    #[error("--port {port}: {what} answer has a wrong length: {bytes} bytes")]
+    #[error("port {port}: {what} answer has a wrong length: {bytes} bytes")]
     Answer {
         /// The port.
         port: String,

@@ -22,7 +22,12 @@ pub enum Engine {
     Golden(Box<Golden>),
     /// The bit-true model.
     Fixed(Box<Model>),
+    /// Something else, such as a board.
+    Other(Box<Reconstruct>),
 }
+
+/// Gives the result of a block of frames.
+pub type Reconstruct = dyn Fn(&[Frame]) -> Result<Reconstruction>;
 
 /// How a stream is read and answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,6 +141,7 @@ impl Engine {
         match self {
             Engine::Golden(golden) => Ok(golden.run_averaged(frames)?),
             Engine::Fixed(model) => Ok(model.reconstruct_averaged(frames)?),
+            Engine::Other(reconstruct) => reconstruct(frames),
         }
     }
 }

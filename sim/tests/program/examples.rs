@@ -12,13 +12,15 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 45] = [
+const NOT_RUN: [(&str, &str); 47] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
     ("dermis live pad.toml --noise 0.002 --engine fixed", PAGE),
     ("dermis live pad.toml --stream=udp:127.0.0.1:9000", PAGE),
     ("dermis live pad.toml --stream=/dev/ttyUSB0 --baud 115200", PAGE),
+    ("dermis live sensor-1 --recording press.mcap --loop", SOURCE),
+    ("dermis live sensor-1 --board /dev/ttyUSB0", SOURCE),
     ("dermis live sensor-1 --listen 192.168.1.7:8317", PAGE),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
@@ -59,6 +61,7 @@ const NOT_RUN: [(&str, &str); 45] = [
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; netlist.rs"),
 ];
+const SOURCE: &str = "runs until interrupted; live_sources.rs";
 const PAGE: &str = "runs until interrupted; live.rs";
 const IMPORTED: &str = "needs an imported recording; report.rs";
 const BOARD: &str = "needs a board on a serial port";

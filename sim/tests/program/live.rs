@@ -16,13 +16,13 @@ use super::browser::Browser;
 const SCENE: &str = "eight-by-eight";
 
 /// The program with the address of its page.
-struct Live {
-    child: Child,
+pub(super) struct Live {
+    pub(super) child: Child,
     url: String,
 }
 
 impl Live {
-    fn start(more: &[&str]) -> Live {
+    pub(super) fn start(more: &[&str]) -> Live {
         Live::listen("127.0.0.1:0", more)
     }
 
@@ -36,11 +36,16 @@ impl Live {
     }
 
     fn connect(&self) -> TcpStream {
-        TcpStream::connect(self.url.trim_start_matches("http://").trim_end_matches('/')).unwrap()
+        TcpStream::connect(self.host()).unwrap()
+    }
+
+    /// Host and port of the page.
+    pub(super) fn host(&self) -> &str {
+        self.url.trim_start_matches("http://").trim_end_matches('/')
     }
 
     /// The answer to a request, sent on a connection of its own.
-    fn answer(&self, request: &str) -> String {
+    pub(super) fn answer(&self, request: &str) -> String {
         let mut stream = self.connect();
         let _ = stream.write_all(request.as_bytes());
         // A refused connection may be closed already.
@@ -216,7 +221,7 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
 #[test]
 fn foreign_pages_and_too_many_clients_are_refused() {
     let live = Live::start(&[]);
-    let host = live.url.trim_start_matches("http://").trim_end_matches('/');
+    let host = live.host();
     let status = |answer: String| answer.split(' ').nth(1).unwrap_or_default().to_owned();
     let get = |host: &str| status(live.answer(&format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n")));
     assert_eq!((get(host), get("evil.example")), ("200".into(), "403".into()));

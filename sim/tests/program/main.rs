@@ -13,6 +13,7 @@ mod guide;
 mod guide_links;
 mod host;
 mod live;
+mod live_sources;
 mod page;
 mod recording;
 mod report;
