@@ -7,6 +7,7 @@
 //! The mean of the thread's processor time must be at most [`MOST_MS`]; the time on the clock has other programs in it too.
 
 #[path = "../tests/program/browser.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
 mod browser;
 
 use std::net::TcpListener;

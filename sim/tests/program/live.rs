@@ -11,7 +11,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use serde_json::{json, Value};
 
-use super::browser::Browser;
+use super::browser::{Browser, DESKTOP, PHONE};
 
 const SCENE: &str = "eight-by-eight";
 
@@ -190,12 +190,8 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
     mouse(&mut browser, "mousePressed", 0.3, 0.3);
     browser.wait_for("document.querySelector('#forces').innerText.includes('±')");
     let mut colours = Vec::new();
-    for (width, dark) in [(1280, false), (1280, true), (360, false), (360, true)] {
-        let (scheme, mobile) = (if dark { "dark" } else { "light" }, width == 360);
-        let size = json!({"width": width, "height": 780, "deviceScaleFactor": 1, "mobile": mobile});
-        browser.call("Emulation.setDeviceMetricsOverride", size);
-        let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
-        browser.call("Emulation.setEmulatedMedia", media);
+    for (width, dark) in [(DESKTOP, false), (DESKTOP, true), (PHONE, false), (PHONE, true)] {
+        browser.set(width, dark);
         let found = browser.evaluate(
             "({ inner: innerWidth, width: document.documentElement.scrollWidth,
                 colours: [getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color],
@@ -207,7 +203,7 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
                     .filter(name => !name.startsWith(location.origin)) })",
         );
         assert_eq!((&found["inner"], &found["elsewhere"]), (&json!(width), &json!([])), "{found}");
-        assert!(found["width"].as_u64() <= Some(width), "{found}");
+        assert!(found["width"].as_u64() <= Some(width.into()), "{found}");
         assert!(found["table"].as_u64() <= found["room"].as_u64(), "{found}");
         assert!(found["small"].as_f64() > Some(9.0) && found["map"].as_f64() > Some(300.0), "{found}");
         assert_ne!(found["colours"][0], found["colours"][1]);
