@@ -15,8 +15,8 @@
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
 //! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimators but `search` |
 //! | `misfit` | the stated noise does not explain what the estimate leaves, or noise found from the frame is above a tenth of its peak | `Checks::flags`, estimators but `search` |
-//! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
+//! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -55,11 +55,11 @@ pub enum Flag {
     ShapeMismatch,
     /// The shear's standard deviation is above a third of it.
     ShearNotResolved,
-    /// There are more contacts than get a μ; the smallest have no shear.
-    TooManyContacts,
     /// Noise of the stated size, or of a size that a sensor can have, does not explain what the estimate leaves of the
     /// stress.
     Misfit,
+    /// There are more contacts than get a μ; the smallest have no shear.
+    TooManyContacts,
 }
 
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
@@ -143,8 +143,8 @@ mod tests {
             Flag::LoadMismatch,
             Flag::ShapeMismatch,
             Flag::ShearNotResolved,
-            Flag::TooManyContacts,
             Flag::Misfit,
+            Flag::TooManyContacts,
         ];
         let text = serde_json::to_string(&all).unwrap();
         let wanted = [
@@ -161,8 +161,8 @@ mod tests {
             "load-mismatch",
             "shape-mismatch",
             "shear-not-resolved",
-            "too-many-contacts",
             "misfit",
+            "too-many-contacts",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

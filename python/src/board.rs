@@ -84,8 +84,8 @@ impl Board {
                     frame.id
                 )));
             }
-            let beats = answer.beats.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
-            let result = session.model.decode(&[readings], "board", &beats, &answer.status).map_err(fixed)?;
+            let result = session.decode(&readings, &answer).map_err(fixed)?;
+            let result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
             Ok(Reconstruction::new(Arc::new(result), scene.lengths()))
         })
     }

@@ -7,6 +7,7 @@
 //! The mean of the thread's processor time must be at most [`MOST_MS`]; the time on the clock has other programs in it too.
 
 #[path = "../tests/program/browser.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
 mod browser;
 
 use std::net::TcpListener;
@@ -55,7 +56,8 @@ fn main() -> anyhow::Result<()> {
     let result = &Engine::new(&scene, false)?.reconstruct(std::slice::from_ref(frame))?;
     let newest = Arc::new(Newest::default());
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
-    let answer = Answer { sequence, line, received_s, answered_s, dropped, frame, result };
+    let (frames, received) = (std::slice::from_ref(frame), &[received_s][..]);
+    let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
     Show::new(&newest).outcome(&Outcome::Answer(answer))?;
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let url = format!("http://{}/", listener.local_addr()?);

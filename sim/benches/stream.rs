@@ -22,9 +22,9 @@ fn rate(scene: &Scene, fixed: bool, frames: usize) -> anyhow::Result<f64> {
     let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     let text: String = shipped.iter().cycle().take(frames).map(line).collect();
     let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
-    let options = StreamOptions { queue: 64, policy: Policy::All, brief: false };
+    let options = StreamOptions { queue: 64, policy: Policy::All };
     let begin = Instant::now();
-    let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink()))?;
+    let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink(), false))?;
     ensure!(counts.answered == frames as u64, "{counts:?}");
     Ok(frames as f64 / begin.elapsed().as_secs_f64())
 }

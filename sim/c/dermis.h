@@ -131,6 +131,10 @@ typedef enum {
    * `misfit`
    */
   DERMIS_FLAG_MISFIT = (1 << 13),
+  /**
+   * `too-many-contacts`
+   */
+  DERMIS_FLAG_TOO_MANY_CONTACTS = (1 << 14),
 } dermis_flag;
 
 /**

@@ -18,10 +18,10 @@ use crate::progress::Progress;
 /// Exit code when a second signal ends the program at once.
 const SECOND_INTERRUPT_EXIT: i32 = 130;
 
-/// Interrupted by SIGINT or SIGTERM.
+/// Interrupted by SIGINT or SIGTERM, with what became of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("interrupted; nothing was written")]
-pub struct Interrupted;
+#[error("interrupted; {0}")]
+pub struct Interrupted(pub &'static str);
 
 /// Set when SIGINT or SIGTERM has arrived.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +33,17 @@ impl Interrupt {
     /// # Errors
     /// A handler cannot be registered.
     pub fn on_signals() -> Result<Interrupt> {
+        // Tasks that run are not stopped and may take half a minute.
+        Interrupt::with(|| {
+            eprintln!("interrupted: the tasks that run are ended first; a second signal ends them at once");
+        })
+    }
+
+    /// The same; `act` is called after the first signal, in a thread of its own: a handler must not write or lock.
+    ///
+    /// # Errors
+    /// A handler cannot be registered.
+    pub fn with(act: impl FnOnce() + Send + 'static) -> Result<Interrupt> {
         let interrupt = Interrupt::default();
         let (mut woken, wakes) = UnixStream::pair()?;
         for signal in [SIGINT, SIGTERM] {
@@ -41,10 +52,9 @@ impl Interrupt {
             flag::register(signal, interrupt.0.clone())?;
             pipe::register(signal, wakes.try_clone()?)?;
         }
-        // A handler must not write by itself; tasks that run are not stopped and may take half a minute.
         std::thread::spawn(move || {
             if woken.read_exact(&mut [0]).is_ok() {
-                eprintln!("interrupted: the tasks that run are ended first; a second signal ends them at once");
+                act();
             }
         });
         Ok(interrupt)
@@ -56,7 +66,7 @@ impl Interrupt {
     /// [`Interrupted`].
     pub fn check(&self) -> Result<()> {
         match self.0.load(Ordering::Relaxed) {
-            true => Err(Interrupted.into()),
+            true => Err(Interrupted("nothing was written").into()),
             false => Ok(()),
         }
     }

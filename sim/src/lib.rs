@@ -1,12 +1,13 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Seven folders; each uses only those above it and the files beside the folders.
+//! Eight folders; each uses only those above it and the files beside the folders.
 //!
 //! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
 //! | [`cosim`] | co-simulation: the hardware under Verilator and rust-hdl, compared with the bit-true model, stressed, with faults |
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
+//! | [`recording`] | frames and results of a stream in an MCAP file, with the message types of ROS 2 |
 //! | [`mod@link`] | the host end of a board's link, of real and of simulated boards |
 //! | [`report`] | measurements, and text, JSON, CSV, pictures and pages of all results |
 //! | [`live`] | a page in the browser that shows the newest result of a stream or of a drawn finger |
@@ -36,6 +37,7 @@ pub mod jobs;
 pub mod link;
 pub mod live;
 mod progress;
+pub mod recording;
 pub mod report;
 pub mod run_log;
 pub mod stream;

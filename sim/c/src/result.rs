@@ -45,6 +45,8 @@ pub enum dermis_flag {
     ShearNotResolved = 1 << 12,
     /// `misfit`
     Misfit = 1 << 13,
+    /// `too-many-contacts`
+    TooManyContacts = 1 << 14,
 }
 
 /// The bit of a flag.
@@ -64,6 +66,7 @@ pub fn bit(flag: Flag) -> u32 {
         Flag::ShapeMismatch => dermis_flag::ShapeMismatch,
         Flag::ShearNotResolved => dermis_flag::ShearNotResolved,
         Flag::Misfit => dermis_flag::Misfit,
+        Flag::TooManyContacts => dermis_flag::TooManyContacts,
     };
     bit as u32
 }

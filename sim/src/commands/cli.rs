@@ -42,6 +42,7 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct sensor-1                        the scene's first shipped frame, golden model
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
   dermis reconstruct sensor-1 --engine rtl           the same in the generated hardware, under Verilator
+  dermis replay press.mcap                           the frames of a recording, one per line
   dermis live sensor-1                               page in the browser: press and drag, forces at once
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis bitstream eight-by-eight                    synthesis, place and route for its board
@@ -63,7 +64,9 @@ const EXAMPLES: &str = "Examples:
 enum Command {
     /// Reconstruct the forces of one frame.
     Reconstruct(super::reconstruct::Arguments),
-    /// Show the newest forces of a stream, or of a finger that the mouse moves, on a local page.
+    /// Write the frames or the results of a recording, line by line.
+    Replay(super::replay::Arguments),
+    /// Show the newest forces of a stream, of a recording, or of a finger that the mouse moves, on a local page.
     Live(super::live::Arguments),
     /// Generate the Verilog of a scene.
     Build(super::build::Arguments),
@@ -171,6 +174,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
     cache::set_folder(Some(&build_dir.join("matrices")));
     match &arguments.command {
         Command::Reconstruct(arguments) => Ok((super::reconstruct::run(arguments, build_dir)?, true)),
+        Command::Replay(arguments) => Ok((super::replay::run(arguments)?, true)),
         Command::Live(arguments) => Ok((super::live::run(arguments, print)?, true)),
         Command::Build(arguments) => Ok((super::build::run(arguments, build_dir)?, true)),
         Command::Cosim(arguments) => super::cosim::run(arguments, build_dir),

@@ -112,11 +112,10 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
     let (mut text, mut equal) = (String::new(), true);
     for (index, frame) in frames.iter().enumerate() {
         let (readings, answer) = session.request(frame)?;
-        if let Some(beats) = &answer.beats {
-            let readings = std::slice::from_ref(&readings);
-            let result = session.model.decode(readings, "board", beats, &answer.status)?;
+        if let Some(result) = session.decode(&readings, &answer)? {
             let sensor = &session.model.scene.sensor;
-            let full_scale_MPa = full_scale(&session.model.scene, &session.model.stress(readings)?);
+            let stress = session.model.stress(std::slice::from_ref(&readings))?;
+            let full_scale_MPa = full_scale(&session.model.scene, &stress);
             text.push_str(&report::reconstruction(&result, sensor, full_scale_MPa));
             text.push_str(&report::equality(&answer));
         } else {

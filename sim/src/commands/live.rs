@@ -1,17 +1,23 @@
-//! `dermis live`: a local page with the newest forces of a stream, or of a finger that the mouse moves.
+//! `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger that the mouse moves.
 
+use std::io::Read;
 use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
+use dermis_golden::fixed::Model;
+use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 
 use super::inputs::{note_estimator, BoardOverride};
 use super::reconstruct_stream::{open, SoftwareEngine};
+use crate::link::{open as connect, require_uart, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
+use crate::recording::{Lines, Pace};
 use crate::stream::{run as run_stream, Engine, Outcome, Policy, Source, StreamOptions};
 
 /// Arguments of `dermis live`.
@@ -22,6 +28,8 @@ use crate::stream::{run as run_stream, Engine, Outcome, Policy, Source, StreamOp
   sensor-program | dermis live pad.toml --stream           one frame per line, as dermis reconstruct --stream takes them
   dermis live pad.toml --stream=udp:127.0.0.1:9000
   dermis live pad.toml --stream=/dev/ttyUSB0 --baud 115200
+  dermis live sensor-1 --recording press.mcap --loop       recorded frames, as far apart as they were received
+  dermis live sensor-1 --board /dev/ttyUSB0                the finger's frames, the board's forces
   dermis live sensor-1 --listen 192.168.1.7:8317           for a phone in the same network, without any password
 
 The address is printed on standard output; the program runs until it is interrupted. Only the newest frame is
@@ -33,17 +41,27 @@ pub struct Arguments {
     /// a finger that the mouse on the page moves.
     #[arg(long, value_name = "SOURCE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
     stream: Option<Source>,
-    /// Bit rate of a serial port; default: that of the scene's board.
+    /// Bit rate of the stream's serial port; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
+    /// Show the frames of a recording, as far apart as they were received.
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "stream")]
+    recording: Option<PathBuf>,
+    /// Begin the recording again at its end.
+    #[arg(long = "loop", requires = "recording")]
+    repeat: bool,
     /// Model that computes the forces.
-    #[arg(long, value_enum, default_value = "golden")]
+    #[arg(long, value_enum, default_value = "golden", conflicts_with = "board")]
     engine: SoftwareEngine,
+    /// Serial port of a board that computes the forces in place of a model, at the bit rate of the scene's board.
+    #[arg(long, value_name = "PATH")]
+    board: Option<String>,
     /// Standard deviation of the noise on the finger's frames over the largest |b|.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0005, conflicts_with = "stream")]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0005, conflicts_with_all = ["stream", "recording"])]
     noise: f64,
     /// Largest number of the finger's frames per second.
-    #[arg(long, value_name = "N", default_value_t = 60, conflicts_with = "stream", value_parser = value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 60, conflicts_with_all = ["stream", "recording"],
+          value_parser = value_parser!(u32).range(1..=1000))]
     rate: u32,
     /// Address and port of the page; port 0 takes a free one.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8317")]
@@ -52,35 +70,75 @@ pub struct Arguments {
     target: BoardOverride,
 }
 
+/// Time without a board's answer after which a request is sent again.
+const BOARD_TIMEOUT: Duration = Duration::from_secs(1);
+
+impl Arguments {
+    /// Whether the mouse on the page is the source of frames.
+    fn finger(&self) -> bool {
+        self.stream.is_none() && self.recording.is_none()
+    }
+
+    /// The lines of frames and their source's name; `None` with the finger.
+    fn input(&self, scene: &Scene) -> Result<Option<(Box<dyn Read + Send>, String)>> {
+        match (&self.stream, &self.recording) {
+            (Some(source), _) => open(source, scene, self.baud).map(Some),
+            (None, Some(path)) => {
+                let (name, shape) = (path.display().to_string(), Some([scene.sensor.rows, scene.sensor.cols]));
+                let lines = Lines::open(path.clone(), shape, Pace::Recorded, self.repeat);
+                let lines = lines.map_err(|error| anyhow!("--recording {name}: {error}"))?;
+                Ok(Some((Box::new(lines), name)))
+            }
+            (None, None) => Ok(None),
+        }
+    }
+
+    /// What computes the forces.
+    fn engine(&self, scene: &Scene) -> Result<Engine> {
+        let fixed = matches!(self.engine, SoftwareEngine::Fixed);
+        if fixed || self.board.is_some() {
+            note_estimator(scene);
+        }
+        let Some(port) = &self.board else { return Engine::new(scene, fixed) };
+        require_uart(scene, "live --board")?;
+        let model = Model::new(scene)?;
+        let client = connect(port, LinkKind::Uart.bit_rate(&model.board)?, BOARD_TIMEOUT)?;
+        Ok(Session::new(client, model, None, true, false)?.into())
+    }
+}
+
 /// Runs the command until it is interrupted.
 ///
 /// # Errors
-/// A scene without that engine, a source that cannot be read, an address that cannot be used.
+/// A scene without that engine, a source or a board that cannot be used, an address that cannot be used.
 pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<String> {
-    let Arguments { scene, stream, baud, engine, noise, rate, listen, target } = arguments;
+    let Arguments { scene, board, noise, rate, listen, target, .. } = arguments;
     let mut scene = target.apply(Scene::load(scene)?);
-    if stream.is_none() {
+    if arguments.finger() {
         // The finger's frames are stress already.
-        (scene.input.calibration, scene.input.tare) = (None, None);
+        let converted = [("calibration", scene.input.calibration.take()), ("tare", scene.input.tare.take())];
+        if let (Some(port), Some((field, _))) = (board, converted.iter().find(|(_, value)| value.is_some())) {
+            bail!(
+                "--board {port}: the board applies input.{field} of scene {}, and the finger's frames are stress \
+                   already: take --stream or --recording",
+                scene.name
+            );
+        }
     }
     if !(0.0..=1.0).contains(noise) {
         bail!("--noise = {noise} is not allowed: 0 to 1");
     }
-    let fixed = matches!(engine, SoftwareEngine::Fixed);
-    if fixed {
-        note_estimator(&scene);
-    }
-    let engine = Engine::new(&scene, fixed)?;
-    let input = stream.as_ref().map(|source| open(source, &scene, *baud)).transpose()?;
+    let engine = arguments.engine(&scene)?;
+    let input = arguments.input(&scene)?;
     let listener = TcpListener::bind(listen).map_err(|error| anyhow!("--listen {listen}: {error}"))?;
     let address = listener.local_addr()?;
     if let Some(address) = open_to_others(address) {
         eprintln!("warning: {address} is open to the network; whoever reaches it sees the frames and moves the finger");
     }
     let newest = Arc::new(Newest::default());
-    let hand = stream.is_none().then(|| Arc::new(Hand::default()));
-    let source = match stream {
-        Some(source) => format!("frames from {}", source.name()),
+    let hand = arguments.finger().then(|| Arc::new(Hand::default()));
+    let source = match &input {
+        Some((_, name)) => format!("frames from {name}"),
         None => format!("finger, noise {noise}"),
     };
     let server = Server::new(&scene, &source, Arc::clone(&newest), hand.clone());
@@ -93,7 +151,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
             hand.run(&scene, &engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
         }
         (None, Some((input, name))) => {
-            let options = StreamOptions { queue: 1, policy: Policy::Latest, brief: false };
+            let options = StreamOptions { queue: 1, policy: Policy::Latest };
             let counts = run_stream(&scene, &engine, (input, &name), options, &mut output)?;
             eprintln!("{}: {name} has ended after {} results; the last one is shown", scene.name, counts.answered);
         }

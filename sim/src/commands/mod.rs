@@ -16,11 +16,12 @@
 //! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
 //! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
 //! | [`inputs`] | scene and frames from command-line arguments |
-//! | [`live`] | `dermis live`: a local page with the newest forces of a stream, or of a finger that the mouse moves |
+//! | [`live`] | `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger |
 //! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
+//! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
@@ -47,6 +48,7 @@ pub mod new;
 pub mod noise;
 pub mod reconstruct;
 mod reconstruct_stream;
+pub mod replay;
 pub mod report;
 pub mod stability;
 pub mod stress;

@@ -26,11 +26,12 @@ use crate::report;
   dermis reconstruct my-scene.toml --frame eq2 --json
   dermis reconstruct sensor-1 --stream <frames.csv >forces.ndjson
   dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief
+  dermis reconstruct sensor-1 --stream --record touch.mcap <frames.csv >forces.ndjson
   dermis reconstruct averaging.toml --frame 1.csv --frame 2.csv     the mean of 2 frames, input.average = 1
 
 A stream has one frame per line: taxels separated by commas, row-major, or {\"id\": 7, \"stress_MPa\": [0.1, ...]}. Every
 line is answered by one of JSON: sequence, line, received_s, answered_s, dropped, and the fields of --json; a bad line by
-its number and the error. The noise must be stated: it is not found from a stream's frames where the search finds the
+its number and the error. A recording has both, for dermis replay, dermis live and programs that read ROS 2 messages. The noise must be stated: it is not found from a stream's frames where the search finds the
 shear.")]
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.

@@ -1,6 +1,7 @@
-//! `dermis reconstruct --stream`: frames as lines, results as lines of JSON.
+//! `dermis reconstruct --stream`: frames as lines, results as lines of JSON, and as a recording.
 
-use std::io::Read;
+use std::io::{Error, Read};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail, Result};
@@ -8,7 +9,9 @@ use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::scene::Scene;
 
 use super::inputs::note_estimator;
-use crate::stream::{as_lines, run, Engine, Policy, Source, StreamOptions};
+use crate::jobs::{Interrupt, Interrupted};
+use crate::recording::Recorder;
+use crate::stream::{as_lines, run_until, Engine, Outcome, Policy, Source, Stop, StreamOptions};
 
 /// Lines that wait with `--all`: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;
@@ -38,6 +41,10 @@ pub(super) struct StreamArguments {
     /// Bit rate of a serial port; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
+    /// Write frames and results into a new MCAP file too, with the message types of ROS 2; the first interruption
+    /// completes it.
+    #[arg(long, value_name = "FILE.mcap", requires = "stream")]
+    record: Option<PathBuf>,
 }
 
 impl StreamArguments {
@@ -59,15 +66,40 @@ impl StreamArguments {
         let policy = if self.latest { Policy::Latest } else { Policy::All };
         let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
         let (input, name) = open(source, scene, self.baud)?;
-        let options = StreamOptions { queue: queue as usize, policy, brief: self.brief };
+        let options = StreamOptions { queue: queue as usize, policy };
+        let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, &scene.sensor)).transpose()?;
+        let stop = Stop::default();
+        // Without a recording there is nothing to complete.
+        let interrupted = match &recorder {
+            Some(_) => {
+                let stop = stop.clone();
+                Interrupt::with(move || stop.now())?
+            }
+            None => Interrupt::default(),
+        };
         let begun = Instant::now();
-        let counts = run(scene, &engine, (input, &name), options, &mut as_lines(&mut std::io::stdout().lock()))?;
+        let mut stdout = std::io::stdout().lock();
+        let mut lines = as_lines(&mut stdout, self.brief);
+        let mut output = |outcome: &Outcome| {
+            if let Some(recorder) = &mut recorder {
+                recorder.outcome(outcome).map_err(|error| Error::other(error.to_string()))?;
+            }
+            lines(outcome)
+        };
+        let counts = run_until(&stop, scene, &engine, (input, &name), options, &mut output);
+        // Completed whatever ended the stream.
+        if let (Some(recorder), Some(path)) = (recorder, &self.record) {
+            let results = recorder.finish()?;
+            eprintln!("{}: {results} results recorded", path.display());
+        }
+        let counts = counts?;
         let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
         let (answered, refused, dropped) = (counts.answered, counts.refused, counts.dropped);
         eprintln!(
             "{}: {answered} results, {rate:.1} per second; {refused} lines refused, {dropped} dropped",
             scene.name
         );
+        interrupted.check().map_err(|_| Interrupted("the recording is complete"))?;
         if refused > 0 {
             bail!("{name}: {refused} of {} lines were refused", refused + answered);
         }

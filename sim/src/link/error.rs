@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HostError {
     /// The port cannot be opened, or fails.
-    #[error("--port {port}: {reason}")]
+    #[error("port {port}: {reason}")]
     Port {
         /// The port, as given.
         port: String,
@@ -15,7 +15,7 @@ pub enum HostError {
     },
     /// No valid answer after several attempts.
     #[error(
-        "--port {port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a \
+        "port {port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a \
          Dermis board, configured, and at this bit rate?"
     )]
     NoAnswer {
@@ -29,7 +29,7 @@ pub enum HostError {
         milliseconds: u128,
     },
     /// The board is another one.
-    #[error("--port {port}: {reason}")]
+    #[error("port {port}: {reason}")]
     Identity {
         /// The port.
         port: String,
@@ -37,7 +37,7 @@ pub enum HostError {
         reason: IdentityError,
     },
     /// An answer has the wrong length: a defect of the board or of this program.
-    #[error("--port {port}: {what} answer has a wrong length: {bytes} bytes")]
+    #[error("port {port}: {what} answer has a wrong length: {bytes} bytes")]
     Answer {
         /// The port.
         port: String,

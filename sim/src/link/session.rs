@@ -1,17 +1,20 @@
 //! A connection to an identified board, with the model of its scene.
 
+use std::cell::RefCell;
 use std::time::Duration;
 
-use anyhow::Result;
-use dermis_golden::fixed::Model;
+use anyhow::{anyhow, bail, Result};
+use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::input::Input;
 use dermis_golden::link::{Identity, Kind};
+use dermis_golden::reconstruct::Reconstruction;
 use serialport::SerialPort;
 
 use super::answer::Answer;
 use super::client::Client;
 use super::error::HostError;
+use crate::stream::Engine;
 
 /// Longest wait of a read of the port for a byte.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
@@ -63,6 +66,28 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         }
         answer.beats = answer.beats.filter(|_| self.forces);
         Ok((frame, answer))
+    }
+
+    /// The result of an answer to these readings; `None` if it has no forces.
+    ///
+    /// # Errors
+    /// An answer that the model cannot decode.
+    pub fn decode(&self, readings: &Frame, answer: &Answer) -> Result<Option<Reconstruction>, FixedError> {
+        let decode = |beats| self.model.decode(std::slice::from_ref(readings), "board", beats, &answer.status);
+        answer.beats.as_deref().map(decode).transpose()
+    }
+}
+
+impl<P: std::io::Read + std::io::Write + 'static> From<Session<P>> for Engine {
+    /// The board as the engine of a stream; the session must ask for forces. A board takes no blocks of several frames.
+    fn from(session: Session<P>) -> Engine {
+        let session = RefCell::new(session);
+        Engine::Other(Box::new(move |frames| {
+            let mut session = session.borrow_mut();
+            let [frame] = frames else { bail!("{} frames: a board takes one for each result", frames.len()) };
+            let (readings, answer) = session.request(frame)?;
+            session.decode(&readings, &answer)?.ok_or_else(|| anyhow!("the answer has no forces"))
+        }))
     }
 }
 

@@ -91,8 +91,10 @@ impl Hand {
             let frames = vec![frame; scene.input.frames_per_result()];
             let result = engine.reconstruct(&frames)?;
             let answered_s = seconds(SystemTime::now());
-            let (line, frame, result) = (sequence + 1, &frames[0], &result);
-            output(&Outcome::Answer(Answer { sequence, line, received_s, answered_s, dropped: 0, frame, result }))?;
+            let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
+            let (frames, received, result) = (&frames[..], &received[..], &result);
+            let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
+            output(&Outcome::Answer(answer))?;
             std::thread::sleep(period.saturating_sub(begun.elapsed()));
         }
         Ok(())

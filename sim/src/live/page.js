@@ -54,7 +54,7 @@ class ArrayMap {
     this.arrows.setAttribute("d", path);
     let [thick, bars] = ["", ""];
     const scale = largest > 0 ? 0.3 * cols / largest : 0;
-    for (const { centre, force, sigma } of contacts) {
+    for (const { centre_mm: centre, force_N: force, sigma_N: sigma } of contacts) {
       if (!centre) continue;
       const [x, y] = place(centre), tip = [x + scale * force[0], y + scale * force[1]];
       thick += arrow(x, y, tip[0] - x, tip[1] - y, 0.6);
@@ -71,17 +71,8 @@ class ArrayMap {
 const found = new ArrayMap(at("found")), real = new ArrayMap(at("true"));
 let history = []; // of the last seconds: when drawn, when received, number, forces, peaks
 
-/** The contacts of a result; one of the whole array where it has none. */
-function contactsOf(result) {
-  const named = result.contacts && result.contacts.map(c => ({ centre: c.centre_mm, force: c.force_N, sigma: c.sigma_N }))
-    || result.regions && result.regions.map(r => ({ centre: r.centre_mm, force: r.load_N }))
-    || result.resultants && result.resultants.map(r => ({ centre: r.centre_mm, force: r.force_N }));
-  return named || result.subarrays.length === 1
-    && [{ centre: result.subarrays[0].compression_centroid_mm, force: result.resultant_N }] || [];
-}
-
 function table(picture, contacts) {
-  const rows = contacts.map((c, k) => [`contact ${k + 1}`, c.force, c.sigma]);
+  const rows = contacts.map((c, k) => [`contact ${k + 1}`, c.force_N, c.sigma_N]);
   rows.push(["found, sum", picture.result.resultant_N]);
   if (picture.truth) rows.push(["true, sum", picture.truth.resultant_N]);
   const body = at("forces");
@@ -117,8 +108,8 @@ const most = values => values.reduce((most, value) => Math.max(most, Math.abs(va
 
 /** Draws a picture; the time is in seconds. */
 function draw(picture, now) {
-  const { result, truth, stress_MPa: stress } = picture, contacts = contactsOf(result);
-  const sums = [result.resultant_N, ...contacts.map(c => c.force), ...(truth ? [truth.resultant_N] : [])];
+  const { result, truth, contacts, stress_MPa: stress } = picture;
+  const sums = [result.resultant_N, ...contacts.map(c => c.force_N), ...(truth ? [truth.resultant_N] : [])];
   history.push({
     drawn: now, received: picture.received_s, sequence: picture.sequence,
     found: result.resultant_N, true: truth && truth.resultant_N, peak: most(stress),

@@ -5,6 +5,7 @@ use dermis_golden::reconstruct::Reconstruction;
 use serde::Serialize;
 
 use super::newest::Newest;
+use crate::recording::{contacts, ContactForce};
 use crate::stream::{Answer, Outcome};
 
 /// The newest result with its frame.
@@ -24,6 +25,8 @@ pub struct Picture<'a> {
     pub refusal: Option<&'a str>,
     /// Stress of each taxel in MPa, row-major.
     pub stress_MPa: &'a [f64],
+    /// The contacts of the result.
+    pub contacts: Vec<ContactForce>,
     /// The result.
     pub result: &'a Reconstruction,
     /// What is known about the forces.
@@ -77,7 +80,8 @@ impl<'a> Show<'a> {
                 let error = refusal.error.strip_prefix(&line).unwrap_or(refusal.error);
                 self.refusal = Some(line.clone() + error);
             }
-            Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frame, result, .. }) => {
+            Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frames, result, .. }) => {
+                let Some(frame) = frames.last() else { return Ok(()) };
                 let picture = Picture {
                     sequence: *sequence,
                     received_s: *received_s,
@@ -86,6 +90,7 @@ impl<'a> Show<'a> {
                     refused: self.refused,
                     refusal: self.refusal.as_deref(),
                     stress_MPa: &frame.stress_MPa,
+                    contacts: contacts(result),
                     result,
                     truth: Truth::of(frame),
                 };

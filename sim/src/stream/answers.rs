@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::line;
 use super::queue::{Policy, Queue};
+use super::stop::Stop;
 
 /// What reconstructs.
 pub enum Engine {
@@ -21,7 +22,12 @@ pub enum Engine {
     Golden(Box<Golden>),
     /// The bit-true model.
     Fixed(Box<Model>),
+    /// Something else, such as a board.
+    Other(Box<Reconstruct>),
 }
+
+/// Gives the result of a block of frames.
+pub type Reconstruct = dyn Fn(&[Frame]) -> Result<Reconstruction>;
 
 /// How a stream is read and answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,8 +36,6 @@ pub struct StreamOptions {
     pub queue: usize,
     /// What happens where that many wait.
     pub policy: Policy,
-    /// Leave out the forces of taxels.
-    pub brief: bool,
 }
 
 /// What a stream had.
@@ -64,7 +68,7 @@ pub enum Outcome<'a> {
 }
 
 /// A result.
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 pub struct Answer<'a> {
     /// Number of the result, from 0.
     pub sequence: u64,
@@ -76,9 +80,12 @@ pub struct Answer<'a> {
     pub answered_s: f64,
     /// Lines dropped so far.
     pub dropped: u64,
-    /// The frame of that line; no part of the output line.
+    /// The frames of the block, the last one of that line; no part of the output line.
     #[serde(skip)]
-    pub frame: &'a Frame,
+    pub frames: &'a [Frame],
+    /// Seconds since 1970 when the line of each was read; no part of the output line.
+    #[serde(skip)]
+    pub received: &'a [f64],
     /// The result.
     #[serde(flatten)]
     pub result: &'a Reconstruction,
@@ -96,10 +103,16 @@ pub struct Refusal<'a> {
 /// What takes the outcomes, in the order of the lines; the error [`ErrorKind::BrokenPipe`] ends a stream without error.
 pub type Output<'a> = dyn FnMut(&Outcome) -> std::io::Result<()> + 'a;
 
-/// Writes each outcome as a line of JSON.
-pub fn as_lines(output: &mut dyn Write) -> impl FnMut(&Outcome) -> std::io::Result<()> + '_ {
+/// Writes each outcome as a line of JSON; if `brief` without the forces of taxels.
+pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> std::io::Result<()> + '_ {
     move |outcome| {
-        let text = serde_json::to_string(outcome)? + "\n";
+        let text = match outcome {
+            Outcome::Answer(answer) if brief => {
+                let result = &Reconstruction { forces_N: Forces::default(), ..answer.result.clone() };
+                serde_json::to_string(&Answer { result, ..*answer })?
+            }
+            outcome => serde_json::to_string(outcome)?,
+        } + "\n";
         output.write_all(text.as_bytes())?;
         output.flush()
     }
@@ -128,6 +141,7 @@ impl Engine {
         match self {
             Engine::Golden(golden) => Ok(golden.run_averaged(frames)?),
             Engine::Fixed(model) => Ok(model.reconstruct_averaged(frames)?),
+            Engine::Other(reconstruct) => reconstruct(frames),
         }
     }
 }
@@ -137,6 +151,21 @@ impl Engine {
 /// # Errors
 /// Input or output that fails; a bad line is none.
 pub fn run(
+    scene: &Scene,
+    engine: &Engine,
+    input: (Box<dyn Read + Send>, &str),
+    options: StreamOptions,
+    output: &mut Output,
+) -> Result<Counts> {
+    run_until(&Stop::default(), scene, engine, input, options, output)
+}
+
+/// As [`run`], or until `stop`.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_until(
+    stop: &Stop,
     scene: &Scene,
     engine: &Engine,
     (input, name): (Box<dyn Read + Send>, &str),
@@ -153,11 +182,23 @@ pub fn run(
             outcome
         })
     };
-    let mut stream = Stream { scene, engine, brief: options.brief, waiting: Vec::new(), counts: Counts::default() };
+    stop.add(&queue);
+    let (waiting, times, counts) = (Vec::new(), Vec::new(), Counts::default());
+    let mut stream = Stream { scene, engine, waiting, times, counts };
     loop {
+        if stop.stopped() {
+            queue.close();
+            return Ok(stream.counts);
+        }
         let (received, dropped) = queue.pop();
         stream.counts.dropped = dropped;
-        let Some(received) = received else { break };
+        let Some(received) = received else {
+            // A reader that was stopped may never return.
+            if stop.stopped() {
+                return Ok(stream.counts);
+            }
+            break;
+        };
         match stream.answer(&received, output) {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => {
                 queue.close();
@@ -194,9 +235,10 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 struct Stream<'a> {
     scene: &'a Scene,
     engine: &'a Engine,
-    brief: bool,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
+    /// Seconds since 1970 when the line of each was read.
+    times: Vec<f64>,
     counts: Counts,
 }
 
@@ -205,25 +247,24 @@ impl Stream<'_> {
     fn answer(&mut self, received: &Received, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
             self.waiting.push(frame);
+            self.times.push(seconds(received.time));
             if self.waiting.len() < self.scene.input.frames_per_result() {
                 return Ok(None);
             }
-            let mut frames = std::mem::take(&mut self.waiting);
+            let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
             let result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
-            Ok(frames.pop().map(|frame| (frame, result)))
+            Ok(Some((frames, times, result)))
         });
         let line = received.number;
         match result {
             Ok(None) => Ok(()),
-            Ok(Some((frame, mut result))) => {
-                if self.brief {
-                    result.forces_N = Forces::default();
-                }
+            Ok(Some((frames, times, result))) => {
                 let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
                 self.counts.answered += 1;
                 let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
-                let (frame, result) = (&frame, &result);
-                output(&Outcome::Answer(Answer { sequence, line, received_s, answered_s, dropped, frame, result }))
+                let (frames, received, result) = (&frames[..], &times[..], &result);
+                let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
+                output(&Outcome::Answer(answer))
             }
             Err(error) => {
                 self.counts.refused += 1;
@@ -252,16 +293,16 @@ mod tests {
     use super::*;
     use serde_json::Value;
 
-    fn answers(scene: &Scene, fixed: bool, input: String, options: StreamOptions) -> (Counts, Vec<Value>) {
+    fn answers(scene: &Scene, fixed: bool, input: String, options: StreamOptions, brief: bool) -> (Counts, Vec<Value>) {
         let engine = Engine::new(scene, fixed).unwrap();
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
         let mut output = Vec::new();
-        let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut output)).unwrap();
+        let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut output, brief)).unwrap();
         let text = String::from_utf8(output).unwrap();
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }
 
-    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, brief: false };
+    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All };
 
     fn scene() -> Scene {
         Scene::builtin("eight-by-eight").unwrap().for_hardware()
@@ -276,7 +317,7 @@ mod tests {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
         let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
         for fixed in [false, true] {
-            let (counts, answers) = answers(&scene, fixed, input.clone(), ALL);
+            let (counts, answers) = answers(&scene, fixed, input.clone(), ALL, false);
             assert_eq!(counts, Counts { answered: 2, refused: 2, dropped: 0 });
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
@@ -301,7 +342,7 @@ mod tests {
         let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
         scene.input.average = 1;
         let input = csv(&frames[0]) + &csv(&frames[1]) + &csv(&frames[2]);
-        let (counts, answers) = answers(&scene, false, input, StreamOptions { brief: true, ..ALL });
+        let (counts, answers) = answers(&scene, false, input, ALL, true);
         assert_eq!((counts.answered, answers.len(), &answers[0]["line"]), (1, 1, &Value::from(2)));
         assert_eq!(answers[0]["forces_N"]["fz"], Value::Array(Vec::new()));
         let mean = Golden::new(&scene).unwrap().run_averaged(&frames[..2]).unwrap().resultant_N;
@@ -320,11 +361,58 @@ mod tests {
     #[test]
     fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let options = StreamOptions { queue: 1, policy: Policy::Latest, brief: true };
-        let (counts, answers) = answers(&scene, false, csv(&frames[0]).repeat(2000), options);
+        let options = StreamOptions { queue: 1, policy: Policy::Latest };
+        let (counts, answers) = answers(&scene, false, csv(&frames[0]).repeat(2000), options, true);
         assert_eq!(counts.answered + counts.dropped, 2000);
         assert!(counts.dropped > 0);
         // The newest line is never dropped.
         assert_eq!(answers.last().unwrap()["line"], 2000);
+    }
+
+    /// An input that never ends.
+    struct Endless;
+
+    impl Read for Endless {
+        fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+            std::thread::park();
+            Ok(0)
+        }
+    }
+
+    #[test]
+    fn a_stream_whose_input_never_ends_is_stopped() {
+        let (scene, stop) = (scene(), Stop::default());
+        let run = || {
+            let engine = Engine::new(&scene, false)?;
+            run_until(&stop, &scene, &engine, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
+        };
+        std::thread::scope(|scope| {
+            let running = scope.spawn(run);
+            stop.now();
+            assert_eq!(running.join().unwrap().unwrap(), Counts::default());
+        });
+        // One that begins later ends at once.
+        assert_eq!(run().unwrap(), Counts::default());
+    }
+
+    #[test]
+    fn an_answer_has_the_frames_of_its_block() {
+        let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
+        scene.input.average = 1;
+        let engine = Engine::new(&scene, false).unwrap();
+        let input = csv(&frames[0]) + &csv(&frames[1]);
+        let mut seen = Vec::new();
+        let mut output = |outcome: &Outcome| {
+            if let Outcome::Answer(answer) = outcome {
+                let stress = answer.frames.iter().map(|frame| frame.stress_MPa.clone());
+                seen.push((stress.collect::<Vec<_>>(), answer.received.to_vec(), answer.received_s));
+            }
+            Ok(())
+        };
+        let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
+        run(&scene, &engine, (input, "memory"), ALL, &mut output).unwrap();
+        let [(stress, received, last)] = &seen[..] else { panic!("{} answers", seen.len()) };
+        assert_eq!(*stress, [frames[0].stress_MPa.clone(), frames[1].stress_MPa.clone()]);
+        assert!(received.len() == 2 && received[0] <= received[1] && received[1] == *last, "{received:?}, {last}");
     }
 }

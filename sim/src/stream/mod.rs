@@ -23,14 +23,19 @@
 //! | [`line`] | a line of bounded length, and the frame in it |
 //! | [`queue`] | the queue between the two threads |
 //! | [`source`] | where lines come from |
+//! | [`stop`] | the end that another thread asks for |
 //! | [`answers`] | reconstruction, results and refusals |
 
 pub mod answers;
 pub(crate) mod line;
 pub mod queue;
 pub mod source;
+pub mod stop;
 
-pub use answers::{as_lines, run, seconds, Answer, Counts, Engine, Outcome, Output, Refusal, StreamOptions};
+pub use answers::{
+    as_lines, run, run_until, seconds, Answer, Counts, Engine, Outcome, Output, Reconstruct, Refusal, StreamOptions,
+};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use source::Source;
+pub use stop::Stop;

@@ -10,6 +10,10 @@ use serde_json::{json, Value};
 
 /// Longest wait for something to appear on a page.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// Window width of a desktop.
+pub const DESKTOP: u32 = 1280;
+/// Window width of a phone in portrait format.
+pub const PHONE: u32 = 360;
 
 /// A browser with one page.
 pub struct Browser {
@@ -20,6 +24,8 @@ pub struct Browser {
     session: Option<String>,
     /// Console messages and errors of the page so far.
     pub problems: Vec<Value>,
+    /// Addresses that pages have requested since the domain `Network` is enabled, without data within the page.
+    pub requests: Vec<String>,
     _work: tempfile::TempDir,
 }
 
@@ -40,17 +46,31 @@ impl Browser {
         // In the order in which the shell opens their other ends.
         let commands = File::options().write(true).open(commands).unwrap();
         let messages = BufReader::new(File::open(messages).unwrap());
-        let (problems, session, sent) = (Vec::new(), None, 0);
-        let mut browser = Browser { child, commands, messages, sent, session, problems, _work: work };
+        let (problems, requests, session, sent) = (Vec::new(), Vec::new(), None, 0);
+        let mut browser = Browser { child, commands, messages, sent, session, problems, requests, _work: work };
         let target = browser.call("Target.createTarget", json!({"url": "about:blank"}))["targetId"].clone();
         let attached = browser.call("Target.attachToTarget", json!({"targetId": target, "flatten": true}));
         browser.session = Some(attached["sessionId"].as_str().unwrap().to_owned());
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             browser.call(domain, json!({}));
         }
-        browser.call("Page.navigate", json!({"url": url}));
-        browser.wait_for("document.readyState == 'complete' && location.protocol == 'http:'");
+        browser.go(url);
         browser
+    }
+
+    /// Opens another page, or the same again.
+    pub fn go(&mut self, url: &str) {
+        self.call("Page.navigate", json!({"url": url}));
+        self.wait_for(&format!("document.readyState == 'complete' && location.href == '{url}'"));
+    }
+
+    /// Sets the width of the window, and whether the user has asked for a dark theme; the narrow one is a phone's.
+    pub fn set(&mut self, width: u32, dark: bool) {
+        let (scheme, mobile) = (if dark { "dark" } else { "light" }, width == PHONE);
+        let size = json!({"width": width, "height": 780, "deviceScaleFactor": 1, "mobile": mobile});
+        self.call("Emulation.setDeviceMetricsOverride", size);
+        let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+        self.call("Emulation.setEmulatedMedia", media);
     }
 
     /// The result of a command.
@@ -74,6 +94,8 @@ impl Browser {
             if ["Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"].contains(&event) {
                 self.problems.push(message["params"].clone());
             }
+            let address = message["params"]["request"]["url"].as_str().filter(|_| event == "Network.requestWillBeSent");
+            self.requests.extend(address.filter(|address| !address.starts_with("data:")).map(str::to_owned));
         }
     }
 

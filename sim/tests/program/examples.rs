@@ -5,19 +5,22 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use rayon::prelude::*;
 
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 44] = [
+const NOT_RUN: [(&str, &str); 47] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
+    ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
     ("dermis live pad.toml --noise 0.002 --engine fixed", PAGE),
     ("dermis live pad.toml --stream=udp:127.0.0.1:9000", PAGE),
     ("dermis live pad.toml --stream=/dev/ttyUSB0 --baud 115200", PAGE),
+    ("dermis live sensor-1 --recording press.mcap --loop", SOURCE),
+    ("dermis live sensor-1 --board /dev/ttyUSB0", SOURCE),
     ("dermis live sensor-1 --listen 192.168.1.7:8317", PAGE),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
@@ -58,6 +61,7 @@ const NOT_RUN: [(&str, &str); 44] = [
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; netlist.rs"),
 ];
+const SOURCE: &str = "runs until interrupted; live_sources.rs";
 const PAGE: &str = "runs until interrupted; live.rs";
 const IMPORTED: &str = "needs an imported recording; report.rs";
 const BOARD: &str = "needs a board on a serial port";
@@ -121,6 +125,8 @@ fn prepare(work: &Path) {
     // One frame per line.
     let flat = csv.trim_end().replace('\n', ",") + "\n";
     fs::write(work.join("frames.csv"), flat.repeat(3)).unwrap();
+    let stream = "dermis reconstruct sensor-1 --stream --brief --record press.mcap <frames.csv";
+    assert!(in_shell(work, stream).status.success());
     for (name, counts) in [("zero.csv", 120), ("half.csv", 220), ("full.csv", 320)] {
         fs::write(work.join(name), format!("{}\n", vec![counts.to_string(); 10].join(",")).repeat(20)).unwrap();
     }
@@ -131,6 +137,12 @@ fn prepare(work: &Path) {
         fs::copy(recordings.join(file), work.join(name)).unwrap();
     }
     fs::write(work.join("log.csv"), "0,0,0,0,0,5,6,0,0,7,9,0,0,0,0,0\n".repeat(3)).unwrap();
+}
+
+/// Runs a command line in which the program is found by its name.
+fn in_shell(work: &Path, line: &str) -> Output {
+    let path = format!("{}:{}", program().parent().unwrap().display(), std::env::var("PATH").unwrap());
+    Command::new("sh").current_dir(work).env("PATH", path).args(["-c", line]).output().unwrap()
 }
 
 #[test]
@@ -147,12 +159,10 @@ fn every_example_works() {
     // The folder for the example of `dermis check`.
     let built = Command::new(program()).current_dir(work.path()).args(["build", "sensor-1"]).output().unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let path = format!("{}:{}", program().parent().unwrap().display(), std::env::var("PATH").unwrap());
     let run: Vec<&String> = all.difference(&not_run).collect();
     assert!(run.len() >= 15, "{run:?}");
     let failure = |line: &&String| {
-        let output =
-            Command::new("sh").current_dir(work.path()).env("PATH", &path).args(["-c", line]).output().unwrap();
+        let output = in_shell(work.path(), line);
         (!output.status.success()).then(|| format!("{line}\n{}\n", String::from_utf8_lossy(&output.stderr)))
     };
     // Several build into the same folder: those run one after the other, beside all others.

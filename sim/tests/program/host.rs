@@ -23,7 +23,8 @@ fn model() -> Model {
     model
 }
 
-fn board(to_board: ChannelFaults, to_host: ChannelFaults) -> PseudoTerminal {
+/// A simulated board of the scene `eight-by-eight`, which runs until it is dropped.
+pub(super) fn board(to_board: ChannelFaults, to_host: ChannelFaults) -> PseudoTerminal {
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
     let hardware = Hardware::new(model(), &build).unwrap();
     PseudoTerminal::with_channels(&hardware, NoisyChannel::new(to_board), NoisyChannel::new(to_host)).unwrap()

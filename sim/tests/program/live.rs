@@ -11,18 +11,18 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use serde_json::{json, Value};
 
-use super::browser::Browser;
+use super::browser::{Browser, DESKTOP, PHONE};
 
 const SCENE: &str = "eight-by-eight";
 
 /// The program with the address of its page.
-struct Live {
-    child: Child,
+pub(super) struct Live {
+    pub(super) child: Child,
     url: String,
 }
 
 impl Live {
-    fn start(more: &[&str]) -> Live {
+    pub(super) fn start(more: &[&str]) -> Live {
         Live::listen("127.0.0.1:0", more)
     }
 
@@ -36,11 +36,16 @@ impl Live {
     }
 
     fn connect(&self) -> TcpStream {
-        TcpStream::connect(self.url.trim_start_matches("http://").trim_end_matches('/')).unwrap()
+        TcpStream::connect(self.host()).unwrap()
+    }
+
+    /// Host and port of the page.
+    pub(super) fn host(&self) -> &str {
+        self.url.trim_start_matches("http://").trim_end_matches('/')
     }
 
     /// The answer to a request, sent on a connection of its own.
-    fn answer(&self, request: &str) -> String {
+    pub(super) fn answer(&self, request: &str) -> String {
         let mut stream = self.connect();
         let _ = stream.write_all(request.as_bytes());
         // A refused connection may be closed already.
@@ -185,12 +190,8 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
     mouse(&mut browser, "mousePressed", 0.3, 0.3);
     browser.wait_for("document.querySelector('#forces').innerText.includes('±')");
     let mut colours = Vec::new();
-    for (width, dark) in [(1280, false), (1280, true), (360, false), (360, true)] {
-        let (scheme, mobile) = (if dark { "dark" } else { "light" }, width == 360);
-        let size = json!({"width": width, "height": 780, "deviceScaleFactor": 1, "mobile": mobile});
-        browser.call("Emulation.setDeviceMetricsOverride", size);
-        let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
-        browser.call("Emulation.setEmulatedMedia", media);
+    for (width, dark) in [(DESKTOP, false), (DESKTOP, true), (PHONE, false), (PHONE, true)] {
+        browser.set(width, dark);
         let found = browser.evaluate(
             "({ inner: innerWidth, width: document.documentElement.scrollWidth,
                 colours: [getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color],
@@ -202,7 +203,7 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
                     .filter(name => !name.startsWith(location.origin)) })",
         );
         assert_eq!((&found["inner"], &found["elsewhere"]), (&json!(width), &json!([])), "{found}");
-        assert!(found["width"].as_u64() <= Some(width), "{found}");
+        assert!(found["width"].as_u64() <= Some(width.into()), "{found}");
         assert!(found["table"].as_u64() <= found["room"].as_u64(), "{found}");
         assert!(found["small"].as_f64() > Some(9.0) && found["map"].as_f64() > Some(300.0), "{found}");
         assert_ne!(found["colours"][0], found["colours"][1]);
@@ -216,7 +217,7 @@ fn the_page_is_readable_on_a_phone_and_in_the_dark_and_asks_nobody_else() {
 #[test]
 fn foreign_pages_and_too_many_clients_are_refused() {
     let live = Live::start(&[]);
-    let host = live.url.trim_start_matches("http://").trim_end_matches('/');
+    let host = live.host();
     let status = |answer: String| answer.split(' ').nth(1).unwrap_or_default().to_owned();
     let get = |host: &str| status(live.answer(&format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n")));
     assert_eq!((get(host), get("evil.example")), ("200".into(), "403".into()));

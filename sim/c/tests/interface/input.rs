@@ -201,6 +201,7 @@ fn flags_are_bits_named_as_in_json() {
         Flag::ShapeMismatch,
         Flag::ShearNotResolved,
         Flag::Misfit,
+        Flag::TooManyContacts,
     ];
     let header = std::fs::read_to_string(super::header::folder().join("dermis.h")).unwrap();
     for (index, flag) in all.into_iter().enumerate() {

@@ -1,0 +1,154 @@
+//! Recorded frames as lines of a stream, at a pace.
+
+use std::io::{Error, Read, Result};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+
+use super::read::Frames;
+
+/// When frames are handed out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// As fast as they are taken.
+    Unbounded,
+    /// This many per second.
+    Rate(f64),
+    /// As far apart as they were received.
+    Recorded,
+}
+
+/// The frames of a file, read as lines that a stream takes; errors have no file's name.
+pub struct Lines {
+    path: PathBuf,
+    shape: Option<[usize; 2]>,
+    pace: Pace,
+    /// Begin again at the end.
+    repeat: bool,
+    frames: Frames,
+    /// When the first frame is handed out, and when it was received.
+    begun: Option<(Instant, u64)>,
+    /// Number of frames since then.
+    count: u64,
+    /// When the last frame was due since then, and how long after the one before.
+    due: Duration,
+    gap: Duration,
+    line: Vec<u8>,
+    /// Bytes of the line that were read.
+    used: usize,
+}
+
+impl Lines {
+    /// Opens a file whose frames have `shape`, rows and columns, if that is given; with `repeat` it begins again at its end.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn open(path: PathBuf, shape: Option<[usize; 2]>, pace: Pace, repeat: bool) -> anyhow::Result<Lines> {
+        let frames = Frames::open(&path, shape)?;
+        let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Vec::new());
+        Ok(Lines { path, shape, pace, repeat, frames, begun: None, count: 0, due, gap, line, used: 0 })
+    }
+
+    /// Takes the next line, once it is due; returns whether there is one.
+    fn advance(&mut self) -> anyhow::Result<bool> {
+        let mut next = self.frames.next_frame()?;
+        if next.is_none() && self.repeat {
+            self.frames = Frames::open(&self.path, self.shape)?;
+            (self.begun, self.count, self.due) = (None, 0, Duration::ZERO);
+            next = self.frames.next_frame()?;
+        }
+        let Some(frame) = next else { return Ok(false) };
+        // From the last frame to the first one as long as from the last but one to the last.
+        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, frame.received));
+        let due = match self.pace {
+            Pace::Unbounded => Duration::ZERO,
+            Pace::Rate(rate) => Duration::try_from_secs_f64(self.count as f64 / rate).unwrap_or(Duration::MAX),
+            Pace::Recorded => Duration::from_nanos(frame.received.saturating_sub(first)),
+        };
+        let wait = begun.checked_add(due).map_or(due, |at| at.saturating_duration_since(Instant::now()));
+        std::thread::sleep(wait);
+        // Received times may go back.
+        (self.gap, self.due) = (due.saturating_sub(self.due), due);
+        self.count += 1;
+        (self.line, self.used) = (format!("{}\n", json!({"stress_MPa": frame.stress_MPa})).into_bytes(), 0);
+        Ok(true)
+    }
+}
+
+impl Read for Lines {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        if self.used == self.line.len() && !self.advance().map_err(|error| Error::other(error.to_string()))? {
+            return Ok(0);
+        }
+        let bytes = buffer.len().min(self.line.len() - self.used);
+        buffer[..bytes].copy_from_slice(&self.line[self.used..self.used + bytes]);
+        self.used += bytes;
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recorder;
+    use crate::stream::{Answer, Outcome};
+    use dermis_golden::float::Golden;
+    use dermis_golden::frame::Frame;
+    use dermis_golden::scene::Scene;
+    use std::io::{BufRead, BufReader};
+
+    /// A recording of the scene's first frame, received at these seconds.
+    fn recorded(folder: &std::path::Path, seconds: &[f64]) -> (PathBuf, Frame) {
+        let scene = Scene::builtin("eight-by-eight").unwrap().for_hardware();
+        let frames = Frame::shipped(&scene)[..1].to_vec();
+        let result = &Golden::new(&scene).unwrap().run(&frames[0]).unwrap();
+        let path = folder.join("press.mcap");
+        let mut recorder = Recorder::create(&path, &scene.sensor).unwrap();
+        for (sequence, received_s) in (0..).zip(seconds) {
+            let (received_s, received, frames) = (*received_s, &[*received_s][..], &frames[..]);
+            let answer = Answer {
+                sequence,
+                line: sequence + 1,
+                received_s,
+                answered_s: received_s,
+                dropped: 0,
+                frames,
+                received,
+                result,
+            };
+            recorder.outcome(&Outcome::Answer(answer)).unwrap();
+        }
+        assert_eq!(recorder.finish().unwrap(), seconds.len() as u64);
+        (path, frames[0].clone())
+    }
+
+    #[test]
+    fn frames_are_lines_at_their_pace_and_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, frame) = recorded(folder.path(), &[100.0, 100.05, 100.15]);
+        let line = json!({"stress_MPa": frame.stress_MPa}).to_string();
+        let read = |pace, repeat, count: usize| {
+            let begun = Instant::now();
+            let lines = BufReader::new(Lines::open(path.clone(), Some([8, 8]), pace, repeat).unwrap()).lines();
+            let lines: Vec<String> = lines.take(count).map(Result::unwrap).collect();
+            assert!(lines.iter().all(|own| *own == line));
+            (lines.len(), begun.elapsed().as_secs_f64())
+        };
+        assert_eq!(read(Pace::Unbounded, false, 9).0, 3);
+        assert_eq!(read(Pace::Unbounded, true, 9).0, 9);
+        let (count, took) = read(Pace::Recorded, false, 9);
+        assert!(count == 3 && took >= 0.15, "{count} in {took} s");
+        // Again after 0.1 s, as long as before the last one.
+        let (count, took) = read(Pace::Recorded, true, 4);
+        assert!(count == 4 && took >= 0.25, "{count} in {took} s");
+        let (count, took) = read(Pace::Rate(20.0), false, 9);
+        assert!(count == 3 && took >= 0.1, "{count} in {took} s");
+        // A file without frames is no endless loop.
+        let empty = folder.path().join("empty.mcap");
+        Recorder::create(&empty, &Scene::builtin("eight-by-eight").unwrap().sensor).unwrap().finish().unwrap();
+        let mut lines = Lines::open(empty, None, Pace::Unbounded, true).unwrap();
+        let error = lines.read(&mut [0; 8]).unwrap_err().to_string();
+        assert_eq!(error, "has no message of channel /dermis/stress; its channels: /dermis/stress");
+    }
+}

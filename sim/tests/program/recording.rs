@@ -1,0 +1,146 @@
+//! `dermis reconstruct --record` and `dermis replay` as a user runs them.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use rustix::process::{kill_process, Pid, Signal};
+use serde_json::{json, Value};
+
+const SCENE: &str = "eight-by-eight";
+
+/// Runs the program in a folder on an input, which may be closed before it is read.
+fn dermis(folder: &Path, args: &[&str], input: &[u8]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.current_dir(folder).args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    std::thread::scope(|scope| {
+        scope.spawn(move || drop(stdin.write_all(input)));
+        child.wait_with_output().unwrap()
+    })
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+/// The results without what differs between two runs: times, numbers of lines and names of frames.
+fn results(output: &[u8]) -> Vec<Value> {
+    let lines = text(output).lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let mut results: Vec<Value> = lines.filter(|line| line["scene"].is_string()).collect();
+    for result in &mut results {
+        for field in ["received_s", "answered_s", "line", "frame"] {
+            assert!(result.as_object_mut().unwrap().remove(field).is_some(), "{field}");
+        }
+    }
+    results
+}
+
+/// Lines of frames whose every value has a full mantissa.
+fn lines(count: u64) -> String {
+    let scene = Scene::builtin(SCENE).unwrap();
+    let frame = &Frame::shipped(&scene)[0];
+    let line = |k: u64| {
+        let stress = frame.stress_MPa.iter().map(|stress| stress * (1.0 + k as f64).sqrt()).collect::<Vec<_>>();
+        if k.is_multiple_of(2) {
+            json!({"id": format!("press {k}"), "stress_MPa": stress}).to_string()
+        } else {
+            stress.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+        }
+    };
+    (0..count).map(|k| line(k) + "\n").collect()
+}
+
+#[test]
+fn a_replayed_recording_gives_the_same_results_to_the_last_bit() {
+    let work = tempfile::tempdir().unwrap();
+    let scene = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    std::fs::write(work.path().join("averaging.toml"), format!("{scene}[input]\naverage = 1\n")).unwrap();
+    let input = lines(6) + "1,2\n" + &lines(2);
+    for (scene, engine, answered) in
+        [(SCENE, "golden", 8), (SCENE, "fixed", 8), ("averaging.toml", "golden", 4), ("averaging.toml", "fixed", 4)]
+    {
+        let file = format!("{engine}-{answered}.mcap");
+        let stream = ["reconstruct", scene, "--engine", engine, "--stream"];
+        let output = dermis(work.path(), &[&stream[..], &["--record", &file]].concat(), input.as_bytes());
+        let stderr = text(&output.stderr);
+        assert!(stderr.contains(&format!("{file}: {answered} results recorded\n")), "{stderr}");
+        let recorded = dermis(work.path(), &["replay", &file, "--results"], b"");
+        assert_eq!(text(&recorded.stdout), text(&output.stdout));
+        let replayed = dermis(work.path(), &["replay", &file], b"");
+        assert!(replayed.status.success(), "{}", text(&replayed.stderr));
+        let frames: Vec<Value> =
+            text(&replayed.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let fed = input.lines().filter(|line| *line != "1,2").map(|line| match line.starts_with('{') {
+            true => serde_json::from_str::<Value>(line).unwrap()["stress_MPa"].clone(),
+            false => serde_json::from_str(&format!("[{line}]")).unwrap(),
+        });
+        assert!(frames.iter().map(|frame| frame["stress_MPa"].clone()).eq(fed));
+        let again = dermis(work.path(), &stream, &replayed.stdout);
+        let (first, second) = (results(&output.stdout), results(&again.stdout));
+        assert_eq!((first.len(), &first), (answered, &second));
+    }
+}
+
+#[test]
+fn brief_output_leaves_the_recording_whole() {
+    let work = tempfile::tempdir().unwrap();
+    let args = ["reconstruct", SCENE, "--stream", "--brief", "--record", "press.mcap"];
+    let output = dermis(work.path(), &args, lines(1).as_bytes());
+    let recorded = dermis(work.path(), &["replay", "press.mcap", "--results"], b"");
+    let lengths = [&output.stdout, &recorded.stdout].map(|bytes| {
+        let value: Value = serde_json::from_slice(bytes).unwrap();
+        value["forces_N"]["fz"].as_array().unwrap().len()
+    });
+    assert_eq!(lengths, [0, 64]);
+    // A recording is never written over.
+    let again = dermis(work.path(), &args, lines(1).as_bytes());
+    assert_eq!(again.status.code(), Some(2));
+    assert_eq!(text(&again.stderr), "error: press.mcap: File exists (os error 17)\n");
+}
+
+#[test]
+fn a_recording_that_is_interrupted_is_complete() {
+    let work = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.current_dir(work.path()).args(["reconstruct", SCENE, "--stream", "--record", "press.mcap"]);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let mut output = BufReader::new(child.stdout.take().unwrap()).lines();
+    input.write_all(lines(2).as_bytes()).unwrap();
+    let answered: Vec<String> = output.by_ref().take(2).map(Result::unwrap).collect();
+    // The input is still open.
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130));
+    let stderr = text(&ended.stderr);
+    assert!(stderr.contains("press.mcap: 2 results recorded\n"), "{stderr}");
+    assert!(stderr.ends_with("error: interrupted; the recording is complete\n"), "{stderr}");
+    drop(input);
+    let replayed = dermis(work.path(), &["replay", "press.mcap", "--results"], b"");
+    assert!(replayed.status.success(), "{}", text(&replayed.stderr));
+    assert_eq!(text(&replayed.stdout).lines().collect::<Vec<_>>(), answered);
+}
+
+#[test]
+fn a_recording_without_its_end_gives_what_it_has_and_an_error() {
+    let work = tempfile::tempdir().unwrap();
+    dermis(work.path(), &["reconstruct", SCENE, "--stream", "--record", "press.mcap"], lines(3).as_bytes());
+    let whole = std::fs::read(work.path().join("press.mcap")).unwrap();
+    let replay = |bytes: &[u8]| {
+        std::fs::write(work.path().join("cut.mcap"), bytes).unwrap();
+        let output = dermis(work.path(), &["replay", "cut.mcap"], b"");
+        (output.status.code(), text(&output.stdout).lines().count(), text(&output.stderr).to_owned())
+    };
+    assert_eq!(replay(&whole), (Some(0), 3, String::new()));
+    // Without the index, all frames are there.
+    let (code, frames, error) = replay(&whole[..whole.len() - 30]);
+    assert_eq!((code, frames), (Some(2), 3));
+    assert!(error.starts_with("error: cut.mcap: ends early"), "{error}");
+    let (code, frames, error) = replay(&whole[..whole.len() / 3]);
+    assert_eq!(code, Some(2));
+    assert!(frames < 3 && error.starts_with("error: cut.mcap: ends early"), "{frames}, {error}");
+}
