@@ -10,7 +10,7 @@
 //! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
-//! | | `condition` ("loaded"; "both-signs") |
+//! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "search"), `degree` (none; 1 … 8) |
 //! | | `network` (none; a file, or "dermis:sensor-1", "dermis:sensor-1-unipolar") |

@@ -91,7 +91,7 @@ mod tests {
         let shift = formats.input_bits - 1 - 7;
         let word = |code: i64| code << shift;
         let middle = found.input[3];
-        assert_eq!(middle, [4 * word(100) >> formats.input_low_bits, 0, 0, 0]);
+        assert_eq!(middle, [(4 * word(100)) >> formats.input_low_bits, 0, 0, 0]);
         // The quad of the corners: (−1, −1), (−1, 1), (1, −1), (1, 1), of which only the last is on the array.
         let corners = hadamard([0, 0, 0, word(105)]).map(|f| f >> formats.input_low_bits);
         assert_eq!((found.input[0], found.mask[0]), (corners, hadamard([MASKED, MASKED, MASKED, 0])));
