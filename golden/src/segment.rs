@@ -1,8 +1,8 @@
 //! Segment: the contact to which each taxel belongs, from the normal forces alone.
 //!
-//! The algorithm is one of integers, so that hardware and its bit-true model, which have no contacts yet, can take the same:
-//! the forces are words, those of the floating-point model are first brought to [`PEAK_BITS`] bits. Every step is one that
-//! hardware does with one multiplier, comparisons and memories.
+//! The algorithm is one of integers, the same for both models: the forces are words, those of the floating-point model are
+//! first brought to [`PEAK_BITS`] bits. Every step is one that hardware, which has no contacts yet, can do with one multiplier,
+//! comparisons and memories.
 //!
 //! ```text
 //! p ── compressive part ── smooth along x, y ── climb ── basins ── join ── contact of each taxel, or none
@@ -25,7 +25,7 @@
 //! | in: p | n, row-major | words, or N |
 //! | out: labels | n | contact of each taxel, 0 …, in the order of their largest taxels, or none |
 //!
-//! Feeds the contacts of the golden model, its estimator `evidence` and the choice of `adaptive`.
+//! Feeds the contacts of both models, the golden model's estimator `evidence` and its choice of `adaptive`.
 
 use crate::sensor::Sensor;
 

@@ -91,7 +91,10 @@ pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
 }
 
 /// Checks that there are blocks for everything that the bit-true model does.
-pub(crate) fn require_hardware(model: &Model) -> Result<(), HdlError> {
+///
+/// # Errors
+/// [`HdlError::OnlyModel`] names what the hardware lacks.
+pub fn require_hardware(model: &Model) -> Result<(), HdlError> {
     match model.by_contact {
         Some(_) => Err(HdlError::OnlyModel { field: "partition.case", value: model.scene.partition.case.to_string() }),
         None => Ok(()),

@@ -6,12 +6,13 @@
 //! ```
 //! As [`crate::float::contacts`] does it with a network, in words.
 
+use super::passes::{Passes, QuadStream};
 use super::plan::contents::ContactPlan;
 use super::stages::segment::{self, segment};
 use super::stages::shear::shear;
 use super::stages::unfold::unfold;
 use super::stages::window::{window, Array};
-use super::subarray::{Passes, QuadStream};
+
 use super::words::network::WordNetwork;
 use super::words::schedule::schedule;
 

@@ -21,8 +21,8 @@ use crate::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, Resultant, SubarrayResult,
 };
 
-/// What a status says of μ.
-struct Told {
+/// μ as a status has it.
+struct StatusMu {
     condition: bool,
     found: bool,
     mu: [f64; 2],
@@ -123,7 +123,7 @@ impl Model {
         }
         let of_subarrays = if regions.is_some() { &[][..] } else { &all };
         for (part, status) in case.parts.iter().zip(of_subarrays) {
-            let Told { condition, found, mu, estimate } = self.told(status);
+            let StatusMu { condition, found, mu, estimate } = self.told(status);
             if condition && self.searches() && !found {
                 flags.push(Flag::NoCompression);
             }
@@ -164,19 +164,19 @@ impl Model {
     }
 
     /// What a status says of μ.
-    fn told(&self, status: &Status) -> Told {
+    fn told(&self, status: &Status) -> StatusMu {
         let [condition, found] = [FLAG_CONDITION, FLAG_FOUND].map(|flag| status.flags & flag != 0);
         let unit = 1.0 / MU_STEPS as f64;
         let mu = status.position.map(|x| f64::from(x) * unit * self.scene.search.mu_max);
         let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
         let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position));
-        Told { condition, found, mu, estimate }
+        StatusMu { condition, found, mu, estimate }
     }
 
     /// The contact with the status in this slot, if there is one; `labels` are those of the taxels.
     fn region(&self, labels: &[usize], slot: usize, status: &Status, forces: &Forces) -> Option<Region> {
         let taxels: Vec<usize> = (0..labels.len()).filter(|&taxel| labels[taxel] == slot + 1).collect();
-        let Told { condition, mu, estimate, .. } = self.told(status);
+        let StatusMu { condition, mu, estimate, .. } = self.told(status);
         let own = Region {
             centroid_condition: condition,
             mu,

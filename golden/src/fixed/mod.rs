@@ -5,6 +5,9 @@
 //!       → normalise → fold → pass → rescale → unfold → search → forces → send → beats, status
 //!                             ↑________|  v_ij of the next degree
 //! ```
+//! With a network `estimate` and `relax` take the place of the search, and with a μ for each contact v_00 passes `segment`,
+//! each contact `window`, and every step of `relax` `shear` first.
+//!
 //! Each stage is one file in [`stages`] and one file of the same name in the hardware description. The [`Trace`] keeps
 //! what every stage passes on under the stage's name; tests compare it word for word with every simulation of the
 //! hardware. The difference from the floating-point model is measured by tests, never assumed.
@@ -28,6 +31,7 @@ mod contacts;
 mod decode;
 mod error;
 mod model;
+mod passes;
 mod run;
 mod subarray;
 

@@ -4,7 +4,6 @@
 //! prepare ── receive ── choose ── each subarray of the chosen case ── force ── send
 //! ```
 
-use super::contacts::Contacts;
 use super::model::Model;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
@@ -14,10 +13,9 @@ use super::stages::receive::mask;
 use super::stages::resultants::{self, sums};
 use super::stages::search::Best;
 use super::stages::send::{
-    labels_to_beats, ln_sigma_word, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS,
-    FLAG_NO_CONTACT, FRAMES_SHIFT,
+    labels_to_beats, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT,
 };
-use super::subarray::{Streams, SubarrayTrace};
+use super::subarray::{SubarrayTrace, Told};
 use crate::board::EngineKind;
 use crate::partition::Subarray;
 
@@ -39,9 +37,9 @@ pub struct Trace {
     pub status: Vec<[i32; 3]>,
     /// The words of each stage, in pipeline order.
     pub stages: Vec<Stage>,
-    /// Cycle counts of the frame at full speed.
+    /// Cycle counts of the frame at full speed; 0 for contacts, which have no hardware yet.
     pub cycles: Cycles,
-    /// Cycles from the last input beat to each output beat, status included, at full speed.
+    /// Cycles from the last input beat to each output beat, status included, at full speed; none for contacts.
     pub beat_cycles: Vec<u64>,
 }
 
@@ -64,8 +62,11 @@ impl Model {
         let solve = |part: &Subarray| SubarrayTrace::new(self, case, &part.gather(sensor, codes));
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
-        let cycles = Cycles::of_case(self, case, &searched);
-        let sending = BeatCycles::new(self, case, &searched);
+        let (cycles, sending) = match self.by_contact {
+            // Contacts have no hardware whose cycles could be stated.
+            Some(_) => Default::default(),
+            None => (Cycles::of_case(self, case, &searched), BeatCycles::new(self, case, &searched)),
+        };
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
 
@@ -76,48 +77,31 @@ impl Model {
         let contact = forces.iter().any(|f| f.words[2] != 0);
         let force_saturations = forces.iter().map(|f| f.saturations).sum();
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
-        let common = |s: &SubarrayTrace| Status {
-            flags: flag(!contact, FLAG_NO_CONTACT) | number << CASE_SHIFT | frames << FRAMES_SHIFT,
-            rescale: s.rescale,
-            normalise: s.normalise,
-            rescale_saturations: s.saturations,
-            force_saturations,
-            cycles: sending.counted as u32,
-            ..Status::default()
+        let beats_of = |s: &SubarrayTrace, told: Told| {
+            let status = Status {
+                position: told.position,
+                flags: flag(told.condition, FLAG_CONDITION)
+                    | flag(told.score.is_some(), FLAG_FOUND)
+                    | flag(!contact, FLAG_NO_CONTACT)
+                    | flag(told.more_contacts, FLAG_MORE_CONTACTS)
+                    | number << CASE_SHIFT
+                    | frames << FRAMES_SHIFT,
+                score: told.score.unwrap_or(0),
+                rescale: s.rescale,
+                normalise: s.normalise,
+                rescale_saturations: s.saturations,
+                force_saturations,
+                cycles: sending.counted as u32,
+            };
+            status.beats()
         };
-        let of = |s: &SubarrayTrace, position: [i32; 2], condition: bool, score: Option<i32>| Status {
-            position,
-            flags: common(s).flags | flag(condition, FLAG_CONDITION) | flag(score.is_some(), FLAG_FOUND),
-            score: score.unwrap_or(0),
-            ..common(s)
-        };
-        let of_contact = |s: &SubarrayTrace, contacts: &Contacts, slot: usize| {
-            let own = contacts.all.get(slot).map_or_else(
-                || common(s),
-                |contact| {
-                    let score = contact.condition.then(|| ln_sigma_word(contact.ln_sigma));
-                    of(s, contact.position, contact.condition, score)
-                },
-            );
-            Status { flags: own.flags | flag(contacts.overflow, FLAG_MORE_CONTACTS), ..own }
-        };
-        let all_of = |s: &SubarrayTrace| -> Vec<Status> {
-            match &s.contacts {
-                Some(contacts) => {
-                    (0..self.scene.partition.max_contacts).map(|slot| of_contact(s, contacts, slot)).collect()
-                }
-                None => vec![of(s, s.found.position, s.condition, s.found.score.map(|score| score as i32))],
-            }
-        };
-        let status = solved.iter().flat_map(all_of).flat_map(|status| status.beats()).collect();
+        let most = self.scene.partition.max_contacts;
+        let status = solved.iter().flat_map(|s| s.told(most).into_iter().flat_map(|told| beats_of(s, told)));
+        let status = status.collect();
         let labels = solved.iter().filter_map(|s| s.contacts.as_ref()).flat_map(|c| labels_to_beats(&c.labels));
         let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
             name,
             words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
-        };
-        let later = |name, stream: fn(&Streams) -> &[[i64; 4]]| Stage {
-            name,
-            words: solved.iter().flat_map(|s| stream(&s.streams)).map(|quad| quad.to_vec()).collect(),
         };
         let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
         let candidate =
@@ -127,14 +111,14 @@ impl Model {
             Stage { name: "choose", words: vec![vec![chosen as i64]] },
             quads("normalise", |s| &s.normalised),
             quads("fold", |s| &s.folded),
-            later("pass", |s| &s.passed),
-            later("segment", |s| &s.segmented),
-            later("window", |s| &s.windows),
-            later("estimate", |s| &s.estimated),
-            later("shear", |s| &s.sheared),
-            later("rescale", |s| &s.rescaled),
-            later("relax", |s| &s.relaxed),
-            later("unfold", |s| &s.unfolded),
+            quads("pass", |s| &s.streams.passed),
+            quads("segment", |s| &s.streams.segmented),
+            quads("window", |s| &s.streams.windows),
+            quads("estimate", |s| &s.streams.estimated),
+            quads("shear", |s| &s.streams.sheared),
+            quads("rescale", |s| &s.streams.rescaled),
+            quads("relax", |s| &s.streams.relaxed),
+            quads("unfold", |s| &s.streams.unfolded),
             Stage { name: "search", words: sweeps.map(candidate).collect() },
             quads("forces", |s| &s.found.values),
         ];

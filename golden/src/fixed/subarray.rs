@@ -6,23 +6,15 @@
 //!                                       └─ contacts: a μ for each ── steps of relax
 //! ```
 
-use super::contacts::Contacts;
+use super::contacts::{Contact, Contacts};
+use super::passes::{Passes, QuadStream, Streams};
 use super::plan::contents::{CasePlan, Plan};
-use super::stages::estimate::{estimate, images, Estimate};
-use super::stages::pass::{join_limbs, pass, swap, Operands};
-use super::stages::search::{search, Block, SearchResult};
+use super::stages::pass::Operands;
+use super::stages::search::SearchResult;
 use super::stages::send::ln_sigma_word;
-use super::stages::{fold, forces, normalise, receive, relax, rescale, unfold};
-use super::words::formats::{force_shift, Formats};
-use super::words::network::WordNetwork;
-use super::words::quantised::Quantised;
-use super::words::schedule::{by_limbs, is_transposed, layer, schedule, Product, EXPONENTS};
-use crate::board::EngineKind;
+use super::stages::{fold, forces, normalise, receive};
+use super::words::formats::force_shift;
 use crate::segment::NONE;
-use crate::symmetry::quads::Quads;
-
-/// The quads that a stage passes on.
-pub type QuadStream = Vec<[i64; 4]>;
 
 /// The result for a subarray and the words that each stage passed on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,55 +39,41 @@ pub struct SubarrayTrace {
     pub streams: Streams,
 }
 
-/// What the stages from `pass` on passed on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Streams {
-    /// Output of `pass`: one quad per row and accumulation.
-    pub passed: QuadStream,
-    /// Output of `segment`: the contact of each lane of each quad; empty but for contacts.
-    pub segmented: QuadStream,
-    /// Output of `window`: for each contact the quads of its operand, then those of its mask; empty but for contacts.
-    pub windows: QuadStream,
-    /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros, for each contact
-    /// where there are several μ; empty without a network.
-    pub estimated: QuadStream,
-    /// Output of `shear`: for each step and quad the operand for Ax and that for Ay; empty but for contacts.
-    pub sheared: QuadStream,
-    /// Output of `rescale`.
-    pub rescaled: QuadStream,
-    /// Output of `relax`: p after each step; empty without a network.
-    pub relaxed: QuadStream,
-    /// Output of `unfold`.
-    pub unfolded: QuadStream,
-}
-
-/// The passes of a subarray: their operands, and what the stages passed on so far.
-pub struct Passes<'a> {
-    /// The plan.
-    pub plan: &'a Plan,
-    /// Widths and scales.
-    pub formats: &'a Formats,
-    /// The matrices.
-    pub quantised: &'a Quantised,
-    /// Layout of the subarray.
-    pub layout: Quads,
-    /// What the products read.
-    pub operands: Operands,
-    /// Right shift of `rescale`, known from v_00 on.
-    pub shift: u32,
-    /// Saturated words so far.
-    pub saturations: u32,
-    /// What the stages passed on.
-    pub streams: Streams,
-}
-
-/// What comes after v_00.
-struct Outcome {
-    found: SearchResult,
-    contacts: Option<Contacts>,
+/// What a status says of μ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Told {
+    /// Position of μ in mu_max/384, [x, y].
+    pub position: [i32; 2],
+    /// Whether the scene's condition is met.
+    pub condition: bool,
+    /// Score of the search, or the word of two ln σ; `None` if μ was not found.
+    pub score: Option<i32>,
+    /// Whether there are more contacts than get a μ.
+    pub more_contacts: bool,
 }
 
 impl SubarrayTrace {
+    /// What the statuses say: of the subarray, or of each of its `most` contacts, nothing of those beyond the last.
+    pub fn told(&self, most: usize) -> Vec<Told> {
+        let Some(contacts) = &self.contacts else {
+            let (position, condition, more_contacts) = (self.found.position, self.condition, false);
+            return vec![Told {
+                position,
+                condition,
+                score: self.found.score.map(|score| score as i32),
+                more_contacts,
+            }];
+        };
+        let of = |contact: &Contact| Told {
+            position: contact.position,
+            condition: contact.condition,
+            score: contact.condition.then(|| ln_sigma_word(contact.ln_sigma)),
+            more_contacts: false,
+        };
+        let slot = |slot| contacts.all.get(slot).map(of).unwrap_or_default();
+        (0..most).map(|at| Told { more_contacts: contacts.overflow, ..slot(at) }).collect()
+    }
+
     /// Computes the subarray with these `codes`, row-major in it.
     pub fn new(plan: &Plan, case: &CasePlan, codes: &[i32]) -> Self {
         let CasePlan { formats, quantised, .. } = case;
@@ -117,13 +95,13 @@ impl SubarrayTrace {
             saturations: 0,
             streams: Streams::default(),
         };
-        let Outcome { found, contacts } = match (&quantised.network, &plan.by_contact) {
-            (None, _) => passes.search(condition && plan.searches()),
-            (Some(network), None) => passes.by_network(network, condition),
+        let (found, contacts) = match (&quantised.network, &plan.by_contact) {
+            (None, _) => (passes.search(condition && plan.searches()), None),
+            (Some(network), None) => (passes.by_network(network, condition), None),
             (Some(network), Some(plan)) => {
                 let (contacts, values) = passes.by_contact(network, plan, codes);
                 let found = SearchResult { values, ..SearchResult::default() };
-                Outcome { found, contacts: Some(contacts) }
+                (found, Some(contacts))
             }
         };
         let Passes { shift, saturations, streams, .. } = passes;
@@ -155,110 +133,5 @@ impl SubarrayTrace {
         let values = case.layout().unpack(&self.found.values);
         let force = |(taxel, value)| forces::force(formats, value, mu(taxel), shift, threshold);
         values.into_iter().enumerate().map(force).collect()
-    }
-}
-
-impl Passes<'_> {
-    /// The products of vector number `k`, rescaled.
-    pub fn vector(&mut self, k: usize, products: &[Product]) -> QuadStream {
-        let of = |part: &Vec<Product>| pass(self.formats, self.quantised, self.layout, part, &self.operands);
-        let limbs: Vec<QuadStream> = by_limbs(products).iter().map(of).collect();
-        let accumulators = join_limbs(self.formats, &limbs);
-        if k == 0 {
-            self.shift = rescale::shift(self.formats, rescale::raw_length(&accumulators));
-        }
-        let shift = if k == 0 { self.shift } else { self.formats.a_shift };
-        let (words, clipped) = rescale::rescale(self.formats, &accumulators, shift);
-        self.saturations += clipped;
-        match self.plan.board.engine {
-            EngineKind::Parallel => self.streams.passed.extend(limbs.concat()),
-            EngineKind::Serial => self.streams.passed.extend(accumulators),
-        }
-        self.streams.rescaled.extend(&words);
-        words
-    }
-
-    /// v_00 plus these products of a step of `relax`: the sums and their operands.
-    pub fn relax(&mut self, first: &[[i64; 4]], words: &[[i64; 4]]) -> (QuadStream, QuadStream) {
-        let (sums, operands, clipped) = relax::relax(self.formats, first, words);
-        self.saturations += clipped;
-        self.streams.relaxed.extend(&sums);
-        self.streams.unfolded.extend(unfold::unfold(&sums, 0));
-        (sums, operands)
-    }
-
-    /// v_00 where a network gives μ, and its operands.
-    pub fn first(&mut self, products: &[Product]) -> (QuadStream, QuadStream) {
-        let words = self.vector(0, products);
-        self.relax(&vec![[0; 4]; self.formats.quads], &words)
-    }
-
-    /// What the layers of the network say; the images of each become operands. Those of whole groups of rows are passed on,
-    /// zeros beyond the last.
-    pub fn ask(&mut self, network: &WordNetwork) -> Estimate {
-        let (formats, last) = (self.formats, self.formats.layers.len() - 1);
-        self.operands.layers.clear();
-        for (index, rows) in formats.hidden_rows().enumerate() {
-            let products = layer(formats, index);
-            let accumulators = pass(formats, self.quantised, self.layout, &products, &self.operands);
-            let (next, clipped) = images(formats, network.shift, &accumulators);
-            self.saturations += clipped;
-            self.streams.estimated.extend(&next);
-            self.streams.estimated.extend(vec![[0; 4]; rows - next.len()]);
-            self.operands.layers.push(next);
-        }
-        let rows = pass(formats, self.quantised, self.layout, &layer(formats, last), &self.operands);
-        let told = estimate(network.shift, &rows);
-        self.saturations += told.saturations;
-        told
-    }
-
-    /// Passes on a position of μ.
-    pub fn tell(&mut self, position: [i32; 2]) {
-        let [x, y] = position.map(i64::from);
-        self.streams.estimated.push([x, y, 0, 0]);
-    }
-
-    /// One μ for the subarray by the network.
-    fn by_network(&mut self, network: &WordNetwork, condition: bool) -> Outcome {
-        let steps = schedule(self.formats);
-        let (first, mut operands) = self.first(&steps[0]);
-        let mut values = unfold::unfold(&first, 0);
-        let told = self.ask(network);
-        let position = if condition { told.position } else { [0; 2] };
-        self.operands.position = position.map(i64::from);
-        self.tell(position);
-        for (k, products) in steps.iter().enumerate().skip(1) {
-            self.operands.vectors.push(operands);
-            let words = self.vector(k, products);
-            let (sums, next) = self.relax(&first, &words);
-            (values, operands) = (unfold::unfold(&sums, 0), next);
-        }
-        let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
-        Outcome { found: SearchResult { sweeps: Vec::new(), position, score, values }, contacts: None }
-    }
-
-    /// The polynomial p(μ), and the search, if the subarray is `searched`.
-    fn search(&mut self, searched: bool) -> Outcome {
-        let layout = self.layout;
-        let mut polynomials = vec![[[0i64; 10]; 4]; self.formats.quads];
-        for (k, products) in schedule(self.formats).iter().enumerate() {
-            let words = self.vector(k, products);
-            self.operands.vectors.push(rescale::operand(self.formats, &words));
-            // A transposed result is transposed back on its way to the search memory.
-            let transposed = is_transposed(products);
-            let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
-            if transposed {
-                taxels.iter_mut().for_each(|quad| *quad = swap(*quad));
-            }
-            for (address, values) in taxels.iter().enumerate() {
-                let to = if transposed { layout.transposed(address) } else { address };
-                for (w, &value) in polynomials[to].iter_mut().zip(values) {
-                    w[k] = value;
-                }
-            }
-            self.streams.unfolded.extend(taxels);
-        }
-        Outcome { found: search(layout, Block::new(layout, polynomials), searched), contacts: None }
     }
 }

@@ -136,7 +136,10 @@ fn the_forces_of_a_board_are_shown_for_the_finger_and_for_a_stream() {
     input.write_all(b"1,2\n").unwrap();
     input.write_all(line(&frames()[1]).as_bytes()).unwrap();
     let shown = pictures(&live, |_| true).pop().unwrap();
-    assert_eq!((&shown["result"]["engine"], &shown["refused"]), (&json!("board"), &json!(1)));
+    assert_eq!(shown["result"]["engine"], "board");
+    // Only the newest line is answered: the wrong one is refused, or dropped where the frame was there before its turn.
+    let count = |field: &str| shown[field].as_u64().unwrap();
+    assert_eq!(count("refused") + count("dropped"), 1, "{shown}");
     let [wanted, found] = forces(&shown);
     assert_eq!(found, wanted);
 }

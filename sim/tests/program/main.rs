@@ -6,6 +6,7 @@ mod bitstream;
 mod boards;
 mod browser;
 mod cli;
+mod contacts;
 mod contract;
 mod examples;
 mod fake;

@@ -79,7 +79,7 @@ pub(super) const SEND: u64 = 13;
 pub(super) const FOLDED: u64 = 2;
 
 /// Duration of a frame in clock cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Cycles {
     /// Cycles from the last input beat to the first output beat.
     pub first_output: u64,
@@ -151,6 +151,7 @@ impl Cycles {
 }
 
 /// When a frame's output beats leave, at full speed, without the choice of the case.
+#[derive(Default)]
 pub(in crate::fixed) struct BeatCycles {
     /// Cycles that the status states: from the arrival of the last code behind `prepare` to the first force.
     pub counted: u64,

@@ -1,0 +1,170 @@
+//! Passes: from the folded input of a subarray to p and μ, in the order of the schedule.
+//!
+//! ```text
+//! v_00 ─┬─ v_ij of the polynomial ── search
+//!       ├─ network: one μ ── steps of relax
+//!       └─ a μ for each contact: contacts
+//! ```
+
+use super::plan::contents::Plan;
+use super::stages::estimate::{estimate, images, Estimate};
+use super::stages::pass::{join_limbs, pass, swap, Operands};
+use super::stages::search::{search, Block, SearchResult};
+use super::stages::send::ln_sigma_word;
+use super::stages::{relax, rescale, unfold};
+use super::words::formats::Formats;
+use super::words::network::WordNetwork;
+use super::words::quantised::Quantised;
+use super::words::schedule::{by_limbs, is_transposed, layer, schedule, Product, EXPONENTS};
+use crate::board::EngineKind;
+use crate::symmetry::quads::Quads;
+
+/// The quads that a stage passes on.
+pub type QuadStream = Vec<[i64; 4]>;
+
+/// What the stages from `pass` on passed on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Streams {
+    /// Output of `pass`: one quad per row and accumulation.
+    pub passed: QuadStream,
+    /// Output of `segment`: the contact of each lane of each quad; empty but for contacts.
+    pub segmented: QuadStream,
+    /// Output of `window`: for each contact the quads of its operand, then those of its mask; empty but for contacts.
+    pub windows: QuadStream,
+    /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros, for each contact
+    /// where there are several μ; empty without a network.
+    pub estimated: QuadStream,
+    /// Output of `shear`: for each step and quad the operand for Ax and that for Ay; empty but for contacts.
+    pub sheared: QuadStream,
+    /// Output of `rescale`.
+    pub rescaled: QuadStream,
+    /// Output of `relax`: p after each step; empty without a network.
+    pub relaxed: QuadStream,
+    /// Output of `unfold`.
+    pub unfolded: QuadStream,
+}
+
+/// The passes of a subarray: their operands, and what the stages passed on so far.
+pub struct Passes<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// Widths and scales.
+    pub formats: &'a Formats,
+    /// The matrices.
+    pub quantised: &'a Quantised,
+    /// Layout of the subarray.
+    pub layout: Quads,
+    /// What the products read.
+    pub operands: Operands,
+    /// Right shift of `rescale`, known from v_00 on.
+    pub shift: u32,
+    /// Saturated words so far.
+    pub saturations: u32,
+    /// What the stages passed on.
+    pub streams: Streams,
+}
+
+impl Passes<'_> {
+    /// The products of vector number `k`, rescaled.
+    pub fn vector(&mut self, k: usize, products: &[Product]) -> QuadStream {
+        let of = |part: &Vec<Product>| pass(self.formats, self.quantised, self.layout, part, &self.operands);
+        let limbs: Vec<QuadStream> = by_limbs(products).iter().map(of).collect();
+        let accumulators = join_limbs(self.formats, &limbs);
+        if k == 0 {
+            self.shift = rescale::shift(self.formats, rescale::raw_length(&accumulators));
+        }
+        let shift = if k == 0 { self.shift } else { self.formats.a_shift };
+        let (words, clipped) = rescale::rescale(self.formats, &accumulators, shift);
+        self.saturations += clipped;
+        match self.plan.board.engine {
+            EngineKind::Parallel => self.streams.passed.extend(limbs.concat()),
+            EngineKind::Serial => self.streams.passed.extend(accumulators),
+        }
+        self.streams.rescaled.extend(&words);
+        words
+    }
+
+    /// v_00 plus these products of a step of `relax`: the sums and their operands.
+    pub fn relax(&mut self, first: &[[i64; 4]], words: &[[i64; 4]]) -> (QuadStream, QuadStream) {
+        let (sums, operands, clipped) = relax::relax(self.formats, first, words);
+        self.saturations += clipped;
+        self.streams.relaxed.extend(&sums);
+        self.streams.unfolded.extend(unfold::unfold(&sums, 0));
+        (sums, operands)
+    }
+
+    /// v_00 where a network gives μ, and its operands.
+    pub fn first(&mut self, products: &[Product]) -> (QuadStream, QuadStream) {
+        let words = self.vector(0, products);
+        self.relax(&vec![[0; 4]; self.formats.quads], &words)
+    }
+
+    /// What the layers of the network say; the images of each become operands. Those of whole groups of rows are passed on,
+    /// zeros beyond the last.
+    pub fn ask(&mut self, network: &WordNetwork) -> Estimate {
+        let (formats, last) = (self.formats, self.formats.layers.len() - 1);
+        self.operands.layers.clear();
+        for (index, rows) in formats.hidden_rows().enumerate() {
+            let products = layer(formats, index);
+            let accumulators = pass(formats, self.quantised, self.layout, &products, &self.operands);
+            let (next, clipped) = images(formats, network.shift, &accumulators);
+            self.saturations += clipped;
+            self.streams.estimated.extend(&next);
+            self.streams.estimated.extend(vec![[0; 4]; rows - next.len()]);
+            self.operands.layers.push(next);
+        }
+        let rows = pass(formats, self.quantised, self.layout, &layer(formats, last), &self.operands);
+        let told = estimate(network.shift, &rows);
+        self.saturations += told.saturations;
+        told
+    }
+
+    /// Passes on a position of μ.
+    pub fn tell(&mut self, position: [i32; 2]) {
+        let [x, y] = position.map(i64::from);
+        self.streams.estimated.push([x, y, 0, 0]);
+    }
+
+    /// One μ for the subarray by the network.
+    pub fn by_network(&mut self, network: &WordNetwork, condition: bool) -> SearchResult {
+        let steps = schedule(self.formats);
+        let (first, mut operands) = self.first(&steps[0]);
+        let mut values = unfold::unfold(&first, 0);
+        let told = self.ask(network);
+        let position = if condition { told.position } else { [0; 2] };
+        self.operands.position = position.map(i64::from);
+        self.tell(position);
+        for (k, products) in steps.iter().enumerate().skip(1) {
+            self.operands.vectors.push(operands);
+            let words = self.vector(k, products);
+            let (sums, next) = self.relax(&first, &words);
+            (values, operands) = (unfold::unfold(&sums, 0), next);
+        }
+        let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
+        SearchResult { sweeps: Vec::new(), position, score, values }
+    }
+
+    /// The polynomial p(μ), and the search, if the subarray is `searched`.
+    pub fn search(&mut self, searched: bool) -> SearchResult {
+        let layout = self.layout;
+        let mut polynomials = vec![[[0i64; 10]; 4]; self.formats.quads];
+        for (k, products) in schedule(self.formats).iter().enumerate() {
+            let words = self.vector(k, products);
+            self.operands.vectors.push(rescale::operand(self.formats, &words));
+            // A transposed result is transposed back on its way to the search memory.
+            let transposed = is_transposed(products);
+            let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
+            if transposed {
+                taxels.iter_mut().for_each(|quad| *quad = swap(*quad));
+            }
+            for (address, values) in taxels.iter().enumerate() {
+                let to = if transposed { layout.transposed(address) } else { address };
+                for (w, &value) in polynomials[to].iter_mut().zip(values) {
+                    w[k] = value;
+                }
+            }
+            self.streams.unfolded.extend(taxels);
+        }
+        search(layout, Block::new(layout, polynomials), searched)
+    }
+}
