@@ -45,8 +45,8 @@ fn contacts_are_reconstructed_in_words_and_have_no_hardware() {
     let (code, text, error) = run(folder, &["check", "pad.toml", "--draws", "2"]);
     assert_eq!(code, Some(0), "{error}");
     assert!(text.contains(&format!("hardware    none: {reason}")), "{text}");
-    for command in ["build", "cosim"] {
-        let (code, _, error) = run(folder, &[command, "pad.toml"]);
+    for command in [&["build", "pad.toml"][..], &["cosim", "pad.toml", "--frame", "f.json"]] {
+        let (code, _, error) = run(folder, command);
         assert_eq!(code, Some(2), "{error}");
         assert!(error.contains(reason), "{error}");
     }
