@@ -62,6 +62,27 @@ pub enum Flag {
     TooManyContacts,
 }
 
+impl Flag {
+    /// All flags, in order.
+    pub const ALL: [Flag; 15] = [
+        Flag::NoContact,
+        Flag::NoCompression,
+        Flag::ConditionUnmet,
+        Flag::Saturated,
+        Flag::LoadOutside,
+        Flag::MediumMismatch,
+        Flag::ShearUnreliable,
+        Flag::CoefficientsDamaged,
+        Flag::MuAtBound,
+        Flag::ImplausibleStress,
+        Flag::LoadMismatch,
+        Flag::ShapeMismatch,
+        Flag::ShearNotResolved,
+        Flag::Misfit,
+        Flag::TooManyContacts,
+    ];
+}
+
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
 pub const SHARE_INSIDE: f64 = 0.995;
 /// Noise relative to the peak above which the sparse objective cannot determine the shear.
@@ -129,24 +150,7 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_json() {
-        let all = [
-            Flag::NoContact,
-            Flag::NoCompression,
-            Flag::ConditionUnmet,
-            Flag::Saturated,
-            Flag::LoadOutside,
-            Flag::MediumMismatch,
-            Flag::ShearUnreliable,
-            Flag::CoefficientsDamaged,
-            Flag::MuAtBound,
-            Flag::ImplausibleStress,
-            Flag::LoadMismatch,
-            Flag::ShapeMismatch,
-            Flag::ShearNotResolved,
-            Flag::Misfit,
-            Flag::TooManyContacts,
-        ];
-        let text = serde_json::to_string(&all).unwrap();
+        let text = serde_json::to_string(&Flag::ALL).unwrap();
         let wanted = [
             "no-contact",
             "no-compression",

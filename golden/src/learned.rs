@@ -16,6 +16,7 @@
 //! | `network` | layers with the mirror symmetry |
 //! | `frames`, `training` | drawn frames; loss and Adam |
 //! | `file` | bytes, signature |
+//! | `trial` | a network of a few steps, for tests |
 //! | `composed` | the layers as plain matrices of the stress, for the hardware |
 //!
 //! A mirrored frame has the mirrored μ because no layer can do otherwise; in parities that costs a quarter of the products.
@@ -34,6 +35,7 @@ mod network;
 #[cfg(test)]
 mod tests;
 mod training;
+mod trial;
 mod window;
 
 pub use composed::ComposedLayer;
@@ -42,6 +44,7 @@ pub use file::Signature;
 pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
 pub use training::{Stage, Training};
+pub use trial::with_network;
 pub use window::{Place, Window};
 
 use crate::scene::Scene;

@@ -10,11 +10,13 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod contacts;
 mod extra;
 mod figures;
 mod found_noise;
 mod output;
 
+pub use contacts::FoundContact;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;

@@ -1,7 +1,7 @@
 //! Small scenes for tests, and where their taxels are in the memories.
 
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::learned::{Learned, Training};
+use dermis_golden::learned::{with_network, Training};
 use dermis_golden::scene::Scene;
 use dermis_golden::symmetry::quads::Quads;
 
@@ -20,12 +20,8 @@ fn scene(rows: usize, cols: usize, more: &str) -> Scene {
 
 /// The model of such a sensor with a network of these hidden layers, hardly trained; `more` adds to table `[search]`.
 pub(crate) fn learned(rows: usize, cols: usize, hidden: &[usize], more: &str) -> Model {
-    let mut scene = scene(rows, cols, &format!("[search]\nestimator = \"learned\"\n{more}"));
-    let training = Training { steps: 20, batch: 16, contacts: 40, hidden: hidden.to_vec(), ..Training::default() };
-    let trained = Learned::train(&scene, &training, &|_| ()).unwrap();
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), trained.bytes).unwrap();
-    scene.search.network = Some(file.path().to_owned());
+    let scene = scene(rows, cols, &format!("[search]\nestimator = \"learned\"\n{more}"));
+    let (scene, _file) = with_network(scene, &Training::trial(hidden)).unwrap();
     Model::new(&scene).unwrap()
 }
 

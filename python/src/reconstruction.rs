@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use dermis_golden::evidence::ContactEstimate;
 use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::{Reconstruction as Solved, Region};
+use dermis_golden::reconstruct::{FoundContact, Reconstruction as Solved};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -36,93 +35,56 @@ fn flags<'py>(py: Python<'py>, flags: &[Flag]) -> PyResult<Bound<'py, PyAny>> {
 
 /// One contact of a result.
 #[pyclass(frozen, module = "dermis")]
-pub struct Contact {
-    centre_mm: Option<[f64; 2]>,
-    mu: [f64; 2],
-    mu_sigma: Option<[f64; 2]>,
-    force_N: [f64; 3],
-    sigma_N: Option<[f64; 3]>,
-    shear_sigma_N: Option<[f64; 2]>,
-    /// xx, xy, yy.
-    mu_covariance: Option<[f64; 3]>,
-}
-
-impl From<&ContactEstimate> for Contact {
-    fn from(found: &ContactEstimate) -> Contact {
-        Contact {
-            centre_mm: Some(found.centre_mm),
-            mu: found.mu,
-            mu_sigma: Some([0, 2].map(|axis| found.mu_covariance[axis].sqrt())),
-            force_N: found.force_N,
-            sigma_N: Some(found.sigma_N),
-            shear_sigma_N: Some([found.sigma_N[0], found.sigma_N[1]]),
-            mu_covariance: Some(found.mu_covariance),
-        }
-    }
-}
-
-impl From<&Region> for Contact {
-    fn from(region: &Region) -> Contact {
-        Contact {
-            centre_mm: region.centre_mm,
-            mu: region.mu,
-            mu_sigma: region.mu_sigma,
-            force_N: region.load_N,
-            sigma_N: None,
-            shear_sigma_N: region.shear_sigma_N,
-            mu_covariance: None,
-        }
-    }
-}
+pub struct Contact(FoundContact);
 
 #[pymethods]
 impl Contact {
     /// Centre of pressure in mm from the array's centre, shape (2,): x, y; None without compressive forces.
     #[getter]
     fn centre_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.centre_mm.map(|centre| array(py, centre))
+        self.0.centre_mm.map(|centre| array(py, centre))
     }
 
     /// Ratio of shear to normal force, shape (2,): x, y.
     #[getter]
     fn mu<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.mu)
+        array(py, self.0.mu)
     }
 
     /// Standard deviation of mu, shape (2,); None where the estimator gives none.
     #[getter]
     fn mu_sigma<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.mu_sigma.map(|sigma| array(py, sigma))
+        self.0.mu_sigma.map(|sigma| array(py, sigma))
     }
 
     /// Force in N, shape (3,): x, y, normal.
     #[getter]
     fn force_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.force_N)
+        array(py, self.0.force_N)
     }
 
     /// Standard deviation of the force in N, shape (3,); None where the estimator gives none.
     #[getter]
     fn sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.sigma_N.map(|sigma| array(py, sigma))
+        self.0.sigma_N().map(|sigma| array(py, sigma))
     }
 
     /// Standard deviation of the shear in N, shape (2,): x, y; also of an estimator that knows that of mu alone, from the normal
     /// force; None where the estimator gives none.
     #[getter]
     fn shear_sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.shear_sigma_N.map(|sigma| array(py, sigma))
+        self.0.shear_sigma_N.map(|sigma| array(py, sigma))
     }
 
     /// Covariance of mu, shape (2, 2); None where the estimator gives none.
     #[getter]
     fn mu_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.mu_covariance.map(|[xx, xy, yy]| grid(py, &[xx, xy, xy, yy], [2, 2])).transpose()
+        self.0.mu_covariance.map(|[xx, xy, yy]| grid(py, &[xx, xy, xy, yy], [2, 2])).transpose()
     }
 
     fn __repr__(&self) -> String {
-        let [x, y, normal] = self.force_N;
-        let sigma = self.sigma_N.map_or("None".to_owned(), |[x, y, z]| format!("[{x:.3}, {y:.3}, {z:.3}]"));
+        let [x, y, normal] = self.0.force_N;
+        let sigma = self.0.sigma_N().map_or("None".to_owned(), |[x, y, z]| format!("[{x:.3}, {y:.3}, {z:.3}]"));
         format!("Contact(force_N=[{x:.3}, {y:.3}, {normal:.3}], sigma_N={sigma})")
     }
 }
@@ -144,8 +106,7 @@ impl Reconstruction {
 
 /// The contacts of a result, where it tells them apart.
 fn contacts(result: &Solved) -> Option<Vec<Contact>> {
-    let estimated = result.extra.contacts.as_ref().map(|all| all.iter().map(Contact::from).collect());
-    estimated.or_else(|| result.extra.regions.as_ref().map(|all| all.iter().map(Contact::from).collect()))
+    result.contacts().map(|all| all.into_iter().map(Contact).collect())
 }
 
 #[pymethods]

@@ -37,7 +37,7 @@ use std::path::PathBuf;
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::learned::{Learned, Training};
+use dermis_golden::learned::{self, Training};
 use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
 use dermis_sim::cosim::drive::Stimulus;
@@ -70,12 +70,7 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
 pub fn with_network(text: &str, hidden: &[usize]) -> (Scene, NamedTempFile) {
     let mut scene = Scene::parse(text, "network.toml").expect("a scene");
     scene.search.estimator = EstimatorKind::Learned;
-    let training = Training { steps: 20, batch: 16, contacts: 40, hidden: hidden.to_vec(), ..Training::default() };
-    let trained = Learned::train(&scene, &training, &|_| ()).expect("a network");
-    let file = NamedTempFile::new().expect("a temporary file");
-    std::fs::write(file.path(), trained.bytes).expect("a file");
-    scene.search.network = Some(file.path().to_owned());
-    (scene, file)
+    learned::with_network(scene, &Training::trial(hidden)).expect("a network")
 }
 
 /// The Verilog of a scene's engine without its comments, which name stages that a scene may lack.

@@ -10,11 +10,8 @@ use super::passes::{Passes, QuadStream};
 use super::plan::contents::ContactPlan;
 use super::stages::segment::{self, segment};
 use super::stages::shear::shear;
-use super::stages::unfold::unfold;
 use super::stages::window::{window, Array};
-
 use super::words::network::WordNetwork;
-use super::words::schedule::schedule;
 
 /// The contacts of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,10 +46,8 @@ impl Passes<'_> {
         codes: &[i32],
     ) -> (Contacts, QuadStream) {
         let (plan, formats, layout) = (self.plan, self.formats, self.layout);
-        let steps = schedule(formats);
-        let (first, mut operands) = self.first(&steps[0]);
-        let mut values = unfold(&first, 0);
-        let words: Vec<i64> = layout.unpack(&values).iter().map(|p| segment::word(formats, *p)).collect();
+        let first = self.first();
+        let words: Vec<i64> = layout.unpack(&first.taxels).iter().map(|p| segment::word(formats, *p)).collect();
         let sensor = &plan.scene.sensor;
         let found = segment(sensor, &contacts.segmenter, &words, plan.scene.partition.max_contacts);
         let labels = layout.pack(&found.labels);
@@ -61,7 +56,7 @@ impl Passes<'_> {
         let array = Array { sensor, codes, dead: &plan.dead, floor: plan.noise_floor };
         let mut all = Vec::with_capacity(found.middles.len());
         for (index, &middle) in found.middles.iter().enumerate() {
-            let read = window(formats, contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);
+            let read = window(formats, &contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);
             self.streams.windows.extend(read.input.iter().chain(&read.mask));
             self.operands.window = [read.input, read.mask];
             let told = self.ask(network);
@@ -71,16 +66,13 @@ impl Passes<'_> {
             all.push(Contact { middle, condition, position, ln_sigma: told.ln_sigma });
         }
         let positions: Vec<[i64; 2]> = all.iter().map(|contact| contact.position.map(i64::from)).collect();
-        for (k, products) in steps.iter().enumerate().skip(1) {
+        let values = self.relaxed(first, |passes, operands| {
             let (sheared, clipped) = shear(formats, &operands, &labels, &positions);
-            self.saturations += clipped;
+            passes.saturations += clipped;
             let [x, y] = &sheared;
-            self.streams.sheared.extend(x.iter().zip(y).flat_map(|(x, y)| [x, y]));
-            self.operands.sheared.push(sheared);
-            let words = self.vector(k, products);
-            let (sums, next) = self.relax(&first, &words);
-            (values, operands) = (unfold(&sums, 0), next);
-        }
+            passes.streams.sheared.extend(x.iter().zip(y).flat_map(|(x, y)| [x, y]));
+            passes.operands.sheared.push(sheared);
+        });
         (Contacts { labels: found.labels, all, overflow: found.overflow }, values)
     }
 }

@@ -67,14 +67,15 @@ impl Model {
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
         }
-        let expected = if self.by_contact.is_some() { self.status_beats() } else { case.status_beats() };
+        let expected = self.status_beats_of(case);
         if status.len() != expected {
             return Err(FixedError::Beats { what: "status", got: status.len(), expected });
         }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
+        let taxels = self.scene.sensor.taxels();
         let (beats, labels) = match self.by_contact {
-            Some(_) => beats.split_at(self.scene.sensor.taxels()),
-            None => (beats, &[][..]),
+            Some(_) => (&beats[..taxels], Some(labels_of_beats(&beats[taxels..], taxels))),
+            None => (beats, None),
         };
         let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
         let forces = match self.sends_resultants() {
@@ -108,21 +109,17 @@ impl Model {
         let received = |part: &Subarray| {
             receive(sensor, part, &part.gather(sensor, &codes.codes), floor, self.scene.partition.condition)
         };
-        let mut regions = None;
-        if self.by_contact.is_some() {
-            let labels = labels_of_beats(labels, sensor.taxels());
-            let own: Vec<Region> = all
-                .iter()
-                .enumerate()
-                .filter_map(|(slot, status)| self.region(&labels, slot, status, &forces))
-                .collect();
-            shear_spread = shear_spread_of(&own);
-            subarrays
-                .extend(case.parts.iter().map(|part| SubarrayResult::of_regions(part, &received(part), resultant_N)));
-            regions = Some(own);
+        let regions: Option<Vec<Region>> = labels.map(|labels| {
+            let region = |(slot, status)| self.region(&labels, slot, status, &forces);
+            all.iter().enumerate().filter_map(region).collect()
+        });
+        if let Some(regions) = &regions {
+            shear_spread = shear_spread_of(regions);
+            let whole = |part| SubarrayResult::of_regions(part, &received(part), resultant_N);
+            subarrays.extend(case.parts.iter().map(whole));
         }
-        let of_subarrays = if regions.is_some() { &[][..] } else { &all };
-        for (part, status) in case.parts.iter().zip(of_subarrays) {
+        let searched = all.iter().filter(|_| regions.is_none());
+        for (part, status) in case.parts.iter().zip(searched) {
             let StatusMu { condition, found, mu, estimate } = self.told(status);
             if condition && self.searches() && !found {
                 flags.push(Flag::NoCompression);

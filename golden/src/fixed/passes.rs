@@ -22,9 +22,13 @@ use crate::symmetry::quads::Quads;
 /// The quads that a stage passes on.
 pub type QuadStream = Vec<[i64; 4]>;
 
-/// What the stages from `pass` on passed on.
+/// What the stages passed on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Streams {
+    /// Output of `normalise`.
+    pub normalised: QuadStream,
+    /// Output of `fold`.
+    pub folded: QuadStream,
     /// Output of `pass`: one quad per row and accumulation.
     pub passed: QuadStream,
     /// Output of `segment`: the contact of each lane of each quad; empty but for contacts.
@@ -64,9 +68,19 @@ pub struct Passes<'a> {
     pub streams: Streams,
 }
 
+/// A step of `relax`.
+pub struct Relaxed {
+    /// v_00, or p, in parities.
+    pub sums: QuadStream,
+    /// The same as operands.
+    pub operands: QuadStream,
+    /// The same of the taxels, in words of the search.
+    pub taxels: QuadStream,
+}
+
 impl Passes<'_> {
     /// The products of vector number `k`, rescaled.
-    pub fn vector(&mut self, k: usize, products: &[Product]) -> QuadStream {
+    fn vector(&mut self, k: usize, products: &[Product]) -> QuadStream {
         let of = |part: &Vec<Product>| pass(self.formats, self.quantised, self.layout, part, &self.operands);
         let limbs: Vec<QuadStream> = by_limbs(products).iter().map(of).collect();
         let accumulators = join_limbs(self.formats, &limbs);
@@ -84,19 +98,31 @@ impl Passes<'_> {
         words
     }
 
-    /// v_00 plus these products of a step of `relax`: the sums and their operands.
-    pub fn relax(&mut self, first: &[[i64; 4]], words: &[[i64; 4]]) -> (QuadStream, QuadStream) {
+    /// A step of `relax`: the sum of v_00 and these products, its operands, and its taxels.
+    fn relax(&mut self, first: &[[i64; 4]], words: &[[i64; 4]]) -> Relaxed {
         let (sums, operands, clipped) = relax::relax(self.formats, first, words);
         self.saturations += clipped;
+        let taxels = unfold::unfold(&sums, 0);
         self.streams.relaxed.extend(&sums);
-        self.streams.unfolded.extend(unfold::unfold(&sums, 0));
-        (sums, operands)
+        self.streams.unfolded.extend(&taxels);
+        Relaxed { sums, operands, taxels }
     }
 
-    /// v_00 where a network gives μ, and its operands.
-    pub fn first(&mut self, products: &[Product]) -> (QuadStream, QuadStream) {
-        let words = self.vector(0, products);
+    /// v_00 where a network gives μ.
+    pub fn first(&mut self) -> Relaxed {
+        let words = self.vector(0, &schedule(self.formats)[0]);
         self.relax(&vec![[0; 4]; self.formats.quads], &words)
+    }
+
+    /// p of the taxels after all steps of `relax` from v_00; `give` makes the operands of the next products from those of p.
+    pub fn relaxed(&mut self, first: Relaxed, give: impl Fn(&mut Self, QuadStream)) -> QuadStream {
+        let Relaxed { sums: start, mut operands, mut taxels } = first;
+        for (k, products) in schedule(self.formats).iter().enumerate().skip(1) {
+            give(self, operands);
+            let words = self.vector(k, products);
+            Relaxed { operands, taxels, .. } = self.relax(&start, &words);
+        }
+        taxels
     }
 
     /// What the layers of the network say; the images of each become operands. Those of whole groups of rows are passed on,
@@ -127,19 +153,12 @@ impl Passes<'_> {
 
     /// One μ for the subarray by the network.
     pub fn by_network(&mut self, network: &WordNetwork, condition: bool) -> SearchResult {
-        let steps = schedule(self.formats);
-        let (first, mut operands) = self.first(&steps[0]);
-        let mut values = unfold::unfold(&first, 0);
+        let first = self.first();
         let told = self.ask(network);
         let position = if condition { told.position } else { [0; 2] };
         self.operands.position = position.map(i64::from);
         self.tell(position);
-        for (k, products) in steps.iter().enumerate().skip(1) {
-            self.operands.vectors.push(operands);
-            let words = self.vector(k, products);
-            let (sums, next) = self.relax(&first, &words);
-            (values, operands) = (unfold::unfold(&sums, 0), next);
-        }
+        let values = self.relaxed(first, |passes, operands| passes.operands.vectors.push(operands));
         let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
         SearchResult { sweeps: Vec::new(), position, score, values }
     }

@@ -109,8 +109,8 @@ impl Model {
         let mut stages = vec![
             Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
             Stage { name: "choose", words: vec![vec![chosen as i64]] },
-            quads("normalise", |s| &s.normalised),
-            quads("fold", |s| &s.folded),
+            quads("normalise", |s| &s.streams.normalised),
+            quads("fold", |s| &s.streams.folded),
             quads("pass", |s| &s.streams.passed),
             quads("segment", |s| &s.streams.segmented),
             quads("window", |s| &s.streams.windows),

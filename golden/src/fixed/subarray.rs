@@ -7,14 +7,13 @@
 //! ```
 
 use super::contacts::{Contact, Contacts};
-use super::passes::{Passes, QuadStream, Streams};
+use super::passes::{Passes, Streams};
 use super::plan::contents::{CasePlan, Plan};
 use super::stages::pass::Operands;
 use super::stages::search::SearchResult;
 use super::stages::send::ln_sigma_word;
 use super::stages::{fold, forces, normalise, receive};
 use super::words::formats::force_shift;
-use crate::segment::NONE;
 
 /// The result for a subarray and the words that each stage passed on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,11 +30,7 @@ pub struct SubarrayTrace {
     pub found: SearchResult,
     /// The contacts, where each has a μ of its own.
     pub contacts: Option<Contacts>,
-    /// Output of `normalise`.
-    pub normalised: QuadStream,
-    /// Output of `fold`.
-    pub folded: QuadStream,
-    /// What each of the stages after them passed on.
+    /// What each stage passed on.
     pub streams: Streams,
 }
 
@@ -56,19 +51,15 @@ impl SubarrayTrace {
     /// What the statuses say: of the subarray, or of each of its `most` contacts, nothing of those beyond the last.
     pub fn told(&self, most: usize) -> Vec<Told> {
         let Some(contacts) = &self.contacts else {
-            let (position, condition, more_contacts) = (self.found.position, self.condition, false);
-            return vec![Told {
-                position,
-                condition,
-                score: self.found.score.map(|score| score as i32),
-                more_contacts,
-            }];
+            let score = self.found.score.map(|score| score as i32);
+            let (position, condition) = (self.found.position, self.condition);
+            return vec![Told { position, condition, score, ..Told::default() }];
         };
         let of = |contact: &Contact| Told {
             position: contact.position,
             condition: contact.condition,
             score: contact.condition.then(|| ln_sigma_word(contact.ln_sigma)),
-            more_contacts: false,
+            ..Told::default()
         };
         let slot = |slot| contacts.all.get(slot).map(of).unwrap_or_default();
         (0..most).map(|at| Told { more_contacts: contacts.overflow, ..slot(at) }).collect()
@@ -80,9 +71,8 @@ impl SubarrayTrace {
         let layout = case.layout();
         let received = receive::receive(codes, plan.noise_floor);
         let condition = received.meets(plan.scene.partition.condition);
-        let samples: Vec<i64> = codes.iter().map(|&code| i64::from(code)).collect();
         let left = normalise::shift(received.magnitude, formats.input_bits);
-        let normalised = normalise::normalise(&layout.pack(&samples), left);
+        let normalised = normalise::normalise(&layout.pack(codes), left);
         let folded = fold::fold(&normalised);
         let operands = Operands::of_input(&folded, formats);
         let mut passes = Passes {
@@ -93,7 +83,7 @@ impl SubarrayTrace {
             operands,
             shift: 0,
             saturations: 0,
-            streams: Streams::default(),
+            streams: Streams { normalised, folded, ..Streams::default() },
         };
         let (found, contacts) = match (&quantised.network, &plan.by_contact) {
             (None, _) => (passes.search(condition && plan.searches()), None),
@@ -105,33 +95,25 @@ impl SubarrayTrace {
             }
         };
         let Passes { shift, saturations, streams, .. } = passes;
-        SubarrayTrace {
-            condition,
-            normalise: left,
-            rescale: shift,
-            saturations,
-            found,
-            contacts,
-            normalised,
-            folded,
-            streams,
-        }
+        SubarrayTrace { condition, normalise: left, rescale: shift, saturations, found, contacts, streams }
     }
 
     /// Forces of the subarray's taxels, row-major in it; `threshold` is in force LSBs.
     pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<forces::Force> {
         let formats = &case.formats;
         let word = |position: [i32; 2]| position.map(|x| forces::mu_word(formats, x));
-        let mu = |taxel: usize| match &self.contacts {
-            None => word(self.found.position),
-            Some(contacts) => match contacts.labels[taxel] {
-                NONE => [0; 2],
-                label => word(contacts.all[label - 1].position),
-            },
+        // The μ of each label; with one μ all taxels have the first.
+        let (mu, labels): (Vec<[i64; 2]>, _) = match &self.contacts {
+            None => (vec![word(self.found.position)], None),
+            Some(contacts) => {
+                let all = contacts.all.iter().map(|contact| word(contact.position));
+                ([[0; 2]].into_iter().chain(all).collect(), Some(&contacts.labels))
+            }
         };
+        let label = |taxel: usize| labels.map_or(0, |labels| labels[taxel]);
         let shift = force_shift(formats, self.normalise, self.rescale);
         let values = case.layout().unpack(&self.found.values);
-        let force = |(taxel, value)| forces::force(formats, value, mu(taxel), shift, threshold);
+        let force = |(taxel, value)| forces::force(formats, value, mu[label(taxel)], shift, threshold);
         values.into_iter().enumerate().map(force).collect()
     }
 }

@@ -6,7 +6,7 @@ use crate::float::forces::residual;
 use crate::frame::{Contact, Forces, Frame};
 use crate::generator::draws::DrawOptions;
 use crate::generator::generate;
-use crate::learned::{Learned, Training};
+use crate::learned::{self, Training};
 use crate::noise::{shape_study, ShapeStudy};
 use crate::partition::{Case, Grid, Subarray};
 use crate::reception::Received;
@@ -257,12 +257,8 @@ fn with_network() -> &'static Scene {
     let train = || {
         let text = "name = \"two\"\n[sensor]\nrows = 16\ncols = 16\npitch_x_mm = 3.0\npitch_y_mm = 3.0\n\
                     thickness_mm = 3.0\n[partition]\ncase = \"contacts\"\n[search]\nestimator = \"network\"\n";
-        let mut scene = Scene::parse(text, "two").unwrap();
         let training = Training { steps: 1200, batch: 48, contacts: 400, hidden: vec![32, 16], ..Default::default() };
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), Learned::train(&scene, &training, &|_| ()).unwrap().bytes).unwrap();
-        scene.search.network = Some(file.path().to_owned());
-        (scene, file)
+        learned::with_network(Scene::parse(text, "two").unwrap(), &training).unwrap()
     };
     &TRAINED.get_or_init(train).0
 }

@@ -74,21 +74,24 @@ impl Window {
 
     /// Row and column in the array of the window's first taxel, for a contact at `centre_mm`.
     pub(super) fn origin(&self, sensor: &Sensor, centre_mm: [f64; 2]) -> [isize; 2] {
-        let first = |centre: f64, pitch: f64, lines: usize, own: usize| {
-            let line = (centre / pitch + (lines as f64 - 1.0) / 2.0).round() as isize;
-            line - own as isize / 2
-        };
+        let line =
+            |centre: f64, pitch: f64, lines: usize| (centre / pitch + (lines as f64 - 1.0) / 2.0).round() as isize;
         match self.place {
             Place::Array => [0, 0],
-            Place::Contact => [
-                first(centre_mm[1], sensor.pitch_y_mm, sensor.rows, self.rows),
-                first(centre_mm[0], sensor.pitch_x_mm, sensor.cols, self.cols),
-            ],
+            Place::Contact => self.origin_around([
+                line(centre_mm[1], sensor.pitch_y_mm, sensor.rows),
+                line(centre_mm[0], sensor.pitch_x_mm, sensor.cols),
+            ]),
         }
     }
 
+    /// Row and column in the array of the first taxel of a window with this row and column in its middle.
+    pub(crate) fn origin_around(&self, [row, col]: [isize; 2]) -> [isize; 2] {
+        [row - self.rows as isize / 2, col - self.cols as isize / 2]
+    }
+
     /// For each taxel of the window the taxel of the array, if there is one.
-    pub(super) fn taxels_of(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> Vec<Option<usize>> {
+    pub(crate) fn taxels_of(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> Vec<Option<usize>> {
         let line = |first: isize, own: usize, lines: usize| {
             first.checked_add_unsigned(own).filter(|line| (0..lines as isize).contains(line))
         };

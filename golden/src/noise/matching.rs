@@ -8,71 +8,28 @@
 //! | in: found and true contacts | centre, force, standard deviation | mm, N |
 //! | out: partner of each true contact | – | – |
 
-use crate::evidence::ContactEstimate;
 use crate::generator::draws::ContactTruth;
-use crate::reconstruct::Reconstruction;
+use crate::reconstruct::{FoundContact, Reconstruction};
 
-/// A contact of a result.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoundContact {
-    /// Centre of pressure in mm from the array's centre.
-    pub centre_mm: [f64; 2],
-    /// Force in N, [x, y, normal].
-    pub force_N: [f64; 3],
-    /// Standard deviation of the force, if the estimator gives it.
-    pub sigma_N: Option<ForceSigma>,
-}
-
-/// Standard deviation of a force.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ForceSigma {
-    /// N, [x, y].
-    pub shear: [f64; 2],
-    /// N; `None` where the estimator gives that of μ only.
-    pub normal: Option<f64>,
-}
-
-impl ForceSigma {
-    /// That of an estimator that knows μ alone.
-    fn of_shear(shear_sigma_N: Option<[f64; 2]>) -> Option<ForceSigma> {
-        shear_sigma_N.map(|shear| ForceSigma { shear, normal: None })
-    }
-}
-
-/// The contacts of a result: those of `evidence`, its regions, or the whole array as one.
+/// The contacts of a result that have a centre, or the whole array as one.
 pub fn found(result: &Reconstruction) -> Vec<FoundContact> {
-    if let Some(contacts) = &result.extra.contacts {
-        let contact = |own: &ContactEstimate| {
-            let [x, y, normal] = own.sigma_N;
-            let sigma_N = Some(ForceSigma { shear: [x, y], normal: Some(normal) });
-            FoundContact { centre_mm: own.centre_mm, force_N: own.force_N, sigma_N }
-        };
-        return contacts.iter().map(contact).collect();
+    if let Some(contacts) = result.contacts() {
+        return contacts.into_iter().filter(|contact| contact.centre_mm.is_some()).collect();
     }
-    match &result.extra.regions {
-        Some(regions) => {
-            let contact = |region: &crate::reconstruct::Region| {
-                let sigma_N = ForceSigma::of_shear(region.shear_sigma_N);
-                Some(FoundContact { centre_mm: region.centre_mm?, force_N: region.load_N, sigma_N })
-            };
-            regions.iter().filter_map(contact).collect()
-        }
-        None => {
-            // Of several subarrays each has a μ of its own.
-            let sigma_N = match result.subarrays.as_slice() {
-                [one] => ForceSigma::of_shear(one.shear_sigma_N),
-                _ => None,
-            };
-            vec![FoundContact { centre_mm: [0.0; 2], force_N: result.resultant_N, sigma_N }]
-        }
-    }
+    // Of several subarrays each has a μ of its own.
+    let shear_sigma_N = match result.subarrays.as_slice() {
+        [one] => one.shear_sigma_N,
+        _ => None,
+    };
+    let (centre_mm, force_N) = (Some([0.0; 2]), result.resultant_N);
+    vec![FoundContact { centre_mm, force_N, shear_sigma_N, ..FoundContact::default() }]
 }
 
 /// The partner of each true contact.
 pub fn partners(found: &[FoundContact], truth: &[ContactTruth]) -> Vec<Option<FoundContact>> {
     let distance = |f: usize, t: usize| {
-        let ([x, y], [u, v]) = (found[f].centre_mm, truth[t].centre_mm);
-        (x - u).hypot(y - v)
+        let [u, v] = truth[t].centre_mm;
+        found[f].centre_mm.map_or(f64::INFINITY, |[x, y]| (x - u).hypot(y - v))
     };
     let mut pairs: Vec<(usize, usize)> = (0..found.len()).flat_map(|f| (0..truth.len()).map(move |t| (f, t))).collect();
     pairs.sort_by(|a, b| distance(a.0, a.1).total_cmp(&distance(b.0, b.1)));
@@ -100,9 +57,9 @@ mod tests {
             force_N: [0.0; 3],
         });
         let found = [[9.0, 0.0], [4.0, 0.0]].map(|centre_mm| FoundContact {
-            centre_mm,
+            centre_mm: Some(centre_mm),
             force_N: [centre_mm[0], 0.0, 1.0],
-            sigma_N: None,
+            ..FoundContact::default()
         });
         let partners = partners(&found, &truth);
         assert_eq!(partners, [Some(found[1]), Some(found[0]), None]);

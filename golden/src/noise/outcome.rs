@@ -64,10 +64,11 @@ impl Outcome {
         for (truth, partner) in drawn.truth.iter().zip(partners(&found(result), &drawn.truth)) {
             let force_N = partner.map_or([0.0; 3], |found| found.force_N);
             outcome.contact_tangential.extend(Errors::new(truth.force_N, force_N).tangential);
-            if let Some(sigma_N) = partner.and_then(|found| found.sigma_N) {
+            let Some(found) = partner else { continue };
+            if let Some([x, y]) = found.shear_sigma_N {
                 let off = |axis: usize, sigma: f64| (force_N[axis] - truth.force_N[axis]).abs() / sigma;
-                let shear = [off(0, sigma_N.shear[0]), off(1, sigma_N.shear[1])];
-                outcome.deviations.push(Deviation { shear, normal: sigma_N.normal.map(|sigma| off(2, sigma)) });
+                let normal = found.normal_sigma_N.map(|sigma| off(2, sigma));
+                outcome.deviations.push(Deviation { shear: [off(0, x), off(1, y)], normal });
             }
         }
         outcome

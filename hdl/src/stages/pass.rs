@@ -231,7 +231,8 @@ mod tests {
                         Operand::Vector(index) => index + layers + 1,
                         Operand::Layer(index) => index + 2,
                         Operand::InputHigh | Operand::InputLow => usize::from(layer),
-                        _ => 0,
+                        Operand::One => 0,
+                        Operand::Window | Operand::Mask | Operand::Shear(..) => unreachable!("no hardware of contacts"),
                     };
                     let input = matches!(product.operand, Operand::InputHigh | Operand::InputLow);
                     let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false };

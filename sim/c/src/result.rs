@@ -5,10 +5,9 @@
 use std::ffi::{c_char, CString};
 use std::sync::OnceLock;
 
-use dermis_golden::evidence::ContactEstimate;
 use dermis_golden::flags::Flag;
 use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::{Reconstruction, Region};
+use dermis_golden::reconstruct::{FoundContact, Reconstruction};
 use dermis_sim::link::PhysicalAnswer;
 
 use crate::guard::{attempt, copy, dermis_status, free, guarded, place, reference, room, Error};
@@ -97,19 +96,9 @@ pub struct dermis_contact {
     pub has_centre_mm: bool,
 }
 
-/// What an estimator says of a contact.
-struct Figures {
-    force_N: [f64; 3],
-    shear_sigma_N: Option<[f64; 2]>,
-    normal_sigma_N: Option<f64>,
-    mu: [f64; 2],
-    mu_sigma: Option<[f64; 2]>,
-    centre_mm: Option<[f64; 2]>,
-}
-
-impl From<Figures> for dermis_contact {
-    fn from(figures: Figures) -> dermis_contact {
-        let Figures { force_N, shear_sigma_N, normal_sigma_N, mu, mu_sigma, centre_mm } = figures;
+impl From<FoundContact> for dermis_contact {
+    fn from(found: FoundContact) -> dermis_contact {
+        let FoundContact { force_N, shear_sigma_N, normal_sigma_N, mu, mu_sigma, centre_mm, .. } = found;
         let absent = [f64::NAN; 2];
         dermis_contact {
             force_N,
@@ -123,35 +112,6 @@ impl From<Figures> for dermis_contact {
             has_mu_sigma: mu_sigma.is_some(),
             has_centre_mm: centre_mm.is_some(),
         }
-    }
-}
-
-impl From<&ContactEstimate> for dermis_contact {
-    fn from(found: &ContactEstimate) -> dermis_contact {
-        let [x, y, normal] = found.sigma_N;
-        let figures = Figures {
-            force_N: found.force_N,
-            shear_sigma_N: Some([x, y]),
-            normal_sigma_N: Some(normal),
-            mu: found.mu,
-            mu_sigma: Some([0, 2].map(|axis| found.mu_covariance[axis].sqrt())),
-            centre_mm: Some(found.centre_mm),
-        };
-        figures.into()
-    }
-}
-
-impl From<&Region> for dermis_contact {
-    fn from(region: &Region) -> dermis_contact {
-        let figures = Figures {
-            force_N: region.load_N,
-            shear_sigma_N: region.shear_sigma_N,
-            normal_sigma_N: None,
-            mu: region.mu,
-            mu_sigma: region.mu_sigma,
-            centre_mm: region.centre_mm,
-        };
-        figures.into()
     }
 }
 
@@ -200,8 +160,7 @@ impl dermis_result {
 
     fn contacts(&self) -> Option<Vec<dermis_contact>> {
         let Source::Reconstruction(result) = &self.source else { return None };
-        let estimated = result.extra.contacts.as_ref().map(|all| all.iter().map(dermis_contact::from).collect());
-        estimated.or_else(|| result.extra.regions.as_ref().map(|all| all.iter().map(dermis_contact::from).collect()))
+        result.contacts().map(|all| all.into_iter().map(dermis_contact::from).collect())
     }
 
     fn flags(&self) -> u32 {

@@ -54,7 +54,7 @@ class ArrayMap {
     this.arrows.setAttribute("d", path);
     let [thick, bars] = ["", ""];
     const scale = largest > 0 ? 0.3 * cols / largest : 0;
-    for (const { centre_mm: centre, force_N: force, sigma_N: sigma } of contacts) {
+    for (const { centre_mm: centre, force_N: force, shear_sigma_N: sigma } of contacts) {
       if (!centre) continue;
       const [x, y] = place(centre), tip = [x + scale * force[0], y + scale * force[1]];
       thick += arrow(x, y, tip[0] - x, tip[1] - y, 0.6);
@@ -72,14 +72,15 @@ const found = new ArrayMap(at("found")), real = new ArrayMap(at("true"));
 let history = []; // of the last seconds: when drawn, when received, number, forces, peaks
 
 function table(picture, contacts) {
-  const rows = contacts.map((c, k) => [`contact ${k + 1}`, c.force_N, c.sigma_N]);
+  const bars = c => [...(c.shear_sigma_N || [null, null]), c.normal_sigma_N];
+  const rows = contacts.map((c, k) => [`contact ${k + 1}`, c.force_N, bars(c)]);
   rows.push(["found, sum", picture.result.resultant_N]);
   if (picture.truth) rows.push(["true, sum", picture.truth.resultant_N]);
   const body = at("forces");
   while (body.rows.length > rows.length) body.deleteRow(-1);
   rows.forEach(([name, force, sigma], k) => {
     const row = body.rows[k] || body.insertRow();
-    [name, ...force.map((f, axis) => f.toFixed(3) + (sigma ? ` ± ${sigma[axis].toFixed(3)}` : ""))]
+    [name, ...force.map((f, axis) => f.toFixed(3) + (sigma && sigma[axis] != null ? ` ± ${sigma[axis].toFixed(3)}` : ""))]
       .forEach((content, column) => text(row.cells[column] || row.insertCell(), content));
   });
 }

@@ -1,11 +1,11 @@
 //! A result as the page gets it.
 
 use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 use super::newest::Newest;
-use crate::recording::{contacts, ContactForce};
+use crate::recording::contacts;
 use crate::stream::{Answer, Outcome};
 
 /// The newest result with its frame.
@@ -26,7 +26,7 @@ pub struct Picture<'a> {
     /// Stress of each taxel in MPa, row-major.
     pub stress_MPa: &'a [f64],
     /// The contacts of the result.
-    pub contacts: Vec<ContactForce>,
+    pub contacts: Vec<FoundContact>,
     /// The result.
     pub result: &'a Reconstruction,
     /// What is known about the forces.

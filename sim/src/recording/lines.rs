@@ -1,6 +1,6 @@
 //! Recorded frames as lines of a stream, at a pace.
 
-use std::io::{Error, Read, Result};
+use std::io::{Cursor, Error, Read, Result};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -34,9 +34,7 @@ pub struct Lines {
     /// When the last frame was due since then, and how long after the one before.
     due: Duration,
     gap: Duration,
-    line: Vec<u8>,
-    /// Bytes of the line that were read.
-    used: usize,
+    line: Cursor<Vec<u8>>,
 }
 
 impl Lines {
@@ -46,8 +44,8 @@ impl Lines {
     /// A file that cannot be read.
     pub fn open(path: PathBuf, shape: Option<[usize; 2]>, pace: Pace, repeat: bool) -> anyhow::Result<Lines> {
         let frames = Frames::open(&path, shape)?;
-        let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Vec::new());
-        Ok(Lines { path, shape, pace, repeat, frames, begun: None, count: 0, due, gap, line, used: 0 })
+        let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Cursor::default());
+        Ok(Lines { path, shape, pace, repeat, frames, begun: None, count: 0, due, gap, line })
     }
 
     /// Takes the next line, once it is due; returns whether there is one.
@@ -71,20 +69,19 @@ impl Lines {
         // Received times may go back.
         (self.gap, self.due) = (due.saturating_sub(self.due), due);
         self.count += 1;
-        (self.line, self.used) = (format!("{}\n", json!({"stress_MPa": frame.stress_MPa})).into_bytes(), 0);
+        self.line = Cursor::new(format!("{}\n", json!({"stress_MPa": frame.stress_MPa})).into_bytes());
         Ok(true)
     }
 }
 
 impl Read for Lines {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
-        if self.used == self.line.len() && !self.advance().map_err(|error| Error::other(error.to_string()))? {
-            return Ok(0);
+        match self.line.read(buffer)? {
+            0 if !buffer.is_empty() && self.advance().map_err(|error| Error::other(error.to_string()))? => {
+                self.line.read(buffer)
+            }
+            bytes => Ok(bytes),
         }
-        let bytes = buffer.len().min(self.line.len() - self.used);
-        buffer[..bytes].copy_from_slice(&self.line[self.used..self.used + bytes]);
-        self.used += bytes;
-        Ok(bytes)
     }
 }
 

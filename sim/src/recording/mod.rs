@@ -16,7 +16,7 @@ pub mod message;
 pub mod read;
 pub mod write;
 
-pub use contacts::{contacts, ContactForce};
+pub use contacts::contacts;
 pub use lines::{Lines, Pace};
 pub use read::{Frames, Messages, Recorded, RecordedFrame};
 pub use write::Recorder;

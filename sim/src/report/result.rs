@@ -62,12 +62,9 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
         let place = centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
         writeln!(text, "contact at {place}, N   x {}   y {}   normal {}", along(0), along(1), along(2))
     };
-    for own in result.extra.contacts.iter().flatten() {
-        contact(Some(own.centre_mm), own.force_N, own.sigma_N.map(Some))?;
-    }
-    for own in result.extra.regions.iter().flatten() {
+    for own in result.contacts().into_iter().flatten() {
         let [x, y] = own.shear_sigma_N.map_or([None; 2], |sigma| sigma.map(Some));
-        contact(own.centre_mm, own.load_N, [x, y, None])?;
+        contact(own.centre_mm, own.force_N, [x, y, own.normal_sigma_N])?;
     }
     let flag = |flag: &Flag| {
         let name = serde_json::to_value(flag).ok()?.as_str().map(str::to_owned)?;

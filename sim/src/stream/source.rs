@@ -9,7 +9,7 @@
 //! | a pipe | the pipe | with it |
 
 use std::fs::File;
-use std::io::{Error, ErrorKind, Read, Result, Seek};
+use std::io::{Cursor, Error, ErrorKind, Read, Result, Seek};
 use std::net::UdpSocket;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
@@ -63,7 +63,7 @@ impl Source {
             Source::Udp(address) => {
                 let socket = UdpSocket::bind(address).map_err(|error| named(address, error))?;
                 let local = socket.local_addr().ok();
-                Ok((Box::new(Datagrams { socket, buffer: Vec::new(), used: 0 }), local))
+                Ok((Box::new(Datagrams { socket, line: Cursor::default() }), local))
             }
             Source::Path(path) => {
                 let kind = std::fs::metadata(path).map_err(|error| named(path, error))?.file_type();
@@ -136,26 +136,26 @@ impl Read for Serial {
 /// Datagrams, each ended as a line.
 struct Datagrams {
     socket: UdpSocket,
-    buffer: Vec<u8>,
-    /// Bytes of the buffer that were read.
-    used: usize,
+    /// The last one.
+    line: Cursor<Vec<u8>>,
 }
 
 impl Read for Datagrams {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
-        while self.used == self.buffer.len() {
-            self.buffer.resize(DATAGRAM, 0);
-            let bytes = self.socket.recv(&mut self.buffer)?;
-            self.buffer.truncate(bytes);
-            self.used = 0;
-            if bytes > 0 && self.buffer.last() != Some(&b'\n') {
-                self.buffer.push(b'\n');
+        loop {
+            match self.line.read(buffer)? {
+                0 if !buffer.is_empty() => (),
+                bytes => return Ok(bytes),
             }
+            let line = self.line.get_mut();
+            line.resize(DATAGRAM, 0);
+            let bytes = self.socket.recv(line)?;
+            line.truncate(bytes);
+            if bytes > 0 && line.last() != Some(&b'\n') {
+                line.push(b'\n');
+            }
+            self.line.set_position(0);
         }
-        let bytes = buffer.len().min(self.buffer.len() - self.used);
-        buffer[..bytes].copy_from_slice(&self.buffer[self.used..self.used + bytes]);
-        self.used += bytes;
-        Ok(bytes)
     }
 }
 

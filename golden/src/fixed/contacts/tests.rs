@@ -7,7 +7,7 @@ use crate::flags::Flag;
 use crate::float::Golden;
 use crate::frame::Frame;
 use crate::generator::draws::{DrawOptions, Draws};
-use crate::learned::{Learned, OneContact, Training};
+use crate::learned::{with_network, Learned, OneContact, Training};
 use crate::reconstruct::{Reconstruction, Region};
 use crate::scene::Scene;
 use tempfile::NamedTempFile;
@@ -18,13 +18,8 @@ fn scene(more: &str, partition: &str) -> (Scene, NamedTempFile) {
     let text = format!(
         "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"learned\"\n{more}"
     );
-    let mut scene = Scene::parse(&text, "pad.toml").unwrap();
-    let training = Training { steps: 30, batch: 16, contacts: 60, hidden: vec![16, 8], ..Training::default() };
-    let trained = Learned::train(&scene, &training, &|_| ()).unwrap();
-    let file = NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), trained.bytes).unwrap();
-    scene.search.network = Some(file.path().to_owned());
-    (scene, file)
+    let training = Training { steps: 30, contacts: 60, ..Training::trial(&[16, 8]) };
+    with_network(Scene::parse(&text, "pad.toml").unwrap(), &training).unwrap()
 }
 
 /// The contacts by their load in the golden model.

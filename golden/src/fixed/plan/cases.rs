@@ -137,7 +137,7 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
         resources,
         by_contact: (scene.partition.case == Case::Contacts).then(|| ContactPlan {
             segmenter: Segmenter::new(&scene.sensor, segment::WIDTH),
-            window: Window::around_contact(&scene.sensor).quads(),
+            window: Window::around_contact(&scene.sensor),
         }),
         board: board.clone(),
         scene,

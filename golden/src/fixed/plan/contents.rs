@@ -9,6 +9,7 @@ use crate::fixed::stages::resultants;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
+use crate::learned::Window;
 use crate::partition::{Case, Grid, Subarray};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene};
 use crate::segment::Segmenter;
@@ -60,8 +61,8 @@ pub struct CasePlan {
 pub struct ContactPlan {
     /// The constants of the segmentation.
     pub segmenter: Segmenter,
-    /// Layout of the window around a contact.
-    pub window: Quads,
+    /// The window around a contact.
+    pub window: Window,
 }
 
 /// A case that divides the array but was left out, because a design with it exceeds the board.
@@ -119,12 +120,17 @@ impl Plan {
         self.first().grid()
     }
 
-    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays, or for each contact
-    /// that may have a μ of its own.
+    /// Number of status beats of a frame of the first case.
     pub fn status_beats(&self) -> usize {
+        self.status_beats_of(self.first())
+    }
+
+    /// Number of status beats of a frame of a case: [`STATUS_BEATS`] per subarray, in the order of the subarrays, or for each
+    /// contact that may have a μ of its own.
+    pub fn status_beats_of(&self, case: &CasePlan) -> usize {
         match self.by_contact {
             Some(_) => STATUS_BEATS * self.scene.partition.max_contacts,
-            None => self.first().status_beats(),
+            None => case.status_beats(),
         }
     }
 

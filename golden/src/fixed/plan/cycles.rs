@@ -283,10 +283,9 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
         let readable = |product: &Product| match (product.operand, target) {
             (_, Target::Vector(0)) | (Operand::One, _) => 0,
             (Operand::InputHigh | Operand::InputLow, _) => vectors[0],
-            (Operand::Vector(index) | Operand::Shear(index, _), _) => {
-                vectors[index].max(layers.last().copied().unwrap_or(0))
-            }
-            (Operand::Window | Operand::Mask, _) => vectors[0],
+            (Operand::Vector(index), _) => vectors[index].max(layers.last().copied().unwrap_or(0)),
+            // Of contacts, which have no hardware whose cycles could be counted.
+            (Operand::Window | Operand::Mask | Operand::Shear(..), _) => 0,
             (Operand::Layer(index), _) => layers[index],
         };
         for group in 0..groups {

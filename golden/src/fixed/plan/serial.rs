@@ -78,8 +78,12 @@ pub fn operand_index(formats: &Formats, product: &Product) -> usize {
     match product.operand {
         Operand::InputLow => 1,
         Operand::Vector(index) => first_vector(formats) + index,
-        // No network on the serial engine.
-        _ => 0,
+        Operand::InputHigh
+        | Operand::Layer(_)
+        | Operand::Window
+        | Operand::Mask
+        | Operand::Shear(..)
+        | Operand::One => 0,
     }
 }
 

@@ -16,7 +16,7 @@ use crate::fixed::words::formats::{
 use crate::fixed::words::network::WordNetwork;
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
-use crate::learned::{ComposedLayer, Learned, Window};
+use crate::learned::{ComposedLayer, Learned};
 use crate::matrices::Matrices;
 use crate::partition::Case;
 use crate::scene::{EstimatorKind, Scene};
@@ -165,10 +165,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         groups: 1,
         search_width: if composed.is_empty() { search_width(scene, board, degree, shapes) } else { Quads::LANES },
         layers: composed.iter().map(|layer| layer.bias[0].len()).collect(),
-        window_quads: match (composed.is_empty(), scene.partition.case) {
-            (false, Case::Contacts) => Window::around_contact(&scene.sensor).quads().len(),
-            _ => 0,
-        },
+        by_contact: scene.partition.case == Case::Contacts,
         headroom,
         shared_a,
         flips,

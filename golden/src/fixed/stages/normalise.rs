@@ -13,8 +13,8 @@ pub fn shift(magnitude: u64, input_bits: u32) -> u32 {
 }
 
 /// Shifts every code left by `shift`; the words stay `input_bits` wide.
-pub fn normalise(quads: &[[i64; 4]], shift: u32) -> Vec<[i64; 4]> {
-    quads.iter().map(|quad| quad.map(|code| code << shift)).collect()
+pub fn normalise<T: Copy + Into<i64>>(quads: &[[T; 4]], shift: u32) -> Vec<[i64; 4]> {
+    quads.iter().map(|quad| quad.map(|code| code.into() << shift)).collect()
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ impl Operands {
         let mask = (1 << low) - 1;
         let align = formats.limb_align - low;
         Operands {
-            input_high: folded.iter().map(|quad| quad.map(|f| f >> low)).collect(),
+            input_high: high_limbs(folded, formats),
             input_low: folded.iter().map(|quad| quad.map(|f| (f & mask) << align)).collect(),
             ..Operands::default()
         }
@@ -77,6 +77,11 @@ impl Operands {
             None => Cow::Borrowed(quads),
         }
     }
+}
+
+/// The high limbs of a folded input.
+pub fn high_limbs(folded: &[[i64; 4]], formats: &Formats) -> Vector {
+    folded.iter().map(|quad| quad.map(|f| f >> formats.input_low_bits)).collect()
 }
 
 /// Right shift of an operand times a position.

@@ -41,13 +41,12 @@ pub fn segment(sensor: &Sensor, segmenter: &Segmenter, words: &[i64], most: usiz
     order.truncate(most);
     let name = |contact: usize| order.iter().position(|own| *own == contact).map_or(NONE, |index| index + 1);
     let middle = |&contact: &usize| {
-        let of_axis = |line: fn(usize, usize) -> usize, lines: usize| {
-            let taxels = || segments.taxels(contact);
-            let weight: i64 = taxels().map(|taxel| words[taxel]).sum();
-            let moment: i64 = taxels().map(|taxel| words[taxel] * line(taxel, sensor.cols) as i64).sum();
+        let weight: i64 = segments.taxels(contact).map(|taxel| words[taxel]).sum();
+        let of_axis = |line: &dyn Fn(usize) -> usize, lines: usize| {
+            let moment: i64 = segments.taxels(contact).map(|taxel| words[taxel] * line(taxel) as i64).sum();
             (1..lines as i64).take_while(|next| 2 * moment + weight >= 2 * weight * next).count()
         };
-        [of_axis(|taxel, cols| taxel / cols, sensor.rows), of_axis(|taxel, cols| taxel % cols, sensor.cols)]
+        [of_axis(&|taxel| taxel / sensor.cols, sensor.rows), of_axis(&|taxel| taxel % sensor.cols, sensor.cols)]
     };
     Segmented {
         labels: segments.labels.iter().map(|label| label.map_or(NONE, name)).collect(),

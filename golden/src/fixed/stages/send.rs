@@ -30,11 +30,11 @@ pub const FLAG_FOUND: u32 = 1 << 1;
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
 /// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
-/// Flag bit: there are more contacts than get a μ; only with `partition.case = "contacts"`.
-pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
 /// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
 /// "signature"` ([`crate::fixed::plan::check`]).
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
+/// Flag bit: there are more contacts than get a μ; only with `partition.case = "contacts"`.
+pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
 /// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
 /// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.

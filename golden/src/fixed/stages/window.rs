@@ -9,12 +9,12 @@
 
 use super::fold;
 use super::normalise;
-use super::pass::Vector;
+use super::pass::{high_limbs, Vector};
 use super::receive::{receive, Received};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::network::MASKED;
+use crate::learned::Window;
 use crate::sensor::Sensor;
-use crate::symmetry::quads::Quads;
 
 /// The window of a contact.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,32 +40,25 @@ pub struct Array<'a> {
     pub floor: i32,
 }
 
-/// The window with this `layout` around the contact in `middle`, [row, column]; `is_own` tells its taxels, row-major.
+/// The `window` around the contact in `middle`, [row, column]; `is_own` tells its taxels, row-major.
 pub fn window(
     formats: &Formats,
-    layout: Quads,
+    window: &Window,
     array: &Array,
     middle: [usize; 2],
     is_own: &dyn Fn(usize) -> bool,
 ) -> WindowWords {
     let Array { sensor, codes, dead, floor } = *array;
-    let line = |own: usize, middle: usize, lines: usize, all: usize| {
-        (middle + own).checked_sub(lines / 2).filter(|line| *line < all)
-    };
-    let taxel = |own: usize| {
-        let row = line(own / layout.cols, middle[0], layout.rows, sensor.rows)?;
-        let col = line(own % layout.cols, middle[1], layout.cols, sensor.cols)?;
-        Some(row * sensor.cols + col).filter(|taxel| dead.binary_search(taxel).is_err())
-    };
-    let taxels: Vec<Option<usize>> = (0..layout.rows * layout.cols).map(taxel).collect();
-    let words: Vec<i64> = taxels.iter().map(|taxel| taxel.map_or(0, |taxel| i64::from(codes[taxel]))).collect();
+    let origin = window.origin_around(middle.map(|line| line as isize));
+    let is_alive = |taxel: &usize| dead.binary_search(taxel).is_err();
+    let taxels: Vec<Option<usize>> =
+        window.taxels_of(sensor, origin).into_iter().map(|taxel| taxel.filter(is_alive)).collect();
+    let read: Vec<i32> = taxels.iter().map(|taxel| taxel.map_or(0, |taxel| codes[taxel])).collect();
     let mask: Vec<i64> = taxels.iter().map(|taxel| if taxel.is_none() { MASKED } else { 0 }).collect();
-    let magnitude = receive(&words.iter().map(|word| *word as i32).collect::<Vec<_>>(), floor).magnitude;
     let own: Vec<i32> = taxels.iter().flatten().filter(|taxel| is_own(**taxel)).map(|taxel| codes[*taxel]).collect();
-    let shift = normalise::shift(magnitude, formats.input_bits);
-    let folded = fold::fold(&normalise::normalise(&layout.pack(&words), shift));
+    let (layout, shift) = (window.quads(), normalise::shift(receive(&read, floor).magnitude, formats.input_bits));
     WindowWords {
-        input: folded.iter().map(|quad| quad.map(|f| f >> formats.input_low_bits)).collect(),
+        input: high_limbs(&fold::fold(&normalise::normalise(&layout.pack(&read), shift)), formats),
         mask: fold::fold(&layout.pack(&mask)),
         own: receive(&own, floor),
     }
@@ -74,6 +67,7 @@ pub fn window(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learned::Place;
     use crate::scene::Scene;
     use crate::symmetry::parity::hadamard;
 
@@ -84,9 +78,9 @@ mod tests {
         let formats = model.formats();
         let sensor = Sensor { rows: 4, cols: 4, ..model.scene.sensor.clone() };
         let codes: Vec<i32> = (0..16).map(|taxel| if taxel < 8 { 100 + taxel } else { 100_000 }).collect();
-        let layout = Quads { rows: 3, cols: 3 };
+        let small = Window { place: Place::Contact, rows: 3, cols: 3 };
         let array = Array { sensor: &sensor, codes: &codes, dead: &[1], floor: 103 };
-        let found = window(formats, layout, &array, [0, 0], &|taxel| taxel == 4);
+        let found = window(formats, &small, &array, [0, 0], &|taxel| taxel == 4);
         // Rows −1 to 1: codes 100, dead, 104, 105 in the lower right; all shifted to the full width.
         let shift = formats.input_bits - 1 - 7;
         let word = |code: i64| code << shift;
@@ -98,7 +92,7 @@ mod tests {
         assert_eq!((found.mask[3], found.own.positive), ([0; 4], true));
         // (0, −1) is beyond the array, (0, 1) dead: both sides of the middle line are masked.
         assert_eq!(found.mask[2], [4 * MASKED, 0, 0, 0]);
-        let loud = window(formats, layout, &array, [1, 1], &|_| false);
+        let loud = window(formats, &small, &array, [1, 1], &|_| false);
         assert!(!loud.own.positive && loud.input[0] != found.input[0]);
     }
 }

@@ -120,7 +120,7 @@ pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
 /// The products of a step of `relax`: −(μ1 Ax + μ2 Ay) p.
 fn shear(formats: &Formats, step: usize) -> Vec<Product> {
     let of = |kind, axis, flips: &[usize]| -> Vec<Product> {
-        let product = |&flip| match formats.by_contact() {
+        let product = |&flip| match formats.by_contact {
             true => Product::of(kind, flip, Operand::Shear(step, axis)),
             false => Product { factor: Some(axis), ..Product::of(kind, flip, Operand::Vector(step)) },
         };
@@ -133,11 +133,11 @@ fn shear(formats: &Formats, step: usize) -> Vec<Product> {
 pub fn layer(formats: &Formats, layer: usize) -> Vec<Product> {
     let inputs = match layer.checked_sub(1) {
         Some(before) => Operand::Layer(before),
-        None if formats.by_contact() => Operand::Window,
+        None if formats.by_contact => Operand::Window,
         None => Operand::InputHigh,
     };
     let weights = Product::of(Kind::Layer(layer), 0, inputs);
-    let mask = (layer == 0 && formats.by_contact()).then(|| Product::of(Kind::Mask, 0, Operand::Mask));
+    let mask = (layer == 0 && formats.by_contact).then(|| Product::of(Kind::Mask, 0, Operand::Mask));
     let bias = Product::of(Kind::Bias(layer), 0, Operand::One);
     [weights].into_iter().chain(mask).chain([bias]).collect()
 }
@@ -208,12 +208,12 @@ impl Product {
     pub fn operand_index(&self) -> usize {
         match self.operand {
             Operand::Vector(index) => index,
-            Operand::Shear(step, _) => step,
             Operand::InputHigh
             | Operand::InputLow
             | Operand::Layer(_)
             | Operand::Window
             | Operand::Mask
+            | Operand::Shear(..)
             | Operand::One => 0,
         }
     }

@@ -186,25 +186,8 @@ fn error_bars_are_marked_and_absent_ones_are_no_zeros() {
 
 #[test]
 fn flags_are_bits_named_as_in_json() {
-    let all = [
-        Flag::NoContact,
-        Flag::NoCompression,
-        Flag::ConditionUnmet,
-        Flag::Saturated,
-        Flag::LoadOutside,
-        Flag::MediumMismatch,
-        Flag::ShearUnreliable,
-        Flag::CoefficientsDamaged,
-        Flag::MuAtBound,
-        Flag::ImplausibleStress,
-        Flag::LoadMismatch,
-        Flag::ShapeMismatch,
-        Flag::ShearNotResolved,
-        Flag::Misfit,
-        Flag::TooManyContacts,
-    ];
     let header = std::fs::read_to_string(super::header::folder().join("dermis.h")).unwrap();
-    for (index, flag) in all.into_iter().enumerate() {
+    for (index, flag) in Flag::ALL.into_iter().enumerate() {
         assert_eq!(bit(flag), 1 << index);
         // The header's comment of a flag is its name in JSON.
         let name = serde_json::to_value(flag).unwrap().as_str().unwrap().to_owned();
