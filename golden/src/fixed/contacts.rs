@@ -69,8 +69,7 @@ impl Passes<'_> {
         let values = self.relaxed(first, |passes, operands| {
             let (sheared, clipped) = shear(formats, &operands, &labels, &positions);
             passes.saturations += clipped;
-            let [x, y] = &sheared;
-            passes.streams.sheared.extend(x.iter().zip(y).flat_map(|(x, y)| [x, y]));
+            passes.streams.sheared.extend(sheared.iter().flatten());
             passes.operands.sheared.push(sheared);
         });
         (Contacts { labels: found.labels, all, overflow: found.overflow }, values)

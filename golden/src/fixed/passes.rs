@@ -38,7 +38,7 @@ pub struct Streams {
     /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros, for each contact
     /// where there are several μ; empty without a network.
     pub estimated: QuadStream,
-    /// Output of `shear`: for each step and quad the operand for Ax and that for Ay; empty but for contacts.
+    /// Output of `shear`: for each step the operands for Ax, then those for Ay; empty but for contacts.
     pub sheared: QuadStream,
     /// Output of `rescale`.
     pub rescaled: QuadStream,

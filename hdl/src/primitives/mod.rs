@@ -28,6 +28,7 @@ pub use arithmetic::butterfly::Butterfly;
 pub use arithmetic::lanes::{Lanes, MEMORY_FILE};
 pub use arithmetic::leading_one::by_leading_one;
 pub use arithmetic::rescaler::{count_saturations, operand_of, saturating_sum, Rescaler, SATURATION_BITS};
+pub(crate) use arithmetic::saturated::saturated;
 pub(crate) use arithmetic::unfolder::hadamard;
 pub use arithmetic::unfolder::Unfolder;
 #[cfg(test)]

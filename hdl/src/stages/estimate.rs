@@ -16,7 +16,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
-use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, SATURATION_BITS};
+use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, saturated, SATURATION_BITS};
 use crate::wire::Wire;
 
 /// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
@@ -112,17 +112,6 @@ impl Estimate {
         };
         block.bind(shape.kernel())
     }
-}
-
-/// A signed number saturated to `bits` bits, and whether that changed it.
-fn saturated<'k>(k: &'k Builder, value: Expr<'k>, bits: usize) -> (Expr<'k>, Expr<'k>) {
-    if value.bits() <= bits {
-        return (value.signed().extend(bits).unsigned(), k.constant(1, 0));
-    }
-    let above = value.slice(bits - 1, value.bits() - bits + 1);
-    let clips = above.any() & !above.all();
-    let sign = value.top();
-    (clips.mux(sign.concat((!sign).repeat(bits - 1)), value.low(bits)), clips)
 }
 
 /// A signed number within `range`.

@@ -23,6 +23,7 @@ mod rescale;
 mod resultants;
 mod search;
 mod send;
+mod shear;
 mod unfold;
 mod unsearched;
 
@@ -42,5 +43,6 @@ pub use rescale::Rescale;
 pub use resultants::Resultants;
 pub use search::{Search, SearchPorts};
 pub use send::Send;
+pub use shear::Shear;
 pub use unfold::Unfold;
 pub use unsearched::Unsearched;

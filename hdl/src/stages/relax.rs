@@ -8,7 +8,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
-use crate::primitives::{count_bits, count_saturations, operand_of, saturating_sum, SATURATION_BITS};
+use crate::primitives::{count_bits, count_saturations, operand_of, saturated, saturating_sum, SATURATION_BITS};
 use crate::wire::Wire;
 
 /// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four. Those of
@@ -147,9 +147,8 @@ impl Shape {
                 let at = parity * self.word;
                 let own = words2.slice(at, self.word).signed();
                 let sum = own + (first.slice(at, self.word) & adds2.repeat(self.word)).signed();
-                let clips = k.wire("clips", sum.top().differs(sum.at(self.word - 1)));
-                let most = sum.top().concat((!sum.top()).repeat(self.word - 1));
-                let word = k.delay("sum", clips.mux(most, sum.low(self.word).unsigned()));
+                let (word, clips) = saturated(&k, sum, self.word);
+                let word = k.delay("sum", word);
                 [word, operand_of(&k, word, self.data), clips]
             })
         };

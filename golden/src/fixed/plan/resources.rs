@@ -62,6 +62,8 @@ pub enum Holds {
     Raw,
     /// v_00 in parities, for `relax`.
     First,
+    /// p in parities, for `shear`.
+    Sheared,
     /// Coefficient of this index of the polynomials, in the buffers of the search.
     Polynomials(usize),
     /// The same at the start of the search.
@@ -99,6 +101,7 @@ impl std::fmt::Display for Holds {
             Holds::Columns => write!(f, "columns"),
             Holds::Raw => write!(f, "raw words"),
             Holds::First => write!(f, "v_00"),
+            Holds::Sheared => write!(f, "p"),
             Holds::Polynomials(index) => write!(f, "polynomials, coefficient {index}"),
             Holds::Start(index) => write!(f, "polynomials at the start, coefficient {index}"),
             Holds::Bank(bank) => write!(f, "polynomials, bank {bank}"),

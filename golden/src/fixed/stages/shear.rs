@@ -13,8 +13,16 @@ use crate::fixed::words::formats::Formats;
 use crate::segment::NONE;
 use crate::symmetry::parity::hadamard;
 
+/// Cycles from the cycle in which all quads of p are there to the first operand.
+pub const LATENCY: u64 = 8;
+
+/// Cycles from that cycle to the last operand of an array of `quads` quads, one operand per cycle.
+pub fn cycles(quads: usize) -> u64 {
+    LATENCY + 2 * quads as u64 - 1
+}
+
 /// Right shift from the sum of four parities to their mean.
-const MEAN: u32 = 2;
+pub const MEAN: u32 = 2;
 
 /// The operands for Ax and Ay from those of p, and how many words were saturated; `labels` has the contact of each lane of a
 /// quad, `positions` the μ of each contact, the first of which is number 1.

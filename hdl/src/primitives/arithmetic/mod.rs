@@ -6,4 +6,5 @@ pub(crate) mod lanes;
 pub(crate) mod leading_one;
 pub(crate) mod logarithm;
 pub(crate) mod rescaler;
+pub(crate) mod saturated;
 pub(crate) mod unfolder;
