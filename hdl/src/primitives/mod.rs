@@ -53,7 +53,7 @@ pub use pass::limb_sum::LimbSum;
 pub use pass::operand_scale::OperandScale;
 pub use pass::operand_select::OperandSelect;
 pub use pass::operand_writer::OperandWriter;
-pub use pass::pass_program::{longest, Control, PassProgram, COLUMN_FILE, FACTOR_BITS, SOURCE_BITS};
+pub use pass::pass_program::{longest, programs, Control, PassProgram, COLUMN_FILE, FACTOR_BITS, SOURCE_BITS};
 pub use pass::raw_length::{shift_bits, RawLength};
 pub use search::best_candidate::BestCandidate;
 pub use search::candidates::{Candidates, LATENCY as CANDIDATES_LATENCY};

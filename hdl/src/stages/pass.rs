@@ -5,13 +5,13 @@
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1), with a network the
 //! product with μ (3); then the lanes.
 
-use dermis_golden::fixed::plan::resources::{operand_lengths, Holds};
+use dermis_golden::fixed::plan::resources::{operand_words, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, longest, position_bits, BitDelay, Control, Counter, Delay, Dff, Lanes, OperandScale, OperandSelect,
-    OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
+    count_bits, longest, position_bits, programs, BitDelay, Control, Counter, Delay, Dff, Lanes, OperandScale,
+    OperandSelect, OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -22,9 +22,10 @@ pub struct Pass {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is computed.
+    /// Index of the case, constant while a frame is computed; of contacts that of the [section](dermis_golden::fixed::words::schedule::sections), constant from
+    /// `start` until its last row.
     pub which: Wire<In>,
-    /// The products of a subarray may begin while its input is still being written.
+    /// The products of a subarray may begin while its input is still being written; of contacts those of a section.
     pub start: Signal<In, Bit>,
     /// Address of the quad to read from the input memory; in every cycle of a product with the input.
     pub input_address: Wire<Out>,
@@ -77,15 +78,15 @@ impl Pass {
         let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);
         let network = model.has_network();
-        let lengths: Vec<Vec<usize>> = model.cases().iter().map(|case| operand_lengths(&case.formats)).collect();
-        let operands: usize = lengths[0].iter().sum();
+        let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
+        let operands = operand_words(formats);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
         let scaling = OperandScale::latency(network);
         let parity_bits = 4 * formats.data_bits as usize;
         Pass {
             clk: Default::default(),
             rst: Default::default(),
-            which: Wire::new(count_bits(model.cases().len())),
+            which: Wire::new(count_bits(lengths.len())),
             start: Default::default(),
             input_address: Wire::new(count_bits(quads)),
             input_quad: Wire::new(4 * formats.fold_bits as usize),
@@ -193,7 +194,7 @@ mod tests {
     use std::collections::{BTreeMap, VecDeque};
 
     use dermis_golden::fixed::stages::pass::{pass, Operands};
-    use dermis_golden::fixed::words::schedule::{accumulations, Operand, Target};
+    use dermis_golden::fixed::words::schedule::{operand_number, Axis, Operand, Section, Target};
     use dermis_golden::fixed::CasePlan;
 
     use super::*;
@@ -218,21 +219,22 @@ mod tests {
         last: bool,
     }
 
-    /// The columns of a subarray in order.
-    fn columns(case: &CasePlan) -> Vec<Column> {
+    /// The columns of a section in order.
+    fn columns((case, section): &(&CasePlan, Section)) -> Vec<Column> {
         let mut all: Vec<Column> = Vec::new();
-        // The images of hidden layers and μ come between v_00 and the other vectors.
+        // μ comes between the images of hidden layers and the other vectors.
         let layers = case.formats.layers.len();
-        for (accumulation, (target, products)) in accumulations(&case.formats).iter().enumerate() {
+        for (accumulation, (target, products)) in section.accumulations.iter().enumerate() {
             let layer = matches!(target, Target::Layer(_));
             for group in 0..case.storage.groups_of(products) {
                 for product in products {
-                    let needs = match product.operand {
-                        Operand::Vector(index) => index + layers + 1,
-                        Operand::Layer(index) => index + 2,
-                        Operand::InputHigh | Operand::InputLow => usize::from(layer),
-                        Operand::One => 0,
-                        Operand::Window | Operand::Mask | Operand::Shear(..) => unreachable!("no hardware of contacts"),
+                    let needs = match (product.operand, case.formats.by_contact()) {
+                        (Operand::Vector(index), _) => index + layers + 1,
+                        (Operand::Layer(index), by_contact) => index + if by_contact { 3 } else { 2 },
+                        (Operand::InputHigh | Operand::InputLow, _) => usize::from(layer),
+                        (Operand::Window | Operand::Shear(_, Axis::X), _) => 1,
+                        (Operand::Mask | Operand::Shear(_, Axis::Y), _) => 2,
+                        (Operand::One, _) => 0,
                     };
                     let input = matches!(product.operand, Operand::InputHigh | Operand::InputLow);
                     let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false };
@@ -244,12 +246,14 @@ mod tests {
         all
     }
 
-    /// Inputs: reset, case, start, quad of the input, quad of an operand, whether it is valid, position of μ1, of μ2.
+    /// Inputs: reset, section, start, quad of the input, quad of an operand, whether it is valid, position of μ1, of μ2.
     struct Passes<'a> {
         model: &'a Model,
+        programs: Vec<(&'a CasePlan, Section)>,
         columns: Vec<Vec<Column>>,
         cycle: usize,
-        case: usize,
+        /// The section that runs, or ran last.
+        program: usize,
         /// The next column, while a subarray runs, and the first cycle in which it may be issued.
         next: Option<(usize, usize)>,
         /// The column issued in the cycle before, in the cycle before that, and so on.
@@ -264,15 +268,17 @@ mod tests {
 
     impl<'a> Passes<'a> {
         fn new(model: &'a Model) -> Self {
-            let columns = model.cases().iter().map(columns).collect();
+            let programs = programs(model);
+            let columns = programs.iter().map(columns).collect();
             let (input, quads) = (vec![[0; 4]; model.formats().quads], Vec::new());
             let issued = VecDeque::new();
             let position = [0; 2];
-            Passes { model, columns, cycle: 0, case: 0, next: None, issued, input, quads, position, rows: None }
+            let (cycle, program, next, rows) = (0, 0, None, None);
+            Passes { model, programs, columns, cycle, program, next, issued, input, quads, position, rows }
         }
 
         fn case(&self) -> &'a CasePlan {
-            &self.model.cases()[self.case]
+            self.programs[self.program].0
         }
 
         /// Cycles from the issue of a column to its address.
@@ -284,9 +290,8 @@ mod tests {
             }
         }
 
-        /// Quads of each operand vector.
-        fn lengths(&self) -> Vec<usize> {
-            operand_lengths(&self.case().formats)
+        fn section(&self) -> &Section {
+            &self.programs[self.program].1
         }
 
         /// The address that was read from the input memory so many cycles ago.
@@ -300,35 +305,54 @@ mod tests {
             let (at, free) = self.next?;
             let storage = &self.case().storage;
             let mut first = 0;
-            let readable = self.lengths().into_iter().filter(|length| {
-                let needed = if storage.streamed { first + 1 } else { first + length };
-                first += length;
+            let readable = self.section().operands.iter().filter(|length| {
+                let needed = if storage.streamed { first + 1 } else { first + **length };
+                first += **length;
                 self.quads.len() >= needed
             });
             let readable = readable.count();
-            let column = self.columns[self.case][at];
+            let column = self.columns[self.program][at];
             (free <= self.cycle && column.needs <= readable).then_some(column)
         }
 
         fn row(&self, accumulation: usize, row: usize) -> [i64; 4] {
             let CasePlan { formats, quantised, .. } = self.case();
             let mut operands = Operands::of_input(&self.input[..formats.quads], formats);
-            let mut left = &self.quads[..];
-            let hidden = formats.layers.len().saturating_sub(1);
-            for (number, length) in self.lengths().into_iter().enumerate() {
+            let (mut left, mut vectors) = (&self.quads[..], Vec::new());
+            for &length in &self.section().operands {
                 let (quads, rest) = left.split_at(length.min(left.len()));
+                vectors.push(quads.to_vec());
                 left = rest;
-                match number {
-                    _ if number > 0 && number <= hidden => {
-                        operands.layers.push(quads[..formats.layers[number - 1].min(quads.len())].to_vec());
+            }
+            let mut take = |operand: Operand| match operand_number(formats, operand).and_then(|at| vectors.get_mut(at))
+            {
+                Some(own) => std::mem::take(own),
+                None => Vec::new(),
+            };
+            for layer in 0..formats.layers.len().saturating_sub(1) {
+                let mut images = take(Operand::Layer(layer));
+                images.truncate(formats.layers[layer]);
+                operands.layers.push(images);
+            }
+            match formats.by_contact() {
+                true => {
+                    let products = &self.section().accumulations[accumulation].1;
+                    let is_step = products.iter().any(|product| matches!(product.operand, Operand::Shear(..)));
+                    match is_step {
+                        true => operands.sheared = vec![[Axis::X, Axis::Y].map(|axis| take(Operand::Shear(0, axis)))],
+                        false => operands.window = [take(Operand::Window), take(Operand::Mask)],
                     }
-                    _ if hidden > 0 && number == hidden + 1 => {}
-                    _ => operands.vectors.push(quads.to_vec()),
                 }
+                false => operands.vectors = (0..formats.operand_vectors()).map(|k| take(Operand::Vector(k))).collect(),
             }
             operands.position = self.position;
-            let all =
-                pass(formats, quantised, self.case().layout(), &accumulations(formats)[accumulation].1, &operands);
+            let all = pass(
+                formats,
+                quantised,
+                self.case().layout(),
+                &self.section().accumulations[accumulation].1,
+                &operands,
+            );
             // Of a layer the rows of whole groups leave.
             all.get(row).copied().unwrap_or_default()
         }
@@ -337,8 +361,7 @@ mod tests {
     impl Reference for Passes<'_> {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             let formats = self.model.formats();
-            let layer =
-                |accumulation: usize| matches!(accumulations(&self.case().formats)[accumulation].0, Target::Layer(_));
+            let layer = |accumulation: usize| matches!(self.section().accumulations[accumulation].0, Target::Layer(_));
             let leaves = |cycle: usize, of_layer: bool| {
                 let row = self.rows.as_ref()?.get(&cycle);
                 Some(row.is_some_and(|&(accumulation, _)| layer(accumulation) == of_layer).into())
@@ -376,17 +399,17 @@ mod tests {
                 }
                 let free = self.cycle + 1 + if column.last { self.case().storage.pause } else { 0 };
                 let at = self.next.map_or(0, |(at, _)| at + 1);
-                self.next = (at < self.columns[self.case].len()).then_some((at, free));
+                self.next = (at < self.columns[self.program].len()).then_some((at, free));
             }
             self.issued.push_front(issued);
             self.issued.truncate(10);
-            if valid == 1 && self.quads.len() < self.lengths().iter().sum() {
+            if valid == 1 && self.quads.len() < self.section().operands.iter().sum() {
                 self.quads.push(quad(4, formats.data_bits));
             }
             self.position = [6, 7].map(|input| inputs[input].signed(0, position_bits()));
             self.cycle += 1;
             if start == 1 {
-                (self.case, self.next, self.quads) = (which, Some((0, self.cycle)), Vec::new());
+                (self.program, self.next, self.quads) = (which, Some((0, self.cycle)), Vec::new());
             }
             if rst == 1 {
                 (self.next, self.rows, self.issued) = (None, Some(BTreeMap::new()), VecDeque::new());
@@ -402,8 +425,8 @@ mod tests {
         let mut all: Vec<Vec<Word>> = Vec::new();
         let mut cut = true;
         for _ in 0..subarrays {
-            let which = random.usize(..model.cases().len());
-            let quads = model.cases()[which].formats.quads;
+            let which = random.usize(..passes.programs.len());
+            let quads = passes.programs[which].0.formats.quads;
             let input: Vec<Word> =
                 (0..quads).map(|_| random_word(&mut random, 4 * formats.fold_bits as usize)).collect();
             let end = if random.u8(..5) == 0 { random.usize(..200) } else { usize::MAX };
@@ -411,7 +434,7 @@ mod tests {
             let (mut at, mut pause, mut sent) = (0, random.usize(1..100), 0);
             let position = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
             // The ends of the vectors, and one more vector that is no operand.
-            let mut ends: Vec<usize> = operand_lengths(&model.cases()[which].formats);
+            let mut ends = passes.programs[which].1.operands.clone();
             ends.push(quads);
             let ends: Vec<usize> = ends
                 .iter()
@@ -461,7 +484,8 @@ mod tests {
         let streamed = model(4, 6, "[search]\nmu_max = 0.1\ndegree = 2\n");
         assert!(several.formats().groups > 1 && shared.formats().shared_a && streamed.storage().streamed);
         let network = learned(4, 5, &[13, 7], "mu_max = 0.3\n");
-        for model in [several, shared, streamed, network] {
+        let contacts = learned(6, 5, &[13, 7], "mu_max = 0.3\n[partition]\ncase = \"contacts\"\n");
+        for model in [several, shared, streamed, network, contacts] {
             let subject = |changes: &[Change]| {
                 block_subject!(
                     Pass::new(&model),

@@ -1,10 +1,10 @@
 //! The coefficient check, `hardware.coefficient_check = "signature"`: whether the coefficient memory still holds the
 //! generated coefficients.
 //!
-//! For each word (all lanes wide) that the passes of a subarray read, the parity of the word's bits advances a 32-bit
+//! For each word (all lanes wide) that the passes of a [section](crate::fixed::words::schedule::sections) read, the parity of the word's bits advances a 32-bit
 //! signature
 //! ```text
-//! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the subarray's first word
+//! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the section's first word
 //! ```
 //! If it differs from the generated value after the last word, the subarray's status has
 //! [`FLAG_COEFFICIENTS`](crate::fixed::stages::send::FLAG_COEFFICIENTS). The forces are sent all the same.
@@ -19,7 +19,7 @@
 
 use super::contents::CasePlan;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
-use crate::fixed::words::schedule::accumulations;
+use crate::fixed::words::schedule::{sections, Section};
 
 /// The polynomial of CRC-32 without its highest power, x³².
 pub const POLYNOMIAL: u32 = 0x04c1_1db7;
@@ -37,37 +37,41 @@ pub fn parity(word: &[i64]) -> bool {
     word.iter().map(ones).sum::<u32>() % 2 == 1
 }
 
-/// Addresses in the coefficient memory in the order in which the passes of a subarray of one case read them.
-pub fn read_addresses(case: &CasePlan) -> Vec<usize> {
-    let (formats, storage) = (&case.formats, &case.storage);
+/// Addresses in the coefficient memory in the order in which the passes of a section of one case read them.
+fn read_addresses(case: &CasePlan, section: &Section) -> Vec<usize> {
+    let storage = &case.storage;
     let of = |matrix, group| {
         let first = storage.address_of(matrix, group);
         first..first + storage.columns_of(matrix, group).len()
     };
-    let steps = accumulations(formats).into_iter().flat_map(|(_, products)| {
-        let groups = storage.groups_of(&products);
-        (0..groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
+    let steps = section.accumulations.iter().flat_map(|(_, products)| {
+        let groups = storage.groups_of(products);
+        (0..groups).flat_map(move |group| products.iter().map(move |product| (product.matrix, group)))
     });
     steps.flat_map(|(matrix, group)| of(matrix, group)).collect()
 }
 
-/// The signature after all words that the passes of one subarray read.
-pub fn signature(case: &CasePlan) -> u32 {
+/// The signature after all words that the passes of a section read.
+pub fn signature(case: &CasePlan, section: &Section) -> u32 {
     let words = case.storage.memory(&case.formats, &case.quantised);
     let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
-    read_addresses(case).into_iter().fold(START, |s, address| step(s, parities[address - case.storage.base]))
+    read_addresses(case, section).into_iter().fold(START, |s, address| step(s, parities[address - case.storage.base]))
 }
 
 /// Addresses of one case where a flipped bit would not change the signature: never read, or the changes cancel.
 pub fn undetected(case: &CasePlan) -> Vec<usize> {
-    let mut changes = vec![0u32; case.storage.words()];
-    // The change of the signature that an inverted parity at this read causes at the end.
-    let mut change = 1;
-    for address in read_addresses(case).into_iter().rev() {
-        changes[address - case.storage.base] ^= change;
-        change = step(change, false);
+    let mut undetected = vec![true; case.storage.words()];
+    for section in sections(&case.formats) {
+        let mut changes = vec![0u32; case.storage.words()];
+        // The change of the signature that an inverted parity at this read causes at the end.
+        let mut change = 1;
+        for address in read_addresses(case, &section).into_iter().rev() {
+            changes[address - case.storage.base] ^= change;
+            change = step(change, false);
+        }
+        undetected.iter_mut().zip(changes).for_each(|(own, change)| *own &= change == 0);
     }
-    (0..changes.len()).filter(|&index| changes[index] == 0).map(|index| index + case.storage.base).collect()
+    (0..undetected.len()).filter(|&index| undetected[index]).map(|index| index + case.storage.base).collect()
 }
 
 #[cfg(test)]
@@ -93,9 +97,10 @@ mod tests {
     #[test]
     fn a_flipped_bit_changes_the_signature() {
         let mut plan = planned(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-        let right = signature(plan.first());
-        assert_eq!(signature(plan.first()), right);
+        let section = &sections(plan.formats())[0];
+        let right = signature(plan.first(), section);
+        assert_eq!(signature(plan.first(), section), right);
         plan.first_mut().quantised.ax.flips[0].parity[2][5] ^= 4;
-        assert_ne!(signature(plan.first()), right);
+        assert_ne!(signature(plan.first(), section), right);
     }
 }

@@ -27,6 +27,7 @@ use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use crate::fixed::words::network::POSITION_BITS as MU_BITS;
+use crate::fixed::words::schedule::sections;
 use crate::scene::{ForceOutput, Scene};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
@@ -161,16 +162,9 @@ pub fn position_bits() -> usize {
     signed_bits(4 << HALVINGS) as usize
 }
 
-/// Length in quads of each vector that later passes read, in the order in which they are written: with a search the v_ij; with
-/// a network v_00, the images of each hidden layer, one quad when μ is known, then p after each step but the last.
-pub fn operand_lengths(formats: &Formats) -> Vec<usize> {
-    let vectors = vec![formats.quads; formats.operand_vectors()];
-    match (formats.has_network(), vectors.split_first()) {
-        (true, Some((&first, steps))) => {
-            [first].into_iter().chain(formats.hidden_rows()).chain([1]).chain(steps.iter().copied()).collect()
-        }
-        _ => vectors,
-    }
+/// Words of the operand memory: those of the section that has most.
+pub fn operand_words(formats: &Formats) -> usize {
+    sections(formats).iter().map(|section| section.operands.iter().sum()).max().unwrap_or(0)
 }
 
 impl Resources {
@@ -220,7 +214,7 @@ impl Resources {
         memories.push(memory(Holds::Folded, quads, quad(f.fold_bits)));
         if f.degree > 0 {
             // Of several cases the largest is the first.
-            memories.push(memory(Holds::Operands(0), operand_lengths(f).iter().sum(), quad(f.data_bits)));
+            memories.push(memory(Holds::Operands(0), operand_words(f), quad(f.data_bits)));
         }
         memories.push(memory(Holds::Coefficients, wide, word_bits(f)));
         if narrow > 0 {

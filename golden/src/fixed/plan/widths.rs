@@ -18,7 +18,6 @@ use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
 use crate::learned::{ComposedLayer, Learned};
 use crate::matrices::Matrices;
-use crate::partition::Case;
 use crate::scene::{EstimatorKind, Scene};
 use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 use crate::symmetry::quads::Quads;
@@ -165,7 +164,8 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         groups: 1,
         search_width: if composed.is_empty() { search_width(scene, board, degree, shapes) } else { Quads::LANES },
         layers: composed.iter().map(|layer| layer.bias[0].len()).collect(),
-        by_contact: scene.partition.case == Case::Contacts,
+        // The mask is that of a window.
+        window_quads: composed.first().and_then(|layer| layer.mask.as_ref()).map(|mask| mask[0].ncols()),
         headroom,
         shared_a,
         flips,

@@ -65,9 +65,9 @@ pub struct Formats {
     /// Rows of each layer of the network that gives μ, the last with those of the outputs; empty with a search.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<usize>,
-    /// Whether the network gives a μ for each contact, not one for the whole array.
-    #[serde(skip_serializing_if = "is_false")]
-    pub by_contact: bool,
+    /// Quads of the window that the network reads around each contact, which has a μ of its own; `None` where there is one μ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_quads: Option<usize>,
     /// Bits by which p(μ) may be larger than v_00; 0 with a search, whose words grow.
     #[serde(skip_serializing_if = "is_zero")]
     pub headroom: u32,
@@ -134,14 +134,15 @@ fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-fn is_false(flag: &bool) -> bool {
-    !flag
-}
-
 impl Formats {
     /// Whether a network gives μ, and [`relax`](crate::fixed::stages::relax) p(μ), instead of a search.
     pub fn has_network(&self) -> bool {
         !self.layers.is_empty()
+    }
+
+    /// Whether the network gives a μ for each contact, not one for the whole array.
+    pub fn by_contact(&self) -> bool {
+        self.window_quads.is_some()
     }
 
     /// Whether μ is searched: the polynomial has a degree, and no network gives μ.

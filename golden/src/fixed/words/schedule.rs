@@ -120,7 +120,7 @@ pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
 /// The products of a step of `relax`: −(μ1 Ax + μ2 Ay) p.
 fn shear(formats: &Formats, step: usize) -> Vec<Product> {
     let of = |kind, axis, flips: &[usize]| -> Vec<Product> {
-        let product = |&flip| match formats.by_contact {
+        let product = |&flip| match formats.by_contact() {
             true => Product::of(kind, flip, Operand::Shear(step, axis)),
             false => Product { factor: Some(axis), ..Product::of(kind, flip, Operand::Vector(step)) },
         };
@@ -133,11 +133,11 @@ fn shear(formats: &Formats, step: usize) -> Vec<Product> {
 pub fn layer(formats: &Formats, layer: usize) -> Vec<Product> {
     let inputs = match layer.checked_sub(1) {
         Some(before) => Operand::Layer(before),
-        None if formats.by_contact => Operand::Window,
+        None if formats.by_contact() => Operand::Window,
         None => Operand::InputHigh,
     };
     let weights = Product::of(Kind::Layer(layer), 0, inputs);
-    let mask = (layer == 0 && formats.by_contact).then(|| Product::of(Kind::Mask, 0, Operand::Mask));
+    let mask = (layer == 0 && formats.by_contact()).then(|| Product::of(Kind::Mask, 0, Operand::Mask));
     let bias = Product::of(Kind::Bias(layer), 0, Operand::One);
     [weights].into_iter().chain(mask).chain([bias]).collect()
 }
@@ -153,6 +153,61 @@ pub fn accumulations(formats: &Formats) -> Vec<(Target, Vec<Product>)> {
     all.extend((0..formats.layers.len()).map(|index| (Target::Layer(index), layer(formats, index))));
     all.extend(vectors.flat_map(of));
     all
+}
+
+/// Accumulations that the lanes do one after the other, and the operands that come in meanwhile.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// The accumulations in order.
+    pub accumulations: Vec<(Target, Vec<Product>)>,
+    /// Length in quads of each vector that they read from the operand memory, in the order in which it is written.
+    pub operands: Vec<usize>,
+}
+
+/// The sections of a subarray: one. Where each contact has a μ of its own: v_00; the layers, once for each contact; a step of
+/// `relax`, repeated.
+///
+/// | section | vectors in the operand memory |
+/// |---|---|
+/// | with a search | the v_ij but those of the highest degree |
+/// | with one μ | v_00, the images of each hidden layer, one quad when μ is known, then p after each step but the last |
+/// | v_00 of contacts | none |
+/// | layers of a contact | its window, its mask, the images of each hidden layer, one quad when μ is known |
+/// | step of contacts | p times μ1, p times μ2 |
+pub fn sections(formats: &Formats) -> Vec<Section> {
+    let all = accumulations(formats);
+    let (vectors, images) = (formats.operand_vectors(), || formats.hidden_rows().chain([1]));
+    let quads = vec![formats.quads; vectors];
+    let Some(window) = formats.window_quads else {
+        let operands = match (formats.has_network(), quads.split_first()) {
+            (true, Some((&first, steps))) => [first].into_iter().chain(images()).chain(steps.iter().copied()).collect(),
+            _ => quads,
+        };
+        return vec![Section { accumulations: all, operands }];
+    };
+    let part = |of: &dyn Fn(&Target) -> bool, operands| Section {
+        accumulations: all.iter().filter(|(target, _)| of(target)).cloned().collect(),
+        operands,
+    };
+    vec![
+        part(&|target| *target == Target::Vector(0), Vec::new()),
+        part(&|target| matches!(target, Target::Layer(_)), [window; 2].into_iter().chain(images()).collect()),
+        part(&|target| *target == Target::Vector(1), vec![formats.quads; 2]),
+    ]
+}
+
+/// Index of an operand among the vectors of its [`Section`]; `None` for the input and [`Operand::One`].
+pub fn operand_number(formats: &Formats, operand: Operand) -> Option<usize> {
+    match operand {
+        Operand::InputHigh | Operand::InputLow | Operand::One => None,
+        Operand::Window => Some(0),
+        Operand::Mask => Some(1),
+        Operand::Shear(_, axis) => Some(axis as usize),
+        Operand::Layer(layer) => Some(layer + if formats.by_contact() { 2 } else { 1 }),
+        Operand::Vector(0) => Some(0),
+        // With a network the images and μ are between v_00 and p.
+        Operand::Vector(index) => Some(index + formats.layers.len()),
+    }
 }
 
 /// The products of one v_ij by their shift: those of low limbs, if there are any, then the others.

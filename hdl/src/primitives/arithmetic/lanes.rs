@@ -10,7 +10,7 @@ use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Net, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::pass::pass_program::Control;
+use crate::primitives::pass::pass_program::{programs, Control};
 use crate::wire::Wire;
 
 const M: usize = MULTIPLIER_BITS as usize;
@@ -34,7 +34,7 @@ pub struct Lanes {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high; clears the control pipeline and, two cycles later, the accumulators.
     pub rst: Signal<In, Bit>,
-    /// Index of the case; constant from a frame's first product to its last row.
+    /// Index of the section; constant from its first product to its last row.
     pub which: Wire<In>,
     /// Address in the coefficient memory; three cycles before `valid` of its product.
     pub address: Wire<In>,
@@ -52,7 +52,7 @@ pub struct Lanes {
     pub quad_soon: Signal<Out, Bit>,
     /// `quad` holds a row of a layer of a network; `quad_valid` is low. Constant 0 without a network.
     pub layer_valid: Signal<Out, Bit>,
-    /// The signature of the coefficients read since the subarray's first product is wrong, 1 bit; valid from three
+    /// The signature of the coefficients read since the section's first product is wrong, 1 bit; valid from three
     /// cycles after its last product. Constant 0 without the check.
     pub damaged: Wire<Out>,
     kernel: Body,
@@ -77,14 +77,14 @@ struct Shape {
     per_parity: usize,
     /// Width of an accumulator.
     lane_bits: usize,
-    /// Groups of rows, and rows of the last group, of each case.
+    /// Groups of rows, and rows of the last group, of each section.
     groups: Vec<usize>,
     last_rows: Vec<usize>,
     /// Coefficients of each word, one per lane.
     memory: Vec<Vec<i64>>,
     /// The last so many words are in a memory of their own, with so many bits per lane.
     narrow: (usize, usize),
-    /// Expected signatures of the cases, with the coefficient check.
+    /// Expected signatures of the sections, with the coefficient check.
     signatures: Option<Vec<u32>>,
     control: Control,
 }
@@ -94,14 +94,17 @@ impl Lanes {
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (model.formats(), model.cases());
         let words = |case: &CasePlan| case.storage.memory(&case.formats, &case.quantised);
+        let programs = programs(model);
         Lanes::of(&Shape {
             per_parity: formats.lanes_per_parity,
             lane_bits: formats.lane_bits as usize,
-            groups: cases.iter().map(|case| case.formats.groups).collect(),
-            last_rows: cases.iter().map(|case| last_rows(&case.formats)).collect(),
+            groups: programs.iter().map(|(case, _)| case.formats.groups).collect(),
+            last_rows: programs.iter().map(|(case, _)| last_rows(&case.formats)).collect(),
             memory: cases.iter().flat_map(words).collect(),
             narrow: (model.first().storage.narrow, formats.limb_align as usize),
-            signatures: model.has_coefficient_check().then(|| cases.iter().map(signature).collect()),
+            signatures: model
+                .has_coefficient_check()
+                .then(|| programs.iter().map(|(case, section)| signature(case, section)).collect()),
             control: Control::new(model),
         })
     }

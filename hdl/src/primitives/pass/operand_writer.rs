@@ -3,8 +3,8 @@
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::primitives::address::case_counter::value_by_case;
+use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::primitives::address::case_counter::{expression_by_case, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
@@ -33,11 +33,10 @@ pub struct OperandWriter {
 kernel_block!(OperandWriter, clock clk, inputs [which, clear, valid], outputs [address, keep, finished]);
 
 impl OperandWriter {
-    /// `lengths[case]` are the quads of each vector, as many vectors in every case; where there are several cases, all vectors of
-    /// one are as long. `streamed`, only with two quads or more: a vector is read from its first quad on, one quad per cycle,
-    /// while one quad per cycle is written.
+    /// `lengths[case]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is read from its
+    /// first quad on, one quad per cycle, while one quad per cycle is written.
     pub fn new(lengths: &[Vec<usize>], streamed: bool) -> Self {
-        let vectors = lengths.first().map_or(0, Vec::len);
+        let vectors = most_vectors(lengths);
         let block = OperandWriter {
             clk: Default::default(),
             which: Wire::new(count_bits(lengths.len())),
@@ -57,11 +56,16 @@ fn words(lengths: &[Vec<usize>]) -> usize {
     lengths.iter().map(|case| case.iter().sum()).max().unwrap_or(0)
 }
 
+/// Number of vectors of the case that has most.
+fn most_vectors(lengths: &[Vec<usize>]) -> usize {
+    lengths.iter().map(Vec::len).max().unwrap_or(0)
+}
+
 fn kernel(lengths: &[Vec<usize>], streamed: bool) -> Kernel {
     let k = Builder::new("operand_writer");
     let which = k.input("which", count_bits(lengths.len()));
     let (clear, valid) = (k.input("clear", 1), k.input("valid", 1));
-    let (vectors, most) = (lengths.first().map_or(0, Vec::len), words(lengths));
+    let (vectors, most) = (most_vectors(lengths), words(lengths));
     let (address_bits, finished_bits) = (count_bits(most), count_bits(vectors + 1));
     if vectors == 0 {
         k.comment("No v_ij is an operand of a later pass.");
@@ -74,18 +78,21 @@ fn kernel(lengths: &[Vec<usize>], streamed: bool) -> Kernel {
     let quad = k.state("quad", Type::unsigned(count_bits(longest)), clear, 0);
     let address = k.state("address", Type::unsigned(address_bits), clear, 0);
     let finished = k.state("finished", Type::unsigned(finished_bits), clear, 0);
-    let last = match lengths {
-        [own] if own.iter().any(|length| *length != own[0]) => {
+    let is_uniform = |own: &Vec<usize>| own.iter().all(|length| *length == own[0]);
+    let last = if lengths.iter().all(|own| own.len() == vectors && is_uniform(own)) {
+        let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
+        value_by_case(&k, which, &ends, quad.bits())
+    } else {
+        let own = |own: &Vec<usize>| {
             let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
             finished.table(quad.bits(), &padded(lasts, finished_bits))
-        }
-        _ => {
-            let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
-            value_by_case(&k, which, &ends, quad.bits())
-        }
+        };
+        let of_cases: Vec<Expr> = lengths.iter().map(own).collect();
+        expression_by_case(which, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
     };
     let last_quad = k.wire("last_quad", quad.equals(last));
-    let all = finished.is(vectors as u64);
+    let counts: Vec<usize> = lengths.iter().map(Vec::len).collect();
+    let all = finished.equals(value_by_case(&k, which, &counts, finished_bits));
     let full = match streamed {
         true => {
             let full = k.state("full", Type::unsigned(1), clear, 0);
@@ -158,8 +165,11 @@ mod tests {
 
     #[test]
     fn quads_are_counted_to_the_last_vector_of_each_case() {
-        let cases: [(&[Vec<usize>], &[bool]); 2] =
-            [(&[vec![5; 3], vec![3; 3]], &[false, true]), (&[vec![5, 12, 8, 1, 5]], &[false])];
+        let cases: [(&[Vec<usize>], &[bool]); 3] = [
+            (&[vec![5; 3], vec![3; 3]], &[false, true]),
+            (&[vec![5, 12, 8, 1, 5]], &[false]),
+            (&[vec![], vec![4, 4, 9, 1], vec![6, 6]], &[false]),
+        ];
         for (lengths, streamed) in cases {
             let mut random = fastrand::Rng::with_seed(2);
             let mut case = 0;

@@ -1,7 +1,7 @@
 //! Schedule of the matrix passes as a table of instructions.
 
-use dermis_golden::fixed::plan::resources::{operand_lengths, Holds};
-use dermis_golden::fixed::words::schedule::{accumulations, Axis, Operand, Target};
+use dermis_golden::fixed::plan::resources::{operand_words, Holds};
+use dermis_golden::fixed::words::schedule::{operand_number, sections, Axis, Operand, Section, Target};
 use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
@@ -31,46 +31,55 @@ pub struct Step {
     pub layer: bool,
     /// Last product of an accumulation.
     pub last: bool,
-    /// First step of a subarray.
+    /// First step of a section.
     pub opens: bool,
-    /// Last step of a subarray.
+    /// Last step of a section.
     pub ends: bool,
     /// Number of operand vectors that must be readable before this step.
     pub needs: usize,
 }
 
-/// The steps of one case: for each accumulation, for each group of rows, its products.
-pub fn unroll(case: &CasePlan) -> Vec<Step> {
+/// The sections of all cases, each with its case: what a `start` of the pass program begins.
+pub fn programs(model: &Model) -> Vec<(&CasePlan, Section)> {
+    let mut all = Vec::new();
+    for case in model.cases() {
+        all.extend(sections(&case.formats).into_iter().map(|section| (case, section)));
+    }
+    all
+}
+
+/// The steps of a section: for each accumulation, for each group of rows, its products.
+fn unroll((case, section): &(&CasePlan, Section)) -> Vec<Step> {
     let CasePlan { formats, storage, .. } = case;
-    let lengths = operand_lengths(formats);
-    // Number in the operand memory of v_00 or of p after some steps of relax, where layers and μ are between the two.
-    let network = formats.layers.len();
-    let number = |vector: usize| if vector == 0 { 0 } else { vector + network };
-    let first = |number: usize| lengths[..number].iter().sum::<usize>();
+    let first = |number: usize| section.operands[..number].iter().sum::<usize>();
     let mut steps = Vec::new();
-    for (target, products) in accumulations(formats) {
-        for group in 0..storage.groups_of(&products) {
+    for (target, products) in &section.accumulations {
+        let layer = matches!(target, Target::Layer(_));
+        for group in 0..storage.groups_of(products) {
             for (index, product) in products.iter().enumerate() {
-                let (kind, operand, needs) = match (product.operand, target) {
-                    (Operand::Vector(k), _) => (0, first(number(k)), number(k).max(network) + 1),
-                    (Operand::Layer(layer), _) => (0, first(layer + 1), layer + 2),
+                let number = operand_number(formats, product.operand);
+                let needs = match (product.operand, number) {
+                    // p is read once μ is known.
+                    (Operand::Vector(_), Some(number)) => number.max(formats.layers.len()) + 1,
+                    (_, Some(number)) => number + 1,
                     // The first layer waits for v_00, so that one vector is written after the other.
-                    (Operand::InputHigh, Target::Layer(_)) => (1, 0, 1),
-                    (Operand::InputHigh, Target::Vector(_)) => (1, 0, 0),
-                    (Operand::InputLow, _) => (2, 0, 0),
-                    (Operand::One, _) => (3, 0, 0),
-                    // Refused before any block is built.
-                    (Operand::Window | Operand::Mask | Operand::Shear(..), _) => (0, 0, 0),
+                    (Operand::InputHigh, None) => usize::from(layer),
+                    (_, None) => 0,
                 };
                 steps.push(Step {
                     coefficients: storage.address_of(product.matrix, group),
                     columns: storage.columns_of(product.matrix, group).len(),
-                    operand,
-                    kind,
+                    operand: number.map_or(0, first),
+                    kind: match product.operand {
+                        Operand::InputHigh => 1,
+                        Operand::InputLow => 2,
+                        Operand::One => 3,
+                        _ => 0,
+                    },
                     flip: product.matrix.flip as u64,
                     transposed: product.transposed,
                     factor: product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
-                    layer: matches!(target, Target::Layer(_)),
+                    layer,
                     last: index + 1 == products.len(),
                     opens: steps.is_empty(),
                     ends: false,
@@ -85,16 +94,17 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
     steps
 }
 
-/// Number of columns of the longest step of any case.
+/// Number of columns of the longest step.
 pub fn longest(model: &Model) -> usize {
-    model.cases().iter().flat_map(unroll).map(|step| step.columns).max().unwrap_or(1).max(model.formats().quads)
+    let steps = programs(model).iter().flat_map(unroll).map(|step| step.columns).max();
+    steps.unwrap_or(1).max(model.formats().quads)
 }
 
 /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
 ///
-/// `start` loads the first step of case `which`, `advance` the next one, both at the clock edge. `ready` (the step's
-/// operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
-/// of the case, after which the first follows) are combinational.
+/// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge. `ready` (the
+/// step's operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
+/// of the section, after which the first follows) are combinational.
 ///
 /// The current instruction is in a register. The table is always read at the next instruction, because `advance`
 /// settles late in the cycle.
@@ -102,7 +112,7 @@ pub fn longest(model: &Model) -> usize {
 pub struct PassProgram {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Index of the case; valid with `start`, constant until the frame's last step.
+    /// Index of the section; valid with `start`, constant until its last step.
     pub which: Wire<In>,
     /// Load the first step at the clock edge.
     pub start: Signal<In, Bit>,
@@ -116,7 +126,7 @@ pub struct PassProgram {
     pub ready: Signal<Out, Bit>,
     /// `column` is the step's last.
     pub last: Signal<Out, Bit>,
-    /// The step is the last of its case.
+    /// The step is the last of its section.
     pub ends: Signal<Out, Bit>,
     /// Address in the coefficient memory; [`latency`](PassProgram::latency) cycles after `column`.
     pub coefficient_address: Wire<Out>,
@@ -182,7 +192,7 @@ pub const SOURCE_BITS: usize = 5;
 
 /// What decides the circuit.
 struct Shape {
-    /// The steps of each case.
+    /// The steps of each section.
     steps: Vec<Vec<Step>>,
     /// Address of each coefficient word's column, and its transposed address; empty without a column list.
     list: Vec<[usize; 2]>,
@@ -202,18 +212,18 @@ impl PassProgram {
     /// The schedule of `model`.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (model.formats(), model.cases());
-        let lengths = operand_lengths(formats);
+        let programs = programs(model);
         let pair = |case: &CasePlan, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
         let pairs = |case: &CasePlan| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
         PassProgram::of(&Shape {
-            steps: cases.iter().map(unroll).collect(),
+            steps: programs.iter().map(unroll).collect(),
             list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),
             across: formats.shared_a,
             pause: model.first().storage.pause,
             words: cases.iter().map(|case| case.storage.words()).sum(),
             columns: longest(model),
-            operands: lengths.iter().sum::<usize>().max(formats.quads),
-            vectors: lengths.len(),
+            operands: operand_words(formats).max(formats.quads),
+            vectors: programs.iter().map(|(_, section)| section.operands.len()).max().unwrap_or(0),
             control: Control::new(model),
         })
     }
@@ -275,7 +285,7 @@ impl Shape {
         all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
     }
 
-    /// The instruction at index `asked` of case `which`; zeros beyond the last.
+    /// The instruction at index `asked` of section `which`; zeros beyond the last.
     fn table<'k>(&self, k: &'k Builder, which: Expr<'k>, asked: Expr<'k>) -> Expr<'k> {
         let (length, bits) = (1 << asked.bits(), self.fields().iter().sum());
         let (index, cases) = match self.steps.len() {
@@ -382,7 +392,7 @@ impl Shape {
     }
 }
 
-/// Number of steps of the case that has most.
+/// Number of steps of the section that has most.
 fn largest_of(steps: &[Vec<Step>]) -> usize {
     steps.iter().map(Vec::len).max().unwrap_or(1)
 }
@@ -398,7 +408,7 @@ mod tests {
     const QUADS: usize = 7;
     const VECTORS: usize = 2;
 
-    /// Two cases of steps with random fields, with or without a column list.
+    /// Two sections of steps with random fields, with or without a column list.
     fn shape(listed: bool, control: Control) -> Shape {
         let mut random = fastrand::Rng::with_seed(6);
         let mut step = |index: usize, count: usize| Step {
