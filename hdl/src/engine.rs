@@ -451,6 +451,7 @@ impl Logic for Engine {
         self.rescale.quad_valid.next = self.pass.quad_valid.val();
         self.rescale.quad_soon.next = self.pass.quad_soon.val();
         self.estimate.start.next = self.start.val();
+        self.estimate.clear.next = self.start.val();
         self.estimate.enabled.next = self.condition.q.val();
         self.estimate.quad.next = self.pass.quad.val();
         self.estimate.valid.next = self.pass.layer_valid.val();

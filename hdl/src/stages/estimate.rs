@@ -29,8 +29,10 @@ pub struct Estimate {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A subarray starts: the rows of its first layer come next, and its saturations are counted from 0.
+    /// The rows of the first layer come next.
     pub start: Signal<In, Bit>,
+    /// A subarray starts: its saturations are counted from 0.
+    pub clear: Signal<In, Bit>,
     /// Otherwise μ is 0; constant from `start` until the next.
     pub enabled: Signal<In, Bit>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `valid`.
@@ -48,6 +50,8 @@ pub struct Estimate {
     /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; valid as
     /// `position_x`.
     pub ln_sigma: Wire<Out>,
+    /// μ is known; high for one cycle.
+    pub known: Signal<Out, Bit>,
     /// Number of saturated images and outputs of this subarray, 16 bits, stays at the largest count; final with μ.
     pub saturations: Wire<Out>,
     kernel: Body,
@@ -56,8 +60,8 @@ pub struct Estimate {
 kernel_block!(
     Estimate,
     clock clk,
-    inputs [rst, start, enabled, quad, valid],
-    outputs [operands, operands_valid, position_x, position_y, ln_sigma, saturations]
+    inputs [rst, start, clear, enabled, quad, valid],
+    outputs [operands, operands_valid, position_x, position_y, ln_sigma, known, saturations]
 );
 
 /// What decides the circuit.
@@ -99,6 +103,7 @@ impl Estimate {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
+            clear: Default::default(),
             enabled: Default::default(),
             quad: Wire::new(4 * shape.lane_bits),
             valid: Default::default(),
@@ -107,6 +112,7 @@ impl Estimate {
             position_x: Wire::new(position_bits()),
             position_y: Wire::new(position_bits()),
             ln_sigma: Wire::new(shape.score_bits),
+            known: Default::default(),
             saturations: Wire::new(SATURATION_BITS),
             kernel: Body::default(),
         };
@@ -124,7 +130,7 @@ fn clamped<'k>(k: &'k Builder, value: Expr<'k>, [least, most]: [i64; 2]) -> Expr
 impl Shape {
     fn kernel(self) -> Kernel {
         let k = Builder::new("estimate");
-        let [rst, start, enabled] = ["rst", "start", "enabled"].map(|name| k.input(name, 1));
+        let [rst, start, clear, enabled] = ["rst", "start", "clear", "enabled"].map(|name| k.input(name, 1));
         let (quad, valid) = (k.input("quad", 4 * self.lane_bits), k.input("valid", 1));
         let Some(Layers { hidden, shift }) = self.network else {
             k.comment("There is no network.");
@@ -134,6 +140,7 @@ impl Shape {
                 k.wire(name, k.constant(position_bits(), 0));
             }
             k.wire("ln_sigma", k.constant(self.score_bits, 0));
+            k.wire("known", k.constant(1, 0));
             k.wire("saturations", k.constant(SATURATION_BITS, 0));
             return k.finish();
         };
@@ -205,7 +212,7 @@ impl Shape {
             valid2.mux(concat(&[0, 1, 2, 3].map(|lane: usize| images[lane].1)), k.constant(4, 0)),
         );
         let output_clips = k.delay("output_clips", concat(&[0, 1, 2, 3].map(|place: usize| outputs[place].1)));
-        count_saturations(&k, "saturations", start, image_clips | output_clips);
+        count_saturations(&k, "saturations", clear, image_clips | output_clips);
         k.finish()
     }
 
@@ -256,7 +263,7 @@ mod tests {
     /// Cycles from a row to its operands, and from the second row of the last layer until μ is known.
     const LATENCY: [usize; 2] = [4, 2 + REDUCTION_CYCLES * REDUCTIONS];
 
-    /// Inputs: reset, start, whether μ is wanted, a row, whether there is one.
+    /// Inputs: reset, start, clear, whether μ is wanted, a row, whether there is one.
     struct Rows<'a> {
         model: &'a Model,
         hidden: usize,
@@ -300,6 +307,7 @@ mod tests {
                 of(2),
                 of(0),
                 of(1),
+                self.operands.as_ref().map(|_| now.into()),
                 positions.or(due.flatten().map(|quad| Word::of_fields(&quad, bits))),
                 due.map(|quad| (quad.is_some() || now).into()),
                 known.map(|_| u64::from(self.saturations).into()),
@@ -307,12 +315,12 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, start, enabled, valid] = [0, 1, 2, 4].map(|input| inputs[input].number() == 1);
+            let [rst, start, clear, enabled, valid] = [0, 1, 2, 3, 5].map(|input| inputs[input].number() == 1);
             let formats = self.model.formats();
             let network = self.model.quantised().network.as_ref().unwrap();
             self.enabled = enabled;
             if valid && self.rows.len() < self.hidden + 2 {
-                let row = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.lane_bits as usize));
+                let row = [0, 1, 2, 3].map(|parity| inputs[4].signed(parity, formats.lane_bits as usize));
                 self.rows.push(row);
                 if self.rows.len() <= self.hidden {
                     let (quads, saturations) = images(formats, network.shift, &[row]);
@@ -326,7 +334,10 @@ mod tests {
                 }
             }
             if start || rst {
-                (self.rows, self.known, self.saturations) = (Vec::new(), None, 0);
+                (self.rows, self.known) = (Vec::new(), None);
+            }
+            if clear {
+                self.saturations = 0;
             }
             if rst {
                 self.operands = Some(BTreeMap::new());
@@ -347,7 +358,9 @@ mod tests {
         for frame in 0..60 {
             let mut put = |rst: bool, start: bool, row: Option<[i64; 4]>| {
                 let word = Word::of_fields(&row.unwrap_or_default(), bits);
-                stimulus.push(vec![rst.into(), start.into(), enabled.into(), word, row.is_some().into()]);
+                // Several estimates may be made for one subarray.
+                let clear = start && frame % 3 == 0;
+                stimulus.push(vec![rst.into(), start.into(), clear.into(), enabled.into(), word, row.is_some().into()]);
                 // From the cycle after the start on.
                 enabled = if start { frame % 4 > 0 } else { enabled };
             };

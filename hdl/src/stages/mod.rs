@@ -11,6 +11,7 @@
 
 mod banks;
 mod choose;
+mod contacts;
 mod estimate;
 mod fold;
 mod forces;
@@ -29,6 +30,7 @@ mod unsearched;
 
 pub use banks::Banks;
 pub use choose::Choose;
+pub use contacts::Contacts;
 pub use estimate::Estimate;
 pub use fold::Fold;
 pub use forces::Forces;
