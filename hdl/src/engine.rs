@@ -27,7 +27,8 @@ use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
 use crate::primitives::{
-    count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, SATURATION_BITS,
+    count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, OperandSource, StatusSource,
+    SATURATION_BITS,
 };
 use crate::stage_list::engine;
 use crate::stages::{
@@ -110,6 +111,7 @@ engine! {
             fold: Fold => "stages/fold.rs",
             pass: Pass => "stages/pass.rs",
             estimate: Estimate => "stages/estimate.rs",
+            shear: Shear => "stages/shear.rs",
             rescale: Rescale => "stages/rescale.rs",
             relax: Relax => "stages/relax.rs",
             unfold: Unfold => "stages/unfold.rs",
@@ -119,6 +121,8 @@ engine! {
             resultants: Resultants => "stages/resultants.rs",
         }
         control {
+            operands: OperandSource,
+            told: StatusSource,
             begins: BitDelay,
             computing: Dff,
             first: Dff,
@@ -152,7 +156,6 @@ engine! {
             both_signs: Constant<Bit>,
             ahead: Constant<Bit>,
             single: Constant<Bit>,
-            told: Constant<Bit>,
             begin_frame: Signal<Local, Bit>,
             start: Signal<Local, Bit>,
             leaves: Signal<Local, Bit>,
@@ -191,6 +194,9 @@ impl Engine {
             fold: Fold::new(model),
             pass: Pass::new(model),
             estimate: Estimate::new(model),
+            shear: Shear::new(formats, model.scene.partition.max_contacts),
+            operands: OperandSource::new(model),
+            told: StatusSource::new(model),
             relax: Relax::new(formats),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
@@ -233,7 +239,6 @@ impl Engine {
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.resources.overlaps),
             single: Constant::new(counts.iter().all(|&count| count == 1)),
-            told: Constant::new(model.has_network()),
             begin_frame: Default::default(),
             start: Default::default(),
             leaves: Default::default(),
@@ -261,6 +266,10 @@ impl Logic for Engine {
         self.estimate.clk.next = self.clk.val();
         self.estimate.rst.next = self.rst.val();
         self.rescale.clk.next = self.clk.val();
+        self.shear.clk.next = self.clk.val();
+        self.shear.rst.next = self.rst.val();
+        self.operands.clk.next = self.clk.val();
+        self.operands.rst.next = self.rst.val();
         self.relax.clk.next = self.clk.val();
         self.relax.rst.next = self.rst.val();
         self.unfold.clk.next = self.clk.val();
@@ -461,11 +470,14 @@ impl Logic for Engine {
         self.relax.short.next = self.rescale.operands.val();
         self.relax.short_valid.next = self.rescale.operands_valid.val();
         self.relax.rescaled.next = self.rescale.saturations.val();
-        self.relax.images.next = self.estimate.operands.val();
-        self.relax.images_valid.next = self.estimate.operands_valid.val();
         self.relax.estimated.next = self.estimate.saturations.val();
-        self.pass.vector_quad.next = self.relax.operands.val();
-        self.pass.vector_valid.next = self.relax.operands_valid.val();
+        self.relax.sheared.next = self.shear.saturations.val();
+        self.operands.own.next = self.relax.operands.val();
+        self.operands.own_valid.next = self.relax.operands_valid.val();
+        self.operands.images.next = self.estimate.operands.val();
+        self.operands.images_valid.next = self.estimate.operands_valid.val();
+        self.pass.vector_quad.next = self.operands.quad.val();
+        self.pass.vector_valid.next = self.operands.valid.val();
         self.pass.position_x.next = self.estimate.position_x.val();
         self.pass.position_y.next = self.estimate.position_y.val();
         self.unfold.start.next = self.start.val();
@@ -492,23 +504,27 @@ impl Logic for Engine {
                 self.forces.begin_frame.next = self.search.settled.val();
             }
         }
-        self.forces.start.next = self.search.settled.val();
-        self.forces.part.next = self.searched_part.kept.val();
-        self.forces.position_x.next = self.search.best_x.val();
-        self.forces.position_y.next = self.search.best_y.val();
-        self.forces.score.next = self.search.score.val();
-        self.forces.found.next = self.search.found.val();
-        if self.told.val() {
-            self.forces.position_x.next = self.estimate.position_x.val();
-            self.forces.position_y.next = self.estimate.position_y.val();
-            self.forces.score.next = self.estimate.ln_sigma.val();
-            self.forces.found.next = self.searched_condition.q.val();
-        }
+        self.told.settled.next = self.search.settled.val();
+        self.told.subarray.next = self.searched_part.kept.val();
+        self.told.searched.next = self.searched_condition.q.val();
+        self.told.best_x.next = self.search.best_x.val();
+        self.told.best_y.next = self.search.best_y.val();
+        self.told.best_score.next = self.search.score.val();
+        self.told.candidate.next = self.search.found.val();
+        self.told.mu_x.next = self.estimate.position_x.val();
+        self.told.mu_y.next = self.estimate.position_y.val();
+        self.told.ln_sigma.next = self.estimate.ln_sigma.val();
+        self.forces.start.next = self.told.start.val();
+        self.forces.part.next = self.told.part.val();
+        self.forces.position_x.next = self.told.position_x.val();
+        self.forces.position_y.next = self.told.position_y.val();
+        self.forces.score.next = self.told.score.val();
+        self.forces.found.next = self.told.found.val();
         self.forces.normalise.next = self.searched_normalise.kept.val();
         self.forces.rescale.next = self.searched_rescale.kept.val();
         self.forces.saturations.next = self.searched_saturations.kept.val();
         self.forces.damaged.next = self.searched_damaged.kept.val();
-        self.forces.condition.next = self.searched_condition.q.val();
+        self.forces.condition.next = self.told.condition.val();
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.frame_cycles.cycles.val();
         self.send.start.next = self.begin_send.val();

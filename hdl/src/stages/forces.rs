@@ -65,6 +65,12 @@ pub struct Forces {
     pub saturations: Wire<In>,
     /// Cycle counter of the frame; sampled for its first beat.
     pub cycles: Wire<In>,
+    /// Address of the quad whose labels are needed.
+    pub label_address: Wire<Out>,
+    /// Labels of that quad, two cycles after `label_address`; one bit each without contacts.
+    pub labels: Wire<In>,
+    /// There are more contacts than get a μ; constant while the frame is sent.
+    pub overflow: Signal<In, Bit>,
     /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
     /// The receiver accepts a beat in this cycle.
@@ -114,6 +120,9 @@ impl Forces {
             score: Wire::new(formats.score_bits as usize),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
+            label_address: Wire::new(address),
+            labels: Wire::new(unit.labels.width()),
+            overflow: Default::default(),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -167,6 +176,9 @@ impl Logic for Forces {
         self.unit.score.next = self.score.val();
         self.unit.saturations.next = self.saturations.val();
         self.unit.cycles.next = self.cycles.val();
+        self.label_address.next = self.asked.q.val();
+        self.unit.labels.next = self.labels.val();
+        self.unit.overflow.next = self.overflow.val();
 
         self.leaving.reserve.next = self.offer.val();
         self.room.next = self.leaving.room.val();
@@ -230,8 +242,8 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [valid, address, ready] = [22, 23, 24].map(|input| inputs[input]);
-            let mut of_unit = inputs[..22].to_vec();
+            let [valid, address, ready] = [24, 25, 26].map(|input| inputs[input]);
+            let mut of_unit = inputs[..24].to_vec();
             of_unit[VALUES] = self.values.shown().unwrap_or_default();
             let [beat, written, last] = [0, 1, 2].map(|output| self.unit.outputs(&of_unit)[output].unwrap_or_default());
             self.leaving.clock(&[inputs[0], inputs[5], written, last, beat, ready]);
@@ -280,6 +292,8 @@ mod tests {
                 random_word(&mut random, block.score.width()),
                 random_word(&mut random, SATURATION_BITS),
                 random_word(&mut random, CYCLE_BITS),
+                Word::default(),
+                random.bool().into(),
                 (2..2 + steps).contains(&at).into(),
                 random.u64(..steps as u64).into(),
                 random.bool().into(),
@@ -287,7 +301,7 @@ mod tests {
             forces.clock(&inputs);
             inputs
         };
-        let reset = [vec![Word::from(true)], vec![Word::default(); 24]].concat();
+        let reset = [vec![Word::from(true)], vec![Word::default(); 26]].concat();
         let all = (0..frames).flat_map(|_| 0..offers + 230).map(&mut cycle);
         [reset.clone(), reset].into_iter().chain(all).collect()
     }
@@ -303,8 +317,8 @@ mod tests {
                 changes,
                 inputs [
                     rst, which, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
-                    normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, values_valid,
-                    address, m_axis_tready,
+                    normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels,
+                    overflow, values_valid, address, m_axis_tready,
                 ],
                 outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata],
             )

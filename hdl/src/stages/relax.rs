@@ -11,8 +11,7 @@ use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
 use crate::primitives::{count_bits, count_saturations, operand_of, saturated, saturating_sum, SATURATION_BITS};
 use crate::wire::Wire;
 
-/// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four. Those of
-/// `estimate` pass on to the same memory.
+/// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four.
 #[derive(LogicBlock)]
 pub struct Relax {
     /// Clock; registers change on its rising edge.
@@ -29,19 +28,17 @@ pub struct Relax {
     pub short: Wire<In>,
     /// `short` holds a quad.
     pub short_valid: Signal<In, Bit>,
-    /// Operands of `estimate`, `data_bits` each; valid with `images_valid`.
-    pub images: Wire<In>,
-    /// `images` holds a quad; never together with one of the own operands.
-    pub images_valid: Signal<In, Bit>,
     /// Saturations of `rescale` in this subarray; taken in every cycle.
     pub rescaled: Wire<In>,
     /// Saturations of `estimate` in this subarray; taken in every cycle.
     pub estimated: Wire<In>,
+    /// Saturations of `shear` in this subarray; taken in every cycle.
+    pub sheared: Wire<In>,
     /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
     pub sums: Wire<Out>,
     /// `sums` holds a quad.
     pub sums_valid: Signal<Out, Bit>,
-    /// The same as operands, `data_bits` each, or those of `estimate`; valid with `operands_valid`.
+    /// The same as operands, `data_bits` each; valid with `operands_valid`.
     pub operands: Wire<Out>,
     /// `operands` holds a quad.
     pub operands_valid: Signal<Out, Bit>,
@@ -53,7 +50,7 @@ pub struct Relax {
 kernel_block!(
     Relax,
     clock clk,
-    inputs [rst, start, words, words_valid, short, short_valid, images, images_valid, rescaled, estimated],
+    inputs [rst, start, words, words_valid, short, short_valid, rescaled, estimated, sheared],
     outputs [sums, sums_valid, operands, operands_valid, saturations]
 );
 
@@ -64,6 +61,8 @@ struct Shape {
     data: usize,
     quads: usize,
     network: bool,
+    /// Each contact has a μ of its own.
+    contacts: bool,
 }
 
 impl Relax {
@@ -74,6 +73,7 @@ impl Relax {
             data: formats.data_bits as usize,
             quads: formats.quads,
             network: formats.has_network(),
+            contacts: formats.by_contact(),
         })
     }
 
@@ -86,10 +86,9 @@ impl Relax {
             words_valid: Default::default(),
             short: Wire::new(4 * shape.data),
             short_valid: Default::default(),
-            images: Wire::new(4 * shape.data),
-            images_valid: Default::default(),
             rescaled: Wire::new(SATURATION_BITS),
             estimated: Wire::new(SATURATION_BITS),
+            sheared: Wire::new(SATURATION_BITS),
             sums: Wire::new(4 * shape.word),
             sums_valid: Default::default(),
             operands: Wire::new(4 * shape.data),
@@ -107,8 +106,8 @@ impl Shape {
         let [rst, start] = ["rst", "start"].map(|name| k.input(name, 1));
         let (words, valid) = (k.input("words", 4 * self.word), k.input("words_valid", 1));
         let (short, short_valid) = (k.input("short", 4 * self.data), k.input("short_valid", 1));
-        let (images, images_valid) = (k.input("images", 4 * self.data), k.input("images_valid", 1));
-        let [rescaled, estimated] = ["rescaled", "estimated"].map(|name| k.input(name, SATURATION_BITS));
+        let [rescaled, estimated, sheared] =
+            ["rescaled", "estimated", "sheared"].map(|name| k.input(name, SATURATION_BITS));
         if !self.network {
             k.comment("Without a network all passes on.");
             for (name, value) in [
@@ -141,7 +140,7 @@ impl Shape {
         let (words2, adds2) = (twice("words", words), twice("adds", *adds));
         let valid2 = later("valid2", later("valid1", valid));
         later("sums_valid", valid2);
-        let own_valid = later("own_valid", k.named("sums_valid"));
+        later("operands_valid", k.named("sums_valid"));
         let lane = |parity: usize| {
             k.scope(&format!("parity_{parity}"), || {
                 let at = parity * self.word;
@@ -155,12 +154,15 @@ impl Shape {
         let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
         let [sums, own, clipped] = [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
         k.wire("sums", sums);
-        k.wire("operands", images_valid.mux(images, own));
-        k.wire("operands_valid", own_valid | images_valid);
+        k.wire("operands", own);
 
         let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
         let relaxed = count_saturations(&k, "relaxed", start, clipped3);
-        let others = k.delay("others", saturating_sum(&k, "all_others", rescaled, estimated));
+        let mut others = saturating_sum(&k, "of_layers", rescaled, estimated);
+        if self.contacts {
+            others = saturating_sum(&k, "of_contacts", others, sheared);
+        }
+        let others = k.delay("others", others);
         k.delay("saturations", saturating_sum(&k, "total", others, relaxed));
         k.finish()
     }
@@ -176,7 +178,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { word: 22, data: 18, quads: 5, network: true };
+    const SHAPE: Shape = Shape { word: 22, data: 18, quads: 5, network: true, contacts: true };
 
     /// A sum, and how many of its words were saturated.
     type Sum = ([i64; 4], u32);
@@ -202,21 +204,17 @@ mod tests {
     impl Reference for Sums {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let before = |cycles: usize| Some(self.sums.as_ref()?.get(cycles - 1).copied().flatten());
-            let images = inputs[7].number() == 1;
             let (sum, own) = (before(3), before(4));
-            let operands = match (images, own.flatten()) {
-                (true, _) => Some(inputs[6]),
-                (false, own) => own.map(|(sum, _)| Word::of_fields(&sum.map(short), SHAPE.data)),
-            };
-            let others = inputs[8].number() + inputs[9].number();
+            let operands = own.flatten().map(|(sum, _)| Word::of_fields(&sum.map(short), SHAPE.data));
+            let others = [6, 7, 8].map(|input| inputs[input].number()).iter().sum();
             self.quiet = if others == self.others { self.quiet } else { 0 };
             self.others = others;
             let total = u64::from(self.total) + others;
             vec![
                 sum.map(|sum| sum.is_some().into()),
+                own.map(|own| own.is_some().into()),
                 sum.flatten().map(|(sum, _)| Word::of_fields(&sum, SHAPE.word)),
                 operands,
-                own.map(|own| (own.is_some() || images).into()),
                 (self.sums.is_some() && self.quiet > 8).then(|| total.min(0xffff).into()),
             ]
         }
@@ -264,10 +262,10 @@ mod tests {
         let mut stimulus = Vec::new();
         for frame in 0..60 {
             let counts =
-                [(); 2].map(|()| Word::from(if frame % 9 == 8 { random.u64(..0xffff) } else { random.u64(..9) }));
-            let mut put = |random: &mut fastrand::Rng, rst: bool, start: bool, valid: bool, images: bool| {
+                [(); 3].map(|()| Word::from(if frame % 9 == 8 { random.u64(..0xffff) } else { random.u64(..9) }));
+            let mut put = |random: &mut fastrand::Rng, rst: bool, start: bool, valid: bool| {
                 let word = random_word(random, 4 * SHAPE.word);
-                let [short, own] = [(); 2].map(|()| random_word(random, 4 * SHAPE.data));
+                let short = random_word(random, 4 * SHAPE.data);
                 stimulus.push(vec![
                     rst.into(),
                     start.into(),
@@ -275,22 +273,18 @@ mod tests {
                     valid.into(),
                     short,
                     false.into(),
-                    own,
-                    images.into(),
                     counts[0],
                     counts[1],
+                    counts[2],
                 ]);
             };
-            put(&mut random, frame % 4 == 0, false, false, false);
-            put(&mut random, false, true, false, false);
+            put(&mut random, frame % 4 == 0, false, false);
+            put(&mut random, false, true, false);
             for _ in 0..SHAPE.quads * random.usize(1..5) {
-                put(&mut random, false, false, true, false);
-                (0..random.usize(..3)).for_each(|_| put(&mut random, false, false, false, false));
+                put(&mut random, false, false, true);
+                (0..random.usize(..3)).for_each(|_| put(&mut random, false, false, false));
             }
-            for after in 0..20 {
-                let images = after > 5 && random.bool();
-                put(&mut random, false, false, false, images);
-            }
+            (0..20).for_each(|_| put(&mut random, false, false, false));
         }
         stimulus
     }
@@ -305,7 +299,7 @@ mod tests {
 
     impl Reference for Wires {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            [2, 3, 4, 5, 8].map(|input| Some(inputs[input])).into()
+            [2, 3, 4, 5, 6].map(|input| Some(inputs[input])).into()
         }
 
         fn clock(&mut self, _: &[Word]) {}

@@ -58,13 +58,15 @@ pub struct Send {
 impl Send {
     /// For frames of `model`.
     pub fn new(model: &Model) -> Self {
-        let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
-        let count = largest(&counts);
+        let subarrays: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
+        let statuses: Vec<usize> =
+            model.cases().iter().map(|case| model.status_beats_of(case) / STATUS_BEATS).collect();
+        let code = StatusCode::new(largest(&statuses), largest(&subarrays), model.formats().by_contact());
         let scan = Scan::new(model.cases(), model.formats().search_width);
         Send {
             clk: Default::default(),
             rst: Default::default(),
-            which: Wire::new(count_bits(counts.len())),
+            which: Wire::new(count_bits(subarrays.len())),
             start: Default::default(),
             begins: Default::default(),
             m_axis_tvalid: Default::default(),
@@ -73,21 +75,21 @@ impl Send {
             room: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
-            part: Wire::new(count_bits(count)),
+            part: Wire::new(code.part.width()),
             address: Wire::new(scan.address.width()),
             lane: Wire::new(2),
             done: Default::default(),
-            scan,
             words: Counter::new(STATUS_BEATS),
-            parts: CaseCounter::new(&counts),
-            code: StatusCode::new(count_bits(count)),
-            released: PartsBegun::new(count),
+            parts: CaseCounter::new(&statuses),
+            code,
+            released: PartsBegun::new(largest(&subarrays)),
             sending: Default::default(),
             status: Default::default(),
             out: BitDelay::new(1),
             step: Default::default(),
             at_end: Default::default(),
             finish: Default::default(),
+            scan,
         }
     }
 }
@@ -142,7 +144,7 @@ mod tests {
     use super::*;
     use crate::language::testbench::{block_subject, check_with_defects, Reference};
     use crate::language::Change;
-    use crate::scenes::{model, Place};
+    use crate::scenes::{learned, model, Place};
     use crate::wire::Word;
 
     struct Sending<'a> {
@@ -164,7 +166,10 @@ mod tests {
             let case = &self.model.cases()[inputs[1].number() as usize];
             let beat = self.beat.filter(|_| inputs[7].number() == 1)?;
             match beat.checked_sub(self.model.scene.sensor.taxels()) {
-                Some(status) => Some((1 + status % STATUS_BEATS, status / STATUS_BEATS, None)),
+                Some(status) => {
+                    let label = usize::from(self.model.formats().by_contact());
+                    Some((1 + status % STATUS_BEATS, status / STATUS_BEATS + label, None))
+                }
                 None => {
                     let place = Place::of(case, beat);
                     (place.part < self.begun).then_some((0, place.part, Some(place)))
@@ -192,7 +197,8 @@ mod tests {
         fn clock(&mut self, inputs: &[Word]) {
             let [rst, which, start, begins, valid, ready, last] =
                 [0, 1, 2, 3, 4, 5, 6].map(|input| inputs[input].number());
-            let beats = self.model.scene.sensor.taxels() + self.model.cases()[which as usize].status_beats();
+            let beats =
+                self.model.scene.sensor.taxels() + self.model.status_beats_of(&self.model.cases()[which as usize]);
             let next = self.beat.map(|beat| beat + usize::from(self.request(inputs).is_some()));
             self.beat = if start == 1 { Some(0) } else { next.filter(|&beat| beat < beats) };
             self.begun = if start == 1 { 1 } else { self.begun + begins as usize };
@@ -205,9 +211,16 @@ mod tests {
 
     #[test]
     fn forces_are_requested_as_their_values_begin_and_status_beats_follow() {
-        let model = model(10, 14, "[partition]\ncases = [0, 1, 2, 3]\n");
+        let several = model(10, 14, "[partition]\ncases = [0, 1, 2, 3]\n");
+        let contacts = learned(6, 5, &[7], "[partition]\ncase = \"contacts\"\nmax_contacts = 3\n");
+        for (model, defects) in [(several, true), (contacts, false)] {
+            requests_are_in_order(&model, defects);
+        }
+    }
+
+    fn requests_are_in_order(model: &Model, defects: bool) {
         let mut random = fastrand::Rng::with_seed(9);
-        let mut sending = Sending::new(&model);
+        let mut sending = Sending::new(model);
         let mut which = 0;
         let cycle = |cycle: usize| {
             let rst = cycle < 2 || random.u16(..1000) == 0;
@@ -225,7 +238,7 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
         let subject = |changes: &[Change]| {
             block_subject!(
-                Send::new(&model),
+                Send::new(model),
                 changes,
                 inputs [rst, which, start, begins, m_axis_tvalid, m_axis_tready, m_axis_tlast, room],
                 outputs [offer, beat, part, address, lane, done],
@@ -235,6 +248,7 @@ mod tests {
             Change::value("", "released__part", |k| k.named("parts__value")),
             Change::value("", "finish", |k| k.named("step") & k.named("status__q") & k.named("words__last")),
         ];
-        check_with_defects(subject, &stimulus, || Sending::new(&model), &defects);
+        let defects = if defects { &defects[..] } else { &[] };
+        check_with_defects(subject, &stimulus, || Sending::new(model), defects);
     }
 }

@@ -18,7 +18,7 @@ use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, 
 use crate::wire::Wire;
 
 /// Operands of p in, in the order of the quads; after `start`, operands of the products with Ax, then with Ay, the first
-/// [`LATENCY`] cycles later.
+/// [`LATENCY`] cycles later. Without contacts all outputs are constant 0.
 #[derive(LogicBlock)]
 pub struct Shear {
     /// Clock; registers change on its rising edge.
@@ -62,13 +62,14 @@ kernel_block!(
 struct Shape {
     data: usize,
     quads: usize,
-    /// Largest number of contacts.
+    /// Largest number of contacts; 0 without contacts.
     contacts: usize,
 }
 
 impl Shear {
-    /// With the widths of `formats`, for up to `contacts` contacts.
-    pub fn new(formats: &Formats, contacts: usize) -> Self {
+    /// With the widths of `formats`, for up to `most` contacts.
+    pub fn new(formats: &Formats, most: usize) -> Self {
+        let contacts = if formats.by_contact() { most } else { 0 };
         Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts })
     }
 
@@ -83,8 +84,8 @@ impl Shear {
             start: Default::default(),
             label_address: Wire::new(count_bits(shape.quads)),
             labels: Wire::new(4 * shape.label_bits()),
-            positions_x: Wire::new(shape.contacts * position_bits()),
-            positions_y: Wire::new(shape.contacts * position_bits()),
+            positions_x: Wire::new(shape.positions_bits()),
+            positions_y: Wire::new(shape.positions_bits()),
             sheared: Wire::new(quad),
             sheared_valid: Default::default(),
             saturations: Wire::new(SATURATION_BITS),
@@ -95,6 +96,11 @@ impl Shear {
 }
 
 impl Shape {
+    /// Width of the positions of all contacts.
+    fn positions_bits(self) -> usize {
+        self.contacts.max(1) * position_bits()
+    }
+
     /// Width of the number of a contact.
     fn label_bits(self) -> usize {
         count_bits(self.contacts + 1)
@@ -106,7 +112,15 @@ impl Shape {
         let (operands, valid) = (k.input("operands", 4 * self.data), k.input("operands_valid", 1));
         let start = k.input("start", 1);
         let labels = k.input("labels", 4 * self.label_bits());
-        let positions = ["positions_x", "positions_y"].map(|name| k.input(name, self.contacts * position_bits()));
+        let positions = ["positions_x", "positions_y"].map(|name| k.input(name, self.positions_bits()));
+        if self.contacts == 0 {
+            k.comment("There are no contacts.");
+            k.wire("label_address", k.constant(count_bits(self.quads), 0));
+            k.wire("sheared", k.constant(4 * self.data, 0));
+            k.wire("sheared_valid", k.constant(1, 0));
+            k.wire("saturations", k.constant(SATURATION_BITS, 0));
+            return k.finish();
+        }
         let (bit, count) = (Type::unsigned(1), Type::unsigned(count_bits(self.quads)));
         let place = k.state("place", count, rst | clear, 0);
         k.when(valid, || place.set(self.after(&k, *place)));
@@ -316,7 +330,7 @@ mod tests {
     fn each_taxel_is_multiplied_by_the_mu_of_its_contact() {
         let formats = formats();
         let stimulus = stimulus(&formats);
-        let block = Shear::new(&formats, CONTACTS);
+        let block = Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts: CONTACTS });
         let (p, leaving, asked) = (None, VecDeque::new(), VecDeque::new());
         check(block.kernel.kernel(), &stimulus, &mut Shearing { formats, p, leaving, asked, total: 0, quiet: 0 });
     }

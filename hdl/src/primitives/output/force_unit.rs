@@ -25,6 +25,9 @@ use crate::wire::Wire;
 /// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, [`STEPS`]
 /// cycles after `offer`. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
 /// `begin_frame` clears the counts of the frame.
+///
+/// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for each from 1 on,
+/// and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
     /// Clock; registers change on its rising edge.
@@ -73,6 +76,10 @@ pub struct ForceUnit {
     pub saturations: Wire<In>,
     /// Cycle counter of the frame; sampled when the first beat leaves.
     pub cycles: Wire<In>,
+    /// Labels of the taxels of `quad`, with it; one bit each without contacts.
+    pub labels: Wire<In>,
+    /// There are more contacts than get a μ; sampled when the beat with the flags leaves.
+    pub overflow: Signal<In, Bit>,
     /// `beat_data` holds a beat in this cycle.
     pub valid: Signal<Out, Bit>,
     /// The beat is the frame's last; valid with `valid`.
@@ -87,7 +94,7 @@ kernel_block!(
     clock clk,
     inputs [
         rst, which, begin_frame, start, part, offer, beat, beat_part, lane, quad, position_x, position_y, normalise,
-        rescale, condition, found, framing, damaged, frames, score, saturations, cycles,
+        rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels, overflow,
     ],
     outputs [valid, last, beat_data]
 );
@@ -111,7 +118,7 @@ const WORD: usize = FORCE_BITS as usize;
 /// Width of a μ word, in bits.
 const MU_BITS: usize = MULTIPLIER_BITS as usize;
 /// Flags of a subarray, the bits below the case's number.
-const FLAGS: usize = 5;
+const FLAGS: usize = 6;
 /// Width of a right shift, in bits.
 const SHIFT_BITS: usize = 6;
 
@@ -139,9 +146,20 @@ struct Shape {
     checks: bool,
     /// Bits of the number of frames in a sliding mean; `None` where the mean does not slide.
     frames_bits: Option<usize>,
-    /// Subarrays and number of each case.
+    /// Subarrays, or labels, and number of each case.
     counts: Vec<usize>,
     numbers: Vec<usize>,
+    /// Each contact has a μ of its own.
+    contacts: bool,
+}
+
+/// Number of subarrays of a case, or where each contact has a μ of its own, of labels: each has a μ, from which all statuses
+/// but that of label 0 are told.
+fn parts(model: &Model, case: &CasePlan) -> usize {
+    match model.formats().by_contact() {
+        true => 1 + model.scene.partition.max_contacts,
+        false => case.parts.len(),
+    }
 }
 
 impl ForceUnit {
@@ -163,7 +181,8 @@ impl ForceUnit {
             threshold: model.threshold.clamp(0, 1 << WORD) as u64,
             checks: model.has_coefficient_check(),
             frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
-            counts: model.cases().iter().map(|case| case.parts.len()).collect(),
+            counts: model.cases().iter().map(|case| parts(model, case)).collect(),
+            contacts: f.by_contact(),
             numbers: model.cases().iter().map(number).collect(),
         };
         let part_bits = count_bits(shape.parts());
@@ -191,6 +210,8 @@ impl ForceUnit {
             score: Wire::new(shape.score_bits),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
+            labels: Wire::new(shape.lanes * shape.label_bits()),
+            overflow: Default::default(),
             valid: Default::default(),
             last: Default::default(),
             beat_data: Wire::new(3 * WORD),
@@ -242,6 +263,15 @@ impl Shape {
         largest(&self.counts)
     }
 
+    /// Width of a label.
+    fn label_bits(&self) -> usize {
+        if self.contacts {
+            count_bits(self.parts())
+        } else {
+            1
+        }
+    }
+
     fn kernel(&self) -> Kernel {
         let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
         let k = Builder::new("force_unit");
@@ -258,6 +288,7 @@ impl Shape {
         let frames = k.input("frames", self.frames_bits.unwrap_or(1));
         let score = k.input("score", self.score_bits).signed();
         let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
+        let (labels, overflow) = (k.input("labels", self.lanes * self.label_bits()), k.input("overflow", 1));
 
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
         let offers = k.state("offers", Type::unsigned(ASKED), rst, 0);
@@ -285,21 +316,17 @@ impl Shape {
         shifts.write(start_2, part_2, shift);
         let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
 
-        let of_lane = |lane: usize| quad.slice(lane * v, v);
-        let pair = |first: usize| lane_value.at(0).mux(of_lane(first + 1), of_lane(first));
-        let value = match self.lanes {
-            1 => of_lane(0),
-            2 => pair(0),
-            _ => lane_value.at(1).mux(pair(2), pair(0)),
-        };
-        let value = k.delay("value", value.signed());
+        let value = k.delay("value", self.of_lane(quad, v, lane_value).signed());
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let z = k.delay("moved_z", doubled.shift_right_by(shift));
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
-                let at_value = part_after(READ_STEPS);
+                let at_value = match self.contacts {
+                    true => self.of_lane(labels, self.label_bits(), lane_value),
+                    false => part_after(READ_STEPS),
+                };
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);
@@ -345,6 +372,7 @@ impl Shape {
         let flags = [
             case,
             k.constant(CASE_SHIFT as usize - FLAGS, 0),
+            if self.contacts { overflow } else { k.constant(1, 0) },
             if self.checks { kept.status("damages", damaged) } else { k.constant(1, 0) },
             framing,
             !*contact,
@@ -387,6 +415,17 @@ impl Shape {
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
         k.finish()
+    }
+
+    /// The field of a lane, of `bits` bits.
+    fn of_lane<'k>(&self, fields: Expr<'k>, bits: usize, lane: Expr<'k>) -> Expr<'k> {
+        let of = |lane: usize| fields.slice(lane * bits, bits);
+        let pair = |first: usize| lane.at(0).mux(of(first + 1), of(first));
+        match self.lanes {
+            1 => of(0),
+            2 => pair(0),
+            _ => lane.at(1).mux(pair(2), pair(0)),
+        }
     }
 
     /// The μ word of a position, two cycles later.

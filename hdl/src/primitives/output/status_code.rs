@@ -4,10 +4,11 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel};
+use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// During the status, beat codes 1 to 3 and the status counter's subarray; otherwise code 0 and the scanned subarray;
-/// combinational.
+/// combinational. Where each contact has a μ of its own, the subarray of a status is the label of a contact, from 1 on.
 #[derive(LogicBlock)]
 pub struct StatusCode {
     /// The status is being requested.
@@ -31,28 +32,44 @@ kernel_block!(StatusCode, inputs [status, word, status_part, scan_part], outputs
 const BEAT_BITS: usize = 2;
 
 impl StatusCode {
-    /// For subarray indices of `part_bits` bits.
-    pub fn new(part_bits: usize) -> Self {
+    /// For so many statuses of a frame, and subarrays; `labels`: the first status is that of label 1.
+    pub fn new(statuses: usize, subarrays: usize, labels: bool) -> Self {
+        let shape = Shape { statuses, subarrays, labels };
         let block = StatusCode {
             status: Default::default(),
             word: Wire::new(BEAT_BITS),
-            status_part: Wire::new(part_bits),
-            scan_part: Wire::new(part_bits),
+            status_part: Wire::new(count_bits(statuses)),
+            scan_part: Wire::new(count_bits(subarrays)),
             beat: Wire::new(BEAT_BITS),
-            part: Wire::new(part_bits),
+            part: Wire::new(shape.part_bits()),
             kernel: Body::default(),
         };
-        block.bind(kernel(part_bits))
+        block.bind(shape.kernel())
     }
 }
 
-fn kernel(part_bits: usize) -> Kernel {
-    let k = Builder::combinational("status_code");
-    let (status, word) = (k.input("status", 1), k.input("word", BEAT_BITS));
-    let (status_part, scan_part) = (k.input("status_part", part_bits), k.input("scan_part", part_bits));
-    k.wire("beat", status.mux(word.plus(1), k.constant(BEAT_BITS, 0)));
-    k.wire("part", status.mux(status_part, scan_part));
-    k.finish()
+/// What decides the circuit.
+#[derive(Clone, Copy)]
+struct Shape {
+    statuses: usize,
+    subarrays: usize,
+    labels: bool,
+}
+
+impl Shape {
+    fn part_bits(self) -> usize {
+        count_bits(self.statuses + usize::from(self.labels))
+    }
+
+    fn kernel(self) -> Kernel {
+        let k = Builder::combinational("status_code");
+        let (status, word) = (k.input("status", 1), k.input("word", BEAT_BITS));
+        let status_part = k.input("status_part", count_bits(self.statuses)).extend(self.part_bits());
+        let scan_part = k.input("scan_part", count_bits(self.subarrays)).extend(self.part_bits());
+        k.wire("beat", status.mux(word.plus(1), k.constant(BEAT_BITS, 0)));
+        k.wire("part", status.mux(if self.labels { status_part.plus(1) } else { status_part }, scan_part));
+        k.finish()
+    }
 }
 
 #[cfg(test)]
@@ -63,11 +80,17 @@ mod tests {
 
     #[test]
     fn a_status_beat_has_a_code_and_its_own_subarray() {
-        let block = StatusCode::new(3);
-        let of = |inputs: &[Word]| match inputs[0].number() {
-            0 => vec![Some(Word::from(0)), Some(inputs[3])],
-            _ => vec![Some(Word::from((inputs[1].number() + 1) % 4)), Some(inputs[2])],
-        };
-        check(block.kernel.kernel(), &random_words(500, &[1, BEAT_BITS, 3, 3]), &mut Pipeline::new(0, 2, of));
+        for (subarrays, labels) in [(8, false), (1, true)] {
+            let block = StatusCode::new(8, subarrays, labels);
+            let of = |inputs: &[Word]| match inputs[0].number() {
+                0 => vec![Some(Word::from(0)), Some(inputs[3])],
+                _ => {
+                    let part = inputs[2].number() + u64::from(labels);
+                    vec![Some(Word::from((inputs[1].number() + 1) % 4)), Some(Word::from(part))]
+                }
+            };
+            let widths = [1, BEAT_BITS, 3, count_bits(subarrays)];
+            check(block.kernel.kernel(), &random_words(500, &widths), &mut Pipeline::new(0, 2, of));
+        }
     }
 }

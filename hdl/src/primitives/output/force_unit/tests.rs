@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::fixed::stages::send::{
-    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
+    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT,
 };
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
-use crate::scenes::model;
+use crate::scenes::{learned, model};
 use crate::wire::Word;
 
 /// A request, and its value once it has been read.
@@ -19,6 +19,8 @@ struct Entry {
     part: usize,
     lane: usize,
     value: i64,
+    /// Label of the taxel.
+    label: usize,
 }
 
 /// Values stored per subarray.
@@ -44,6 +46,20 @@ struct Frame {
     counting: bool,
 }
 
+/// Subarrays of the case that has most, or labels.
+fn most_parts(model: &Model) -> usize {
+    model.cases().iter().map(|case| parts(model, case)).max().unwrap()
+}
+
+/// Width of a label.
+fn label_bits(model: &Model) -> usize {
+    if model.formats().by_contact() {
+        count_bits(most_parts(model))
+    } else {
+        1
+    }
+}
+
 /// The model's force on every request.
 pub(crate) struct Requests {
     model: Model,
@@ -57,7 +73,7 @@ pub(crate) struct Requests {
 
 impl Requests {
     pub(crate) fn new(model: Model) -> Self {
-        let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+        let parts = most_parts(&model);
         let (pipe, parts) = (vec![None; ASKED].into(), vec![Part::default(); parts]);
         Requests { model, pipe, frame: Frame::default(), parts, output: None, reset: false }
     }
@@ -83,7 +99,8 @@ impl Requests {
         match entry.beat {
             0 => {
                 let shift = force_shift(f, part.normalise, part.rescale);
-                let mu = part.position.map(|x| mu_word(f, x));
+                let own = if f.by_contact() { self.parts[entry.label] } else { part };
+                let mu = own.position.map(|x| mu_word(f, x));
                 let result = force(f, entry.value, mu, shift, self.model.threshold);
                 frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
                 frame.contact |= result.words[2] != 0;
@@ -98,9 +115,10 @@ impl Requests {
                     | flag(!frame.contact, FLAG_NO_CONTACT)
                     | flag(inputs[16].number() == 1, FLAG_FRAMING)
                     | flag(part.damaged, FLAG_COEFFICIENTS)
+                    | flag(f.by_contact() && inputs[23].number() == 1, FLAG_MORE_CONTACTS)
                     | number << CASE_SHIFT
                     | part.frames << FRAMES_SHIFT;
-                let position = if self.model.searches() { part.position } else { [0; 2] };
+                let position = if f.degree > 0 { part.position } else { [0; 2] };
                 [position[0], position[1], flags as i32]
             }
             2 => [part.score, part.rescale as i32, part.normalise as i32],
@@ -123,17 +141,24 @@ impl Reference for Requests {
         let [rst, begin_frame, start, offer] = [0, 2, 3, 5].map(|k| inputs[k].number() == 1);
         if let Some(entry) = &mut self.pipe[READ_STEPS - 1] {
             entry.value = inputs[9].signed(entry.lane, self.model.formats().search_bits[0] as usize);
+            entry.label = inputs[22].field(entry.lane * label_bits(&self.model), label_bits(&self.model)) as usize;
         }
         self.output = self.pipe.pop_back().unwrap().map(|entry| {
             if std::mem::take(&mut self.frame.counting) {
                 self.frame.cycles = (inputs[21].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
             }
             let words = self.answer(entry, inputs).map(i64::from);
-            let ends = self.model.cases()[inputs[1].number() as usize].parts.len();
+            let ends = parts(&self.model, &self.model.cases()[inputs[1].number() as usize]);
             (entry.beat == 3 && entry.part + 1 == ends, Word::of_fields(&words, WORD))
         });
         let [beat, part, lane] = [6, 7, 8].map(|k| inputs[k].number());
-        self.pipe.push_front(offer.then_some(Entry { beat, part: part as usize, lane: lane as usize, value: 0 }));
+        self.pipe.push_front(offer.then_some(Entry {
+            beat,
+            part: part as usize,
+            lane: lane as usize,
+            value: 0,
+            label: 0,
+        }));
         if begin_frame {
             self.frame = Frame { counting: true, ..Frame::default() };
         }
@@ -151,7 +176,7 @@ impl Reference for Requests {
 fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
     let mut random = fastrand::Rng::with_seed(11);
     let cases = model.cases().len() as u64;
-    let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+    let parts = most_parts(model);
     let mut which = 0;
     let inputs = |cycle: usize| {
         // 40 cycles of a frame begin it and store the subarrays, the rest request beats.
@@ -187,6 +212,8 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             random_word(&mut random, block.score.width()),
             random_word(&mut random, SATURATION_BITS),
             random_word(&mut random, CYCLE_BITS),
+            Word::of_fields(&[(); 4].map(|()| random.i64(..parts as i64)), label_bits(model)),
+            random.bool().into(),
         ]
     };
     (0..cycles).map(inputs).collect()
@@ -195,6 +222,10 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
     let mut model = model(side, side, more);
     model.threshold = threshold;
+    check_forces(model);
+}
+
+fn check_forces(model: Model) {
     let block = ForceUnit::new(&model);
     check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
 }
@@ -207,4 +238,5 @@ fn beats_are_those_of_the_model() {
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
     is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
+    check_forces(learned(6, 5, &[7], "mu_max = 0.3\n[partition]\ncase = \"contacts\"\n"));
 }

@@ -1,0 +1,243 @@
+//! The quads that go into the operand memory of the passes, from the stages that make them.
+
+use dermis_golden::fixed::words::network::MASKED;
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::wire::Wire;
+
+/// One stage at a time gives quads, which pass on in the same cycle.
+///
+/// | scene | operands |
+/// |---|---|
+/// | with a search | `own`: v_ij |
+/// | one μ by a network | `own`: v_00 and p; `images`: of the layers, and when μ is known |
+/// | a μ for each contact | `window`, then as many quads of its mask; `images`; `sheared` |
+///
+/// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
+#[derive(LogicBlock)]
+pub struct OperandSource {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// Operands of `relax`, `data_bits` each, signed; valid with `own_valid`.
+    pub own: Wire<In>,
+    /// `own` holds a quad; with a μ for each contact it goes to `shear` instead.
+    pub own_valid: Signal<In, Bit>,
+    /// Operands of `estimate`, `data_bits` each, signed; valid with `images_valid`.
+    pub images: Wire<In>,
+    /// `images` holds a quad.
+    pub images_valid: Signal<In, Bit>,
+    /// High limbs of a contact's window, signed; valid with `window_valid`.
+    pub window: Wire<In>,
+    /// Folded mask of the same quad, in units of the word of a masked taxel, signed; valid with `window_valid`.
+    pub mask: Wire<In>,
+    /// `window` and `mask` hold a quad.
+    pub window_valid: Signal<In, Bit>,
+    /// Operands of `shear`, `data_bits` each, signed; valid with `sheared_valid`.
+    pub sheared: Wire<In>,
+    /// `sheared` holds a quad.
+    pub sheared_valid: Signal<In, Bit>,
+    /// A quad of operands, `data_bits` each, signed; valid with `valid`.
+    pub quad: Wire<Out>,
+    /// `quad` holds a quad.
+    pub valid: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    OperandSource,
+    clock clk,
+    inputs [rst, own, own_valid, images, images_valid, window, mask, window_valid, sheared, sheared_valid],
+    outputs [quad, valid]
+);
+
+/// What decides the circuit.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    data: usize,
+    /// Width of a word of the window.
+    limb: usize,
+    network: bool,
+    /// Quads of a window, where each contact has a μ of its own.
+    window: Option<usize>,
+}
+
+/// Width of a field of the mask: one word of 0 or 1, signed, and the growth of the sum.
+pub const MASK_BITS: usize = 4;
+
+impl OperandSource {
+    /// For the operands of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = model.formats();
+        OperandSource::of(Shape {
+            data: formats.data_bits as usize,
+            limb: (formats.fold_bits - formats.input_low_bits) as usize,
+            network: formats.has_network(),
+            window: formats.window_quads,
+        })
+    }
+
+    fn of(shape: Shape) -> Self {
+        let quad = || Wire::new(4 * shape.data);
+        let block = OperandSource {
+            clk: Default::default(),
+            rst: Default::default(),
+            own: quad(),
+            own_valid: Default::default(),
+            images: Wire::new(4 * shape.data),
+            images_valid: Default::default(),
+            window: Wire::new(4 * shape.limb),
+            mask: Wire::new(4 * MASK_BITS),
+            window_valid: Default::default(),
+            sheared: Wire::new(4 * shape.data),
+            sheared_valid: Default::default(),
+            quad: Wire::new(4 * shape.data),
+            valid: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("operand_source");
+        let rst = k.input("rst", 1);
+        let (own, own_valid) = (k.input("own", 4 * self.data), k.input("own_valid", 1));
+        let (images, images_valid) = (k.input("images", 4 * self.data), k.input("images_valid", 1));
+        let (window, mask) = (k.input("window", 4 * self.limb), k.input("mask", 4 * MASK_BITS));
+        let window_valid = k.input("window_valid", 1);
+        let (sheared, sheared_valid) = (k.input("sheared", 4 * self.data), k.input("sheared_valid", 1));
+        let Some(quads) = self.window else {
+            let (quad, valid) = match self.network {
+                true => (images_valid.mux(images, own), images_valid | own_valid),
+                false => (own, own_valid),
+            };
+            k.wire("quad", quad);
+            k.wire("valid", valid);
+            return k.finish();
+        };
+        let place = k.state("place", Type::unsigned(count_bits(quads)), rst, 0);
+        let masks = k.state("masks", Type::unsigned(1), rst, 0);
+        let last = k.wire("last", place.is(quads as u64 - 1));
+        k.when(window_valid | *masks, || place.set(last.mux(k.constant(place.bits(), 0), place.plus(1))));
+        k.when((window_valid | *masks) & last, || masks.set(window_valid));
+        let memory = k.memory("mask_of", quads, 4 * MASK_BITS, Contents::Undefined);
+        memory.write(window_valid, *place, mask);
+        let kept = memory.read(*place);
+        let field = |lane: usize| {
+            let words = kept.slice(lane * MASK_BITS, MASK_BITS).signed();
+            words.shift_left(MASKED.trailing_zeros() as usize).resize(self.data).unsigned()
+        };
+        let mask = concat(&[3, 2, 1, 0].map(field));
+        let wide = |lane: usize| window.slice(lane * self.limb, self.limb).signed().resize(self.data).unsigned();
+        let window = concat(&[3, 2, 1, 0].map(wide));
+        let made = images_valid.mux(images, sheared);
+        k.wire("quad", window_valid.mux(window, masks.mux(mask, made)));
+        k.wire("valid", window_valid | *masks | images_valid | sheared_valid);
+        k.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { data: 18, limb: 17, network: true, window: Some(5) };
+
+    /// Inputs in the order of the block.
+    struct Sources {
+        shape: Shape,
+        /// Masks of the window so far; `None` before the first reset.
+        masks: Option<Vec<Word>>,
+        /// Index of the mask that passes on, once the window is complete.
+        next: Option<usize>,
+    }
+
+    impl Reference for Sources {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [own, images, window, sheared] = [2, 4, 7, 9].map(|input| inputs[input].number() == 1);
+            let Shape { data, limb, network, window: quads } = self.shape;
+            if quads.is_none() {
+                let quad = if images && network { Some(inputs[3]) } else { own.then_some(inputs[1]) };
+                return vec![quad, Some((own || images && network).into())];
+            }
+            let mask = self.masks.as_ref().zip(self.next).map(|(masks, next)| {
+                Word::of_fields(&[0, 1, 2, 3].map(|lane| masks[next].signed(lane, MASK_BITS) * MASKED), data)
+            });
+            let read = Word::of_fields(&[0, 1, 2, 3].map(|lane| inputs[5].signed(lane, limb)), data);
+            let made = [(window, read), (images, inputs[3]), (sheared, inputs[8])];
+            let made = made.into_iter().find_map(|(given, quad)| given.then_some(quad));
+            let valid = self.masks.as_ref().map(|_| (mask.or(made).is_some()).into());
+            vec![mask.or(made), valid]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let Some(quads) = self.shape.window else { return };
+            if let (true, Some(masks)) = (inputs[7].number() == 1, &mut self.masks) {
+                masks.push(inputs[6]);
+                self.next = (masks.len() == quads).then_some(0);
+            } else if let (Some(next), Some(masks)) = (self.next, &mut self.masks) {
+                self.next = (next + 1 < quads).then_some(next + 1);
+                if self.next.is_none() {
+                    masks.clear();
+                }
+            }
+            if inputs[0].number() == 1 {
+                (self.masks, self.next) = (Some(Vec::new()), None);
+            }
+        }
+    }
+
+    /// Windows with gaps, after each a pause in which its mask leaves, then quads of the others, one at a time.
+    fn stimulus(shape: Shape) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut all = Vec::new();
+        let mut put = |random: &mut fastrand::Rng, rst: bool, given: Option<usize>| {
+            let quad = |random: &mut fastrand::Rng| random_word(random, 4 * shape.data);
+            let mask = Word::of_fields(&[(); 4].map(|()| random.i64(-2..=4)), MASK_BITS);
+            let given = |one: usize| Word::from(given == Some(one));
+            all.push(vec![
+                rst.into(),
+                quad(random),
+                given(0),
+                quad(random),
+                given(1),
+                random_word(random, 4 * shape.limb),
+                mask,
+                given(2),
+                quad(random),
+                given(3),
+            ]);
+        };
+        for round in 0..80 {
+            put(&mut random, round % 9 == 0, None);
+            let quads = shape.window.unwrap_or(0);
+            for _ in 0..if round % 9 == 8 { random.usize(..=quads) } else { quads } {
+                put(&mut random, false, Some(2));
+                (0..random.usize(..4)).for_each(|_| put(&mut random, false, None));
+            }
+            (0..if round % 9 == 8 { 0 } else { quads }).for_each(|_| put(&mut random, false, None));
+            for _ in 0..12 {
+                let one = [None, Some(1), if shape.window.is_some() { Some(3) } else { Some(0) }][random.usize(..3)];
+                put(&mut random, false, one.filter(|_| round % 9 < 8));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn quads_of_one_stage_at_a_time_pass_on() {
+        for shape in [SHAPE, Shape { window: None, ..SHAPE }, Shape { window: None, network: false, ..SHAPE }] {
+            let mut sources = Sources { shape, masks: None, next: None };
+            check(OperandSource::of(shape).kernel.kernel(), &stimulus(shape), &mut sources);
+        }
+    }
+}
