@@ -259,14 +259,14 @@ impl<'k> Ports<'k> {
         };
         let (row, has_row) = line(0, *down, lane.at(1), window.rows, array.rows);
         let (col, has_col) = line(1, *across, lane.at(0), window.cols, array.cols);
-        let inside = k.wire("inside", has_row & has_col);
-        let place = |name: &str, at: Expr<'k>| k.delay(name, at & inside.repeat(at.bits()));
+        let on_array = k.wire("on_array", has_row & has_col);
+        let place = |name: &str, at: Expr<'k>| k.delay(name, at & on_array.repeat(at.bits()));
         Scanned {
             valid: *scanning,
             lane: *lane,
             ends_quad: quad_ends & *again,
             place: [place("row", row), place("col", col)],
-            outside: k.delay("outside", !inside),
+            outside: k.delay("outside", !on_array),
         }
     }
 

@@ -1,21 +1,24 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::plan::contents::ContactPlan;
-use dermis_golden::fixed::stages::receive::{receive, Received};
+use dermis_golden::fixed::stages::receive::Received;
 use dermis_golden::fixed::stages::window::{cycles, window, Array, WindowWords};
 use dermis_golden::fixed::words::network::MASKED;
 use dermis_golden::learned::Place;
 use dermis_golden::segment::Segmenter;
 
 use super::*;
-use crate::language::testbench::{block_subject, check, check_with_defects, random_word, Reference, Subject};
+use crate::language::testbench::{
+    block_subject, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
 
-/// A model of an array with contacts, `own` rows and columns in a window; `more` is the rest of the scene file.
-fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], more: &str) -> Model {
+/// A model of an array with so many contacts, `own` rows and columns in a window; `more` is the rest of the scene file.
+fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, more: &str) -> Model {
     let mut model = model(rows, cols, more);
+    (model.scene.partition.max_contacts, model.noise_floor) = (contacts, 100);
     let segmenter = Segmenter::new(&model.scene.sensor, 1.0);
     let window = learned::Window { place: Place::Contact, rows: own[0], cols: own[1] };
     model.by_contact = Some(ContactPlan { segmenter, window });
@@ -150,8 +153,9 @@ impl Reference for Windows<'_> {
             let address = taxel.map_or(0, |taxel| layout.locate(taxel / layout.cols, taxel % layout.cols).address);
             Word::from(address as u64)
         });
-        // A quad is written two cycles after the sums have had its last taxel's code.
-        let read = since.checked_sub(CODE + 4).filter(|read| *read >= 4 * quads && *read < 8 * quads && read % 4 == 3);
+        // The scan begins a cycle after the start; a quad is written in the cycle after the sums have taken its last taxel.
+        let read =
+            since.checked_sub(1 + SUM + 1).filter(|read| *read >= 4 * quads && *read < 8 * quads && read % 4 == 3);
         let quad = read.map(|read| read / 4 - quads);
         let word = |quad: [i64; 4], bits: u32| Word::of_fields(&quad, bits as usize);
         let is_over = *since >= cycles(&own) as usize;
@@ -199,17 +203,42 @@ fn reference<'a>(model: &'a Model, contacts: &[Contact]) -> Windows<'a> {
     Windows { model, next: contacts.to_vec().into(), reset: false, now: None }
 }
 
-/// Sizes of arrays and windows, even and odd, larger and smaller.
+/// Windows and arrays of even and odd sizes, either of them the larger one.
 #[test]
 fn windows_are_those_of_the_model() {
-    for (array, own, more) in [
-        ([8, 9], [5, 4], "[input]\ndead = [[0, 0], [3, 3], [3, 4], [7, 8]]\n[partition]\nmax_contacts = 3\n"),
-        ([5, 8], [11, 10], "[fixed]\ninput_bits = 12\n[input]\ndead = [[4, 7]]\n"),
-        ([3, 2], [3, 11], ""),
-        ([10, 7], [1, 2], "[partition]\nmax_contacts = 1\n"),
+    for (array, own, contacts, more) in [
+        ([5, 8], [11, 10], 8, "[fixed]\ninput_bits = 12\n[input]\ndead = [[4, 7]]\n"),
+        ([3, 2], [3, 11], 8, ""),
+        ([10, 7], [1, 2], 1, ""),
     ] {
-        let model = with_contacts(array, own, more);
+        let model = with_contacts(array, own, contacts, more);
         let (contacts, inputs) = stimulus(&model, 60);
         check(subject(&model, &[]), &inputs, &mut reference(&model, &contacts));
     }
+}
+
+#[test]
+fn a_window_that_differs_is_found() {
+    let dead = "[input]\ndead = [[0, 0], [3, 3], [3, 4], [7, 8]]\n";
+    let model = with_contacts([8, 9], [5, 4], 3, dead);
+    let (contacts, inputs) = stimulus(&model, 100);
+    let defects = [
+        Change::value("", "masked_0", |k| k.named("outside")),
+        Change::value("", "on_array", |k| k.constant(1, 1)),
+        Change::value("", "own", |k| k.constant(1, 1)),
+        Change::value("", "shift", |k| k.constant(5, 3)),
+        Change::value("", "valid_5", |k| k.constant(1, 1)),
+        Change::value("", "ends_quad_0", |k| k.named("quad_ends")),
+        Change::value("", "done", |k| k.named("write")),
+    ];
+    check_with_defects(|changes| subject(&model, changes), &inputs, || reference(&model, &contacts), &defects);
+}
+
+/// In a scene without contacts there is nothing to read.
+#[test]
+fn without_contacts_there_is_no_window() {
+    let block = Window::new(&model(4, 5, ""));
+    let widths = [1, 1, 2, 3, 4, 80, 16];
+    let outputs = |_: &[Word]| vec![Some(Word::default()); 9];
+    check(block.kernel.kernel(), &random_words(100, &widths), &mut Pipeline::new(0, 9, outputs));
 }
