@@ -11,14 +11,15 @@
 
 use dermis_golden::fixed::Model;
 use dermis_golden::learned;
+use dermis_golden::symmetry::parity::hadamard;
 use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use super::normalise::left_shift;
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
-use crate::primitives::{beyond, count_bits, magnitude_of, subtracted, TaxelPlace};
-use crate::wire::Wire;
+use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtracted, TaxelPlace};
+use crate::wire::{Wire, Word};
 
 /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
 /// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked.
@@ -77,8 +78,8 @@ kernel_block!(
 const MASK_BITS: usize = 4;
 
 /// Cycles from the scan of a taxel until its code has been chosen from its quad, and until it enters the sums of its own.
-const CODE: usize = 6;
-const SUM: usize = 8;
+const CODE: usize = 7;
+const SUM: usize = 9;
 
 impl Window {
     /// For the windows of `model`.
@@ -199,24 +200,25 @@ impl<'k> Ports<'k> {
         let valid = self.later("valid", scanned.valid, CODE, true);
         let gathered = |name: &str, value: Expr<'k>| {
             let held = k.state(name, Type::unsigned(value.bits()), self.restarts(), 0);
-            k.when(valid, || held.set(*held | value));
+            held.set(*held | value);
             *held
         };
-        let magnitude = gathered("magnitude", magnitude_of(code));
+        let magnitude = magnitude_of(code);
+        let magnitude = gathered("magnitude", magnitude & valid.repeat(magnitude.bits()));
         let [above, below] = beyond(k, code, model.noise_floor);
-        gathered("positive", own & above);
-        gathered("negative", own & below);
+        let counts = self.bit("counts", own & valid);
+        gathered("positive", k.delay("above", above) & counts);
+        gathered("negative", k.delay("below", below) & counts);
 
         k.comment("Second sweep: codes and mask are shifted and folded, a taxel per cycle.");
         let shift = k.delay("shift", left_shift(k, magnitude));
         let shifted = k.delay("shifted", k.delay("near", code).shift_left_by(shift));
-        let masked = self.later("masked_code", masked, SUM - CODE, false);
-        let lane = self.later("lane", scanned.lane, SUM, false);
-        let words = self.sums("sum", shifted, lane);
-        let mask = self.sums("mask", k.constant(1, 0).concat(masked), lane);
+        let sums = self.sums(shifted, self.later("lane", scanned.lane, SUM, false));
         let low = model.formats().input_low_bits as usize;
-        k.wire("write_quad", concat(&words.map(|sum| sum.slice(low, sum.bits() - low))));
-        k.wire("mask_quad", concat(&mask));
+        k.wire("write_quad", concat(&sums.map(|sum| sum.slice(low, sum.bits() - low))));
+        let mask = k.register("mask", Type::unsigned(Quads::LANES));
+        mask.set(self.later("masked_code", masked, SUM - CODE, false).concat(mask.slice(1, Quads::LANES - 1)));
+        k.wire("mask_quad", mask.table(4 * MASK_BITS, &folded_masks()));
 
         let ended = self.later("ends_quad", scanned.ends_quad, SUM, true);
         let write = self.bit("write", ended);
@@ -274,8 +276,10 @@ impl<'k> Ports<'k> {
     fn code(&self, model: &Model, scanned: &Scanned<'k>) -> [Expr<'k>; 3] {
         let (k, layout) = (self.k, model.layout());
         let [row, col] = scanned.place;
-        let place = TaxelPlace::of(k, layout, scanned.place, k.constant(count_bits(layout.len()), 0));
-        let address = k.delay("quad_address", place.address);
+        let place = TaxelPlace::of(k, layout, scanned.place);
+        let near = [0, 1].map(|axis| k.delay(["near_row", "near_col"][axis], place.near[axis]));
+        let first = k.constant(count_bits(layout.len()), 0);
+        let address = k.delay("quad_address", quad_address_of(k, layout, near, first));
         k.wire("label_address", address);
         let is_dead = (!model.dead.is_empty()).then(|| {
             let table = (0..1usize << (row.bits() + col.bits())).map(|at| {
@@ -286,8 +290,8 @@ impl<'k> Ports<'k> {
         });
         let masked = is_dead.map_or(scanned.outside, |dead| scanned.outside | dead);
         // With the quad.
-        let masked = self.later("masked", masked, 3, false);
-        let from = self.later("from", place.lower.concat(place.right), 3, false);
+        let masked = self.later("masked", masked, 4, false);
+        let from = self.later("from", place.lower.concat(place.right), 4, false);
         let chosen = |quad: Expr<'k>| {
             let bits = quad.bits() / Quads::LANES;
             let lane = |lane: usize| quad.slice(lane * bits, bits);
@@ -302,19 +306,27 @@ impl<'k> Ports<'k> {
     }
 
     /// The four parities of a quad whose words, signed, come one after the other; last first.
-    fn sums(&self, name: &str, word: Expr<'k>, lane: Expr<'k>) -> [Expr<'k>; 4] {
+    fn sums(&self, word: Expr<'k>, lane: Expr<'k>) -> [Expr<'k>; 4] {
         let k = self.k;
         let bits = word.bits() + 2;
         let word = word.signed().extend(bits).unsigned();
         let begins = !lane.any();
         let odd = subtracted(k, lane);
         [3, 2, 1, 0].map(|parity| {
-            let sum = k.register(&format!("{name}{parity}"), Type::unsigned(bits));
+            let sum = k.register(&format!("sum{parity}"), Type::unsigned(bits));
             let before = begins.mux(k.constant(bits, 0), *sum);
-            sum.set(odd[parity].mux((before - word).low(bits), (before + word).low(bits)));
+            // One adder: −w is the complement of w and one more, the carry of the added lowest bits.
+            let (odd, turned) = (odd[parity], word ^ odd[parity].repeat(bits));
+            sum.set((before.concat(odd) + turned.concat(odd)).slice(1, bits));
             *sum
         })
     }
+}
+
+/// The folded mask of a quad, by its four bits.
+fn folded_masks() -> Vec<u64> {
+    let folded = |masked: i64| hadamard([0, 1, 2, 3].map(|lane| masked >> lane & 1));
+    (0..1 << Quads::LANES).map(|masked| Word::of_fields(&folded(masked), MASK_BITS).number()).collect()
 }
 
 #[cfg(test)]

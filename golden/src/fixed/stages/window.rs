@@ -29,8 +29,8 @@ pub struct WindowWords {
 }
 
 /// Cycles from the start until the first taxel is folded: the window's first row and column 1, those of the taxel 1, whether
-/// the array has them 1, address 1, frame buffer 2, lane 1, shift 2, sum 1.
-const LATENCY: u64 = 10;
+/// the array has them 1, row and column of its quad 1, address 1, frame buffer 2, lane 1, shift 2, sum 1.
+const LATENCY: u64 = 11;
 
 /// Cycles of the hardware from the start of a window until all of it has been written: its quads are read twice, a taxel a
 /// cycle, for the magnitude and to be shifted and folded.

@@ -74,10 +74,10 @@ pub fn frame_quads(cases: &[CasePlan]) -> usize {
     largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
 
-/// Where a taxel is in a frame buffer of quads.
+/// Where a taxel is in a subarray's quads.
 pub(crate) struct Place<'k> {
-    /// Address of its quad.
-    pub address: Expr<'k>,
+    /// Row and column of its quad.
+    pub near: [Expr<'k>; 2],
     /// It is in the lower half: the upper bit of the lane from which it is read.
     pub lower: Expr<'k>,
     /// It is in the right half: the lower bit of the lane.
@@ -88,14 +88,23 @@ pub(crate) struct Place<'k> {
 }
 
 impl<'k> Place<'k> {
-    /// Of the taxel in this row and column of a subarray of `layout` whose quads begin at address `first`.
-    pub fn of(k: &'k Builder, layout: Quads, [row, col]: [Expr<'k>; 2], first: Expr<'k>) -> Place<'k> {
-        let bits = first.bits();
+    /// Of the taxel in this row and column of a subarray of `layout`.
+    pub fn of(k: &'k Builder, layout: Quads, [row, col]: [Expr<'k>; 2]) -> Place<'k> {
         let (lower, near_row, both_rows) = fold(k, row, layout.rows);
         let (right, near_col, both_cols) = fold(k, col, layout.cols);
-        let address = first + times(k, near_row, layout.quad_cols(), bits) + near_col;
-        Place { address: address.resize(bits), lower, right, both_rows, both_cols }
+        Place { near: [near_row, near_col], lower, right, both_rows, both_cols }
     }
+}
+
+/// Address of the quad in this row and column of the quads of `layout`, which begin at address `first`.
+pub(crate) fn quad_address_of<'k>(
+    k: &'k Builder,
+    layout: Quads,
+    [row, col]: [Expr<'k>; 2],
+    first: Expr<'k>,
+) -> Expr<'k> {
+    let bits = first.bits();
+    (first + times(k, row, layout.quad_cols(), bits) + col).resize(bits)
 }
 
 impl QuadAddress {
@@ -111,15 +120,16 @@ impl QuadAddress {
                 _ => (times(&k, part[0], grid.cols, part_bits) + part[1]).resize(part_bits),
             };
             let first = times(&k, part, layout.len(), address_bits);
-            (part, Place::of(&k, layout, [row, col], first))
+            let place = Place::of(&k, layout, [row, col]);
+            (part, quad_address_of(&k, layout, place.near, first), place)
         };
-        let places: Vec<(Expr, Place)> = cases.iter().map(place).collect();
-        let chosen = |of: for<'k> fn(&(Expr<'k>, Place<'k>)) -> Expr<'k>, bits: usize| {
+        let places: Vec<(Expr, Expr, Place)> = cases.iter().map(place).collect();
+        let chosen = |of: for<'k> fn(&(Expr<'k>, Expr<'k>, Place<'k>)) -> Expr<'k>, bits: usize| {
             let each: Vec<Expr> = places.iter().map(of).collect();
             expression_by_case(which, &each).unwrap_or(k.constant(bits, 0))
         };
-        let quad = chosen(|(_, place)| place.address, address_bits);
-        let (lower, right) = (chosen(|(_, place)| place.lower, 1), chosen(|(_, place)| place.right, 1));
+        let quad = chosen(|(_, address, _)| *address, address_bits);
+        let (lower, right) = (chosen(|(.., place)| place.lower, 1), chosen(|(.., place)| place.right, 1));
         // The lane of the quad is the index of the word in it, followed by the lane of the word.
         let address = match lanes {
             1 => quad.concat(lower).concat(right),
@@ -127,10 +137,10 @@ impl QuadAddress {
             _ => quad,
         };
         k.wire("address", address);
-        k.wire("part", chosen(|(part, _)| *part, part_bits));
+        k.wire("part", chosen(|(part, ..)| *part, part_bits));
         let (lower, right) = (k.wire("lower", lower), k.wire("right", right));
-        let both_rows = k.wire("both_rows", chosen(|(_, place)| place.both_rows, 1));
-        let both_cols = k.wire("both_cols", chosen(|(_, place)| place.both_cols, 1));
+        let both_rows = k.wire("both_rows", chosen(|(.., place)| place.both_rows, 1));
+        let both_cols = k.wire("both_cols", chosen(|(.., place)| place.both_cols, 1));
         let lane = match lanes {
             1 => k.constant(2, 0),
             2 => right.extend(2),

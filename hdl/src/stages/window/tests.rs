@@ -148,7 +148,7 @@ impl Reference for Windows<'_> {
             return [vec![None, None, known(false)], vec![None; 5], vec![known(false)]].concat();
         };
         let (layout, quads) = (self.model.layout(), own.quads().len());
-        let address = since.checked_sub(4).filter(|read| *read < 8 * quads).map(|read| {
+        let address = since.checked_sub(5).filter(|read| *read < 8 * quads).map(|read| {
             let taxel = contact.taxel(self.model, read);
             let address = taxel.map_or(0, |taxel| layout.locate(taxel / layout.cols, taxel % layout.cols).address);
             Word::from(address as u64)
@@ -227,7 +227,7 @@ fn a_window_that_differs_is_found() {
         Change::value("", "on_array", |k| k.constant(1, 1)),
         Change::value("", "own", |k| k.constant(1, 1)),
         Change::value("", "shift", |k| k.constant(5, 3)),
-        Change::value("", "valid_5", |k| k.constant(1, 1)),
+        Change::value("", "valid_6", |k| k.constant(1, 1)),
         Change::value("", "ends_quad_0", |k| k.named("quad_ends")),
         Change::value("", "done", |k| k.named("write")),
     ];
