@@ -63,7 +63,7 @@ impl Window {
     }
 
     /// Its quads of mirror images.
-    pub(crate) fn quads(&self) -> Quads {
+    pub fn quads(&self) -> Quads {
         Quads { rows: self.rows, cols: self.cols }
     }
 
@@ -86,12 +86,12 @@ impl Window {
     }
 
     /// Row and column in the array of the first taxel of a window with this row and column in its middle.
-    pub(crate) fn origin_around(&self, [row, col]: [isize; 2]) -> [isize; 2] {
+    pub fn origin_around(&self, [row, col]: [isize; 2]) -> [isize; 2] {
         [row - self.rows as isize / 2, col - self.cols as isize / 2]
     }
 
     /// For each taxel of the window the taxel of the array, if there is one.
-    pub(crate) fn taxels_of(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> Vec<Option<usize>> {
+    pub fn taxels_of(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> Vec<Option<usize>> {
         let line = |first: isize, own: usize, lines: usize| {
             first.checked_add_unsigned(own).filter(|line| (0..lines as isize).contains(line))
         };

@@ -5,6 +5,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Kernel, Type};
+use crate::primitives::subtracted;
 use crate::wire::Wire;
 
 /// ```text
@@ -69,8 +70,7 @@ fn kernel(bits: usize) -> Kernel {
     let clears = k.wire("clears", rst | ends);
     let sums = ["sum0", "sum1", "sum2", "sum3"].map(|name| k.state(name, Type::signed(bits + 2), clears, 0));
     k.when(valid, || {
-        let odd = [k.constant(1, 0), taken.at(0), taken.at(1), taken.at(0) ^ taken.at(1)];
-        for (sum, odd) in sums.iter().zip(odd) {
+        for (sum, odd) in sums.iter().zip(subtracted(&k, *taken)) {
             let [less, more] = [**sum - word, **sum + word].map(|sum| sum.low(bits + 2).signed());
             sum.set(odd.mux(less, more));
         }

@@ -44,16 +44,21 @@ impl Normalise {
     }
 }
 
+/// The left shift for codes whose magnitudes have the OR `magnitude`, one bit narrower than a code.
+pub(super) fn left_shift<'k>(k: &'k Builder, magnitude: Expr<'k>) -> Expr<'k> {
+    let bits = magnitude.bits() + 1;
+    let width = count_bits(bits);
+    k.comment("Codes that are all zero have the largest shift, as if a one followed the lowest bit.");
+    let none = k.wire("none", (!magnitude.any()).repeat(width) & k.constant(width, bits as u64 - 1));
+    none | by_leading_one(k, magnitude, 0..bits - 1, width, |bit| bits - 2 - bit)
+}
+
 fn kernel(bits: usize) -> Kernel {
     let k = Builder::new("normalise");
     let (start, magnitude) = (k.input("start", 1), k.input("magnitude", bits - 1));
     let quad = k.input("quad", 4 * bits);
     let shift = k.register("shift", Type::unsigned(count_bits(bits)));
-    k.comment("An all-zero subarray has the largest shift, as if a one followed the lowest bit.");
-    let most = k.constant(shift.bits(), bits as u64 - 1);
-    let none = k.wire("none", (!magnitude.any()).repeat(shift.bits()) & most);
-    let first = by_leading_one(&k, magnitude, 0..bits - 1, shift.bits(), |bit| bits - 2 - bit);
-    let left = k.delay("left", none | first);
+    let left = k.delay("left", left_shift(&k, magnitude));
     let started = k.delay("started", start);
     k.when(started, || shift.set(left));
     let near = k.delay("near", quad);

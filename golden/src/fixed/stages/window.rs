@@ -15,6 +15,7 @@ use crate::fixed::words::formats::Formats;
 use crate::fixed::words::network::MASKED;
 use crate::learned::Window;
 use crate::sensor::Sensor;
+use crate::symmetry::quads::Quads;
 
 /// The window of a contact.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -25,6 +26,16 @@ pub struct WindowWords {
     pub mask: Vector,
     /// Magnitude and signs of the codes of the contact's own taxels in the window.
     pub own: Received,
+}
+
+/// Cycles from the start until the first taxel is folded: the window's first row and column 1, those of the taxel 1, whether
+/// the array has them 1, row and column of its quad 1, address 1, frame buffer 2, lane 1, shift 2, sum 1.
+const LATENCY: u64 = 11;
+
+/// Cycles of the hardware from the start of a window until all of it has been written: its quads are read twice, a taxel a
+/// cycle, for the magnitude and to be shifted and folded.
+pub fn cycles(window: &Window) -> u64 {
+    2 * (Quads::LANES * window.quads().len()) as u64 + LATENCY
 }
 
 /// An array whose windows are read.

@@ -74,15 +74,37 @@ pub fn frame_quads(cases: &[CasePlan]) -> usize {
     largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
 
-/// Of one taxel in one case.
-struct Place<'k> {
-    part: Expr<'k>,
-    address: Expr<'k>,
-    lower: Expr<'k>,
-    right: Expr<'k>,
+/// Where a taxel is in a subarray's quads.
+pub(crate) struct Place<'k> {
+    /// Row and column of its quad.
+    pub near: [Expr<'k>; 2],
+    /// It is in the lower half: the upper bit of the lane from which it is read.
+    pub lower: Expr<'k>,
+    /// It is in the right half: the lower bit of the lane.
+    pub right: Expr<'k>,
     /// The taxel is on the middle line of an odd count, which is its own mirror image: written to both lanes.
     both_rows: Expr<'k>,
     both_cols: Expr<'k>,
+}
+
+impl<'k> Place<'k> {
+    /// Of the taxel in this row and column of a subarray of `layout`.
+    pub fn of(k: &'k Builder, layout: Quads, [row, col]: [Expr<'k>; 2]) -> Place<'k> {
+        let (lower, near_row, both_rows) = fold(k, row, layout.rows);
+        let (right, near_col, both_cols) = fold(k, col, layout.cols);
+        Place { near: [near_row, near_col], lower, right, both_rows, both_cols }
+    }
+}
+
+/// Address of the quad in this row and column of the quads of `layout`, which begin at address `first`.
+pub(crate) fn quad_address_of<'k>(
+    k: &'k Builder,
+    layout: Quads,
+    [row, col]: [Expr<'k>; 2],
+    first: Expr<'k>,
+) -> Expr<'k> {
+    let bits = first.bits();
+    (first + times(k, row, layout.quad_cols(), bits) + col).resize(bits)
 }
 
 impl QuadAddress {
@@ -93,23 +115,21 @@ impl QuadAddress {
         let part = [k.input("part_row", self.part_row.width()), k.input("part_col", self.part_col.width())];
         let (address_bits, part_bits) = (count_bits(frame_quads), self.part.width());
         let place = |&(layout, grid): &(Quads, Grid)| {
-            let (lower, near_row, both_rows) = fold(&k, row, layout.rows);
-            let (right, near_col, both_cols) = fold(&k, col, layout.cols);
             let part = match grid.rows * grid.cols {
                 1 => k.constant(part_bits, 0),
                 _ => (times(&k, part[0], grid.cols, part_bits) + part[1]).resize(part_bits),
             };
             let first = times(&k, part, layout.len(), address_bits);
-            let address = first + times(&k, near_row, layout.quad_cols(), address_bits) + near_col;
-            Place { part, address: address.resize(address_bits), lower, right, both_rows, both_cols }
+            let place = Place::of(&k, layout, [row, col]);
+            (part, quad_address_of(&k, layout, place.near, first), place)
         };
-        let places: Vec<Place> = cases.iter().map(place).collect();
-        let chosen = |of: for<'k> fn(&Place<'k>) -> Expr<'k>, bits: usize| {
+        let places: Vec<(Expr, Expr, Place)> = cases.iter().map(place).collect();
+        let chosen = |of: for<'k> fn(&(Expr<'k>, Expr<'k>, Place<'k>)) -> Expr<'k>, bits: usize| {
             let each: Vec<Expr> = places.iter().map(of).collect();
             expression_by_case(which, &each).unwrap_or(k.constant(bits, 0))
         };
-        let quad = chosen(|place| place.address, address_bits);
-        let (lower, right) = (chosen(|place| place.lower, 1), chosen(|place| place.right, 1));
+        let quad = chosen(|(_, address, _)| *address, address_bits);
+        let (lower, right) = (chosen(|(.., place)| place.lower, 1), chosen(|(.., place)| place.right, 1));
         // The lane of the quad is the index of the word in it, followed by the lane of the word.
         let address = match lanes {
             1 => quad.concat(lower).concat(right),
@@ -117,10 +137,10 @@ impl QuadAddress {
             _ => quad,
         };
         k.wire("address", address);
-        k.wire("part", chosen(|place| place.part, part_bits));
+        k.wire("part", chosen(|(part, ..)| *part, part_bits));
         let (lower, right) = (k.wire("lower", lower), k.wire("right", right));
-        let both_rows = k.wire("both_rows", chosen(|place| place.both_rows, 1));
-        let both_cols = k.wire("both_cols", chosen(|place| place.both_cols, 1));
+        let both_rows = k.wire("both_rows", chosen(|(.., place)| place.both_rows, 1));
+        let both_cols = k.wire("both_cols", chosen(|(.., place)| place.both_cols, 1));
         let lane = match lanes {
             1 => k.constant(2, 0),
             2 => right.extend(2),

@@ -48,6 +48,11 @@ fn kernel(bits: usize) -> Kernel {
     k.finish()
 }
 
+/// For each parity whether the taxel in `lane`, 2 bits, is subtracted: where the lanes come one after the other.
+pub(crate) fn subtracted<'k>(k: &'k Builder, lane: Expr<'k>) -> [Expr<'k>; 4] {
+    [k.constant(1, 0), lane.at(0), lane.at(1), lane.at(0) ^ lane.at(1)]
+}
+
 /// a + b modulo two to the power of their width.
 fn add<'k>(a: Expr<'k>, b: Expr<'k>) -> Expr<'k> {
     (a + b).low(a.bits())

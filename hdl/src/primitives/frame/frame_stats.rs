@@ -56,18 +56,32 @@ impl FrameStats {
             negative: Default::default(),
             kernel: Body::default(),
         };
-        // A floor beyond the code's range is clamped to its end, which no code exceeds either.
-        block.bind(kernel(bits, i64::from(floor).min((1 << (bits - 1)) - 1), parts))
+        block.bind(kernel(bits, floor, parts))
     }
 }
 
-fn kernel(bits: usize, floor: i64, parts: usize) -> Kernel {
+/// The ones' complement magnitude of a signed code, one bit narrower.
+pub(crate) fn magnitude_of(code: Expr<'_>) -> Expr<'_> {
+    let bits = code.bits() - 1;
+    code.low(bits) ^ code.top().repeat(bits)
+}
+
+/// Whether a signed code is above the noise floor of `floor` codes, and whether it is below minus the noise floor.
+pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: i32) -> [Expr<'k>; 2] {
+    let bits = code.bits();
+    // A floor beyond the code's range is clamped to its end, which no code exceeds either.
+    let floor = i64::from(floor).min((1 << (bits - 1)) - 1);
+    let [most, least] = [floor, -floor].map(|limit| k.signed_constant(bits, limit));
+    [most.less(code.signed()), code.signed().less(least)]
+}
+
+fn kernel(bits: usize, floor: i32, parts: usize) -> Kernel {
     let k = Builder::new("frame_stats");
     let (clear, accept, code) = (k.input("clear", 1), k.input("accept", 1), k.input("code", bits));
     let (part, select) = (k.input("part", count_bits(parts)), k.input("select", count_bits(parts)));
-    let magnitude = k.wire("own_magnitude", code.low(bits - 1) ^ code.top().repeat(bits - 1));
-    let above = k.wire("above", k.signed_constant(bits, floor).less(code.signed()));
-    let below = k.wire("below", code.signed().less(k.signed_constant(bits, -floor)));
+    let magnitude = k.wire("own_magnitude", magnitude_of(code));
+    let [above, below] = beyond(&k, code, floor);
+    let (above, below) = (k.wire("above", above), k.wire("below", below));
     // Each the OR over the accepted codes of a subarray.
     for (name, value) in [("magnitude", magnitude), ("positive", above), ("negative", below)] {
         let of = |number: usize| {

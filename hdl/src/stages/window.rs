@@ -1,0 +1,333 @@
+//! Stage `window`: what the network reads around a contact, out of the frame buffer.
+//!
+//! ```text
+//! first sweep   taxel -> code -> magnitude -> shift
+//! second sweep  taxel -> code -> shifted -> sums of the quad -> high limbs -> window memory
+//! both sweeps   code of a taxel of the contact -> positive, negative
+//! ```
+//! A sweep reads the window quad by quad, the four mirror images of a quad one after the other, one taxel per cycle. The
+//! second follows the first at once: the shift is known when its first taxel arrives. A window takes
+//! [`cycles`](dermis_golden::fixed::stages::window::cycles), wherever it lies.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::learned;
+use dermis_golden::symmetry::parity::hadamard;
+use dermis_golden::symmetry::quads::Quads;
+use rust_hdl::prelude::*;
+
+use super::normalise::left_shift;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtracted, TaxelPlace};
+use crate::wire::{Wire, Word};
+
+/// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
+/// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked.
+///
+/// Without contacts all outputs are constant 0.
+#[derive(LogicBlock)]
+pub struct Window {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high: ends a window.
+    pub rst: Signal<In, Bit>,
+    /// Reads the window around a contact, from now on; ends another.
+    pub start: Signal<In, Bit>,
+    /// Row of the taxel in the middle of the contact; valid with `start`.
+    pub middle_row: Wire<In>,
+    /// Column of this taxel; valid with `start`.
+    pub middle_col: Wire<In>,
+    /// Label of the contact's taxels, from 1 on; valid with `start`.
+    pub label: Wire<In>,
+    /// Address of a quad of the frame buffer; 0 for a taxel beyond the array.
+    pub quad_address: Wire<Out>,
+    /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
+    pub quad: Wire<In>,
+    /// Address of a quad of labels, the same as `quad_address`.
+    pub label_address: Wire<Out>,
+    /// Labels of the quad's four taxels; two cycles after `label_address`.
+    pub labels: Wire<In>,
+    /// A quad is written to the window memory.
+    pub write: Signal<Out, Bit>,
+    /// Address of the quad; valid with `write`.
+    pub write_address: Wire<Out>,
+    /// High limbs of the four parities of the quad, signed; valid with `write`.
+    pub write_quad: Wire<Out>,
+    /// Folded mask of the quad in units of [`MASKED`](dermis_golden::fixed::words::network::MASKED), four signed fields of
+    /// 4 bits; valid with `write`.
+    pub mask_quad: Wire<Out>,
+    /// A code of the contact's taxels in the window is above the noise floor; valid from `done` until the next `start`.
+    pub positive: Signal<Out, Bit>,
+    /// A code of these taxels is below minus the noise floor; valid as `positive`.
+    pub negative: Signal<Out, Bit>,
+    /// The window has been written; high for one cycle, the cycle after the last `write`.
+    pub done: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Window,
+    clock clk,
+    inputs [rst, start, middle_row, middle_col, label, quad, labels],
+    outputs [
+        quad_address, label_address, write, write_address, write_quad, mask_quad, positive, negative, done
+    ]
+);
+
+/// Width of a field of the mask: one word of 0 or 1, signed, and the growth of the sum.
+const MASK_BITS: usize = 4;
+
+/// Cycles from the scan of a taxel until its code has been chosen from its quad, and until it enters the sums of its own.
+const CODE: usize = 7;
+const SUM: usize = 9;
+
+impl Window {
+    /// For the windows of `model`.
+    pub fn new(model: &Model) -> Self {
+        let (formats, layout) = (model.formats(), model.layout());
+        let (bits, label_bits) = (formats.input_bits as usize, count_bits(model.scene.partition.max_contacts + 1));
+        let quads = model.by_contact.as_ref().map_or(1, |contacts| contacts.window.quads().len());
+        let address = count_bits(layout.len());
+        let block = Window {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            middle_row: Wire::new(count_bits(layout.rows)),
+            middle_col: Wire::new(count_bits(layout.cols)),
+            label: Wire::new(label_bits),
+            quad_address: Wire::new(address),
+            quad: Wire::new(4 * bits),
+            label_address: Wire::new(address),
+            labels: Wire::new(4 * label_bits),
+            write: Default::default(),
+            write_address: Wire::new(count_bits(quads)),
+            write_quad: Wire::new(4 * (formats.fold_bits - formats.input_low_bits) as usize),
+            mask_quad: Wire::new(4 * MASK_BITS),
+            positive: Default::default(),
+            negative: Default::default(),
+            done: Default::default(),
+            kernel: Body::default(),
+        };
+        let kernel = block.kernel_of(model);
+        block.bind(kernel)
+    }
+
+    fn kernel_of(&self, model: &Model) -> Kernel {
+        let k = Builder::new("window");
+        let own = Ports {
+            k: &k,
+            rst: k.input("rst", 1),
+            start: k.input("start", 1),
+            middle: [k.input("middle_row", self.middle_row.width()), k.input("middle_col", self.middle_col.width())],
+            label: k.input("label", self.label.width()),
+            quad: k.input("quad", self.quad.width()),
+            labels: k.input("labels", self.labels.width()),
+        };
+        match &model.by_contact {
+            Some(contacts) => own.window(model, &contacts.window),
+            None => {
+                k.comment("There are no contacts.");
+                let words = [
+                    ("quad_address", self.quad_address.width()),
+                    ("label_address", self.label_address.width()),
+                    ("write_address", self.write_address.width()),
+                    ("write_quad", self.write_quad.width()),
+                    ("mask_quad", self.mask_quad.width()),
+                ];
+                let bits = ["write", "positive", "negative", "done"].map(|name| (name, 1));
+                for (name, width) in words.into_iter().chain(bits) {
+                    k.wire(name, k.constant(width, 0));
+                }
+            }
+        }
+        k.finish()
+    }
+}
+
+/// The inputs, in the kernel under construction.
+struct Ports<'k> {
+    k: &'k Builder,
+    rst: Expr<'k>,
+    start: Expr<'k>,
+    middle: [Expr<'k>; 2],
+    label: Expr<'k>,
+    quad: Expr<'k>,
+    labels: Expr<'k>,
+}
+
+/// The taxel of a cycle of the scan.
+struct Scanned<'k> {
+    /// One is scanned.
+    valid: Expr<'k>,
+    /// Lane of the window's quad, 2 bits.
+    lane: Expr<'k>,
+    /// With it a quad of the second sweep ends.
+    ends_quad: Expr<'k>,
+    /// Its row and column in the array, where the array has it, else 0; two cycles later.
+    place: [Expr<'k>; 2],
+    /// It is beyond the array; valid with `place`.
+    outside: Expr<'k>,
+}
+
+impl<'k> Ports<'k> {
+    /// A bit that is 0 after a reset or a start.
+    fn bit(&self, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let state = self.k.state(name, Type::unsigned(1), self.restarts(), 0);
+        state.set(value);
+        *state
+    }
+
+    fn restarts(&self) -> Expr<'k> {
+        self.rst | self.start
+    }
+
+    /// `value` so many cycles later; a bit of control is 0 after a reset or a start.
+    fn later(&self, name: &str, value: Expr<'k>, cycles: usize, is_control: bool) -> Expr<'k> {
+        (0..cycles).fold(value, |value, number| match is_control {
+            true => self.bit(&format!("{name}_{number}"), value),
+            false => self.k.delay(&format!("{name}_{number}"), value),
+        })
+    }
+
+    fn window(&self, model: &Model, window: &learned::Window) {
+        let k = self.k;
+        let scanned = self.scan(window, model.layout());
+        let [code, own, masked] = self.code(model, &scanned);
+
+        k.comment(
+            "First sweep: the magnitude, from which the shift follows; both: signs. The second sweep repeats them.",
+        );
+        let valid = self.later("valid", scanned.valid, CODE, true);
+        let gathered = |name: &str, value: Expr<'k>| {
+            let held = k.state(name, Type::unsigned(value.bits()), self.restarts(), 0);
+            held.set(*held | value);
+            *held
+        };
+        let magnitude = magnitude_of(code);
+        let magnitude = gathered("magnitude", magnitude & valid.repeat(magnitude.bits()));
+        let [above, below] = beyond(k, code, model.noise_floor);
+        let counts = self.bit("counts", own & valid);
+        gathered("positive", k.delay("above", above) & counts);
+        gathered("negative", k.delay("below", below) & counts);
+
+        k.comment("Second sweep: codes and mask are shifted and folded, a taxel per cycle.");
+        let shift = k.delay("shift", left_shift(k, magnitude));
+        let shifted = k.delay("shifted", k.delay("near", code).shift_left_by(shift));
+        let sums = self.sums(shifted, self.later("lane", scanned.lane, SUM, false));
+        let low = model.formats().input_low_bits as usize;
+        k.wire("write_quad", concat(&sums.map(|sum| sum.slice(low, sum.bits() - low))));
+        let mask = k.register("mask", Type::unsigned(Quads::LANES));
+        mask.set(self.later("masked_code", masked, SUM - CODE, false).concat(mask.slice(1, Quads::LANES - 1)));
+        k.wire("mask_quad", mask.table(4 * MASK_BITS, &folded_masks()));
+
+        let ended = self.later("ends_quad", scanned.ends_quad, SUM, true);
+        let write = self.bit("write", ended);
+        let quads = window.quads().len();
+        let address = k.state("write_address", Type::unsigned(count_bits(quads)), self.restarts(), 0);
+        k.when(write, || address.set(address.plus(1)));
+        self.bit("done", write & address.is(quads as u64 - 1));
+    }
+
+    /// Scans the window twice: quad by quad, in each the four lanes.
+    fn scan(&self, window: &learned::Window, array: Quads) -> Scanned<'k> {
+        let (k, quads) = (self.k, window.quads());
+        let scanning = k.state("scanning", Type::unsigned(1), self.rst, 0);
+        let counter = |name: &str, limit: usize| k.state(name, Type::unsigned(count_bits(limit)), self.restarts(), 0);
+        let lane = counter("lane", Quads::LANES);
+        let (across, down) = (counter("across", quads.quad_cols()), counter("down", quads.quad_rows()));
+        let again = counter("again", 2);
+        let quad_ends = k.wire("quad_ends", *scanning & lane.all());
+        let row_ends = k.wire("row_ends", quad_ends & across.is(quads.quad_cols() as u64 - 1));
+        let sweep_ends = k.wire("sweep_ends", row_ends & down.is(quads.quad_rows() as u64 - 1));
+        k.when(*scanning, || lane.set(lane.plus(1)));
+        k.when(quad_ends, || across.set(across.plus(1)));
+        k.when(row_ends, || across.set(k.constant(across.bits(), 0)));
+        k.when(row_ends, || down.set(down.plus(1)));
+        k.when(sweep_ends, || down.set(k.constant(down.bits(), 0)));
+        k.when(sweep_ends, || again.set(k.constant(1, 1)));
+        scanning.set(self.start | (*scanning & !(sweep_ends & *again)));
+
+        k.comment(
+            "Row and column in the array, modulo a power of two that tells lines beyond either end from its own.",
+        );
+        let line = |axis: usize, near: Expr<'k>, far: Expr<'k>, own: usize, lines: usize| {
+            let name = ["row", "col"][axis];
+            let bits = count_bits(lines + own);
+            let first = k.register(&format!("first_{name}"), Type::unsigned(bits));
+            k.when(self.start, || first.set(self.middle[axis].extend(bits).minus(own as u64 / 2)));
+            let mirrored = (k.constant(count_bits(own), own as u64 - 1) - near).low(count_bits(own));
+            let at = k.delay(&format!("{name}_at"), (*first + far.mux(mirrored, near)).low(bits));
+            (at.low(count_bits(lines)), at.less(k.constant(bits, lines as u64)))
+        };
+        let (row, has_row) = line(0, *down, lane.at(1), window.rows, array.rows);
+        let (col, has_col) = line(1, *across, lane.at(0), window.cols, array.cols);
+        let on_array = k.wire("on_array", has_row & has_col);
+        let place = |name: &str, at: Expr<'k>| k.delay(name, at & on_array.repeat(at.bits()));
+        Scanned {
+            valid: *scanning,
+            lane: *lane,
+            ends_quad: quad_ends & *again,
+            place: [place("row", row), place("col", col)],
+            outside: k.delay("outside", !on_array),
+        }
+    }
+
+    /// The code of the scanned taxel, whether it is one of the contact, and whether it is masked; [`CODE`] cycles later.
+    fn code(&self, model: &Model, scanned: &Scanned<'k>) -> [Expr<'k>; 3] {
+        let (k, layout) = (self.k, model.layout());
+        let [row, col] = scanned.place;
+        let place = TaxelPlace::of(k, layout, scanned.place);
+        let near = [0, 1].map(|axis| k.delay(["near_row", "near_col"][axis], place.near[axis]));
+        let first = k.constant(count_bits(layout.len()), 0);
+        let address = k.delay("quad_address", quad_address_of(k, layout, near, first));
+        k.wire("label_address", address);
+        let is_dead = (!model.dead.is_empty()).then(|| {
+            let table = (0..1usize << (row.bits() + col.bits())).map(|at| {
+                let (row, col) = (at >> col.bits(), at % (1 << col.bits()));
+                u64::from(col < layout.cols && model.dead.binary_search(&(row * layout.cols + col)).is_ok())
+            });
+            row.concat(col).table(1, &table.collect::<Vec<u64>>())
+        });
+        let masked = is_dead.map_or(scanned.outside, |dead| scanned.outside | dead);
+        // With the quad.
+        let masked = self.later("masked", masked, 4, false);
+        let from = self.later("from", place.lower.concat(place.right), 4, false);
+        let chosen = |quad: Expr<'k>| {
+            let bits = quad.bits() / Quads::LANES;
+            let lane = |lane: usize| quad.slice(lane * bits, bits);
+            from.at(1).mux(from.at(0).mux(lane(3), lane(2)), from.at(0).mux(lane(1), lane(0)))
+        };
+        let bits = self.quad.bits() / Quads::LANES;
+        let code = k.delay("code", chosen(self.quad) & (!masked).repeat(bits));
+        let label = k.register("contact", Type::unsigned(self.label.bits()));
+        k.when(self.start, || label.set(self.label));
+        let own = k.delay("own", chosen(self.labels).equals(*label));
+        [code, own, k.delay("masked_code", masked)]
+    }
+
+    /// The four parities of a quad whose words, signed, come one after the other; last first.
+    fn sums(&self, word: Expr<'k>, lane: Expr<'k>) -> [Expr<'k>; 4] {
+        let k = self.k;
+        let bits = word.bits() + 2;
+        let word = word.signed().extend(bits).unsigned();
+        let begins = !lane.any();
+        let odd = subtracted(k, lane);
+        [3, 2, 1, 0].map(|parity| {
+            let sum = k.register(&format!("sum{parity}"), Type::unsigned(bits));
+            let before = begins.mux(k.constant(bits, 0), *sum);
+            // One adder: −w is the complement of w and one more, the carry of the added lowest bits.
+            let (odd, turned) = (odd[parity], word ^ odd[parity].repeat(bits));
+            sum.set((before.concat(odd) + turned.concat(odd)).slice(1, bits));
+            *sum
+        })
+    }
+}
+
+/// The folded mask of a quad, by its four bits.
+fn folded_masks() -> Vec<u64> {
+    let folded = |masked: i64| hadamard([0, 1, 2, 3].map(|lane| masked >> lane & 1));
+    (0..1 << Quads::LANES).map(|masked| Word::of_fields(&folded(masked), MASK_BITS).number()).collect()
+}
+
+#[cfg(test)]
+mod tests;
