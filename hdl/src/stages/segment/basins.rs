@@ -1,0 +1,280 @@
+//! The tables of the basins: loads, saddles, joining, order.
+//!
+//! Basins that exist are a list in `chain`, in the order of their numbers: each holds the next one, 0 the first, the last one
+//! 0. One that is gone holds the one it is part of, which has a smaller number. One that has been taken from the list, in the
+//! order of the loads, holds its contact.
+
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::segment::SMALL;
+
+use super::control::*;
+use super::walk::Order;
+use crate::language::{Contents, Expr, Net, Type};
+use crate::primitives::count_bits;
+
+/// Ticks of `PAIRS`: the next lower basin of a pair, the next higher one, its saddle, the decision.
+const LOWER: u64 = 0;
+const SADDLE: u64 = 3;
+const HIGHER: u64 = 4;
+const JUDGE: u64 = 5;
+
+/// Registers of the tables alone.
+struct List<'k> {
+    /// The lower basin of the pairs; in `LEAST` the basin before the cursor.
+    outer: Net<'k>,
+    /// The pair that was found; of a basin with its load the one before and itself.
+    into: Net<'k>,
+    gone: Net<'k>,
+    found: Net<'k>,
+    /// Saddles of a basin with a small load are compared.
+    small: Net<'k>,
+    /// The largest load is looked for.
+    ranks: Net<'k>,
+    /// Highest saddle so far.
+    best: Net<'k>,
+    /// Bar of another basin.
+    hold: Net<'k>,
+    /// The basin after the cursor.
+    next: Expr<'k>,
+    /// The basin that is gone is after the cursor, and what was after that.
+    unlinks: Expr<'k>,
+    after: Net<'k>,
+}
+
+impl<'k> Circuit<'k> {
+    /// Every number of a basin is in the list.
+    pub(super) fn cleared(&self) -> Expr<'k> {
+        self.is(CLEAR) & self.lower.equals(*self.higher) & self.higher.equals(*self.count)
+    }
+
+    /// Every basin has its contact.
+    pub(super) fn settled(&self) -> Expr<'k> {
+        self.at(SETTLE, 1) & self.higher.all()
+    }
+
+    /// The tables, filled in the `order` of the taxels.
+    pub(super) fn tables(&self, order: &Order<'k>) {
+        let k = self.k;
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        k.comment("List of the basins");
+        let [outer, into, gone, after] = ["outer", "into", "gone", "after"].map(|name| register(name, BASIN));
+        let [found, small, ranks] = ["found", "small", "ranks"].map(|name| register(name, 1));
+        let follows = self.chain_out.low(BASIN);
+        let unlinks = k.wire("unlinks", self.is(JOIN) & follows.equals(*gone));
+        let next = k.wire("next", unlinks.mux(*after, follows));
+        let [best, hold] = ["best", "hold"].map(|name| register(name, self.shape.smoothed));
+        let list = List { outer, into, gone, found, small, ranks, best, hold, next, unlinks, after };
+        self.saddles(order, &list);
+        let less = self.loads(order, &list);
+        self.middles(less);
+        self.list(&list);
+        self.enter(order.joins, LEAST, || {
+            self.cursor.set(self.zero(BASIN));
+            ranks.set(self.zero(1));
+        });
+    }
+
+    /// The saddles and the bars; which pair is to be joined.
+    fn saddles(&self, order: &Order<'k>, list: &List<'k>) {
+        let (k, shape) = (self.k, self.shape);
+        let one = k.constant(1, 1);
+        k.comment("Saddles");
+        let basin = self.steps_out.low(BASIN);
+        let stall = k.register("stall", Type::unsigned(2));
+        let differs = k.wire("differs", self.is(BORDERS) & order.beside & basin.differs(*self.own));
+        stall.set(stall.plus(1) & differs.repeat(2));
+        self.moves.set(!differs | stall.all());
+        k.when(self.at(BORDERS, 3), || self.own.set(basin));
+        let meets = k.wire("meets", differs & stall.is(0));
+
+        let one_basin = select(&[
+            (self.is(BORDERS), *self.own),
+            (self.is(PAIRS), *list.outer),
+            (self.at(JOIN, 2), *list.into),
+            (self.at(JOIN, 5), *list.gone),
+        ]);
+        let other = self.is(BORDERS).mux(basin, self.at(JOIN, 2).mux(*self.cursor, list.next));
+        let (one_basin, other) = (k.wire("one_basin", one_basin), k.wire("other_basin", other));
+        let ordered = k.wire("ordered", one_basin.less(other));
+        let pairs = [(PAIRS, HIGHER), (PAIRS, SADDLE), (JOIN, 2), (JOIN, 5)];
+        let pairs = pairs.map(|(step, tick)| self.at(step, tick)).into_iter().fold(meets, |any, at| any | at);
+        k.when(pairs, || {
+            self.lower.set(ordered.mux(one_basin, other));
+            self.higher.set(ordered.mux(other, one_basin));
+        });
+        let diagonal = k.wire("diagonal", self.lower.equals(*self.higher));
+        k.when(self.is(CLEAR), || {
+            self.lower.set(diagonal.mux(self.zero(BASIN), self.lower.plus(1)));
+        });
+        k.when(self.is(CLEAR) & diagonal | self.at(SETTLE, 1), || self.higher.set(self.higher.plus(1)));
+
+        let place = self.lower.concat(*self.higher);
+        let memory = k.memory("saddles", TABLE * TABLE, shape.smoothed, Contents::Undefined).unchecked();
+        let memory = memory.holds(Holds::Saddles);
+        let saddle = k.delay("saddle", k.delay("saddle_read", memory.read(place)));
+        let larger = k.wire("larger", list.best.less(saddle));
+        let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
+        memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, 5), place, largest);
+        let lower = self.difference.top().mux(self.words_out, *self.base);
+        k.when(meets, || list.best.set(lower));
+        k.when(self.at(JOIN, 4), || list.best.set(saddle));
+
+        let bar = k.wire("bar", self.bars.read(*self.cursor));
+        k.when(self.at(PAIRS, HIGHER) | self.at(JOIN, 0), || list.hold.set(bar));
+        let rises = self.at(JOIN, 1) & list.into.any() & bar.less(*list.hold);
+        let fresh = order.fresh;
+        self.bars.write(fresh | rises, fresh.mux(order.next, *self.cursor), fresh.mux(self.result, *list.hold));
+        let high = !saddle.less(bar) | !saddle.less(*list.hold);
+        let may = list.small.mux(self.cursor.differs(*list.outer), high);
+        let takes = k.wire("takes_pair", self.at(PAIRS, SADDLE) & may & (!*list.found | larger));
+        k.when(takes, || {
+            list.best.set(saddle);
+            list.found.set(one);
+            list.into.set(*self.lower);
+            list.gone.set(*self.higher);
+        });
+    }
+
+    /// The loads, and the sums of the contacts: whether one is less than what is held.
+    fn loads(&self, order: &Order<'k>, list: &List<'k>) -> Expr<'k> {
+        let (k, shape) = (self.k, self.shape);
+        let contact = count_bits(shape.most);
+        k.comment("Loads and sums");
+        let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
+        // A product is there two cycles after its factor is chosen.
+        let sum = self.tick.at(0).concat(!self.tick.at(0) & !self.tick.at(2));
+        let at = select(&[
+            (self.is(BORDERS), *self.own & (!self.tick.at(0)).repeat(BASIN)),
+            (self.is(LABEL), index(self.label.minus(1).low(contact), sum)),
+            (self.is(MIDDLE), index(self.higher.low(contact), self.tick.low(2))),
+            (self.among(&[CLEAR, SETTLE]), *self.higher),
+            (self.among(&[LEAST, JOIN]), *self.cursor),
+        ]);
+        let at = k.wire("load_place", at);
+        let load = k.wire("load", self.loads.read(at));
+        let (held, low) = (k.register("held", load.ty()), k.register("held_low", Type::unsigned(1)));
+        let less = k.wire("less", load.concat(self.zero(1)).less(held.concat(*low)));
+        let begins = k.wire("begins_list", !self.cursor.any());
+        let scans = self.at(LEAST, 0);
+        k.when(scans | self.at(JOIN, 0) | self.at(MIDDLE, 0), || {
+            let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(shape.sum);
+            let limit = whole & (!*list.ranks).repeat(shape.sum);
+            let taken = less ^ *list.ranks;
+            let kept = (scans & !begins & !taken).mux(*held, load);
+            held.set((scans & begins).mux(limit, kept));
+        });
+        // Half a unit more makes a comparison one of "at most".
+        k.when(scans & begins, || low.set(k.constant(1, 1)));
+        let takes = k.wire("takes_load", scans & !begins & (less ^ *list.ranks));
+        k.when(takes, || {
+            low.set(*list.ranks);
+            list.found.set(k.constant(1, 1));
+            list.gone.set(*self.cursor);
+            list.into.set(*list.outer);
+        });
+        k.when(scans & begins, || list.found.set(self.zero(1)));
+        k.when(self.at(MIDDLE, 0), || low.set(self.zero(1)));
+
+        let diagonal = self.is(CLEAR) & self.lower.equals(*self.higher);
+        let zeros = k.wire("zeros", diagonal | self.at(SETTLE, 1));
+        let of_basin = !self.tick.at(0) & self.own.any() | self.tick.at(0);
+        let borders = self.is(BORDERS) & *self.begun & *self.moves & !self.tick.slice(1, 3).any() & of_basin;
+        let joins = self.at(JOIN, 1) & list.into.any();
+        let labels = self.is(LABEL) & *self.adds & !self.tick.at(1);
+        let subtracts = k.wire("subtracts", self.goes_on(less));
+        let products = self.among(&[BORDERS, LABEL]);
+        let addend = products.mux(self.product.resize(shape.sum), *held ^ self.is(MIDDLE).repeat(shape.sum));
+        let total = k.wire("load_total", (load + addend + self.is(MIDDLE)).low(shape.sum));
+        let _ = order;
+        self.loads.write(zeros | borders | joins | labels | subtracts, at, total & (!zeros).repeat(shape.sum));
+        less
+    }
+
+    /// The list, and the steps through it.
+    fn list(&self, list: &List<'k>) {
+        let (k, tick) = (self.k, self.tick);
+        let zero = |bits: usize| self.zero(bits);
+        let (one, ends) = (k.constant(1, 1), k.wire("list_ends", !list.next.any()));
+        let found = *list.found;
+
+        k.comment("Steps through the list");
+        let scans = self.at(LEAST, 0);
+        k.when(scans, || list.outer.set(*self.cursor));
+        k.when(scans | self.at(JOIN, 5), || self.cursor.set(list.next));
+        self.turn(scans & ends, 1);
+        let told = self.at(LEAST, 1);
+        self.enter(told & *list.ranks & found, TAKE, || self.cursor.set(*list.gone));
+        self.enter(told & *list.ranks & !found, SETTLE, || self.higher.set(zero(BASIN)));
+        self.enter(told & !*list.ranks, PAIRS, || {
+            list.small.set(found);
+            list.found.set(zero(1));
+            list.outer.set(*list.gone);
+            self.lower.set(zero(BASIN));
+            self.higher.set(*list.gone);
+        });
+        self.turn(told & !*list.ranks & found, 1);
+
+        let (lower, higher, saddle) = (self.at(PAIRS, LOWER), self.at(PAIRS, HIGHER), self.at(PAIRS, SADDLE));
+        k.when(lower, || {
+            list.outer.set(list.next);
+            self.cursor.set(list.next);
+            tick.set(ends.mux(k.constant(4, JUDGE), k.constant(4, HIGHER)));
+        });
+        k.when(self.at(PAIRS, 1) | self.at(PAIRS, 2), || tick.set(tick.plus(1)));
+        k.when(higher | saddle, || {
+            self.cursor.set(ends.mux(*list.outer, list.next));
+            let end = (saddle & *list.small).mux(k.constant(4, JUDGE), k.constant(4, LOWER));
+            tick.set(ends.mux(end, k.constant(4, 1)));
+        });
+        let judges = self.at(PAIRS, JUDGE);
+        self.enter(judges & found, JOIN, || self.cursor.set(*list.gone));
+        self.enter(judges & !found, LEAST, || {
+            self.cursor.set(zero(BASIN));
+            list.ranks.set(one);
+            self.kept.set(zero(self.kept.bits()));
+        });
+
+        k.when(self.is(JOIN), || tick.set(tick.is(5).mux(k.constant(4, 2), tick.plus(1))));
+        k.when(self.at(JOIN, 0), || {
+            list.after.set(list.next);
+            self.cursor.set(*list.into);
+        });
+        k.when(self.at(JOIN, 1), || {
+            self.cursor.set(zero(BASIN));
+            self.lower.set(zero(BASIN));
+            self.higher.set(*list.gone);
+        });
+        self.enter(self.at(JOIN, 5) & ends, LEAST, || ());
+
+        let full = self.kept.is(self.shape.most as u64);
+        self.enter(self.at(TAKE, 1), LEAST, || {
+            self.cursor.set(zero(BASIN));
+            self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
+        });
+        k.when(self.at(TAKE, 1) & full, || self.overflow.set(one));
+        k.when(self.at(SETTLE, 0) & !self.chain_out.top(), || self.cursor.set(list.next));
+        k.when(self.at(SETTLE, 1), || self.cursor.set(self.higher.plus(1)));
+
+        let link = |basin: Expr<'k>| zero(1).concat(basin);
+        let diagonal = self.is(CLEAR) & self.lower.equals(*self.higher);
+        let last = self.higher.equals(*self.count);
+        let label = one.concat((self.kept.plus(1) & (!full).repeat(self.kept.bits())).resize(BASIN));
+        let (joins, unlinks) = (self.at(JOIN, 1), self.at(JOIN, 5) & list.unlinks);
+        let [takes, labels, settles] = [(TAKE, 0), (TAKE, 1), (SETTLE, 1)].map(|(step, tick)| self.at(step, tick));
+        let at = select(&[
+            (self.among(&[CLEAR, SETTLE]), *self.higher),
+            (joins | labels, *list.gone),
+            (self.at(JOIN, 5), *self.cursor),
+            (takes, *list.into),
+        ]);
+        let following = self.higher.plus(1) & (!last).repeat(BASIN);
+        let data = select(&[
+            (self.is(CLEAR), link(following)),
+            (joins, link(*list.into)),
+            (takes | self.at(JOIN, 5), link(list.next)),
+            (labels, label),
+            (settles, self.chain_out),
+        ]);
+        self.chain.write(diagonal | joins | unlinks | takes | labels | settles, at, data);
+    }
+}
