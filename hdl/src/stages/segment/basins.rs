@@ -58,7 +58,7 @@ impl<'k> Circuit<'k> {
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         k.comment("List of the basins");
         let [outer, into, gone, after] = ["outer", "into", "gone", "after"].map(|name| register(name, BASIN));
-        let [found, small, ranks] = ["found", "small", "ranks"].map(|name| register(name, 1));
+        let [found, small, ranks] = ["found", "is_small", "ranks"].map(|name| register(name, 1));
         let follows = self.chain_out.low(BASIN);
         let unlinks = k.wire("unlinks", self.is(JOIN) & follows.equals(*gone));
         let next = k.wire("next", unlinks.mux(*after, follows));

@@ -256,11 +256,13 @@ impl<'k> Circuit<'k> {
         let sum = shape.smoothed + FRACTION;
         let partial = register("partial", sum);
         let total = k.wire("total", (*partial + product.low(sum)).low(sum));
-        let adds = k.wire("adds", smooths & (tick.at(3) | tick.slice(1, 2).all()));
+        let adds = k.wire("sums", smooths & (tick.at(3) | tick.slice(1, 2).all()));
         let rounding = smooths.mux(k.constant(sum, HALF), k.constant(sum, BAR_ROUNDING));
         partial.set((adds & !flags.at(0)).mux(total, rounding));
         let result = k.delay("result", total.slice(FRACTION, shape.smoothed));
-        let smoothed = k.delay("smoothed", adds & flags.at(0));
+        let ready = k.delay("ready", adds & flags.at(0));
+        // Not the word that follows the last one of an axis into the next step.
+        let smoothed = k.wire("smoothed", ready & tick.any());
         let line_ends = k.delay("line_ends", flags.at(2));
 
         let table = |name: &str, bits: usize, holds: Holds| memory(name, TABLE, bits, holds);

@@ -76,7 +76,7 @@ fn frame(sensor: &Sensor, kind: usize, random: &mut fastrand::Rng) -> Vec<i64> {
             3 => -random.i64(0..most),
             4 => most - 1,
             5 => [0, most / 2][random.usize(..2)],
-            6 if row % 2 == 0 && col % 2 == 0 => most / 2 - 1000 * random.i64(..3),
+            6 if row % 2 == 0 && col % 2 == 0 => most / 2 - 1000 * random.i64(0..3),
             7 => most / 64 * (row + col) as i64 / 2,
             8 => (shape(row, col) >> LOW >> 10) << LOW << 10,
             _ => 0,
@@ -214,5 +214,118 @@ fn contacts_are_those_of_the_model() {
     for (array, kinds) in arrays {
         let block = Segment::new(&array.segmentation(), LANE, LOW);
         check(block.kernel.kernel(), &stimulus(&array, kinds, 5), &mut Segmenting::new(&array));
+    }
+}
+
+#[test]
+fn debug_segment() {
+    use crate::language::Simulation;
+    for (rows, cols, most, sharp) in [
+        (2, 3, 8, false),
+        (8, 8, 2, false),
+        (7, 12, 8, false),
+        (10, 10, 8, false),
+        (16, 16, 8, true),
+        (20, 20, 8, false),
+    ] {
+        let array = if sharp { Array::sharp(rows, cols) } else { Array::new(rows, cols, most) };
+        let block = Segment::new(&array.segmentation(), LANE, LOW);
+        let kernel = block.kernel.kernel();
+        let mut sim = Simulation::new(kernel);
+        let slot = |name: &str| sim.slot_of(kernel, name).unwrap();
+        let names = [
+            "rst",
+            "start",
+            "fill",
+            "fill_address",
+            "fill_quad",
+            "done",
+            "state",
+            "count",
+            "overflow",
+            "middle_row",
+            "middle_col",
+            "contact",
+            "label_address",
+            "labels",
+        ];
+        let slots: Vec<usize> = names.iter().map(|n| slot(n)).collect();
+        let at = |n: &str| slots[names.iter().position(|m| *m == n).unwrap()];
+        let mut random = fastrand::Rng::with_seed(1);
+        println!("{rows}x{cols} longest {}", array.segmentation().longest());
+        for index in 0..30 {
+            let p = frame(&array.sensor, index % KINDS, &mut random);
+            sim.set(at("rst"), &[u64::from(index == 0)]);
+            sim.set(at("start"), &[0]);
+            sim.show();
+            sim.clock();
+            sim.set(at("rst"), &[0]);
+            for (address, quad) in array.quads(&p).into_iter().enumerate() {
+                sim.set(at("fill"), &[1]);
+                sim.set(at("fill_address"), &[address as u64]);
+                sim.set(at("fill_quad"), &quad.limbs()[..2]);
+                sim.show();
+                sim.clock();
+            }
+            sim.set(at("fill"), &[0]);
+            let found = segment(&array.sensor, &array.segmenter, &words(&p), array.most);
+            let basins = array.segmenter.segment(&words(&p));
+            let course =
+                dermis_golden::fixed::stages::segment::cycles::Course::of(&array.sensor, &basins, &found.middles);
+            let mut states = std::collections::BTreeMap::new();
+            let mut cycles = 0;
+            sim.set(at("start"), &[1]);
+            loop {
+                sim.show();
+                *states.entry(sim.get(at("state"), 1)[0]).or_insert(0) += 1;
+                if sim.get(at("done"), 1)[0] == 1 || cycles > 100_000 {
+                    break;
+                }
+                sim.clock();
+                sim.set(at("start"), &[0]);
+                cycles += 1;
+            }
+            let mut middles = Vec::new();
+            for contact in 0..found.middles.len() {
+                sim.set(at("contact"), &[contact as u64]);
+                sim.show();
+                sim.clock();
+                sim.show();
+                middles.push(["middle_row", "middle_col"].map(|n| sim.get(at(n), 1)[0] as usize));
+            }
+            let mut labels = vec![0; array.sensor.taxels()];
+            let layout = array.layout();
+            for quad in 0..layout.len() {
+                sim.set(at("label_address"), &[quad as u64]);
+                for _ in 0..2 {
+                    sim.show();
+                    sim.clock();
+                }
+                sim.show();
+                let word = sim.get(at("labels"), 1)[0];
+                let bits = count_bits(array.most + 1);
+                (0..4).for_each(|lane| {
+                    labels[layout.taxel(quad, lane)] = (word >> (bits * lane) & ((1 << bits) - 1)) as usize
+                });
+            }
+            let ok = [
+                cycles == found.cycles,
+                sim.get(at("count"), 1)[0] as usize == found.middles.len(),
+                (sim.get(at("overflow"), 1)[0] == 1) == found.overflow,
+                middles == found.middles,
+                labels == found.labels,
+            ];
+            println!(
+                "kind {} cycles {cycles} expected {} ok {ok:?} basins {} joins {} contacts {}",
+                index % KINDS,
+                found.cycles,
+                course.basins,
+                course.joins.len(),
+                course.contacts
+            );
+            if !ok.iter().all(|ok| *ok) {
+                println!("  {states:?} {course:?}\n {middles:?} {:?}", found.middles);
+            }
+        }
     }
 }
