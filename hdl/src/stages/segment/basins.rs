@@ -12,15 +12,22 @@ use super::walk::Order;
 use crate::language::{Contents, Expr, Net, Type};
 use crate::primitives::count_bits;
 
-/// Ticks of `PAIRS`: the next lower basin of a pair, the next higher one, its saddle, the decision.
-const LOWER: u64 = 0;
-const SADDLE: u64 = 3;
-const HIGHER: u64 = 4;
-const JUDGE: u64 = 5;
+/// Ticks of `PAIRS`: the next lower basin of a pair, the next higher one, three for its saddle, the decision.
+const LOWER: u64 = 1;
+const HIGHER: u64 = 3;
+const FIRST: u64 = 4;
+const SADDLE: u64 = 6;
+const JUDGE: u64 = 7;
+/// Ticks of `JOIN`: four for the saddles to another basin.
+const OTHER: u64 = 3;
+const BEST: u64 = 5;
+const MERGED: u64 = 6;
+/// Tick of `LEAST` in which the last load has been compared.
+const TOLD: u64 = 3;
 
 /// Registers of the tables alone.
 struct List<'k> {
-    /// The lower basin of the pairs; in `LEAST` the basin before the cursor.
+    /// The lower basin of the pairs.
     outer: Net<'k>,
     /// The pair that was found; of a basin with its load the one before and itself.
     into: Net<'k>,
@@ -34,9 +41,10 @@ struct List<'k> {
     best: Net<'k>,
     /// Bar of another basin.
     hold: Net<'k>,
-    /// The basin after the cursor.
+    /// The basin after the cursor; the same a cycle later, in `JOIN` without the one that is gone.
+    follows: Expr<'k>,
     next: Expr<'k>,
-    /// The basin that is gone is after the cursor, and what was after that.
+    /// The basin that is gone was after the cursor of the cycle before, and what was after that.
     unlinks: Expr<'k>,
     after: Net<'k>,
 }
@@ -61,11 +69,12 @@ impl<'k> Circuit<'k> {
         let [found, small, ranks] = ["found", "is_small", "ranks"].map(|name| register(name, 1));
         let follows = self.chain_out.low(BASIN);
         let unlinks = k.wire("unlinks", self.is(JOIN) & follows.equals(*gone));
-        let next = k.wire("next", unlinks.mux(*after, follows));
+        let next = k.delay("next", unlinks.mux(*after, follows));
+        let unlinks = k.delay("unlinked", unlinks);
         let [best, hold] = ["best", "hold"].map(|name| register(name, self.shape.smoothed));
-        let list = List { outer, into, gone, found, small, ranks, best, hold, next, unlinks, after };
+        let list = List { outer, into, gone, found, small, ranks, best, hold, follows, next, unlinks, after };
         self.saddles(order, &list);
-        let less = self.loads(order, &list);
+        let less = self.loads(&list);
         self.middles(less);
         self.list(&list);
         self.enter(order.joins, LEAST, || {
@@ -90,13 +99,13 @@ impl<'k> Circuit<'k> {
         let one_basin = select(&[
             (self.is(BORDERS), *self.own),
             (self.is(PAIRS), *list.outer),
-            (self.at(JOIN, 2), *list.into),
-            (self.at(JOIN, 5), *list.gone),
+            (self.at(JOIN, OTHER), *list.into),
+            (self.at(JOIN, MERGED), *list.gone),
         ]);
-        let other = self.is(BORDERS).mux(basin, self.at(JOIN, 2).mux(*self.cursor, list.next));
+        let other = self.is(BORDERS).mux(basin, self.at(JOIN, OTHER).mux(*self.cursor, list.next));
         let (one_basin, other) = (k.wire("one_basin", one_basin), k.wire("other_basin", other));
         let ordered = k.wire("ordered", one_basin.less(other));
-        let pairs = [(PAIRS, HIGHER), (PAIRS, SADDLE), (JOIN, 2), (JOIN, 5)];
+        let pairs = [(PAIRS, HIGHER), (PAIRS, SADDLE), (JOIN, OTHER), (JOIN, MERGED)];
         let pairs = pairs.map(|(step, tick)| self.at(step, tick)).into_iter().fold(meets, |any, at| any | at);
         k.when(pairs, || {
             self.lower.set(ordered.mux(one_basin, other));
@@ -114,14 +123,14 @@ impl<'k> Circuit<'k> {
         let saddle = k.delay("saddle", k.delay("saddle_read", memory.read(place)));
         let larger = k.wire("larger", list.best.less(saddle));
         let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
-        memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, 5), place, largest);
+        memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
         let lower = self.difference.top().mux(self.words_out, *self.base);
         k.when(meets, || list.best.set(lower));
-        k.when(self.at(JOIN, 4), || list.best.set(saddle));
+        k.when(self.at(JOIN, BEST), || list.best.set(saddle));
 
-        let bar = k.wire("bar", self.bars.read(*self.cursor));
-        k.when(self.at(PAIRS, HIGHER) | self.at(JOIN, 0), || list.hold.set(bar));
-        let rises = self.at(JOIN, 1) & list.into.any() & bar.less(*list.hold);
+        let bar = k.delay("bar", self.bars.read(*self.cursor));
+        k.when(self.at(PAIRS, HIGHER) | self.at(JOIN, 1), || list.hold.set(bar));
+        let rises = self.at(JOIN, 2) & list.into.any() & bar.less(*list.hold);
         let fresh = order.fresh;
         self.bars.write(fresh | rises, fresh.mux(order.next, *self.cursor), fresh.mux(self.result, *list.hold));
         let high = !saddle.less(bar) | !saddle.less(*list.hold);
@@ -135,58 +144,63 @@ impl<'k> Circuit<'k> {
         });
     }
 
-    /// The loads, and the sums of the contacts: whether one is less than what is held.
-    fn loads(&self, order: &Order<'k>, list: &List<'k>) -> Expr<'k> {
+    /// The loads, and the sums of the contacts: whether one is less than what is held. A sum is there two cycles after its
+    /// place is chosen, and may be written then.
+    fn loads(&self, list: &List<'k>) -> Expr<'k> {
         let (k, shape) = (self.k, self.shape);
         let contact = count_bits(shape.most);
         k.comment("Loads and sums");
         let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
-        // A product is there two cycles after its factor is chosen.
-        let sum = self.tick.at(0).concat(!self.tick.at(0) & !self.tick.at(2));
+        // In LABEL 0, 1, 2 at the ticks 4, 0, 1; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
+        let moment = self.tick.at(0).concat(!self.tick.at(0) & !self.tick.at(2));
+        let column = self.tick.at(3) | self.tick.at(2) & self.tick.low(2).any();
+        let middle = column.concat(!column & self.tick.any());
         let at = select(&[
-            (self.is(BORDERS), *self.own & (!self.tick.at(0)).repeat(BASIN)),
-            (self.is(LABEL), index(self.label.minus(1).low(contact), sum)),
-            (self.is(MIDDLE), index(self.higher.low(contact), self.tick.low(2))),
+            (self.at(BORDERS, 4), *self.own),
+            (self.is(LABEL), index(self.label.minus(1).low(contact), moment)),
+            (self.is(MIDDLE), index(self.higher.low(contact), middle)),
             (self.among(&[CLEAR, SETTLE]), *self.higher),
             (self.among(&[LEAST, JOIN]), *self.cursor),
         ]);
-        let at = k.wire("load_place", at);
-        let load = k.wire("load", self.loads.read(at));
+        let place = k.delay("place", at);
+        let load = k.delay("load", self.loads.read(place));
+        let place = k.delay("place2", place);
+        let before = k.delay("place3", place);
+        let later = |name: &str, value| k.delay(&format!("{name}2"), k.delay(&format!("{name}1"), value));
         let (held, low) = (k.register("held", load.ty()), k.register("held_low", Type::unsigned(1)));
         let less = k.wire("less", load.concat(self.zero(1)).less(held.concat(*low)));
-        let begins = k.wire("begins_list", !self.cursor.any());
-        let scans = self.at(LEAST, 0);
-        k.when(scans | self.at(JOIN, 0) | self.at(MIDDLE, 0), || {
+        let scans = later("scans", self.at(LEAST, 0));
+        let begins = k.wire("begins_list", scans & !place.any());
+        let takes = k.wire("takes_load", scans & place.any() & (less ^ *list.ranks));
+        k.when(begins | takes | self.at(JOIN, 2) | self.at(MIDDLE, 2), || {
             let whole = load.shift_right(SMALL.trailing_zeros() as usize).extend(shape.sum);
-            let limit = whole & (!*list.ranks).repeat(shape.sum);
-            let taken = less ^ *list.ranks;
-            let kept = (scans & !begins & !taken).mux(*held, load);
-            held.set((scans & begins).mux(limit, kept));
+            held.set(begins.mux(whole & (!*list.ranks).repeat(shape.sum), load));
         });
         // Half a unit more makes a comparison one of "at most".
-        k.when(scans & begins, || low.set(k.constant(1, 1)));
-        let takes = k.wire("takes_load", scans & !begins & (less ^ *list.ranks));
+        k.when(begins, || {
+            low.set(k.constant(1, 1));
+            list.found.set(self.zero(1));
+        });
         k.when(takes, || {
             low.set(*list.ranks);
             list.found.set(k.constant(1, 1));
-            list.gone.set(*self.cursor);
-            list.into.set(*list.outer);
+            list.gone.set(place);
+            list.into.set(before);
         });
-        k.when(scans & begins, || list.found.set(self.zero(1)));
-        k.when(self.at(MIDDLE, 0), || low.set(self.zero(1)));
+        k.when(self.at(MIDDLE, 2), || low.set(self.zero(1)));
 
         let diagonal = self.is(CLEAR) & self.lower.equals(*self.higher);
-        let zeros = k.wire("zeros", diagonal | self.at(SETTLE, 1));
-        let of_basin = !self.tick.at(0) & self.own.any() | self.tick.at(0);
-        let borders = self.is(BORDERS) & *self.begun & *self.moves & !self.tick.slice(1, 3).any() & of_basin;
+        let zeros = later("zeros", diagonal | self.at(SETTLE, 1));
+        let borders = (self.at(BORDERS, 4) & self.own.any() | self.at(BORDERS, 0) & *self.begun) & *self.moves;
         let joins = self.at(JOIN, 1) & list.into.any();
         let labels = self.is(LABEL) & *self.adds & !self.tick.at(1);
-        let subtracts = k.wire("subtracts", self.goes_on(less));
-        let products = self.among(&[BORDERS, LABEL]);
-        let addend = products.mux(self.product.resize(shape.sum), *held ^ self.is(MIDDLE).repeat(shape.sum));
-        let total = k.wire("load_total", (load + addend + self.is(MIDDLE)).low(shape.sum));
-        let _ = order;
-        self.loads.write(zeros | borders | joins | labels | subtracts, at, total & (!zeros).repeat(shape.sum));
+        let sums = later("sums_up", borders | joins | labels);
+        let subtracts = k.wire("subtracts", self.is(MIDDLE) & self.tick.low(2).all());
+        let held = *held ^ subtracts.repeat(shape.sum);
+        let addend = (subtracts | self.is(JOIN)).mux(held, self.product.resize(shape.sum));
+        let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
+        let writes = zeros | sums | self.goes_on(less);
+        self.loads.write(writes, place, total & (!zeros).repeat(shape.sum));
         less
     }
 
@@ -195,36 +209,37 @@ impl<'k> Circuit<'k> {
         let (k, tick) = (self.k, self.tick);
         let zero = |bits: usize| self.zero(bits);
         let (one, ends) = (k.constant(1, 1), k.wire("list_ends", !list.next.any()));
-        let found = *list.found;
+        let (found, ranks) = (*list.found, *list.ranks);
+        let number = |tick: u64| k.constant(4, tick);
 
         k.comment("Steps through the list");
+        k.when(self.among(&[LEAST, PAIRS, JOIN]), || tick.set(tick.plus(1)));
         let scans = self.at(LEAST, 0);
-        k.when(scans, || list.outer.set(*self.cursor));
-        k.when(scans | self.at(JOIN, 5), || self.cursor.set(list.next));
-        self.turn(scans & ends, 1);
-        let told = self.at(LEAST, 1);
-        self.enter(told & *list.ranks & found, TAKE, || self.cursor.set(*list.gone));
-        self.enter(told & *list.ranks & !found, SETTLE, || self.higher.set(zero(BASIN)));
-        self.enter(told & !*list.ranks, PAIRS, || {
+        k.when(scans, || {
+            self.cursor.set(list.follows);
+            tick.set(zero(3).concat(!list.follows.any()));
+        });
+        let told = self.at(LEAST, TOLD);
+        self.enter(told & ranks & found, TAKE, || self.cursor.set(*list.gone));
+        self.enter(told & ranks & !found, SETTLE, || self.higher.set(zero(BASIN)));
+        self.enter(told & !ranks, PAIRS, || {
             list.small.set(found);
             list.found.set(zero(1));
             list.outer.set(*list.gone);
             self.lower.set(zero(BASIN));
             self.higher.set(*list.gone);
         });
-        self.turn(told & !*list.ranks & found, 1);
+        self.turn(told & !ranks & found, FIRST);
 
-        let (lower, higher, saddle) = (self.at(PAIRS, LOWER), self.at(PAIRS, HIGHER), self.at(PAIRS, SADDLE));
-        k.when(lower, || {
+        k.when(self.at(PAIRS, LOWER), || {
             list.outer.set(list.next);
             self.cursor.set(list.next);
-            tick.set(ends.mux(k.constant(4, JUDGE), k.constant(4, HIGHER)));
+            tick.set(ends.mux(number(JUDGE), number(LOWER + 1)));
         });
-        k.when(self.at(PAIRS, 1) | self.at(PAIRS, 2), || tick.set(tick.plus(1)));
-        k.when(higher | saddle, || {
+        let saddle = self.at(PAIRS, SADDLE);
+        k.when(self.at(PAIRS, HIGHER) | saddle, || {
             self.cursor.set(ends.mux(*list.outer, list.next));
-            let end = (saddle & *list.small).mux(k.constant(4, JUDGE), k.constant(4, LOWER));
-            tick.set(ends.mux(end, k.constant(4, 1)));
+            tick.set(ends.mux((saddle & *list.small).mux(number(JUDGE), zero(4)), number(FIRST)));
         });
         let judges = self.at(PAIRS, JUDGE);
         self.enter(judges & found, JOIN, || self.cursor.set(*list.gone));
@@ -234,17 +249,21 @@ impl<'k> Circuit<'k> {
             self.kept.set(zero(self.kept.bits()));
         });
 
-        k.when(self.is(JOIN), || tick.set(tick.is(5).mux(k.constant(4, 2), tick.plus(1))));
         k.when(self.at(JOIN, 0), || {
-            list.after.set(list.next);
+            list.after.set(list.follows);
             self.cursor.set(*list.into);
         });
-        k.when(self.at(JOIN, 1), || {
+        k.when(self.at(JOIN, 2), || {
             self.cursor.set(zero(BASIN));
             self.lower.set(zero(BASIN));
             self.higher.set(*list.gone);
         });
-        self.enter(self.at(JOIN, 5) & ends, LEAST, || ());
+        let merged = self.at(JOIN, MERGED);
+        k.when(merged, || {
+            self.cursor.set(list.next);
+            tick.set(number(OTHER));
+        });
+        self.enter(merged & ends, LEAST, || ());
 
         let full = self.kept.is(self.shape.most as u64);
         self.enter(self.at(TAKE, 1), LEAST, || {
@@ -252,26 +271,27 @@ impl<'k> Circuit<'k> {
             self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
         });
         k.when(self.at(TAKE, 1) & full, || self.overflow.set(one));
-        k.when(self.at(SETTLE, 0) & !self.chain_out.top(), || self.cursor.set(list.next));
+        k.when(self.at(SETTLE, 0) & !self.chain_out.top(), || self.cursor.set(list.follows));
         k.when(self.at(SETTLE, 1), || self.cursor.set(self.higher.plus(1)));
 
         let link = |basin: Expr<'k>| zero(1).concat(basin);
         let diagonal = self.is(CLEAR) & self.lower.equals(*self.higher);
         let last = self.higher.equals(*self.count);
         let label = one.concat((self.kept.plus(1) & (!full).repeat(self.kept.bits())).resize(BASIN));
-        let (joins, unlinks) = (self.at(JOIN, 1), self.at(JOIN, 5) & list.unlinks);
+        let (joins, unlinks) = (self.at(JOIN, 1), merged & list.unlinks);
         let [takes, labels, settles] = [(TAKE, 0), (TAKE, 1), (SETTLE, 1)].map(|(step, tick)| self.at(step, tick));
         let at = select(&[
             (self.among(&[CLEAR, SETTLE]), *self.higher),
             (joins | labels, *list.gone),
-            (self.at(JOIN, 5), *self.cursor),
+            (merged, *self.cursor),
             (takes, *list.into),
         ]);
         let following = self.higher.plus(1) & (!last).repeat(BASIN);
         let data = select(&[
             (self.is(CLEAR), link(following)),
             (joins, link(*list.into)),
-            (takes | self.at(JOIN, 5), link(list.next)),
+            (takes, link(list.follows)),
+            (merged, link(list.next)),
             (labels, label),
             (settles, self.chain_out),
         ]);

@@ -381,12 +381,16 @@ fn factor<'k>(k: &'k Builder, shape: &Shape, [state, tick, weight, row, col, lan
     let constant = |value: u64| k.constant(FACTOR, value);
     let [x, y, diagonal] = shape.slopes.map(constant);
     let slopes = [(5, y), (7, x), (8, x), (0, y), (2, constant(BAR))];
-    let odd = |line: Expr<'k>, lines: usize, far: Expr<'k>| {
-        let line = far.mux(k.constant(line.bits(), lines as u64 - 1) - line, line.extend(line.bits() + 1).signed());
-        line.low(line.bits() - 1).concat(k.constant(1, 1)).resize(FACTOR)
+    // The factors of a taxel stay until its products are there, when the next one has been chosen.
+    let odd = |name: &str, line: Expr<'k>, lines: usize, far: Expr<'k>| {
+        let mirrored = (k.constant(line.bits(), lines as u64 - 1) - line).low(line.bits());
+        let odd = far.mux(mirrored, line).concat(k.constant(1, 1));
+        let factor = k.register(name, odd.ty());
+        k.when(tick.is(1), || factor.set(odd));
+        factor.resize(FACTOR)
     };
-    let moments = [(2, constant(2)), (3, odd(row, shape.rows, lane.at(1)))];
-    let moment = tick.case(&moments, odd(col, shape.cols, lane.at(0)));
+    let moments = [(4, constant(2)), (0, odd("row_factor", row, shape.rows, lane.at(1)))];
+    let moment = tick.case(&moments, odd("col_factor", col, shape.cols, lane.at(0)));
     select(&[
         (state.is(ALONG_ROWS) | state.is(ALONG_COLUMNS), weight),
         (state.is(CLIMB), tick.case(&slopes, diagonal)),

@@ -7,6 +7,10 @@ use super::walk::Order;
 use crate::language::{Contents, Expr, Type};
 use crate::primitives::count_bits;
 
+/// Ticks of `MIDDLE` in which the moments along the rows and the columns are compared.
+const ROW: u64 = 3;
+const COLUMN: u64 = 7;
+
 impl<'k> Circuit<'k> {
     /// The contact of each taxel, and the labels of the quads.
     pub(super) fn labels(&self, order: &Order<'k>) {
@@ -33,9 +37,9 @@ impl<'k> Circuit<'k> {
     /// Whether the line of a middle is further: the sum of a contact is not `less` than what is held, twice its weight.
     pub(super) fn goes_on(&self, less: Expr<'k>) -> Expr<'k> {
         let last = |lines: usize| self.line.is(lines as u64 - 1);
-        let [row, col] =
-            [(1, self.shape.rows), (2, self.shape.cols)].map(|(tick, lines)| self.at(MIDDLE, tick) & !last(lines));
-        (row | col) & !less
+        let [row, col] = [(ROW, self.shape.rows), (COLUMN, self.shape.cols)];
+        let further = |(tick, lines): (u64, usize)| self.at(MIDDLE, tick) & !last(lines);
+        (further(row) | further(col)) & !less
     }
 
     /// The middles, and the end.
@@ -44,9 +48,16 @@ impl<'k> Circuit<'k> {
         let bits = count_bits(self.shape.most);
         let goes_on = self.goes_on(less);
         k.comment("Middles");
-        k.when(self.is(MIDDLE), || self.line.set(self.line.plus(1) & goes_on.repeat(self.line.bits())));
-        k.when(self.is(MIDDLE) & !goes_on, || tick.set(tick.at(1).mux(self.zero(4), tick.plus(1))));
-        k.when(self.at(MIDDLE, 2) & !goes_on, || self.higher.set(self.higher.plus(1)));
+        // A sum that was written is read again in the next tick, and compared in the one after.
+        k.when(self.is(MIDDLE), || tick.set(tick.plus(1)));
+        self.turn(self.at(MIDDLE, ROW + 1), ROW);
+        self.turn(self.at(MIDDLE, COLUMN + 1), COLUMN);
+        self.turn(self.at(MIDDLE, ROW) & !goes_on, ROW + 2);
+        self.turn(self.at(MIDDLE, COLUMN) & !goes_on, 0);
+        let compares = self.is(MIDDLE) & tick.low(2).all();
+        let line = self.line.plus(1) & goes_on.repeat(self.line.bits());
+        k.when(self.at(MIDDLE, 0) | compares, || self.line.set(line));
+        k.when(self.at(MIDDLE, COLUMN) & !goes_on, || self.higher.set(self.higher.plus(1)));
         let ends = k.wire("ends", self.at(MIDDLE, 0) & self.higher.equals(self.kept.resize(BASIN)));
         self.enter(ends, IDLE, || ());
         self.done.set(ends);
@@ -54,7 +65,7 @@ impl<'k> Circuit<'k> {
         for (axis, (name, lines)) in [("middle_row", self.row), ("middle_col", self.col)].into_iter().enumerate() {
             let memory = k.memory(&format!("{name}s"), self.shape.most, lines.bits(), Contents::Undefined).unchecked();
             let memory = memory.holds(Holds::Middles(axis));
-            let writes = self.at(MIDDLE, 1 + axis as u64) & !goes_on;
+            let writes = self.at(MIDDLE, [ROW, COLUMN][axis]) & !goes_on;
             memory.write(writes, self.higher.low(bits), self.line.low(lines.bits()));
             k.delay(name, memory.read(contact));
         }

@@ -329,3 +329,15 @@ fn debug_segment() {
         }
     }
 }
+#[test]
+fn debug_verilog() {
+    for (rows, cols) in [(10, 10), (20, 20)] {
+        let array = Array::new(rows, cols, MOST);
+        let mut block = Segment::new(&array.segmentation(), LANE, LOW);
+        block.connect_all();
+        let text =
+            crate::language::Hierarchy::of(&block)
+                .verilog("segment", &crate::language::Attributes::new(), &|_, _| None);
+        std::fs::write(format!("/tmp/seg{rows}.v"), text).unwrap();
+    }
+}

@@ -94,7 +94,7 @@ impl<'k> Circuit<'k> {
             twice(shape.rows % 2 == 1, middle_row, far) | twice(shape.cols % 2 == 1, col_last, self.lane.at(0));
         let unpacks = k.wire("unpacks", self.is(UNPACK) & self.tick.any() & !self.tick.is(5));
         let lane_end = self.at(LABEL, 4);
-        k.when(unpacks | self.at(LABEL, 0), || {
+        k.when(unpacks | self.at(LABEL, 1), || {
             self.lane_then.set(*self.lane);
             self.counts.set(!copies);
         });

@@ -10,14 +10,14 @@
 //! | clear the table of b basins | (b + 1)(b + 2)/2 |
 //! | follow the steps to the maxima | 3 for each reading: of each taxel; twice of each with a step; once per walk |
 //! | borders: loads and saddles | 5 n + 3, and 3 for each pair of neighbours in different basins |
-//! | join: for each round with B basins the smallest load | B + 2 |
+//! | join: for each round with B basins the smallest load | B + 4 |
 //! | … then its saddles, if it is small | 3 (B + 1) + 1 |
-//! | … or those of all pairs | 2 B + 3 B (B − 1)/2 + 2 |
-//! | … and the joining of a pair | 4 B + 2 |
-//! | order: for each of the remaining the largest load | B + 4 |
-//! | … then settle the contact of every basin | 66 |
+//! | … or those of all pairs | 4 B + 3 B (B − 1)/2 + 3 |
+//! | … and the joining of a pair | 4 B + 3 |
+//! | order: for each of the remaining the largest load | B + 6 |
+//! | … then settle the contact of every basin | 68 |
 //! | label the quads and add the moments | 20 Q + 2 |
-//! | middle: for each contact its row and column | row + column + 3 |
+//! | middle: for each contact its row and column | 2 (row + column) + 7 |
 
 use super::WORD_BITS;
 use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS};
@@ -88,13 +88,13 @@ impl Course {
 
 /// Cycles of a round of joining with `basins` basins: of the search for a pair, `small` or not, and of its joining.
 fn round(basins: usize, small: bool, joins: bool) -> u64 {
-    let pairs = if small { 3 * (basins + 1) + 1 } else { 2 * basins + 3 * basins * basins.saturating_sub(1) / 2 + 2 };
-    (basins + 2 + pairs + if joins { 4 * basins + 2 } else { 0 }) as u64
+    let pairs = if small { 3 * (basins + 1) + 1 } else { 4 * basins + 3 * basins * basins.saturating_sub(1) / 2 + 3 };
+    (basins + 4 + pairs + if joins { 4 * basins + 3 } else { 0 }) as u64
 }
 
 /// Cycles of the order of `contacts` contacts, and of the contacts of all basins.
 fn order(contacts: usize) -> u64 {
-    (1..=contacts as u64).map(|left| left + 4).sum::<u64>() + 66
+    (1..=contacts as u64).map(|left| left + 6).sum::<u64>() + 68
 }
 
 impl Segmentation<'_> {
@@ -136,7 +136,7 @@ impl Segmentation<'_> {
     /// Cycles from the start to the end.
     pub fn cycles(&self, course: &Course) -> u64 {
         let joined = course.joins.iter().map(|join| round(join.basins, join.small, true)).sum::<u64>();
-        let middles = course.middles.iter().map(|[row, col]| (row + col + 3) as u64).sum::<u64>();
+        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 7) as u64).sum::<u64>();
         let readings = self.sensor.taxels() + 2 * course.steps + course.walks;
         let joining = joined + round(course.contacts, false, false) + order(course.contacts);
         self.fixed() + cleared(course.basins) + 3 * (readings + course.borders) as u64 + joining + middles
@@ -148,7 +148,7 @@ impl Segmentation<'_> {
         let (rows, cols, taxels) = (self.sensor.rows, self.sensor.cols, self.sensor.taxels());
         let basins = BASINS.min(taxels);
         let pairs = rows * (cols - 1) + (rows - 1) * cols + 2 * (rows - 1) * (cols - 1);
-        let middle = |contacts: usize| (contacts.min(self.most) * (rows + cols + 1)) as u64;
+        let middle = |contacts: usize| (contacts.min(self.most) * (2 * (rows + cols) + 3)) as u64;
         let joining = |contacts: usize| {
             let joined = (contacts + 1..=basins).map(|left| round(left, true, true).max(round(left, false, true)));
             joined.sum::<u64>() + round(contacts, false, false) + order(contacts) + middle(contacts)
