@@ -129,8 +129,8 @@ pub(super) struct Circuit<'k> {
     pub(super) mirror: Net<'k>,
     pub(super) quad: Net<'k>,
     pub(super) lane: Net<'k>,
-    /// Lane that `word` is of, and whether its taxel is read from it.
-    pub(super) lane_then: Net<'k>,
+    /// The word of the lane is taken; whether it is that of a taxel of its own.
+    pub(super) picks: Expr<'k>,
     pub(super) counts: Net<'k>,
     /// Taxel that is read, and one that is written.
     pub(super) point: Net<'k>,
@@ -194,7 +194,7 @@ impl<'k> Circuit<'k> {
         let tick = register("tick", 4);
         let [address, mirror, point, target] =
             ["address", "mirror", "point", "target"].map(|name| register(name, taxel));
-        let (lane_then, moves) = (register("lane_then", 2), k.net("moves", Type::unsigned(1)));
+        let (lane, moves) = (register("lane", 2), k.net("moves", Type::unsigned(1)));
         let is = |step: u64| state.is(step);
         let later = |name: &str, value| k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value));
 
@@ -213,8 +213,10 @@ impl<'k> Circuit<'k> {
         let quads_out = later("quads", quads.read(*quad));
         let lanes: Vec<(u64, Expr)> =
             (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
-        let signed = lane_then.case(&lanes[..3], lanes[3].1);
-        let word = k.wire("word", signed.low(WORD) & (!signed.top()).repeat(WORD));
+        let signed = lane.case(&lanes[..3], lanes[3].1);
+        let picks = k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(2));
+        let word = register("word", WORD);
+        k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
 
         let memory = |name: &str, words: usize, bits: usize, holds: Holds| {
             k.memory(name, words, bits, Contents::Undefined).unchecked().holds(holds)
@@ -238,7 +240,6 @@ impl<'k> Circuit<'k> {
 
         k.comment("Multiplier and the sum of its products");
         let (row, col) = (register("row", row), register("col", col));
-        let lane = register("lane", 2);
         let smooths = k.wire("smooths", is(ALONG_ROWS) | is(ALONG_COLUMNS));
         let base = register("base", shape.smoothed);
         let read = word.extend(shape.smoothed);
@@ -281,7 +282,7 @@ impl<'k> Circuit<'k> {
             mirror,
             quad,
             lane,
-            lane_then,
+            picks,
             counts: register("counts", 1),
             point,
             target,
@@ -291,7 +292,7 @@ impl<'k> Circuit<'k> {
             moves,
             words,
             steps,
-            word,
+            word: word.get(),
             words_out,
             steps_out,
             tap,
@@ -359,7 +360,7 @@ impl<'k> Circuit<'k> {
         let (k, tick) = (self.k, self.tick);
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
         let counted = self.among(&[UNPACK, CLIMB, WALK, LABEL, TAKE, SETTLE]);
-        let ends = [(UNPACK, 5), (CLIMB, 9), (WALK, 2), (BORDERS, 4), (LABEL, 4), (TAKE, 1), (SETTLE, 1)];
+        let ends = [(UNPACK, 6), (CLIMB, 9), (WALK, 2), (BORDERS, 4), (LABEL, 4), (TAKE, 1), (SETTLE, 1)];
         let ends = ends.map(|(step, tick)| self.at(step, tick)).into_iter().reduce(|any, end| any | end);
         let ends = k.wire("ticks_end", ends.unwrap_or(self.zero(1)));
         k.when(counted | self.is(BORDERS) & *self.moves | smooths & !tick.at(3), || {
@@ -386,7 +387,7 @@ fn factor<'k>(k: &'k Builder, shape: &Shape, [state, tick, weight, row, col, lan
         let mirrored = (k.constant(line.bits(), lines as u64 - 1) - line).low(line.bits());
         let odd = far.mux(mirrored, line).concat(k.constant(1, 1));
         let factor = k.register(name, odd.ty());
-        k.when(tick.is(1), || factor.set(odd));
+        k.when(tick.is(2), || factor.set(odd));
         factor.resize(FACTOR)
     };
     let moments = [(4, constant(2)), (0, odd("row_factor", row, shape.rows, lane.at(1)))];

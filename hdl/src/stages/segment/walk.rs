@@ -57,7 +57,7 @@ impl<'k> Circuit<'k> {
 
         k.comment("Order of quads and taxels");
         let in_quads = k.wire("in_quads", self.among(&[UNPACK, LABEL]));
-        let quads_end = k.wire("quads_end", self.at(UNPACK, 5) | self.at(LABEL, 4) & self.lane.all());
+        let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
         let known = self.steps_out.at(BASIN);
         let walks = k.wire("walks", self.at(WALK, 2));
         let passes = k.wire("passes", known & (*back | !*walking));
@@ -92,13 +92,9 @@ impl<'k> Circuit<'k> {
         let middle_row = self.row.is(shape.quads[0] as u64 - 1);
         let copies =
             twice(shape.rows % 2 == 1, middle_row, far) | twice(shape.cols % 2 == 1, col_last, self.lane.at(0));
-        let unpacks = k.wire("unpacks", self.is(UNPACK) & self.tick.any() & !self.tick.is(5));
-        let lane_end = self.at(LABEL, 4);
-        k.when(unpacks | self.at(LABEL, 1), || {
-            self.lane_then.set(*self.lane);
-            self.counts.set(!copies);
-        });
-        k.when(unpacks | lane_end, || self.lane.set(self.lane.plus(1)));
+        let unpacks = k.wire("unpacks", self.is(UNPACK) & self.picks);
+        k.when(self.picks, || self.counts.set(!copies));
+        k.when(unpacks | self.at(LABEL, 4), || self.lane.set(self.lane.plus(1)));
 
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
@@ -243,7 +239,7 @@ impl<'k> Circuit<'k> {
         let (k, shape, bits) = (self.k, self.shape, self.target.bits());
         let stride = |number: usize| k.constant(bits, number as u64);
         let columns = self.is(ALONG_COLUMNS);
-        let stores = self.is(UNPACK) & self.tick.slice(1, 3).any() & *self.counts;
+        let stores = k.delay("stores", unpacks) & *self.counts;
         let word = columns.mux(self.result, self.word.extend(shape.smoothed));
         self.words.write(stores | columns & self.smoothed, *self.target, word);
         let entry = self.steps_out.bits();

@@ -4,7 +4,7 @@
 //!
 //! | step | cycles |
 //! |---|---|
-//! | unpack: quads to words, row-major | 6 Q |
+//! | unpack: quads to words, row-major | 7 Q |
 //! | smooth along the rows, along the columns | R t₀ + 7, C t₁ + 7 |
 //! | climb: the steepest neighbour of each taxel | 10 n + 6 |
 //! | clear the table of b basins | (b + 1)(b + 2)/2 |
@@ -163,7 +163,7 @@ impl Segmentation<'_> {
             (self.sensor.rows, self.sensor.cols, self.sensor.taxels(), self.quads().len());
         let taps = |axis: usize| self.taps(axis).iter().map(|(_, weights)| weights.len()).sum::<usize>();
         let smooth = rows * taps(0) + cols * taps(1) + 14;
-        (6 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 2) as u64 + ENDS
+        (7 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 2) as u64 + ENDS
     }
 }
 
