@@ -12,12 +12,12 @@ use super::walk::Order;
 use crate::language::{Contents, Expr, Net, Type};
 use crate::primitives::count_bits;
 
-/// Ticks of `PAIRS`: the next lower basin of a pair, the next higher one, three for its saddle, the decision.
+/// Ticks of `PAIRS`: the next lower basin of a pair, the next higher one, three for its saddle, the decision two later.
 const LOWER: u64 = 1;
 const HIGHER: u64 = 3;
 const FIRST: u64 = 4;
 const SADDLE: u64 = 6;
-const JUDGE: u64 = 7;
+const JUDGE: u64 = 8;
 /// Ticks of `JOIN`: four for the saddles to another basin.
 const OTHER: u64 = 3;
 const BEST: u64 = 5;
@@ -135,12 +135,15 @@ impl<'k> Circuit<'k> {
         self.bars.write(fresh | rises, fresh.mux(order.next, *self.cursor), fresh.mux(self.result, *list.hold));
         let high = !saddle.less(bar) | !saddle.less(*list.hold);
         let may = list.small.mux(self.cursor.differs(*list.outer), high);
-        let takes = k.wire("takes_pair", self.at(PAIRS, SADDLE) & may & (!*list.found | larger));
+        let may = k.delay("may_take", self.at(PAIRS, SADDLE) & may);
+        let takes = k.wire("takes_pair", may & (!*list.found | k.delay("is_larger", larger)));
+        let [saddle, lower, higher] = [("saddle2", saddle), ("lower2", *self.lower), ("higher2", *self.higher)]
+            .map(|(name, value)| k.delay(name, value));
         k.when(takes, || {
             list.best.set(saddle);
             list.found.set(one);
-            list.into.set(*self.lower);
-            list.gone.set(*self.higher);
+            list.into.set(lower);
+            list.gone.set(higher);
         });
     }
 
@@ -234,12 +237,12 @@ impl<'k> Circuit<'k> {
         k.when(self.at(PAIRS, LOWER), || {
             list.outer.set(list.next);
             self.cursor.set(list.next);
-            tick.set(ends.mux(number(JUDGE), number(LOWER + 1)));
+            tick.set(ends.mux(number(JUDGE - 1), number(LOWER + 1)));
         });
         let saddle = self.at(PAIRS, SADDLE);
         k.when(self.at(PAIRS, HIGHER) | saddle, || {
             self.cursor.set(ends.mux(*list.outer, list.next));
-            tick.set(ends.mux((saddle & *list.small).mux(number(JUDGE), zero(4)), number(FIRST)));
+            tick.set(ends.mux((saddle & *list.small).mux(number(JUDGE - 1), zero(4)), number(FIRST)));
         });
         let judges = self.at(PAIRS, JUDGE);
         self.enter(judges & found, JOIN, || self.cursor.set(*list.gone));

@@ -11,8 +11,8 @@
 //! | follow the steps to the maxima | 3 for each reading: of each taxel; twice of each with a step; once per walk |
 //! | borders: loads and saddles | 5 n + 3, and 3 for each pair of neighbours in different basins |
 //! | join: for each round with B basins the smallest load | B + 4 |
-//! | … then its saddles, if it is small | 3 (B + 1) + 1 |
-//! | … or those of all pairs | 4 B + 3 B (B − 1)/2 + 3 |
+//! | … then its saddles, if it is small | 3 (B + 1) + 2 |
+//! | … or those of all pairs | 4 B + 3 B (B − 1)/2 + 4 |
 //! | … and the joining of a pair | 4 B + 3 |
 //! | order: for each of the remaining the largest load | B + 6 |
 //! | … then settle the contact of every basin | 68 |
@@ -88,7 +88,7 @@ impl Course {
 
 /// Cycles of a round of joining with `basins` basins: of the search for a pair, `small` or not, and of its joining.
 fn round(basins: usize, small: bool, joins: bool) -> u64 {
-    let pairs = if small { 3 * (basins + 1) + 1 } else { 4 * basins + 3 * basins * basins.saturating_sub(1) / 2 + 3 };
+    let pairs = if small { 3 * (basins + 1) + 2 } else { 4 * basins + 3 * basins * basins.saturating_sub(1) / 2 + 4 };
     (basins + 4 + pairs + if joins { 4 * basins + 3 } else { 0 }) as u64
 }
 
