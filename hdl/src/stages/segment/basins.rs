@@ -77,7 +77,7 @@ impl<'k> Circuit<'k> {
         let less = self.loads(&list);
         self.middles(less);
         self.list(&list);
-        self.enter(order.joins, LEAST, || {
+        self.enter(order.joins, [BORDERS, LEAST], || {
             self.cursor.set(self.zero(BASIN));
             ranks.set(self.zero(1));
         });
@@ -154,13 +154,12 @@ impl<'k> Circuit<'k> {
         let contact = count_bits(shape.most);
         k.comment("Loads and sums");
         let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
-        // In LABEL 0, 1, 2 at the ticks 4, 0, 1; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
-        let moment = self.tick.at(0).concat(!self.tick.at(0) & !self.tick.at(2));
+        // In LABEL 0, 1, 2 at these ticks; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
         let column = self.tick.at(3) | self.tick.at(2) & self.tick.low(2).any();
         let middle = column.concat(!column & self.tick.any());
         let at = select(&[
             (self.at(BORDERS, 4), *self.own),
-            (self.is(LABEL), index(self.label.minus(1).low(contact), moment)),
+            (self.is(LABEL), index(self.label.minus(1).low(contact), self.tick.low(2))),
             (self.is(MIDDLE), index(self.higher.low(contact), middle)),
             (self.among(&[CLEAR, SETTLE]), *self.higher),
             (self.among(&[LEAST, JOIN]), *self.cursor),
@@ -196,7 +195,7 @@ impl<'k> Circuit<'k> {
         let zeros = later("zeros", diagonal | self.at(SETTLE, 1));
         let borders = (self.at(BORDERS, 4) & self.own.any() | self.at(BORDERS, 0) & *self.begun) & *self.moves;
         let joins = self.at(JOIN, 1) & list.into.any();
-        let labels = self.is(LABEL) & *self.adds & !self.tick.at(1);
+        let labels = self.is(LABEL) & *self.adds & !self.tick.at(2) & !self.tick.low(2).all();
         let sums = later("sums_up", borders | joins | labels);
         let subtracts = k.wire("subtracts", self.is(MIDDLE) & self.tick.low(2).all());
         let held = *held ^ subtracts.repeat(shape.sum);
@@ -223,9 +222,9 @@ impl<'k> Circuit<'k> {
             tick.set(zero(3).concat(!list.follows.any()));
         });
         let told = self.at(LEAST, TOLD);
-        self.enter(told & ranks & found, TAKE, || self.cursor.set(*list.gone));
-        self.enter(told & ranks & !found, SETTLE, || self.higher.set(zero(BASIN)));
-        self.enter(told & !ranks, PAIRS, || {
+        self.enter(told & ranks & found, [LEAST, TAKE], || self.cursor.set(*list.gone));
+        self.enter(told & ranks & !found, [LEAST, SETTLE], || self.higher.set(zero(BASIN)));
+        self.enter(told & !ranks, [LEAST, PAIRS], || {
             list.small.set(found);
             list.found.set(zero(1));
             list.outer.set(*list.gone);
@@ -245,8 +244,8 @@ impl<'k> Circuit<'k> {
             tick.set(ends.mux((saddle & *list.small).mux(number(JUDGE - 1), zero(4)), number(FIRST)));
         });
         let judges = self.at(PAIRS, JUDGE);
-        self.enter(judges & found, JOIN, || self.cursor.set(*list.gone));
-        self.enter(judges & !found, LEAST, || {
+        self.enter(judges & found, [PAIRS, JOIN], || self.cursor.set(*list.gone));
+        self.enter(judges & !found, [PAIRS, LEAST], || {
             self.cursor.set(zero(BASIN));
             list.ranks.set(one);
             self.kept.set(zero(self.kept.bits()));
@@ -266,10 +265,10 @@ impl<'k> Circuit<'k> {
             self.cursor.set(list.next);
             tick.set(number(OTHER));
         });
-        self.enter(merged & ends, LEAST, || ());
+        self.enter(merged & ends, [JOIN, LEAST], || ());
 
         let full = self.kept.is(self.shape.most as u64);
-        self.enter(self.at(TAKE, 1), LEAST, || {
+        self.enter(self.at(TAKE, 1), [TAKE, LEAST], || {
             self.cursor.set(zero(BASIN));
             self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
         });

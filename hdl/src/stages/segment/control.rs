@@ -25,21 +25,39 @@ const BAR_ROUNDING: u64 = (1 << WEIGHT_BITS) - (1 << WEIGHT_BITS) / SADDLE[1] as
 /// What rounds a smoothed word half up.
 const HALF: u64 = 1 << (WEIGHT_BITS - 1);
 
-pub(super) const IDLE: u64 = 0;
-pub(super) const UNPACK: u64 = 1;
-pub(super) const ALONG_ROWS: u64 = 2;
-pub(super) const ALONG_COLUMNS: u64 = 3;
-pub(super) const CLIMB: u64 = 4;
-pub(super) const CLEAR: u64 = 5;
-pub(super) const WALK: u64 = 6;
-pub(super) const BORDERS: u64 = 7;
-pub(super) const LEAST: u64 = 8;
-pub(super) const PAIRS: u64 = 9;
-pub(super) const JOIN: u64 = 10;
-pub(super) const TAKE: u64 = 11;
-pub(super) const SETTLE: u64 = 12;
-pub(super) const LABEL: u64 = 13;
-pub(super) const MIDDLE: u64 = 14;
+pub(super) const IDLE: usize = 0;
+pub(super) const UNPACK: usize = 1;
+pub(super) const ALONG_ROWS: usize = 2;
+pub(super) const ALONG_COLUMNS: usize = 3;
+pub(super) const CLIMB: usize = 4;
+pub(super) const CLEAR: usize = 5;
+pub(super) const WALK: usize = 6;
+pub(super) const BORDERS: usize = 7;
+pub(super) const LEAST: usize = 8;
+pub(super) const PAIRS: usize = 9;
+pub(super) const JOIN: usize = 10;
+pub(super) const TAKE: usize = 11;
+pub(super) const SETTLE: usize = 12;
+pub(super) const LABEL: usize = 13;
+pub(super) const MIDDLE: usize = 14;
+/// Names of the states, a register each.
+const STATES: [&str; 15] = [
+    "idle",
+    "unpack",
+    "along_rows",
+    "along_columns",
+    "climb",
+    "clear",
+    "walk",
+    "borders",
+    "least",
+    "pairs",
+    "join",
+    "take",
+    "settle",
+    "label",
+    "middle",
+];
 
 /// Sizes of the circuit.
 #[derive(Clone, Debug)]
@@ -119,7 +137,7 @@ pub(super) struct Circuit<'k> {
     pub(super) k: &'k Builder,
     pub(super) shape: &'k Shape,
     start: Expr<'k>,
-    pub(super) state: Net<'k>,
+    state: [Net<'k>; STATES.len()],
     pub(super) tick: Net<'k>,
 
     /// Taxel, or upper left taxel of a quad; its row and column, or those of the quad; upper right taxel of the quad.
@@ -190,12 +208,13 @@ impl<'k> Circuit<'k> {
         let (row, col) = (count_bits(shape.rows), count_bits(shape.cols));
         let (rst, start) = (k.input("rst", 1), k.input("start", 1));
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
-        let state = k.state("state", Type::unsigned(4), rst, IDLE);
+        let state =
+            STATES.map(|name| k.state(&format!("in_{name}"), Type::unsigned(1), rst, u64::from(name == STATES[IDLE])));
         let tick = register("tick", 4);
         let [address, mirror, point, target] =
             ["address", "mirror", "point", "target"].map(|name| register(name, taxel));
         let (lane, moves) = (register("lane", 2), k.net("moves", Type::unsigned(1)));
-        let is = |step: u64| state.is(step);
+        let is = |step: usize| *state[step];
         let later = |name: &str, value| k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value));
 
         k.comment("Quads of words, each with its sign; the word of a lane");
@@ -214,7 +233,8 @@ impl<'k> Circuit<'k> {
         let lanes: Vec<(u64, Expr)> =
             (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
         let signed = lane.case(&lanes[..3], lanes[3].1);
-        let picks = k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(2));
+        let picks =
+            k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(2));
         let word = register("word", WORD);
         k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
 
@@ -248,7 +268,7 @@ impl<'k> Circuit<'k> {
         let operand = register("operand", shape.smoothed + 1);
         k.when(!is(BORDERS) | tick.is(3), || operand.set(difference));
         let weight = k.delay("weight2", k.delay("weight1", tap_out.low(FACTOR)));
-        let factor = k.delay("factor", factor(k, shape, [*state, *tick, weight, *row, *col, *lane]));
+        let factor = k.delay("factor", factor(k, shape, &is, [*tick, weight, *row, *col, *lane]));
         let product = register("product", shape.smoothed + 1 + FACTOR);
         product.set((operand.signed() * factor.extend(FACTOR + 1).signed()).low(product.bits()));
         // A tap's flags, when its product is there.
@@ -327,24 +347,25 @@ impl<'k> Circuit<'k> {
         self.k.constant(bits, 0)
     }
 
-    pub(super) fn is(&self, step: u64) -> Expr<'k> {
-        self.state.is(step)
+    pub(super) fn is(&self, step: usize) -> Expr<'k> {
+        *self.state[step]
     }
 
     /// Whether the step is one of these.
-    pub(super) fn among(&self, steps: &[u64]) -> Expr<'k> {
+    pub(super) fn among(&self, steps: &[usize]) -> Expr<'k> {
         steps.iter().map(|&step| self.is(step)).reduce(|any, is| any | is).unwrap_or(self.zero(1))
     }
 
     /// Whether the step is this one at this tick.
-    pub(super) fn at(&self, step: u64, tick: u64) -> Expr<'k> {
+    pub(super) fn at(&self, step: usize, tick: u64) -> Expr<'k> {
         self.is(step) & self.tick.is(tick)
     }
 
-    /// Goes to a step if `when`, with what else is `set` then.
-    pub(super) fn enter(&self, when: Expr<'k>, step: u64, set: impl FnOnce()) {
+    /// Goes from a step to another if `when`, which is only in the first of them, with what else is `set` then.
+    pub(super) fn enter(&self, when: Expr<'k>, [from, to]: [usize; 2], set: impl FnOnce()) {
         self.k.when(when, || {
-            self.state.set(self.k.constant(4, step));
+            self.state[from].set(self.zero(1));
+            self.state[to].set(self.k.constant(1, 1));
             self.tick.set(self.zero(4));
             set();
         });
@@ -378,7 +399,12 @@ pub(super) fn select<'k>(values: &[(Expr<'k>, Expr<'k>)]) -> Expr<'k> {
 
 /// The factor of a product: a weight along an axis; the slope to a neighbour, or the ratio of a bar; 1 for a load; 2 for the
 /// weight of a contact, an odd number for its moments.
-fn factor<'k>(k: &'k Builder, shape: &Shape, [state, tick, weight, row, col, lane]: [Expr<'k>; 6]) -> Expr<'k> {
+fn factor<'k>(
+    k: &'k Builder,
+    shape: &Shape,
+    is: &dyn Fn(usize) -> Expr<'k>,
+    [tick, weight, row, col, lane]: [Expr<'k>; 5],
+) -> Expr<'k> {
     let constant = |value: u64| k.constant(FACTOR, value);
     let [x, y, diagonal] = shape.slopes.map(constant);
     let slopes = [(5, y), (7, x), (8, x), (0, y), (2, constant(BAR))];
@@ -390,12 +416,12 @@ fn factor<'k>(k: &'k Builder, shape: &Shape, [state, tick, weight, row, col, lan
         k.when(tick.is(2), || factor.set(odd));
         factor.resize(FACTOR)
     };
-    let moments = [(4, constant(2)), (0, odd("row_factor", row, shape.rows, lane.at(1)))];
+    let moments = [(0, constant(2)), (1, odd("row_factor", row, shape.rows, lane.at(1)))];
     let moment = tick.case(&moments, odd("col_factor", col, shape.cols, lane.at(0)));
     select(&[
-        (state.is(ALONG_ROWS) | state.is(ALONG_COLUMNS), weight),
-        (state.is(CLIMB), tick.case(&slopes, diagonal)),
-        (state.is(BORDERS), constant(1)),
-        (state.is(LABEL), moment),
+        (is(ALONG_ROWS) | is(ALONG_COLUMNS), weight),
+        (is(CLIMB), tick.case(&slopes, diagonal)),
+        (is(BORDERS), constant(1)),
+        (is(LABEL), moment),
     ])
 }

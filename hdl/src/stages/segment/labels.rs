@@ -17,21 +17,21 @@ impl<'k> Circuit<'k> {
         let (k, bits) = (self.k, self.shape.label());
         k.comment("Labels");
         let found = self.chain_out.low(bits);
-        k.when(self.at(LABEL, 3), || {
+        let before = k.register("labels_before", Type::unsigned(3 * bits));
+        let quad = k.wire("label_quad", found.concat(*before));
+        k.when(self.at(LABEL, 4), || {
             self.label.set(found);
             self.adds.set(*self.counts & found.any());
+            before.set(quad.slice(bits, 3 * bits));
         });
         k.when(self.settled(), || self.adds.set(self.zero(1)));
-        let before = k.register("labels_before", Type::unsigned(3 * bits));
-        let quad = k.wire("label_quad", self.label.concat(*before));
-        k.when(self.at(LABEL, 4), || before.set(quad.slice(bits, 3 * bits)));
         let memory = k.memory("label_quads", self.shape.quad_count(), 4 * bits, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Labels);
         memory.write(self.is(LABEL) & order.quads_end, *self.quad, quad);
         let address = k.input("label_address", self.quad.bits());
         k.delay("labels", k.delay("labels_read", memory.read(address)));
         k.when(self.is(LABEL) & order.last_quad, || self.ending.set(k.constant(1, 1)));
-        self.enter(self.at(LABEL, 1) & *self.ending, MIDDLE, || ());
+        self.enter(self.at(LABEL, 2) & *self.ending, [LABEL, MIDDLE], || ());
     }
 
     /// Whether the line of a middle is further: the sum of a contact is not `less` than what is held, twice its weight.
@@ -59,7 +59,7 @@ impl<'k> Circuit<'k> {
         k.when(self.at(MIDDLE, 0) | compares, || self.line.set(line));
         k.when(self.at(MIDDLE, COLUMN) & !goes_on, || self.higher.set(self.higher.plus(1)));
         let ends = k.wire("ends", self.at(MIDDLE, 0) & self.higher.equals(self.kept.resize(BASIN)));
-        self.enter(ends, IDLE, || ());
+        self.enter(ends, [MIDDLE, IDLE], || ());
         self.done.set(ends);
         let contact = k.input("contact", bits);
         for (axis, (name, lines)) in [("middle_row", self.row), ("middle_col", self.col)].into_iter().enumerate() {

@@ -240,7 +240,7 @@ fn debug_segment() {
             "fill_address",
             "fill_quad",
             "done",
-            "state",
+            "tick",
             "count",
             "overflow",
             "middle_row",
@@ -277,7 +277,7 @@ fn debug_segment() {
             sim.set(at("start"), &[1]);
             loop {
                 sim.show();
-                *states.entry(sim.get(at("state"), 1)[0]).or_insert(0) += 1;
+                *states.entry(sim.get(at("tick"), 1)[0]).or_insert(0) += 1;
                 if sim.get(at("done"), 1)[0] == 1 || cycles > 100_000 {
                     break;
                 }

@@ -59,7 +59,9 @@ impl<'k> Circuit<'k> {
         let in_quads = k.wire("in_quads", self.among(&[UNPACK, LABEL]));
         let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
         let known = self.steps_out.at(BASIN);
-        let walks = k.wire("walks", self.at(WALK, 2));
+        // Both registers are what their names say of the present tick.
+        let walks = k.delay("walks", self.at(WALK, 1));
+        let runs = k.register("runs", Type::unsigned(1));
         let passes = k.wire("passes", known & (*back | !*walking));
         let begins = k.wire("begins", self.at(CLIMB, 9) | self.at(BORDERS, 4) & *self.moves);
         let advances = k.wire("advances", quads_end | begins | walks & passes);
@@ -99,7 +101,8 @@ impl<'k> Circuit<'k> {
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
         let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_out.at(FRACTION + 1 + flag));
-        let runs = k.wire("runs", smooths & self.tick.slice(1, 3).any());
+        runs.set(smooths & self.tick.any());
+        let (runs_register, runs) = (runs, *runs);
         let [along_row, along_column] = shape.tap_counts();
         let tap = |number: usize| constant(self.tap.bits(), number);
         let wraps = [(along_row - 1, 0), (along_row + along_column - 1, along_row)];
@@ -107,22 +110,25 @@ impl<'k> Circuit<'k> {
         self.tap.set(smooths.mux(self.tap.case(&wraps, self.tap.plus(1)), tap(0)));
 
         k.comment("The taxel that is read");
-        let climbs = self.tick.is(9).mux(self.zero(DIRECTION), *self.tick);
-        let borders = self.tick.any().mux(self.tick.plus(4), self.zero(DIRECTION));
-        let direction = select(&[
-            (self.is(CLIMB), climbs),
-            (self.is(BORDERS), borders),
-            (walks & !known, self.steps_out.low(DIRECTION)),
-            (runs & (!last | ends | moves) | walks & passes, constant(DIRECTION, NEXT as usize)),
-        ]);
+        // Direction of the present tick, 0 in the other steps.
+        let heading = k.register("heading", Type::unsigned(DIRECTION));
+        let [climbs, borders] = [[1, 2, 3, 4, 5, 6, 7, 8], [5, 6, 7, 8, 0, 0, 0, 0]]
+            .map(|next| self.tick.table(DIRECTION, &[&next[..], &[0; 8]].concat()));
+        k.when(self.is(CLIMB) | self.is(BORDERS) & *self.moves, || {
+            heading.set(self.is(BORDERS).mux(borders, climbs));
+        });
+        let ahead = k.wire("ahead", runs & (!last | ends | moves) | walks & passes);
+        let steps = self.steps_out.low(DIRECTION) & (walks & !known).repeat(DIRECTION);
+        let direction = *heading | steps | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION);
         let direction = k.wire("direction", direction);
         let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
         let from_window = k.wire("from_window", smooths & last & !ends);
         let from_point = k.wire("from_point", smooths & !from_window | self.is(WALK) & !known);
-        let from = from_window.mux(*window, from_point.mux(*self.point, *self.address));
+        let own = self.is(LABEL).mux(*self.target, *self.address);
+        let from = from_window.mux(*window, from_point.mux(*self.point, own));
         let next = k.wire("next_point", (from + offset).low(self.address.bits()));
-        let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 0);
-        k.when(reads, || self.point.set(self.is(LABEL).mux(of_lane, next)));
+        let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 1);
+        k.when(reads, || self.point.set(next));
         k.when(runs & last, || window.set(next));
         k.when(walks, || {
             walking.set(!(passes));
@@ -131,7 +137,7 @@ impl<'k> Circuit<'k> {
         });
         let needs = |directions: &[usize]| {
             let table: Vec<u64> = (0..16).map(|at| u64::from(directions.contains(&at))).collect();
-            direction.table(1, &table)
+            heading.table(1, &table)
         };
         let beyond = [
             (vec![1, 2, 3], self.row.is(0)),
@@ -140,31 +146,31 @@ impl<'k> Circuit<'k> {
             (vec![3, 5, 8], self.col.is(shape.cols as u64 - 1)),
         ];
         let beyond = beyond.iter().map(|(directions, end)| needs(directions) & *end).reduce(|any, end| any | end);
-        let within = direction.any() & !beyond.unwrap_or(self.zero(1));
+        let within = heading.any() & !beyond.unwrap_or(self.zero(1));
         k.when(*self.moves, || valids.set(valids.low(4).concat(within)));
 
         k.when(self.tick.is(3), || self.base.set(self.words_out));
         let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2);
         k.when(bare, || self.base.set(self.zero(shape.smoothed)));
         let climbed = self.climb(valids.top());
-        self.write(walks & *back & !known, unpacks, of_lane, &climbed);
+        self.write(walks & *back & !known, unpacks | self.at(LABEL, 0), of_lane, &climbed);
 
         k.comment("Ends of the steps");
         let line_last = self.is(ALONG_ROWS).mux(self.line_is(shape.rows), self.line_is(shape.cols));
         let smoothed = k.wire("smoothed_all", self.smoothed & self.line_ends & line_last);
         let joins = k.wire("joins", self.at(BORDERS, 2) & *self.moves & *self.ending);
         let ends = [
-            (starts, UNPACK),
-            (self.is(UNPACK) & last_quad, ALONG_ROWS),
-            (self.is(ALONG_ROWS) & smoothed, ALONG_COLUMNS),
-            (self.is(ALONG_COLUMNS) & smoothed, CLIMB),
-            (self.at(CLIMB, 5) & *self.ending, CLEAR),
-            (cleared, WALK),
-            (walks & passes & last_taxel, BORDERS),
-            (labels, LABEL),
+            (starts, IDLE, UNPACK),
+            (self.is(UNPACK) & last_quad, UNPACK, ALONG_ROWS),
+            (self.is(ALONG_ROWS) & smoothed, ALONG_ROWS, ALONG_COLUMNS),
+            (self.is(ALONG_COLUMNS) & smoothed, ALONG_COLUMNS, CLIMB),
+            (self.at(CLIMB, 5) & *self.ending, CLIMB, CLEAR),
+            (cleared, CLEAR, WALK),
+            (walks & passes & last_taxel, WALK, BORDERS),
+            (labels, SETTLE, LABEL),
         ];
-        for (end, step) in ends {
-            self.enter(end, step, || match step {
+        for (end, from, to) in ends {
+            self.enter(end, [from, to], || match to {
                 ALONG_COLUMNS => self.tap.set(tap(along_row)),
                 CLIMB => {
                     [self.count, self.overflow].iter().for_each(|register| register.set(self.zero(register.bits())))
@@ -173,7 +179,7 @@ impl<'k> Circuit<'k> {
                 _ => {}
             });
         }
-        let restarts = k.wire("restarts", ends.map(|(end, _)| end).into_iter().reduce(|any, end| any | end).unwrap());
+        let restarts = k.wire("restarts", ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end).unwrap());
         k.when(restarts, || {
             let registers = [
                 self.address,
@@ -190,6 +196,8 @@ impl<'k> Circuit<'k> {
                 walking,
                 back,
                 valids,
+                heading,
+                runs_register,
             ];
             registers.iter().for_each(|register| register.set(self.zero(register.bits())));
             self.mirror.set(address(shape.cols - 1));
@@ -235,11 +243,11 @@ impl<'k> Circuit<'k> {
     }
 
     /// Writes what is smoothed, the steps, and in the way `back` of a walk the basins.
-    fn write(&self, back: Expr<'k>, unpacks: Expr<'k>, of_lane: Expr<'k>, climbed: &Climbed<'k>) {
+    fn write(&self, back: Expr<'k>, places: Expr<'k>, of_lane: Expr<'k>, climbed: &Climbed<'k>) {
         let (k, shape, bits) = (self.k, self.shape, self.target.bits());
         let stride = |number: usize| k.constant(bits, number as u64);
         let columns = self.is(ALONG_COLUMNS);
-        let stores = k.delay("stores", unpacks) & *self.counts;
+        let stores = k.delay("stores", self.is(UNPACK) & self.picks) & *self.counts;
         let word = columns.mux(self.result, self.word.extend(shape.smoothed));
         self.words.write(stores | columns & self.smoothed, *self.target, word);
         let entry = self.steps_out.bits();
@@ -257,9 +265,9 @@ impl<'k> Circuit<'k> {
         ]);
         let along = (*self.target + along).low(bits);
         let turns = self.line_ends & !self.is(CLIMB);
-        k.when(unpacks | self.smoothed | climbed.decides, || {
+        k.when(places | self.smoothed | climbed.decides, || {
             let next = turns.mux(next_line.resize(bits), along);
-            self.target.set(self.is(UNPACK).mux(of_lane, next));
+            self.target.set(places.mux(of_lane, next));
         });
         k.when(self.smoothed & self.line_ends, || self.line.set(next_line));
     }
