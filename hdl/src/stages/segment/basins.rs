@@ -76,11 +76,7 @@ impl<'k> Circuit<'k> {
         self.saddles(order, &list);
         let less = self.loads(&list);
         self.middles(less);
-        self.list(&list);
-        self.enter(order.joins, [BORDERS, LEAST], || {
-            self.cursor.set(self.zero(BASIN));
-            ranks.set(self.zero(1));
-        });
+        self.list(&list, order.joins);
     }
 
     /// The saddles and the bars; which pair is to be joined.
@@ -154,12 +150,12 @@ impl<'k> Circuit<'k> {
         let contact = count_bits(shape.most);
         k.comment("Loads and sums");
         let index = |contact: Expr<'k>, sum: Expr<'k>| contact.concat(sum).extend(BASIN);
-        // In LABEL 0, 1, 2 at these ticks; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
+        // In LABEL 0, 1, 2 at the ticks 1, 2, 3; in MIDDLE 0 at tick 0, 1 up to tick 4, then 2.
         let column = self.tick.at(3) | self.tick.at(2) & self.tick.low(2).any();
         let middle = column.concat(!column & self.tick.any());
         let at = select(&[
             (self.at(BORDERS, 4), *self.own),
-            (self.is(LABEL), index(self.label.minus(1).low(contact), self.tick.low(2))),
+            (self.is(LABEL), index(self.label.minus(1).low(contact), self.tick.minus(1).low(2))),
             (self.is(MIDDLE), index(self.higher.low(contact), middle)),
             (self.among(&[CLEAR, SETTLE]), *self.higher),
             (self.among(&[LEAST, JOIN]), *self.cursor),
@@ -195,7 +191,7 @@ impl<'k> Circuit<'k> {
         let zeros = later("zeros", diagonal | self.at(SETTLE, 1));
         let borders = (self.at(BORDERS, 4) & self.own.any() | self.at(BORDERS, 0) & *self.begun) & *self.moves;
         let joins = self.at(JOIN, 1) & list.into.any();
-        let labels = self.is(LABEL) & *self.adds & !self.tick.at(2) & !self.tick.low(2).all();
+        let labels = self.is(LABEL) & *self.adds & self.tick.low(2).any();
         let sums = later("sums_up", borders | joins | labels);
         let subtracts = k.wire("subtracts", self.is(MIDDLE) & self.tick.low(2).all());
         let held = *held ^ subtracts.repeat(shape.sum);
@@ -207,7 +203,7 @@ impl<'k> Circuit<'k> {
     }
 
     /// The list, and the steps through it.
-    fn list(&self, list: &List<'k>) {
+    fn list(&self, list: &List<'k>, joins: Expr<'k>) {
         let (k, tick) = (self.k, self.tick);
         let zero = |bits: usize| self.zero(bits);
         let (one, ends) = (k.constant(1, 1), k.wire("list_ends", !list.next.any()));
@@ -215,14 +211,14 @@ impl<'k> Circuit<'k> {
         let number = |tick: u64| k.constant(4, tick);
 
         k.comment("Steps through the list");
+        self.enter(joins, [BORDERS, LEAST], || list.ranks.set(zero(1)));
         k.when(self.among(&[LEAST, PAIRS, JOIN]), || tick.set(tick.plus(1)));
         let scans = self.at(LEAST, 0);
         k.when(scans, || {
-            self.cursor.set(list.follows);
             tick.set(zero(3).concat(!list.follows.any()));
         });
         let told = self.at(LEAST, TOLD);
-        self.enter(told & ranks & found, [LEAST, TAKE], || self.cursor.set(*list.gone));
+        self.enter(told & ranks & found, [LEAST, TAKE], || ());
         self.enter(told & ranks & !found, [LEAST, SETTLE], || self.higher.set(zero(BASIN)));
         self.enter(told & !ranks, [LEAST, PAIRS], || {
             list.small.set(found);
@@ -235,46 +231,55 @@ impl<'k> Circuit<'k> {
 
         k.when(self.at(PAIRS, LOWER), || {
             list.outer.set(list.next);
-            self.cursor.set(list.next);
             tick.set(ends.mux(number(JUDGE - 1), number(LOWER + 1)));
         });
         let saddle = self.at(PAIRS, SADDLE);
         k.when(self.at(PAIRS, HIGHER) | saddle, || {
-            self.cursor.set(ends.mux(*list.outer, list.next));
             tick.set(ends.mux((saddle & *list.small).mux(number(JUDGE - 1), zero(4)), number(FIRST)));
         });
         let judges = self.at(PAIRS, JUDGE);
-        self.enter(judges & found, [PAIRS, JOIN], || self.cursor.set(*list.gone));
+        self.enter(judges & found, [PAIRS, JOIN], || ());
         self.enter(judges & !found, [PAIRS, LEAST], || {
-            self.cursor.set(zero(BASIN));
             list.ranks.set(one);
             self.kept.set(zero(self.kept.bits()));
         });
 
         k.when(self.at(JOIN, 0), || {
             list.after.set(list.follows);
-            self.cursor.set(*list.into);
         });
         k.when(self.at(JOIN, 2), || {
-            self.cursor.set(zero(BASIN));
             self.lower.set(zero(BASIN));
             self.higher.set(*list.gone);
         });
         let merged = self.at(JOIN, MERGED);
         k.when(merged, || {
-            self.cursor.set(list.next);
             tick.set(number(OTHER));
         });
         self.enter(merged & ends, [JOIN, LEAST], || ());
 
         let full = self.kept.is(self.shape.most as u64);
         self.enter(self.at(TAKE, 1), [TAKE, LEAST], || {
-            self.cursor.set(zero(BASIN));
             self.kept.set(full.mux(*self.kept, self.kept.plus(1)));
         });
         k.when(self.at(TAKE, 1) & full, || self.overflow.set(one));
-        k.when(self.at(SETTLE, 0) & !self.chain_out.top(), || self.cursor.set(list.follows));
-        k.when(self.at(SETTLE, 1), || self.cursor.set(self.higher.plus(1)));
+
+        let others = self.at(PAIRS, HIGHER) | saddle;
+        let follows = scans | self.at(SETTLE, 0) & !self.chain_out.top();
+        let nexts = self.at(PAIRS, LOWER) | others | merged;
+        let gone = told & ranks & found | judges & found;
+        let zeros = joins | judges & !found | self.at(JOIN, 2) | self.at(TAKE, 1);
+        let (into, settles, labels) = (self.at(JOIN, 0), self.at(SETTLE, 1), self.is(LABEL));
+        // The next one is 0 at the end of the list.
+        let cursor = select(&[
+            (nexts, list.next),
+            (others & ends, *list.outer),
+            (gone, *list.gone),
+            (into, *list.into),
+            (settles, self.higher.plus(1)),
+            (labels, self.steps_out.low(BASIN)),
+        ]);
+        let cursor = list.follows & follows.repeat(BASIN) | k.wire("other_cursor", cursor);
+        k.when(follows | nexts | gone | into | settles | labels | zeros, || self.cursor.set(cursor));
 
         let link = |basin: Expr<'k>| zero(1).concat(basin);
         let diagonal = self.is(CLEAR) & self.lower.equals(*self.higher);

@@ -234,7 +234,7 @@ impl<'k> Circuit<'k> {
             (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
         let signed = lane.case(&lanes[..3], lanes[3].1);
         let picks =
-            k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(2));
+            k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(3));
         let word = register("word", WORD);
         k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
 
@@ -289,7 +289,7 @@ impl<'k> Circuit<'k> {
         let table = |name: &str, bits: usize, holds: Holds| memory(name, TABLE, bits, holds);
         let chain = table("chain", BASIN + 1, Holds::Chain);
         let cursor = register("cursor", BASIN);
-        let chain_out = k.wire("chain_out", chain.read(is(LABEL).mux(steps_out.low(BASIN), *cursor)));
+        let chain_out = k.wire("chain_out", chain.read(*cursor));
         Circuit {
             k,
             shape,
@@ -413,10 +413,10 @@ fn factor<'k>(
         let mirrored = (k.constant(line.bits(), lines as u64 - 1) - line).low(line.bits());
         let odd = far.mux(mirrored, line).concat(k.constant(1, 1));
         let factor = k.register(name, odd.ty());
-        k.when(tick.is(2), || factor.set(odd));
+        k.when(tick.is(3), || factor.set(odd));
         factor.resize(FACTOR)
     };
-    let moments = [(0, constant(2)), (1, odd("row_factor", row, shape.rows, lane.at(1)))];
+    let moments = [(1, constant(2)), (2, odd("row_factor", row, shape.rows, lane.at(1)))];
     let moment = tick.case(&moments, odd("col_factor", col, shape.cols, lane.at(0)));
     select(&[
         (is(ALONG_ROWS) | is(ALONG_COLUMNS), weight),

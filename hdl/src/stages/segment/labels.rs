@@ -19,19 +19,22 @@ impl<'k> Circuit<'k> {
         let found = self.chain_out.low(bits);
         let before = k.register("labels_before", Type::unsigned(3 * bits));
         let quad = k.wire("label_quad", found.concat(*before));
-        k.when(self.at(LABEL, 4), || {
+        // The basin of a taxel is the cursor when the next taxel has been chosen.
+        k.when(self.at(LABEL, 4), || self.begun.set(k.constant(1, 1)));
+        k.when(self.at(LABEL, 0), || {
             self.label.set(found);
-            self.adds.set(*self.counts & found.any());
+            self.adds.set(*self.counts & found.any() & *self.begun);
             before.set(quad.slice(bits, 3 * bits));
         });
         k.when(self.settled(), || self.adds.set(self.zero(1)));
         let memory = k.memory("label_quads", self.shape.quad_count(), 4 * bits, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Labels);
-        memory.write(self.is(LABEL) & order.quads_end, *self.quad, quad);
+        let whole = k.delay("label_quad_ends", self.is(LABEL) & order.quads_end);
+        memory.write(whole, k.delay("label_quad_address", *self.quad), quad);
         let address = k.input("label_address", self.quad.bits());
         k.delay("labels", k.delay("labels_read", memory.read(address)));
         k.when(self.is(LABEL) & order.last_quad, || self.ending.set(k.constant(1, 1)));
-        self.enter(self.at(LABEL, 2) & *self.ending, [LABEL, MIDDLE], || ());
+        self.enter(self.at(LABEL, 3) & *self.ending, [LABEL, MIDDLE], || ());
     }
 
     /// Whether the line of a middle is further: the sum of a contact is not `less` than what is held, twice its weight.

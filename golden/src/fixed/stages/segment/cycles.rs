@@ -16,7 +16,7 @@
 //! | … and the joining of a pair | 4 B + 3 |
 //! | order: for each of the remaining the largest load | B + 6 |
 //! | … then settle the contact of every basin | 68 |
-//! | label the quads and add the moments | 20 Q + 3 |
+//! | label the quads and add the moments | 20 Q + 4 |
 //! | middle: for each contact its row and column | 2 (row + column) + 7 |
 
 use super::WORD_BITS;
@@ -163,7 +163,7 @@ impl Segmentation<'_> {
             (self.sensor.rows, self.sensor.cols, self.sensor.taxels(), self.quads().len());
         let taps = |axis: usize| self.taps(axis).iter().map(|(_, weights)| weights.len()).sum::<usize>();
         let smooth = rows * taps(0) + cols * taps(1) + 14;
-        (7 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 3) as u64 + ENDS
+        (7 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 4) as u64 + ENDS
     }
 }
 
