@@ -92,36 +92,43 @@ impl<'k> Circuit<'k> {
         k.when(self.at(BORDERS, 3), || self.own.set(basin));
         let meets = k.wire("meets", differs & stall.is(0));
 
-        let one_basin = select(&[
+        let (other_tick, merged) = (self.at(JOIN, OTHER), self.at(JOIN, MERGED));
+        let (told, starts) = (self.at(LEAST, TOLD), self.at(JOIN, 2));
+        let pairs = meets | self.at(PAIRS, HIGHER) | self.at(PAIRS, SADDLE) | other_tick | merged;
+        let diagonal = k.wire("diagonal", self.lower.equals(*self.higher));
+        let (clears, climbs) = (self.is(CLEAR), self.is(CLIMB));
+        let lower = select(&[
             (self.is(BORDERS), *self.own),
             (self.is(PAIRS), *list.outer),
-            (self.at(JOIN, OTHER), *list.into),
-            (self.at(JOIN, MERGED), *list.gone),
+            (other_tick, *list.into),
+            (merged, *list.gone),
+            (clears & !diagonal, self.lower.plus(1)),
         ]);
-        let other = self.is(BORDERS).mux(basin, self.at(JOIN, OTHER).mux(*self.cursor, list.next));
-        let (one_basin, other) = (k.wire("one_basin", one_basin), k.wire("other_basin", other));
-        let ordered = k.wire("ordered", one_basin.less(other));
-        let pairs = [(PAIRS, HIGHER), (PAIRS, SADDLE), (JOIN, OTHER), (JOIN, MERGED)];
-        let pairs = pairs.map(|(step, tick)| self.at(step, tick)).into_iter().fold(meets, |any, at| any | at);
-        k.when(pairs, || {
-            self.lower.set(ordered.mux(one_basin, other));
-            self.higher.set(ordered.mux(other, one_basin));
-        });
-        let diagonal = k.wire("diagonal", self.lower.equals(*self.higher));
-        k.when(self.is(CLEAR), || {
-            self.lower.set(diagonal.mux(self.zero(BASIN), self.lower.plus(1)));
-        });
-        k.when(self.is(CLEAR) & diagonal | self.at(SETTLE, 1), || self.higher.set(self.higher.plus(1)));
+        // The list begins with 0, so do the counters of the steps that follow.
+        k.when(pairs | clears | told | starts | climbs, || self.lower.set(lower));
+        let counts = self.among(&[CLEAR, SETTLE]);
+        let higher = select(&[
+            (self.is(BORDERS), basin),
+            (self.is(PAIRS) | merged, list.next),
+            (other_tick, *self.cursor),
+            (told & !*list.ranks | starts, *list.gone),
+            (counts, self.higher.plus(1)),
+        ]);
+        let counted = clears & diagonal | self.at(SETTLE, 1);
+        k.when(pairs | counted | told | starts | climbs, || self.higher.set(higher));
 
-        let place = self.lower.concat(*self.higher);
+        let turned = k.wire("turned", self.higher.less(*self.lower));
+        let lower = k.wire("lower_ordered", turned.mux(*self.higher, *self.lower));
+        let higher = k.wire("higher_ordered", turned.mux(*self.lower, *self.higher));
+        let place = lower.concat(higher);
         let memory = k.memory("saddles", TABLE * TABLE, shape.smoothed, Contents::Undefined).unchecked();
         let memory = memory.holds(Holds::Saddles);
         let saddle = k.delay("saddle", k.delay("saddle_read", memory.read(place)));
         let larger = k.wire("larger", list.best.less(saddle));
         let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
-        let lower = self.difference.top().mux(self.words_out, *self.base);
-        k.when(meets, || list.best.set(lower));
+        let least = self.difference.top().mux(self.words_out, *self.base);
+        k.when(meets, || list.best.set(least));
         k.when(self.at(JOIN, BEST), || list.best.set(saddle));
 
         let bar = k.delay("bar", self.bars.read(*self.cursor));
@@ -133,8 +140,8 @@ impl<'k> Circuit<'k> {
         let may = list.small.mux(self.cursor.differs(*list.outer), high);
         let may = k.delay("may_take", self.at(PAIRS, SADDLE) & may);
         let takes = k.wire("takes_pair", may & (!*list.found | k.delay("is_larger", larger)));
-        let [saddle, lower, higher] = [("saddle2", saddle), ("lower2", *self.lower), ("higher2", *self.higher)]
-            .map(|(name, value)| k.delay(name, value));
+        let [saddle, lower, higher] =
+            [("saddle2", saddle), ("lower2", lower), ("higher2", higher)].map(|(name, value)| k.delay(name, value));
         k.when(takes, || {
             list.best.set(saddle);
             list.found.set(one);
@@ -219,13 +226,11 @@ impl<'k> Circuit<'k> {
         });
         let told = self.at(LEAST, TOLD);
         self.enter(told & ranks & found, [LEAST, TAKE], || ());
-        self.enter(told & ranks & !found, [LEAST, SETTLE], || self.higher.set(zero(BASIN)));
+        self.enter(told & ranks & !found, [LEAST, SETTLE], || ());
         self.enter(told & !ranks, [LEAST, PAIRS], || {
             list.small.set(found);
             list.found.set(zero(1));
             list.outer.set(*list.gone);
-            self.lower.set(zero(BASIN));
-            self.higher.set(*list.gone);
         });
         self.turn(told & !ranks & found, FIRST);
 
@@ -246,10 +251,6 @@ impl<'k> Circuit<'k> {
 
         k.when(self.at(JOIN, 0), || {
             list.after.set(list.follows);
-        });
-        k.when(self.at(JOIN, 2), || {
-            self.lower.set(zero(BASIN));
-            self.higher.set(*list.gone);
         });
         let merged = self.at(JOIN, MERGED);
         k.when(merged, || {

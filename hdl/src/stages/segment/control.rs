@@ -189,7 +189,7 @@ pub(super) struct Circuit<'k> {
     pub(super) label: Net<'k>,
     pub(super) adds: Net<'k>,
     pub(super) own: Net<'k>,
-    /// Lower and higher basin of the saddle that is read or written.
+    /// Basins of the saddle that is read or written, in any order; counters of other steps.
     pub(super) lower: Net<'k>,
     pub(super) higher: Net<'k>,
     pub(super) cursor: Net<'k>,

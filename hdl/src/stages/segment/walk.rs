@@ -175,7 +175,6 @@ impl<'k> Circuit<'k> {
                 CLIMB => {
                     [self.count, self.overflow].iter().for_each(|register| register.set(self.zero(register.bits())))
                 }
-                CLEAR => [self.lower, self.higher].iter().for_each(|register| register.set(self.zero(BASIN))),
                 _ => {}
             });
         }
