@@ -186,10 +186,23 @@ pub struct Basins {
     pub smoothed: Vec<i64>,
     /// Basin of each taxel before any was joined; [`NONE`] or 1 …, in the order of their maxima.
     pub basins: Vec<usize>,
+    /// The steepest neighbour of each taxel, itself at a maximum.
+    pub steps: Vec<usize>,
+    /// The joinings in their order.
+    pub joins: Vec<Join>,
     /// The contacts.
     pub segments: Segments,
     /// Whether there were more than [`BASINS`] basins.
     pub overflow: bool,
+}
+
+/// A joining of two basins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Join {
+    /// Number of basins before it.
+    pub basins: usize,
+    /// Whether one of the two had a small load; otherwise their saddle is high.
+    pub small: bool,
 }
 
 impl Basins {
@@ -227,7 +240,8 @@ impl Segmenter {
     /// The contacts for the normal forces `p`, row-major.
     pub fn segment(&self, p: &[i64]) -> Basins {
         let smoothed = self.smooth(p);
-        let top = self.climb(&smoothed);
+        let steps = self.steps(&smoothed);
+        let top = tops(&steps);
         let floor = smoothed.iter().copied().max().unwrap_or(0) / FLOOR;
         let mut numbers = vec![NONE; p.len()];
         let mut count = 0;
@@ -236,11 +250,11 @@ impl Segmenter {
             numbers[taxel] = if count > BASINS { NONE } else { count };
         }
         let basins: Vec<usize> = top.iter().map(|&top| numbers[top]).collect();
-        let joined = self.table(&smoothed, &basins).join();
+        let (joined, joins) = self.table(&smoothed, &basins).join();
         let names: Vec<usize> = (1..=BASINS).filter(|&basin| joined[basin] == basin).collect();
         let label = |basin: &usize| names.iter().position(|name| *name == joined[*basin]);
         let segments = Segments { labels: basins.iter().map(label).collect(), count: names.len() };
-        Basins { smoothed, basins, segments, overflow: count > BASINS }
+        Basins { smoothed, basins, steps, joins, segments, overflow: count > BASINS }
     }
 
     /// The compressive part of p, smoothed along the rows, then along the columns, each rounded half up.
@@ -254,8 +268,8 @@ impl Segmenter {
         })
     }
 
-    /// The maximum to which each taxel ascends.
-    fn climb(&self, q: &[i64]) -> Vec<usize> {
+    /// The steepest neighbour of each taxel, itself at a maximum.
+    fn steps(&self, q: &[i64]) -> Vec<usize> {
         let cols = self.sensor.cols;
         let up = |taxel: usize| {
             let (mut steepest, mut next) = (0, taxel);
@@ -272,12 +286,7 @@ impl Segmenter {
             }
             next
         };
-        let mut top: Vec<usize> = (0..q.len()).map(up).collect();
-        // q rises with every step, so that the loop ends.
-        while (0..q.len()).any(|taxel| top[top[taxel]] != top[taxel]) {
-            top = top.iter().map(|&next| top[next]).collect();
-        }
-        top
+        (0..q.len()).map(up).collect()
     }
 
     fn table(&self, q: &[i64], basins: &[usize]) -> Table {
@@ -302,12 +311,24 @@ impl Segmenter {
     }
 }
 
+/// The maximum to which each taxel ascends by `steps`.
+fn tops(steps: &[usize]) -> Vec<usize> {
+    let mut top = steps.to_vec();
+    // q rises with every step, so that the loop ends.
+    while (0..top.len()).any(|taxel| top[top[taxel]] != top[taxel]) {
+        top = top.iter().map(|&next| top[next]).collect();
+    }
+    top
+}
+
 impl Table {
-    /// The basin that each basin is part of in the end; [`NONE`] for those that do not exist.
-    fn join(mut self) -> Vec<usize> {
+    /// The basin that each basin is part of in the end, [`NONE`] for those that do not exist; and how it came to be.
+    fn join(mut self) -> (Vec<usize>, Vec<Join>) {
         let own = |basin: usize| if self.exists[basin] { basin } else { NONE };
         let mut joined: Vec<usize> = (0..self.load.len()).map(own).collect();
-        while let Some((into, gone)) = self.next_pair() {
+        let mut joins = Vec::new();
+        while let Some((small, (into, gone))) = self.next_pair() {
+            joins.push(Join { basins: self.exists.iter().filter(|exists| **exists).count(), small });
             joined.iter_mut().filter(|basin| **basin == gone).for_each(|basin| *basin = into);
             self.exists[gone] = false;
             self.load[into] += self.load[gone];
@@ -317,22 +338,26 @@ impl Table {
                 (self.saddle[into][other], self.saddle[other][into]) = (saddle, saddle);
             }
         }
-        joined
+        (joined, joins)
     }
 
-    /// The next two basins to join, the first of which remains.
-    fn next_pair(&self) -> Option<(usize, usize)> {
+    /// The next two basins to join, the first of which remains, and whether one of them has a small load.
+    fn next_pair(&self) -> Option<(bool, (usize, usize))> {
         let all = || (1..self.load.len()).filter(|&basin| self.exists[basin]);
         let small = all().reduce(|a, b| if self.load[b] < self.load[a] { b } else { a })?;
         if SMALL * self.load[small] <= self.whole {
             let saddle = |other: usize| self.saddle[small][other];
             let others = std::iter::once(NONE).chain(all()).filter(|&other| other != small);
             let next = others.reduce(|a, b| if saddle(b) > saddle(a) { b } else { a })?;
-            return Some(if next < small { (next, small) } else { (small, next) });
+            return Some((true, if next < small { (next, small) } else { (small, next) }));
         }
         let pairs = all().flat_map(|a| all().filter(move |b| a < *b).map(move |b| (a, b)));
         let shallow = pairs.filter(|&(a, b)| SADDLE[1] * self.saddle[a][b] >= SADDLE[0] * self.top[a].min(self.top[b]));
-        shallow.reduce(|(a, b), (c, d)| if self.saddle[c][d] > self.saddle[a][b] { (c, d) } else { (a, b) })
+        let highest = |(a, b): (usize, usize), (c, d): (usize, usize)| match self.saddle[c][d] > self.saddle[a][b] {
+            true => (c, d),
+            false => (a, b),
+        };
+        Some((false, shallow.reduce(highest)?))
     }
 }
 

@@ -79,12 +79,35 @@ pub enum Holds {
     Totals,
     /// Values p(μ*).
     Values,
+    /// Words of `segment`, as quads.
+    SegmentQuads,
+    /// Its words row-major, then smoothed.
+    Smoothed,
+    /// Its words smoothed along the rows, then the step or the basin of each taxel.
+    Steps,
+    /// Its weights in the order of the smoothing.
+    Windows,
+    /// Saddles of its basins.
+    Saddles,
+    /// The basin after each, or the one it is part of, or its contact.
+    Chain,
+    /// Loads of the basins, then sums of the contacts.
+    Loads,
+    /// Smallest saddle of each basin that is high.
+    Bars,
+    /// Contacts of the taxels, as quads.
+    Labels,
+    /// Middles of the contacts: rows 0, columns 1.
+    Middles(usize),
 }
 
 impl Holds {
     /// Whether the content is part of the design, which only a block RAM can have.
     fn is_rom(self) -> bool {
-        matches!(self, Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns)
+        matches!(
+            self,
+            Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns | Holds::Windows
+        )
     }
 }
 
@@ -110,6 +133,16 @@ impl std::fmt::Display for Holds {
             Holds::Floors => write!(f, "floors"),
             Holds::Totals => write!(f, "totals"),
             Holds::Values => write!(f, "values"),
+            Holds::SegmentQuads => write!(f, "segment, quads"),
+            Holds::Smoothed => write!(f, "segment, smoothed words"),
+            Holds::Steps => write!(f, "segment, steps"),
+            Holds::Windows => write!(f, "segment, windows"),
+            Holds::Saddles => write!(f, "segment, saddles"),
+            Holds::Chain => write!(f, "segment, chain"),
+            Holds::Loads => write!(f, "segment, loads"),
+            Holds::Bars => write!(f, "segment, bars"),
+            Holds::Labels => write!(f, "segment, labels"),
+            Holds::Middles(axis) => write!(f, "segment, middles, axis {axis}"),
         }
     }
 }

@@ -10,9 +10,12 @@
 //! scene allows those with the largest loads, sums of the smoothed words, remain; of equal ones the first. The middle is the
 //! taxel nearest to the centre of the words that are not smoothed, ties up: (2 Σ w·line + Σ w) / (2 Σ w), rounded down.
 
+pub mod cycles;
+
 use crate::fixed::words::formats::Formats;
 use crate::segment::{Segmenter, NONE};
 use crate::sensor::Sensor;
+use cycles::{Course, Segmentation};
 
 /// Width of a word, without a sign.
 pub const WORD_BITS: u32 = 16;
@@ -26,6 +29,8 @@ pub struct Segmented {
     pub middles: Vec<[usize; 2]>,
     /// Whether there were more contacts or basins than there may be; their taxels have none.
     pub overflow: bool,
+    /// Cycles that the hardware takes, from its start to its end.
+    pub cycles: u64,
 }
 
 /// The word of the segmentation for a p₀ in words of the search.
@@ -48,10 +53,13 @@ pub fn segment(sensor: &Sensor, segmenter: &Segmenter, words: &[i64], most: usiz
         };
         [of_axis(&|taxel| taxel / sensor.cols, sensor.rows), of_axis(&|taxel| taxel % sensor.cols, sensor.cols)]
     };
+    let middles: Vec<[usize; 2]> = order.iter().map(middle).collect();
+    let segmentation = Segmentation { sensor, segmenter, most };
     Segmented {
         labels: segments.labels.iter().map(|label| label.map_or(NONE, name)).collect(),
-        middles: order.iter().map(middle).collect(),
         overflow: basins.overflow || segments.count > most,
+        cycles: segmentation.cycles(&Course::of(sensor, &basins, &middles)),
+        middles,
     }
 }
 

@@ -1,0 +1,122 @@
+//! Stage `segment`: the contact of each taxel and the middle of each contact, from the words of the unpacked v_00.
+//!
+//! ```text
+//! quads -- unpack --> words -- smooth --> q -- climb --> steps -- walk --> basins -- join, order --> contacts --> labels
+//!                                                                                        moments --> middles
+//! ```
+//! One sequencer with one multiplier. Its steps and their cycles are in `cycles` of the bit-true model, which predicts the
+//! cycles of a frame exactly:
+//!
+//! | state | does | table, memory |
+//! |---|---|---|
+//! | `UNPACK` | words of the quads, row-major | quads → words |
+//! | `ALONG_ROWS`, `ALONG_COLUMNS` | products with the weights of a window, read in their order | words → steps → words |
+//! | `CLIMB` | products of the rise to eight neighbours with the slope; the largest. Maxima get a number and a bar | steps, bars |
+//! | `CLEAR` | the saddles of the basins that there are are 0, so are their loads; a list of them | saddles, loads, chain |
+//! | `WALK` | from each taxel up to the first with a basin, and once more to write that basin | steps |
+//! | `BORDERS` | load of each basin; the smaller word of two neighbours in different basins | loads, saddles |
+//! | `LEAST` | the smallest load, or in the end the largest | loads, chain |
+//! | `PAIRS` | the highest saddle: of a basin with a small load, or of all pairs | saddles, bars |
+//! | `JOIN` | load, bar and saddles of two basins become one's | loads, bars, saddles, chain |
+//! | `TAKE` | the next contact, which leaves the list | chain |
+//! | `SETTLE` | the contact of every basin | chain |
+//! | `LABEL` | labels of the quads; weight and moments of each contact | label quads, loads |
+//! | `MIDDLE` | row and column: how many times twice the weight is in a moment | loads, middles |
+//!
+//! The bar of a maximum m is ⌈29 m/32⌉: a saddle is high if it is not below the lower bar. Moments are sums of the word times
+//! 2·line + 1, so that the middle is their quotient by twice the weight, rounded down.
+
+use dermis_golden::fixed::stages::segment::cycles::Segmentation;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel};
+use crate::primitives::count_bits;
+use crate::wire::Wire;
+use control::{Circuit, Shape};
+
+mod basins;
+mod control;
+mod labels;
+mod walk;
+
+/// Segments the quads that were filled in; ports below, steps in the module docs.
+#[derive(LogicBlock)]
+pub struct Segment {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high; stops the sequence.
+    pub rst: Signal<In, Bit>,
+    /// Four taxels of v_00, signed; valid with `fill`.
+    pub fill_quad: Wire<In>,
+    /// `fill_quad` holds a quad; not from `start` to `done`.
+    pub fill: Signal<In, Bit>,
+    /// Address of the quad; valid with `fill`.
+    pub fill_address: Wire<In>,
+    /// All quads have been filled in: start. Ignored from then to `done`.
+    pub start: Signal<In, Bit>,
+    /// Quad whose labels are asked.
+    pub label_address: Wire<In>,
+    /// Index of the contact whose middle is asked.
+    pub contact: Wire<In>,
+    /// Outputs are valid from now to the next `start`; high for one cycle.
+    pub done: Signal<Out, Bit>,
+    /// Number of contacts.
+    pub count: Wire<Out>,
+    /// There were more contacts or basins than there may be.
+    pub overflow: Signal<Out, Bit>,
+    /// Contacts of the four taxels of a quad, 0 for none, else 1 + index; two cycles after `label_address`.
+    pub labels: Wire<Out>,
+    /// Row of the taxel in the middle of a contact; one cycle after `contact`.
+    pub middle_row: Wire<Out>,
+    /// Its column; as `middle_row`.
+    pub middle_col: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Segment,
+    clock clk,
+    inputs [rst, fill_quad, fill, fill_address, start, label_address, contact],
+    outputs [done, count, overflow, labels, middle_row, middle_col]
+);
+
+impl Segment {
+    /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
+    pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
+        let shape = Shape::new(segmentation, lane, low);
+        let quad = count_bits(shape.quad_count());
+        let block = Segment {
+            clk: Default::default(),
+            rst: Default::default(),
+            fill_quad: Wire::new(4 * lane),
+            fill: Default::default(),
+            fill_address: Wire::new(quad),
+            start: Default::default(),
+            label_address: Wire::new(quad),
+            contact: Wire::new(count_bits(shape.most)),
+            done: Default::default(),
+            count: Wire::new(shape.label()),
+            overflow: Default::default(),
+            labels: Wire::new(4 * shape.label()),
+            middle_row: Wire::new(count_bits(shape.rows)),
+            middle_col: Wire::new(count_bits(shape.cols)),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(&shape))
+    }
+}
+
+fn kernel(shape: &Shape) -> Kernel {
+    let k = Builder::new("segment");
+    {
+        let circuit = Circuit::new(&k, shape);
+        let order = circuit.order();
+        circuit.tables(&order);
+        circuit.labels(&order);
+    }
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,427 @@
+//! What the parts of the circuit share: sizes, registers, memories, the multiplier; and the sequence of the steps.
+
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::stages::segment::cycles::Segmentation;
+use dermis_golden::fixed::stages::segment::WORD_BITS;
+use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS};
+
+use crate::language::{concat, Builder, Contents, Expr, MemoryPort, Net, Type};
+use crate::primitives::count_bits;
+
+/// Width of the number of a basin.
+pub(super) const BASIN: usize = 5;
+/// Entries of the tables of basins.
+pub(super) const TABLE: usize = BASINS + 1;
+/// Width of a word of the segmentation.
+pub(super) const WORD: usize = WORD_BITS as usize;
+/// Fraction bits of a weight.
+pub(super) const FRACTION: usize = WEIGHT_BITS as usize;
+/// Width of a factor of the multiplier: a weight, a slope, an odd number for a line.
+const FACTOR: usize = FRACTION + 1;
+/// Factor by which a maximum becomes its bar, as a weight.
+const BAR: u64 = (SADDLE[0] << WEIGHT_BITS) as u64 / SADDLE[1] as u64;
+/// What rounds a bar up.
+const BAR_ROUNDING: u64 = (1 << WEIGHT_BITS) - (1 << WEIGHT_BITS) / SADDLE[1] as u64;
+/// What rounds a smoothed word half up.
+const HALF: u64 = 1 << (WEIGHT_BITS - 1);
+
+pub(super) const IDLE: usize = 0;
+pub(super) const UNPACK: usize = 1;
+pub(super) const ALONG_ROWS: usize = 2;
+pub(super) const ALONG_COLUMNS: usize = 3;
+pub(super) const CLIMB: usize = 4;
+pub(super) const CLEAR: usize = 5;
+pub(super) const WALK: usize = 6;
+pub(super) const BORDERS: usize = 7;
+pub(super) const LEAST: usize = 8;
+pub(super) const PAIRS: usize = 9;
+pub(super) const JOIN: usize = 10;
+pub(super) const TAKE: usize = 11;
+pub(super) const SETTLE: usize = 12;
+pub(super) const LABEL: usize = 13;
+pub(super) const MIDDLE: usize = 14;
+/// Names of the states, a register each.
+const STATES: [&str; 15] = [
+    "idle",
+    "unpack",
+    "along_rows",
+    "along_columns",
+    "climb",
+    "clear",
+    "walk",
+    "borders",
+    "least",
+    "pairs",
+    "join",
+    "take",
+    "settle",
+    "label",
+    "middle",
+];
+
+/// Sizes of the circuit.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    /// Rows and columns of quads.
+    pub(super) quads: [usize; 2],
+    /// Largest number of contacts.
+    pub(super) most: usize,
+    /// Width of a lane of the quads that come in.
+    pub(super) lane: usize,
+    /// Lowest bit of a word in it.
+    pub(super) low: usize,
+    /// Width of a smoothed word.
+    pub(super) smoothed: usize,
+    /// Width of a load or a moment.
+    pub(super) sum: usize,
+    /// Inverse distances of neighbours along x, along y, of diagonal ones.
+    slopes: [u64; 3],
+    /// For each axis the taps of a line in their order: `{end of the line, window moves on, last of the place, weight}`.
+    taps: [Vec<u64>; 2],
+}
+
+impl Shape {
+    /// Of a segmentation whose quads have lanes of `lane` bits, words from bit `low` on.
+    pub(super) fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
+        let (sensor, quads) = (segmentation.sensor, segmentation.quads());
+        let taps = |axis: usize| {
+            let places = segmentation.taps(axis);
+            let moves = |place: usize| places.get(place + 1).is_some_and(|next| next.0 > places[place].0);
+            let of_place = |(place, (_, weights)): (usize, &(usize, &[i64]))| {
+                let (last, ends, moves) = (weights.len() - 1, place + 1 == places.len(), moves(place));
+                let flag = |flag: bool, at: usize| u64::from(flag) << (FACTOR + at);
+                let tap = |(k, weight): (usize, &i64)| {
+                    *weight as u64 | flag(k == last, 0) | flag(moves, 1) | flag(k == last && ends, 2)
+                };
+                weights.iter().enumerate().map(tap).collect::<Vec<_>>()
+            };
+            places.iter().enumerate().flat_map(of_place).collect::<Vec<u64>>()
+        };
+        Shape {
+            rows: sensor.rows,
+            cols: sensor.cols,
+            quads: [quads.quad_rows(), quads.quad_cols()],
+            most: segmentation.most,
+            lane,
+            low,
+            smoothed: segmentation.smoothed_bits() as usize,
+            sum: segmentation.sum_bits() as usize,
+            slopes: segmentation.segmenter.slopes.map(|slope| slope as u64),
+            taps: [taps(0), taps(1)],
+        }
+    }
+
+    pub(super) fn taxels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    pub(super) fn quad_count(&self) -> usize {
+        self.quads[0] * self.quads[1]
+    }
+
+    /// Number of taps along a line of each axis.
+    pub(super) fn tap_counts(&self) -> [usize; 2] {
+        [0, 1].map(|axis| self.taps[axis].len())
+    }
+
+    /// Width of the contact of a taxel, 0 for none.
+    pub(super) fn label(&self) -> usize {
+        count_bits(self.most + 1)
+    }
+}
+
+/// Registers and memories that more than one part reads or sets.
+pub(super) struct Circuit<'k> {
+    pub(super) k: &'k Builder,
+    pub(super) shape: &'k Shape,
+    start: Expr<'k>,
+    state: [Net<'k>; STATES.len()],
+    pub(super) tick: Net<'k>,
+
+    /// Taxel, or upper left taxel of a quad; its row and column, or those of the quad; upper right taxel of the quad.
+    pub(super) address: Net<'k>,
+    pub(super) row: Net<'k>,
+    pub(super) col: Net<'k>,
+    pub(super) mirror: Net<'k>,
+    pub(super) quad: Net<'k>,
+    pub(super) lane: Net<'k>,
+    /// The word of the lane is taken; whether it is that of a taxel of its own.
+    pub(super) picks: Expr<'k>,
+    pub(super) counts: Net<'k>,
+    /// Taxel that is read, and one that is written.
+    pub(super) point: Net<'k>,
+    pub(super) target: Net<'k>,
+    pub(super) line: Net<'k>,
+    /// The first taxel has been read; the last one has.
+    pub(super) begun: Net<'k>,
+    pub(super) ending: Net<'k>,
+    /// The taxels that are read move on in this cycle.
+    pub(super) moves: Net<'k>,
+
+    /// Unsmoothed words; then words smoothed along both axes.
+    pub(super) words: MemoryPort<'k>,
+    /// Words smoothed along the rows; then for each taxel `{1, basin}` or `{0, direction of its step}`.
+    pub(super) steps: MemoryPort<'k>,
+    pub(super) word: Expr<'k>,
+    pub(super) words_out: Expr<'k>,
+    pub(super) steps_out: Expr<'k>,
+    /// Weight of a tap, and that two cycles later.
+    pub(super) tap: Net<'k>,
+    pub(super) tap_out: Expr<'k>,
+
+    /// What is subtracted from a word before the multiplication; the difference, the product, rounded sum of products.
+    pub(super) base: Net<'k>,
+    pub(super) difference: Expr<'k>,
+    pub(super) operand: Net<'k>,
+    pub(super) product: Expr<'k>,
+    pub(super) result: Expr<'k>,
+    /// `result` is a smoothed word, the last of a line.
+    pub(super) smoothed: Expr<'k>,
+    pub(super) line_ends: Expr<'k>,
+
+    pub(super) count: Net<'k>,
+    pub(super) kept: Net<'k>,
+    pub(super) overflow: Net<'k>,
+    pub(super) done: Net<'k>,
+    /// Contact of a taxel, and whether its word is added to the sums.
+    pub(super) label: Net<'k>,
+    pub(super) adds: Net<'k>,
+    pub(super) own: Net<'k>,
+    /// Basins of the saddle that is read or written, in any order; counters of other steps.
+    pub(super) lower: Net<'k>,
+    pub(super) higher: Net<'k>,
+    pub(super) cursor: Net<'k>,
+    /// For each basin `{0, the next one}`, of those that are gone `{0, the one they are part of}`; at last `{1, contact}`.
+    pub(super) chain: MemoryPort<'k>,
+    pub(super) chain_out: Expr<'k>,
+    /// Loads of the basins, 0 the whole; then sums of the contacts.
+    pub(super) loads: MemoryPort<'k>,
+    /// For each basin the smallest saddle that is high, where its maximum is the lower one.
+    pub(super) bars: MemoryPort<'k>,
+}
+
+impl<'k> Circuit<'k> {
+    pub(super) fn new(k: &'k Builder, shape: &'k Shape) -> Self {
+        let (taxel, quad) = (count_bits(shape.taxels()), count_bits(shape.quad_count()));
+        let (row, col) = (count_bits(shape.rows), count_bits(shape.cols));
+        let (rst, start) = (k.input("rst", 1), k.input("start", 1));
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        let state =
+            STATES.map(|name| k.state(&format!("in_{name}"), Type::unsigned(1), rst, u64::from(name == STATES[IDLE])));
+        let tick = register("tick", 4);
+        let [address, mirror, point, target] =
+            ["address", "mirror", "point", "target"].map(|name| register(name, taxel));
+        let (lane, moves) = (register("lane", 2), k.net("moves", Type::unsigned(1)));
+        let is = |step: usize| *state[step];
+        let later = |name: &str, value| k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value));
+
+        k.comment("Quads of words, each with its sign; the word of a lane");
+        let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", quad));
+        let fill_quad = k.input("fill_quad", 4 * shape.lane);
+        let narrow = |lane: usize| {
+            let value = fill_quad.slice(lane * shape.lane, shape.lane).signed();
+            let value = value.resize(value.bits().max(shape.low + WORD + 1)).unsigned();
+            value.top().concat(value.slice(shape.low, WORD))
+        };
+        let quads = k.memory("quads", shape.quad_count(), 4 * (WORD + 1), Contents::Undefined).unchecked();
+        let quads = quads.holds(Holds::SegmentQuads);
+        quads.write(fill, fill_address, concat(&[3, 2, 1, 0].map(narrow)));
+        let quad = register("quad", quad);
+        let quads_out = later("quads", quads.read(*quad));
+        let lanes: Vec<(u64, Expr)> =
+            (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
+        let signed = lane.case(&lanes[..3], lanes[3].1);
+        let picks =
+            k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(3));
+        let word = register("word", WORD);
+        k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
+
+        let memory = |name: &str, words: usize, bits: usize, holds: Holds| {
+            k.memory(name, words, bits, Contents::Undefined).unchecked().holds(holds)
+        };
+        let words = memory("words", shape.taxels(), shape.smoothed, Holds::Smoothed);
+        let steps = memory("steps", shape.taxels(), shape.smoothed.max(BASIN + 1), Holds::Steps);
+        let read = |name: &str, memory: &MemoryPort<'k>, bits: usize| {
+            let [read, out] = ["read", "out"].map(|stage| register(&format!("{name}_{stage}"), bits));
+            k.when(*moves, || {
+                read.set(memory.read(*point));
+                out.set(*read);
+            });
+            *out
+        };
+        let words_out = read("words", &words, shape.smoothed);
+        let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
+        let taps: Vec<(usize, u64)> = shape.taps.concat().into_iter().enumerate().collect();
+        let tap = register("tap", count_bits(taps.len()));
+        let windows = k.memory("windows", taps.len(), FACTOR + 3, Contents::Words(taps)).style("block");
+        let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
+
+        k.comment("Multiplier and the sum of its products");
+        let (row, col) = (register("row", row), register("col", col));
+        let smooths = k.wire("smooths", is(ALONG_ROWS) | is(ALONG_COLUMNS));
+        let base = register("base", shape.smoothed);
+        let read = word.extend(shape.smoothed);
+        let data = is(ALONG_COLUMNS).mux(steps_out.low(shape.smoothed), is(LABEL).mux(read, words_out));
+        let difference = k.wire("difference", (data - *base).unsigned());
+        let operand = register("operand", shape.smoothed + 1);
+        k.when(!is(BORDERS) | tick.is(3), || operand.set(difference));
+        let weight = k.delay("weight2", k.delay("weight1", tap_out.low(FACTOR)));
+        let factor = k.delay("factor", factor(k, shape, &is, [*tick, weight, *row, *col, *lane]));
+        let product = register("product", shape.smoothed + 1 + FACTOR);
+        product.set((operand.signed() * factor.extend(FACTOR + 1).signed()).low(product.bits()));
+        // A tap's flags, when its product is there.
+        let flags = k.delay("flags1", tap_out.slice(FACTOR, 3));
+        let flags = (2..=4).fold(flags, |flags, stage| k.delay(&format!("flags{stage}"), flags));
+        let sum = shape.smoothed + FRACTION;
+        let partial = register("partial", sum);
+        let total = k.wire("total", (*partial + product.low(sum)).low(sum));
+        let adds = k.wire("sums", smooths & (tick.at(3) | tick.slice(1, 2).all()));
+        let rounding = smooths.mux(k.constant(sum, HALF), k.constant(sum, BAR_ROUNDING));
+        partial.set((adds & !flags.at(0)).mux(total, rounding));
+        let result = k.delay("result", total.slice(FRACTION, shape.smoothed));
+        let ready = k.delay("ready", adds & flags.at(0));
+        // Not the word that follows the last one of an axis into the next step.
+        let smoothed = k.wire("smoothed", ready & tick.any());
+        let line_ends = k.delay("line_ends", flags.at(2));
+
+        let table = |name: &str, bits: usize, holds: Holds| memory(name, TABLE, bits, holds);
+        let chain = table("chain", BASIN + 1, Holds::Chain);
+        let cursor = register("cursor", BASIN);
+        let chain_out = k.wire("chain_out", chain.read(*cursor));
+        Circuit {
+            k,
+            shape,
+            start,
+            state,
+            tick,
+            address,
+            row,
+            col,
+            mirror,
+            quad,
+            lane,
+            picks,
+            counts: register("counts", 1),
+            point,
+            target,
+            line: register("line", row.bits().max(col.bits())),
+            begun: register("begun", 1),
+            ending: register("ending", 1),
+            moves,
+            words,
+            steps,
+            word: word.get(),
+            words_out,
+            steps_out,
+            tap,
+            tap_out,
+            base,
+            difference,
+            operand,
+            product: product.get(),
+            result,
+            smoothed,
+            line_ends,
+            count: register("basins", BASIN),
+            kept: register("count", shape.label()),
+            overflow: register("overflow", 1),
+            done: k.state("done", Type::unsigned(1), rst, 0),
+            label: register("label", shape.label()),
+            adds: register("adds", 1),
+            own: register("own", BASIN),
+            lower: register("lower", BASIN),
+            higher: register("higher", BASIN),
+            cursor,
+            chain,
+            chain_out,
+            loads: table("loads", shape.sum, Holds::Loads),
+            bars: table("bars", shape.smoothed, Holds::Bars),
+        }
+    }
+}
+
+impl<'k> Circuit<'k> {
+    pub(super) fn zero(&self, bits: usize) -> Expr<'k> {
+        self.k.constant(bits, 0)
+    }
+
+    pub(super) fn is(&self, step: usize) -> Expr<'k> {
+        *self.state[step]
+    }
+
+    /// Whether the step is one of these.
+    pub(super) fn among(&self, steps: &[usize]) -> Expr<'k> {
+        steps.iter().map(|&step| self.is(step)).reduce(|any, is| any | is).unwrap_or(self.zero(1))
+    }
+
+    /// Whether the step is this one at this tick.
+    pub(super) fn at(&self, step: usize, tick: u64) -> Expr<'k> {
+        self.is(step) & self.tick.is(tick)
+    }
+
+    /// Goes from a step to another if `when`, which is only in the first of them, with what else is `set` then.
+    pub(super) fn enter(&self, when: Expr<'k>, [from, to]: [usize; 2], set: impl FnOnce()) {
+        self.k.when(when, || {
+            self.state[from].set(self.zero(1));
+            self.state[to].set(self.k.constant(1, 1));
+            self.tick.set(self.zero(4));
+            set();
+        });
+    }
+
+    /// Goes to a tick of the step if `when`.
+    pub(super) fn turn(&self, when: Expr<'k>, tick: u64) {
+        self.k.when(when, || self.tick.set(self.k.constant(4, tick)));
+    }
+
+    /// The start, and the ticks of the steps that count them.
+    pub(super) fn sequence(&self) -> Expr<'k> {
+        let (k, tick) = (self.k, self.tick);
+        let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
+        let counted = self.among(&[UNPACK, CLIMB, WALK, LABEL, TAKE, SETTLE]);
+        let ends = [(UNPACK, 6), (CLIMB, 9), (WALK, 2), (BORDERS, 4), (LABEL, 4), (TAKE, 1), (SETTLE, 1)];
+        let ends = ends.map(|(step, tick)| self.at(step, tick)).into_iter().reduce(|any, end| any | end);
+        let ends = k.wire("ticks_end", ends.unwrap_or(self.zero(1)));
+        k.when(counted | self.is(BORDERS) & *self.moves | smooths & !tick.at(3), || {
+            tick.set(ends.mux(self.zero(4), tick.plus(1)));
+        });
+        k.wire("starts", self.is(IDLE) & self.start)
+    }
+}
+
+/// The one of `values` whose condition is met, 0 if none is; at most one is.
+pub(super) fn select<'k>(values: &[(Expr<'k>, Expr<'k>)]) -> Expr<'k> {
+    let masked = values.iter().map(|&(condition, value)| condition.repeat(value.bits()) & value);
+    masked.reduce(|any, value| any | value).unwrap_or(values[0].1)
+}
+
+/// The factor of a product: a weight along an axis; the slope to a neighbour, or the ratio of a bar; 1 for a load; 2 for the
+/// weight of a contact, an odd number for its moments.
+fn factor<'k>(
+    k: &'k Builder,
+    shape: &Shape,
+    is: &dyn Fn(usize) -> Expr<'k>,
+    [tick, weight, row, col, lane]: [Expr<'k>; 5],
+) -> Expr<'k> {
+    let constant = |value: u64| k.constant(FACTOR, value);
+    let [x, y, diagonal] = shape.slopes.map(constant);
+    let slopes = [(5, y), (7, x), (8, x), (0, y), (2, constant(BAR))];
+    // The factors of a taxel stay until its products are there, when the next one has been chosen.
+    let odd = |name: &str, line: Expr<'k>, lines: usize, far: Expr<'k>| {
+        let mirrored = (k.constant(line.bits(), lines as u64 - 1) - line).low(line.bits());
+        let odd = far.mux(mirrored, line).concat(k.constant(1, 1));
+        let factor = k.register(name, odd.ty());
+        k.when(tick.is(3), || factor.set(odd));
+        factor.resize(FACTOR)
+    };
+    let moments = [(1, constant(2)), (2, odd("row_factor", row, shape.rows, lane.at(1)))];
+    let moment = tick.case(&moments, odd("col_factor", col, shape.cols, lane.at(0)));
+    select(&[
+        (is(ALONG_ROWS) | is(ALONG_COLUMNS), weight),
+        (is(CLIMB), tick.case(&slopes, diagonal)),
+        (is(BORDERS), constant(1)),
+        (is(LABEL), moment),
+    ])
+}

@@ -1,0 +1,277 @@
+//! Which taxel is read when: quads and taxels in their order, windows of the smoothing, neighbours, steps to a maximum.
+//!
+//! A direction is 0 for the taxel itself, 1 to 8 for its neighbours in the order of their addresses.
+
+use dermis_golden::segment::FLOOR;
+
+use super::control::*;
+use crate::language::{Expr, Type};
+
+/// Width of a direction.
+const DIRECTION: usize = 4;
+/// Direction of the taxel with the next address.
+const NEXT: u64 = 5;
+
+/// What the order of the taxels says to the other parts.
+pub(super) struct Order<'k> {
+    /// The neighbour whose word is there in step `BORDERS` is within the array.
+    pub(super) beside: Expr<'k>,
+    /// The steps end in this cycle: to join, to add the moments.
+    pub(super) joins: Expr<'k>,
+    pub(super) quads_end: Expr<'k>,
+    /// The last quad ends.
+    pub(super) last_quad: Expr<'k>,
+    /// A basin is found, with this number.
+    pub(super) fresh: Expr<'k>,
+    pub(super) next: Expr<'k>,
+}
+
+/// The step from a taxel, once it is decided.
+struct Climbed<'k> {
+    decides: Expr<'k>,
+    /// `{1, basin}` of a maximum, else `{0, direction}`.
+    step: Expr<'k>,
+    fresh: Expr<'k>,
+    next: Expr<'k>,
+}
+
+/// What is added to an address for each direction, modulo 2^`bits`.
+fn offsets(cols: usize, bits: usize) -> Vec<u64> {
+    let cols = cols as i64;
+    let all = [0, -cols - 1, -cols, 1 - cols, -1, 1, cols - 1, cols, cols + 1];
+    (0..1 << DIRECTION)
+        .map(|direction| all.get(direction).map_or(0, |offset| offset.rem_euclid(1 << bits) as u64))
+        .collect()
+}
+
+impl<'k> Circuit<'k> {
+    /// The taxels of all steps, in their order.
+    pub(super) fn order(&self) -> Order<'k> {
+        let (starts, cleared, labels) = (self.sequence(), self.cleared(), self.settled());
+        let (k, shape) = (self.k, self.shape);
+        let constant = |bits: usize, value: usize| k.constant(bits, value as u64);
+        let (taxels, [_, quad_cols]) = (shape.taxels(), shape.quads);
+        let [walking, back] = ["walking", "back"].map(|name| k.register(name, Type::unsigned(1)));
+        let window = k.register("window", self.point.ty());
+        let valids = k.register("valids", Type::unsigned(5));
+
+        k.comment("Order of quads and taxels");
+        let in_quads = k.wire("in_quads", self.among(&[UNPACK, LABEL]));
+        let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
+        let known = self.steps_out.at(BASIN);
+        // Both registers are what their names say of the present tick.
+        let walks = k.delay("walks", self.at(WALK, 1));
+        let runs = k.register("runs", Type::unsigned(1));
+        let passes = k.wire("passes", known & (*back | !*walking));
+        let begins = k.wire("begins", self.at(CLIMB, 9) | self.at(BORDERS, 4) & *self.moves);
+        let advances = k.wire("advances", quads_end | begins | walks & passes);
+        let col_last = in_quads.mux(self.col.is(quad_cols as u64 - 1), self.col.is(shape.cols as u64 - 1));
+        let col_last = k.wire("col_last", col_last);
+        let address = |number: usize| constant(self.address.bits(), number % (1 << self.address.bits()));
+        k.when(advances, || {
+            self.col.set(col_last.mux(self.zero(self.col.bits()), self.col.plus(1)));
+            self.row.set((*self.row + col_last).low(self.row.bits()));
+            let step = (in_quads & col_last).mux(address(shape.cols - quad_cols + 1), address(1));
+            self.address.set((*self.address + step).low(self.address.bits()));
+            let step = col_last.mux(address(shape.cols + quad_cols - 1), address((1 << self.address.bits()) - 1));
+            self.mirror.set((*self.mirror + step).low(self.address.bits()));
+        });
+        k.when(quads_end, || self.quad.set(self.quad.plus(1)));
+        let last_taxel = k.wire("last_taxel", self.address.is(taxels as u64 - 1));
+        let last_quad = k.wire("last_quad", quads_end & self.quad.is(shape.quad_count() as u64 - 1));
+        k.when(begins, || {
+            self.begun.set(constant(1, 1));
+            self.ending.set(last_taxel);
+        });
+
+        k.comment("Taxel of a lane");
+        let far = self.lane.at(1);
+        let beside = (far ^ self.lane.at(0)).mux(*self.mirror, *self.address);
+        let turned = beside ^ far.repeat(self.address.bits());
+        let all = address(taxels) & far.repeat(self.address.bits());
+        let of_lane = k.wire("of_lane", (turned + all).low(self.address.bits()));
+        let twice = |odd: bool, end: Expr<'k>, far: Expr<'k>| if odd { end & far } else { self.zero(1) };
+        let middle_row = self.row.is(shape.quads[0] as u64 - 1);
+        let copies =
+            twice(shape.rows % 2 == 1, middle_row, far) | twice(shape.cols % 2 == 1, col_last, self.lane.at(0));
+        let unpacks = k.wire("unpacks", self.is(UNPACK) & self.picks);
+        k.when(self.picks, || self.counts.set(!copies));
+        k.when(unpacks | self.at(LABEL, 4), || self.lane.set(self.lane.plus(1)));
+
+        k.comment("Taps of the smoothing");
+        let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
+        let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_out.at(FRACTION + 1 + flag));
+        runs.set(smooths & self.tick.any());
+        let (runs_register, runs) = (runs, *runs);
+        let [along_row, along_column] = shape.tap_counts();
+        let tap = |number: usize| constant(self.tap.bits(), number);
+        let wraps = [(along_row - 1, 0), (along_row + along_column - 1, along_row)];
+        let wraps = wraps.map(|(end, first)| (end as u64, tap(first)));
+        self.tap.set(smooths.mux(self.tap.case(&wraps, self.tap.plus(1)), tap(0)));
+
+        k.comment("The taxel that is read");
+        // Direction of the present tick, 0 in the other steps.
+        let heading = k.register("heading", Type::unsigned(DIRECTION));
+        let [climbs, borders] = [[1, 2, 3, 4, 5, 6, 7, 8], [5, 6, 7, 8, 0, 0, 0, 0]]
+            .map(|next| self.tick.table(DIRECTION, &[&next[..], &[0; 8]].concat()));
+        k.when(self.is(CLIMB) | self.is(BORDERS) & *self.moves, || {
+            heading.set(self.is(BORDERS).mux(borders, climbs));
+        });
+        let ahead = k.wire("ahead", runs & (!last | ends | moves) | walks & passes);
+        let steps = self.steps_out.low(DIRECTION) & (walks & !known).repeat(DIRECTION);
+        let direction = *heading | steps | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION);
+        let direction = k.wire("direction", direction);
+        let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
+        let from_window = k.wire("from_window", smooths & last & !ends);
+        let from_point = k.wire("from_point", smooths & !from_window | self.is(WALK) & !known);
+        let own = self.is(LABEL).mux(*self.target, *self.address);
+        let from = from_window.mux(*window, from_point.mux(*self.point, own));
+        let next = k.wire("next_point", (from + offset).low(self.address.bits()));
+        let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 1);
+        k.when(reads, || self.point.set(next));
+        k.when(runs & last, || window.set(next));
+        k.when(walks, || {
+            walking.set(!(passes));
+            back.set(known & *walking & !passes | *back & !known);
+            k.when(known & !passes, || self.own.set(self.steps_out.low(BASIN)));
+        });
+        let needs = |directions: &[usize]| {
+            let table: Vec<u64> = (0..16).map(|at| u64::from(directions.contains(&at))).collect();
+            heading.table(1, &table)
+        };
+        let beyond = [
+            (vec![1, 2, 3], self.row.is(0)),
+            (vec![6, 7, 8], self.row.is(shape.rows as u64 - 1)),
+            (vec![1, 4, 6], self.col.is(0)),
+            (vec![3, 5, 8], self.col.is(shape.cols as u64 - 1)),
+        ];
+        let beyond = beyond.iter().map(|(directions, end)| needs(directions) & *end).reduce(|any, end| any | end);
+        let within = heading.any() & !beyond.unwrap_or(self.zero(1));
+        k.when(*self.moves, || valids.set(valids.low(4).concat(within)));
+
+        k.when(self.tick.is(3), || self.base.set(self.words_out));
+        let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2);
+        k.when(bare, || self.base.set(self.zero(shape.smoothed)));
+        let climbed = self.climb(valids.top());
+        self.write(walks & *back & !known, unpacks | self.at(LABEL, 0), of_lane, &climbed);
+
+        k.comment("Ends of the steps");
+        let line_last = self.is(ALONG_ROWS).mux(self.line_is(shape.rows), self.line_is(shape.cols));
+        let smoothed = k.wire("smoothed_all", self.smoothed & self.line_ends & line_last);
+        let joins = k.wire("joins", self.at(BORDERS, 2) & *self.moves & *self.ending);
+        let ends = [
+            (starts, IDLE, UNPACK),
+            (self.is(UNPACK) & last_quad, UNPACK, ALONG_ROWS),
+            (self.is(ALONG_ROWS) & smoothed, ALONG_ROWS, ALONG_COLUMNS),
+            (self.is(ALONG_COLUMNS) & smoothed, ALONG_COLUMNS, CLIMB),
+            (self.at(CLIMB, 5) & *self.ending, CLIMB, CLEAR),
+            (cleared, CLEAR, WALK),
+            (walks & passes & last_taxel, WALK, BORDERS),
+            (labels, SETTLE, LABEL),
+        ];
+        for (end, from, to) in ends {
+            self.enter(end, [from, to], || match to {
+                ALONG_COLUMNS => self.tap.set(tap(along_row)),
+                CLIMB => {
+                    [self.count, self.overflow].iter().for_each(|register| register.set(self.zero(register.bits())))
+                }
+                _ => {}
+            });
+        }
+        let restarts = k.wire("restarts", ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end).unwrap());
+        k.when(restarts, || {
+            let registers = [
+                self.address,
+                self.row,
+                self.col,
+                self.quad,
+                self.lane,
+                self.point,
+                self.target,
+                self.line,
+                self.begun,
+                self.ending,
+                window,
+                walking,
+                back,
+                valids,
+                heading,
+                runs_register,
+            ];
+            registers.iter().for_each(|register| register.set(self.zero(register.bits())));
+            self.mirror.set(address(shape.cols - 1));
+        });
+        Order { beside: valids.at(2), joins, quads_end, last_quad, fresh: climbed.fresh, next: climbed.next }
+    }
+
+    /// The steepest neighbour of a taxel, where the product of its rise is `valid`, and the numbers of the maxima.
+    fn climb(&self, valid: Expr<'k>) -> Climbed<'k> {
+        let (k, shape) = (self.k, self.shape);
+        let zero = |bits: usize| self.zero(bits);
+        let bits = self.product.bits() - 1;
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        let (rise, steepest, tall) = (register("rise", bits), register("steepest", DIRECTION), register("tall", 1));
+        let peak = register("peak", shape.smoothed);
+
+        k.comment("The steepest neighbour; maxima");
+        let rises = k.wire("rises", valid & !self.product.top() & rise.less(self.product.low(bits)));
+        // A product is there five cycles after its direction was read.
+        let directions = [5, 6, 7, 8, 0, 0, 1, 2, 3, 4, 0, 0, 0, 0, 0, 0];
+        k.when(rises, || {
+            rise.set(self.product.low(bits));
+            steepest.set(self.tick.table(DIRECTION, &directions));
+        });
+        k.when(self.tick.is(5), || {
+            rise.set(zero(bits));
+            steepest.set(zero(DIRECTION));
+        });
+        k.when(self.is(ALONG_COLUMNS) & self.smoothed & peak.less(self.result), || peak.set(self.result));
+        k.when(self.is(ALONG_ROWS), || peak.set(zero(shape.smoothed)));
+        let floor = peak.shift_right(FLOOR.trailing_zeros() as usize);
+        k.when(self.tick.is(3), || tall.set(floor.less(self.operand.low(shape.smoothed))));
+        let decides = k.wire("decides", self.at(CLIMB, 5) & *self.begun);
+        let is_top = k.wire("is_top", !steepest.any());
+        let full = self.count.all();
+        let found = k.wire("found_top", decides & is_top & *tall);
+        let (fresh, next) = (k.wire("fresh", found & !full), k.wire("next_basin", self.count.plus(1)));
+        k.when(fresh, || self.count.set(next));
+        k.when(found & full, || self.overflow.set(k.constant(1, 1)));
+        let number = next & (*tall & !full).repeat(BASIN);
+        let step = is_top.concat(is_top.mux(number, steepest.extend(BASIN)));
+        Climbed { decides, step, fresh, next }
+    }
+
+    /// Writes what is smoothed, the steps, and in the way `back` of a walk the basins.
+    fn write(&self, back: Expr<'k>, places: Expr<'k>, of_lane: Expr<'k>, climbed: &Climbed<'k>) {
+        let (k, shape, bits) = (self.k, self.shape, self.target.bits());
+        let stride = |number: usize| k.constant(bits, number as u64);
+        let columns = self.is(ALONG_COLUMNS);
+        let stores = k.delay("stores", self.is(UNPACK) & self.picks) & *self.counts;
+        let word = columns.mux(self.result, self.word.extend(shape.smoothed));
+        self.words.write(stores | columns & self.smoothed, *self.target, word);
+        let entry = self.steps_out.bits();
+        let step = self.is(WALK).mux(k.constant(1, 1).concat(*self.own), climbed.step).extend(entry);
+        let data = self.is(ALONG_ROWS).mux(self.result.extend(entry), step);
+        let writes = self.is(ALONG_ROWS) & self.smoothed | climbed.decides | back;
+        self.steps.write(writes, self.is(WALK).mux(*self.point, *self.target), data);
+
+        // Smoothed words are written transposed, so that both axes are read in the order of the addresses.
+        let next_line = k.wire("next_line", self.line.plus(1));
+        let along = select(&[
+            (self.is(ALONG_ROWS), stride(shape.rows)),
+            (columns, stride(shape.cols)),
+            (self.is(CLIMB), stride(1)),
+        ]);
+        let along = (*self.target + along).low(bits);
+        let turns = self.line_ends & !self.is(CLIMB);
+        k.when(places | self.smoothed | climbed.decides, || {
+            let next = turns.mux(next_line.resize(bits), along);
+            self.target.set(places.mux(of_lane, next));
+        });
+        k.when(self.smoothed & self.line_ends, || self.line.set(next_line));
+    }
+
+    fn line_is(&self, lines: usize) -> Expr<'k> {
+        self.line.is(lines as u64 - 1)
+    }
+}
