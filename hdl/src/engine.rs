@@ -32,8 +32,8 @@ use crate::primitives::{
 };
 use crate::stage_list::engine;
 use crate::stages::{
-    Banks, Estimate, Fold, Forces, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax, Rescale, Resultants, Search,
-    SearchPorts, Send, Unfold, Unsearched,
+    Banks, Contacts, Estimate, Fold, Forces, Labels, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax, Rescale,
+    Resultants, Search, SearchPorts, Segment, Send, Shear, Unfold, Unsearched, Window,
 };
 use crate::wire::Wire;
 
@@ -110,6 +110,9 @@ engine! {
             normalise: Normalise => "stages/normalise.rs",
             fold: Fold => "stages/fold.rs",
             pass: Pass => "stages/pass.rs",
+            segment: Segment => "stages/segment.rs",
+            contacts: Contacts => "stages/contacts.rs",
+            window: Window => "stages/window.rs",
             estimate: Estimate => "stages/estimate.rs",
             shear: Shear => "stages/shear.rs",
             rescale: Rescale => "stages/rescale.rs",
@@ -118,6 +121,7 @@ engine! {
             search: SearchStage => "stages/search.rs",
             forces: Forces => "stages/forces.rs",
             send: Send => "stages/send.rs",
+            labels: Labels => "stages/labels.rs",
             resultants: Resultants => "stages/resultants.rs",
         }
         control {
@@ -156,6 +160,8 @@ engine! {
             both_signs: Constant<Bit>,
             ahead: Constant<Bit>,
             single: Constant<Bit>,
+            network: Constant<Bit>,
+            several: Constant<Bit>,
             begin_frame: Signal<Local, Bit>,
             start: Signal<Local, Bit>,
             leaves: Signal<Local, Bit>,
@@ -194,7 +200,13 @@ impl Engine {
             fold: Fold::new(model),
             pass: Pass::new(model),
             estimate: Estimate::new(model),
-            shear: Shear::new(formats, model.scene.partition.max_contacts),
+            segment: Segment::of_model(model),
+            contacts: Contacts::new(model),
+            window: Window::new(model),
+            labels: Labels::new(model, forces.m_axis_tdata.width()),
+            shear: Shear::new(model),
+            network: Constant::new(model.has_network()),
+            several: Constant::new(model.contacts() > 0),
             operands: OperandSource::new(model),
             told: StatusSource::new(model),
             relax: Relax::new(formats),
@@ -266,6 +278,14 @@ impl Logic for Engine {
         self.estimate.clk.next = self.clk.val();
         self.estimate.rst.next = self.rst.val();
         self.rescale.clk.next = self.clk.val();
+        self.segment.clk.next = self.clk.val();
+        self.segment.rst.next = self.rst.val();
+        self.contacts.clk.next = self.clk.val();
+        self.contacts.rst.next = self.rst.val();
+        self.window.clk.next = self.clk.val();
+        self.window.rst.next = self.rst.val();
+        self.labels.clk.next = self.clk.val();
+        self.labels.rst.next = self.rst.val();
         self.shear.clk.next = self.clk.val();
         self.shear.rst.next = self.rst.val();
         self.operands.clk.next = self.clk.val();
@@ -334,7 +354,8 @@ impl Logic for Engine {
         self.frame_case.keep.next = self.begin_frame.val();
         self.frame_case.word.next = self.receive.which.val();
         self.fold.which.next = self.frame_case.kept.val();
-        self.pass.which.next = self.frame_case.kept.val();
+        self.contacts.which.next = self.frame_case.kept.val();
+        self.pass.which.next = self.contacts.section.val();
         self.rescale.which.next = self.frame_case.kept.val();
         self.unfold.which.next = self.frame_case.kept.val();
         self.search.fill_which.next = self.frame_case.kept.val();
@@ -347,7 +368,7 @@ impl Logic for Engine {
         comment!("the first of several also waits for the previous send,");
         comment!("as does one that is not searched: its only sweep reads");
         comment!("the memory that the next frame is written to");
-        self.begin_send.next = self.search.values_begin.val() & self.searched_first.q.val();
+        self.begin_send.next = self.contacts.begins.val() & self.searched_first.q.val();
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.searched_case.kept.val();
         self.sending.d.next =
@@ -358,7 +379,7 @@ impl Logic for Engine {
         self.hand_over.next =
             self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
         self.leaves.next = self.hand_over.val() & self.part.last.val();
-        self.passed.next = self.search.done.val() & self.searched_last.q.val();
+        self.passed.next = self.contacts.ended.val() & self.searched_last.q.val();
         if self.ahead.val() {
             self.passed.next = self.leaves.val();
         }
@@ -439,8 +460,8 @@ impl Logic for Engine {
         self.receive.s_axis_tvalid.next = self.prepare.m_axis_tvalid.val();
         self.receive.s_axis_tlast.next = self.prepare.m_axis_tlast.val();
         self.prepare.m_axis_tready.next = self.receive.s_axis_tready.val();
-        self.receive.quad_address.next = self.fold.quad_address.val();
-        self.receive.free.next = self.fold.free.val();
+        self.receive.quad_address.next = self.contacts.quad_address.val();
+        self.receive.free.next = self.contacts.free.val();
         self.receive.reported.next = self.begin_frame.val();
         self.receive.part.next = self.part.value.val();
         self.normalise.start.next = self.start.val();
@@ -452,16 +473,16 @@ impl Logic for Engine {
         self.fold.normalised.next = self.normalise.shifted.val();
 
         comment!("fold -> pass -> rescale -> unfold, and back to pass");
-        self.pass.start.next = self.fold.readable.val();
+        self.pass.start.next = self.contacts.pass_start.val();
         self.fold.read_address.next = self.pass.input_address.val();
         self.pass.input_quad.next = self.fold.read_quad.val();
         self.rescale.start.next = self.start.val();
         self.rescale.quad.next = self.pass.quad.val();
         self.rescale.quad_valid.next = self.pass.quad_valid.val();
         self.rescale.quad_soon.next = self.pass.quad_soon.val();
-        self.estimate.start.next = self.start.val();
+        self.estimate.start.next = self.contacts.estimate_start.val();
         self.estimate.clear.next = self.start.val();
-        self.estimate.enabled.next = self.condition.q.val();
+        self.estimate.enabled.next = self.contacts.enabled.val();
         self.estimate.quad.next = self.pass.quad.val();
         self.estimate.valid.next = self.pass.layer_valid.val();
         self.relax.start.next = self.start.val();
@@ -483,6 +504,53 @@ impl Logic for Engine {
         self.unfold.start.next = self.start.val();
         self.unfold.words.next = self.relax.sums.val();
         self.unfold.words_valid.next = self.relax.sums_valid.val();
+
+        comment!("Contacts: segment -> window -> pass, relax -> shear -> pass");
+        self.contacts.start.next = self.start.val();
+        self.contacts.readable.next = self.fold.readable.val();
+        self.contacts.folded.next = self.fold.free.val();
+        self.contacts.taxels_valid.next = self.unfold.taxels_valid.val();
+        self.contacts.segmented.next = self.segment.done.val();
+        self.contacts.count.next = self.segment.count.val();
+        self.contacts.known.next = self.estimate.known.val();
+        self.contacts.condition.next = self.condition.q.val();
+        self.contacts.positive.next = self.window.positive.val();
+        self.contacts.negative.next = self.window.negative.val();
+        self.contacts.position_x.next = self.estimate.position_x.val();
+        self.contacts.position_y.next = self.estimate.position_y.val();
+        self.contacts.ln_sigma.next = self.estimate.ln_sigma.val();
+        self.contacts.values_begin.next = self.search.values_begin.val();
+        self.contacts.searched.next = self.search.done.val();
+        self.contacts.fold_address.next = self.fold.quad_address.val();
+        self.contacts.window_address.next = self.window.quad_address.val();
+        self.contacts.shear_address.next = self.shear.label_address.val();
+        self.contacts.forces_address.next = self.forces.label_address.val();
+        self.contacts.sent_address.next = self.labels.label_address.val();
+        self.contacts.sends_labels.next = self.labels.reads.val();
+        self.segment.fill_quad.next = self.unfold.taxels.val();
+        self.segment.fill.next = self.contacts.fills.val();
+        self.segment.fill_address.next = self.unfold.address.val();
+        self.segment.start.next = self.contacts.segment_start.val();
+        self.segment.label_address.next = self.contacts.label_address.val();
+        self.segment.contact.next = self.contacts.contact.val();
+        self.window.start.next = self.contacts.window_start.val();
+        self.window.middle_row.next = self.segment.middle_row.val();
+        self.window.middle_col.next = self.segment.middle_col.val();
+        self.window.label.next = self.contacts.label.val();
+        self.window.quad.next = self.receive.quad.val();
+        self.window.labels.next = self.segment.labels.val();
+        self.operands.window.next = self.window.write_quad.val();
+        self.operands.mask.next = self.window.mask_quad.val();
+        self.operands.window_valid.next = self.window.write.val();
+        self.shear.clear.next = self.start.val();
+        self.shear.operands.next = self.relax.operands.val();
+        self.shear.operands_valid.next = self.relax.operands_valid.val();
+        self.shear.start.next = self.contacts.shear_start.val();
+        self.shear.labels.next = self.segment.labels.val();
+        self.shear.positions_x.next = self.contacts.positions_x.val();
+        self.shear.positions_y.next = self.contacts.positions_y.val();
+        self.operands.sheared.next = self.shear.sheared.val();
+        self.operands.sheared_valid.next = self.shear.sheared_valid.val();
 
         comment!("unfold -> search");
         self.search.fill_quad.next = self.unfold.taxels.val();
@@ -514,6 +582,14 @@ impl Logic for Engine {
         self.told.mu_x.next = self.estimate.position_x.val();
         self.told.mu_y.next = self.estimate.position_y.val();
         self.told.ln_sigma.next = self.estimate.ln_sigma.val();
+        self.told.told.next = self.contacts.told.val();
+        self.told.told_label.next = self.contacts.told_label.val();
+        self.told.told_x.next = self.contacts.told_x.val();
+        self.told.told_y.next = self.contacts.told_y.val();
+        self.told.told_ln_sigma.next = self.contacts.told_ln_sigma.val();
+        self.told.told_condition.next = self.contacts.told_condition.val();
+        self.forces.labels.next = self.segment.labels.val();
+        self.forces.overflow.next = self.segment.overflow.val();
         self.forces.start.next = self.told.start.val();
         self.forces.part.next = self.told.part.val();
         self.forces.position_x.next = self.told.position_x.val();
@@ -528,7 +604,7 @@ impl Logic for Engine {
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.frame_cycles.cycles.val();
         self.send.start.next = self.begin_send.val();
-        self.send.begins.next = self.search.values_begin.val();
+        self.send.begins.next = self.contacts.begins.val();
         self.send.room.next = self.forces.room.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();
@@ -537,11 +613,16 @@ impl Logic for Engine {
         self.forces.lane.next = self.send.lane.val();
         self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
         self.send.m_axis_tlast.next = self.forces.m_axis_tlast.val();
-        self.send.m_axis_tready.next = self.resultants.s_axis_tready.val();
-        self.forces.m_axis_tready.next = self.resultants.s_axis_tready.val();
-        self.resultants.s_axis_tdata.next = self.forces.m_axis_tdata.val();
-        self.resultants.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
-        self.resultants.s_axis_tlast.next = self.forces.m_axis_tlast.val();
+        self.send.m_axis_tready.next = self.labels.s_axis_tready.val();
+        self.forces.m_axis_tready.next = self.labels.s_axis_tready.val();
+        self.labels.s_axis_tdata.next = self.forces.m_axis_tdata.val();
+        self.labels.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
+        self.labels.s_axis_tlast.next = self.forces.m_axis_tlast.val();
+        self.labels.labels.next = self.segment.labels.val();
+        self.labels.m_axis_tready.next = self.resultants.s_axis_tready.val();
+        self.resultants.s_axis_tdata.next = self.labels.m_axis_tdata.val();
+        self.resultants.s_axis_tvalid.next = self.labels.m_axis_tvalid.val();
+        self.resultants.s_axis_tlast.next = self.labels.m_axis_tlast.val();
         self.resultants.m_axis_tready.next = self.m_axis_tready.val();
         self.m_axis_tdata.next = self.resultants.m_axis_tdata.val();
         self.m_axis_tvalid.next = self.resultants.m_axis_tvalid.val();

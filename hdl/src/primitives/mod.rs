@@ -56,7 +56,7 @@ pub use output::status_source::StatusSource;
 pub use pass::limb_sum::LimbSum;
 pub use pass::operand_scale::OperandScale;
 pub use pass::operand_select::OperandSelect;
-pub use pass::operand_source::OperandSource;
+pub use pass::operand_source::{OperandSource, MASK_BITS};
 pub use pass::operand_writer::OperandWriter;
 pub use pass::pass_program::{longest, programs, Control, PassProgram, COLUMN_FILE, FACTOR_BITS, SOURCE_BITS};
 pub use pass::raw_length::{shift_bits, RawLength};

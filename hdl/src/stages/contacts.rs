@@ -11,30 +11,36 @@
 //! | `PLACE` | one cycle: the middle of the next contact |
 //! | `CONTACT` | its μ is known |
 //! | `STEP` | all quads of p are there as taxels |
-//! | `RESULT` | the search's place is asked to send: its values are p |
+//! | `RESULT` | the values begin |
 //! | `TELL` | one status per cycle, that of the taxels without a contact first |
 
 use dermis_golden::fixed::Model;
+use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
-use crate::primitives::{count_bits, position_bits};
+use crate::primitives::{count_bits, frame_quads, position_bits};
 use crate::wire::Wire;
 
-/// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other.
+/// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other. The
+/// ports of the frame buffer and of the labels are those of the stage that runs.
 ///
-/// Without contacts all outputs are constant 0.
+/// Without contacts pulses pass on wires, and what only contacts need is constant 0.
 #[derive(LogicBlock)]
 pub struct Contacts {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A frame starts.
+    /// A subarray starts.
     pub start: Signal<In, Bit>,
+    /// Index of the case.
+    pub which: Wire<In>,
     /// The products of v_00 may begin.
     pub readable: Signal<In, Bit>,
+    /// `fold` has read the frame.
+    pub folded: Signal<In, Bit>,
     /// `unfold` gives a quad of taxels.
     pub taxels_valid: Signal<In, Bit>,
     /// The contacts are known; high for one cycle.
@@ -43,20 +49,46 @@ pub struct Contacts {
     pub count: Wire<In>,
     /// The μ of the contact is known; high for one cycle.
     pub known: Signal<In, Bit>,
-    /// Whether the contact meets the scene's condition; valid with `known`.
+    /// The subarray meets the scene's condition.
     pub condition: Signal<In, Bit>,
+    /// A code of the contact is above the noise floor; valid with `known`.
+    pub positive: Signal<In, Bit>,
+    /// A code of the contact is below minus the noise floor; valid with `known`.
+    pub negative: Signal<In, Bit>,
     /// Position of its μ1 in mu_max/384, signed; valid with `known`.
     pub position_x: Wire<In>,
     /// Position of its μ2 in mu_max/384, signed; valid with `known`.
     pub position_y: Wire<In>,
     /// Word of both ln σ; valid with `known`.
     pub ln_sigma: Wire<In>,
-    /// Statuses may be told; high for one cycle.
-    pub tell: Signal<In, Bit>,
-    /// Section of the passes: 0 for v_00, 1 for the layers, 2 for a step.
+    /// The values of a subarray begin; high for one cycle.
+    pub values_begin: Signal<In, Bit>,
+    /// The search of a subarray has ended; high for one cycle.
+    pub searched: Signal<In, Bit>,
+    /// Address of the quad that `fold` reads from the frame buffer.
+    pub fold_address: Wire<In>,
+    /// Address of the quad that `window` reads there, and of its labels.
+    pub window_address: Wire<In>,
+    /// Address of the quad whose labels `shear` reads.
+    pub shear_address: Wire<In>,
+    /// Address of the step whose labels `forces` reads.
+    pub forces_address: Wire<In>,
+    /// Address of the quad whose labels `labels` reads.
+    pub sent_address: Wire<In>,
+    /// `labels` reads labels.
+    pub sends_labels: Signal<In, Bit>,
+    /// Section of the passes: of contacts 0 for v_00, 1 for the layers, 2 for a step; else the case.
     pub section: Wire<Out>,
     /// The section begins.
     pub pass_start: Signal<Out, Bit>,
+    /// The frame buffer may be overwritten.
+    pub free: Signal<Out, Bit>,
+    /// Address of the quad to read from the frame buffer.
+    pub quad_address: Wire<Out>,
+    /// Address of the quad whose labels are needed.
+    pub label_address: Wire<Out>,
+    /// The taxels of `unfold` are those of v_00.
+    pub fills: Signal<Out, Bit>,
     /// v_00 is filled in: find the contacts.
     pub segment_start: Signal<Out, Bit>,
     /// Index of the contact.
@@ -65,14 +97,16 @@ pub struct Contacts {
     pub label: Wire<Out>,
     /// Read the window around it; its layers begin.
     pub window_start: Signal<Out, Bit>,
+    /// The rows of the first layer come next.
+    pub estimate_start: Signal<Out, Bit>,
+    /// μ is wanted, otherwise it is 0.
+    pub enabled: Signal<Out, Bit>,
     /// Make the operands of a step.
     pub shear_start: Signal<Out, Bit>,
     /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits.
     pub positions_x: Wire<Out>,
     /// The same of μ2.
     pub positions_y: Wire<Out>,
-    /// All steps are done, p is complete; high for one cycle.
-    pub done: Signal<Out, Bit>,
     /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
     pub told: Signal<Out, Bit>,
     /// The label; valid with `told`.
@@ -85,7 +119,9 @@ pub struct Contacts {
     pub told_ln_sigma: Wire<Out>,
     /// Whether it meets the condition; valid with `told`.
     pub told_condition: Signal<Out, Bit>,
-    /// The last status has been told; high for one cycle.
+    /// Beats of a subarray may be requested; of contacts once the last status has been told; high for one cycle.
+    pub begins: Signal<Out, Bit>,
+    /// The subarray is out of the passes and the search; high for one cycle.
     pub ended: Signal<Out, Bit>,
     kernel: Body,
 }
@@ -94,11 +130,14 @@ kernel_block!(
     Contacts,
     clock clk,
     inputs [
-        rst, start, readable, taxels_valid, segmented, count, known, condition, position_x, position_y, ln_sigma, tell
+        rst, start, which, readable, folded, taxels_valid, segmented, count, known, condition, positive, negative,
+        position_x, position_y, ln_sigma, values_begin, searched, fold_address, window_address, shear_address,
+        forces_address, sent_address, sends_labels
     ],
     outputs [
-        section, pass_start, segment_start, contact, label, window_start, shear_start, positions_x, positions_y, done,
-        told, told_label, told_x, told_y, told_ln_sigma, told_condition, ended
+        section, pass_start, free, quad_address, label_address, fills, segment_start, contact, label, window_start,
+        estimate_start, enabled, shear_start, positions_x, positions_y, told, told_label, told_x, told_y, told_ln_sigma,
+        told_condition, begins, ended
     ]
 );
 
@@ -115,6 +154,12 @@ struct Shape {
     contacts: usize,
     /// Width of the word of both ln σ.
     score_bits: usize,
+    /// A contact needs codes of both signs for a μ.
+    both_signs: bool,
+    cases: usize,
+    /// Quads of a frame, over all subarrays, and steps in which they are sent.
+    frame_quads: usize,
+    frame_steps: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -133,9 +178,17 @@ impl Contacts {
     /// For the contacts of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        let contacts = if formats.by_contact() { model.scene.partition.max_contacts } else { 0 };
-        let (quads, steps, score_bits) = (formats.quads, formats.degree, formats.score_bits as usize);
-        Contacts::of(Shape { quads, steps, contacts, score_bits })
+        let frame_quads = frame_quads(model.cases());
+        Contacts::of(Shape {
+            quads: formats.quads,
+            steps: formats.degree,
+            contacts: model.contacts(),
+            score_bits: formats.score_bits as usize,
+            both_signs: model.scene.partition.condition == Condition::BothSigns,
+            cases: model.cases().len(),
+            frame_quads,
+            frame_steps: formats.sweep_steps(frame_quads),
+        })
     }
 
     fn of(shape: Shape) -> Self {
@@ -145,17 +198,34 @@ impl Contacts {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
+            which: Wire::new(count_bits(shape.cases)),
+            folded: Default::default(),
             readable: Default::default(),
             taxels_valid: Default::default(),
             segmented: Default::default(),
             count: Wire::new(label),
             known: Default::default(),
             condition: Default::default(),
+            positive: Default::default(),
+            negative: Default::default(),
             position_x: Wire::new(position_bits()),
             position_y: Wire::new(position_bits()),
             ln_sigma: Wire::new(shape.score_bits),
-            tell: Default::default(),
-            section: Wire::new(SECTION_BITS),
+            values_begin: Default::default(),
+            searched: Default::default(),
+            fold_address: Wire::new(count_bits(shape.frame_quads)),
+            window_address: Wire::new(count_bits(shape.quads)),
+            shear_address: Wire::new(count_bits(shape.quads)),
+            forces_address: Wire::new(count_bits(shape.frame_steps)),
+            sent_address: Wire::new(count_bits(shape.quads)),
+            sends_labels: Default::default(),
+            section: Wire::new(shape.section_bits()),
+            free: Default::default(),
+            quad_address: Wire::new(count_bits(shape.frame_quads)),
+            label_address: Wire::new(count_bits(shape.quads)),
+            fills: Default::default(),
+            estimate_start: Default::default(),
+            enabled: Default::default(),
             pass_start: Default::default(),
             segment_start: Default::default(),
             contact: Wire::new(shape.contact_bits()),
@@ -164,13 +234,13 @@ impl Contacts {
             shear_start: Default::default(),
             positions_x: Wire::new(positions),
             positions_y: Wire::new(positions),
-            done: Default::default(),
             told: Default::default(),
             told_label: Wire::new(label),
             told_x: Wire::new(position_bits()),
             told_y: Wire::new(position_bits()),
             told_ln_sigma: Wire::new(shape.score_bits),
             told_condition: Default::default(),
+            begins: Default::default(),
             ended: Default::default(),
             kernel: Body::default(),
         };
@@ -184,10 +254,22 @@ impl Contacts {
     /// The kernel of a scene without contacts.
     fn nothing(&self, shape: Shape) -> Kernel {
         let k = Builder::new("contacts");
-        shape.inputs(&k);
+        let own = shape.inputs(&k);
         k.comment("There are no contacts.");
+        for (name, value) in [
+            ("section", own.which),
+            ("pass_start", own.readable),
+            ("free", own.folded),
+            ("quad_address", own.fold_address),
+            ("estimate_start", own.start),
+            ("enabled", own.condition),
+            ("begins", own.values_begin),
+            ("ended", own.searched),
+        ] {
+            k.wire(name, value);
+        }
         let words = [
-            ("section", self.section.width()),
+            ("label_address", self.label_address.width()),
             ("contact", self.contact.width()),
             ("label", self.label.width()),
             ("positions_x", self.positions_x.width()),
@@ -197,8 +279,7 @@ impl Contacts {
             ("told_y", self.told_y.width()),
             ("told_ln_sigma", self.told_ln_sigma.width()),
         ];
-        let bits =
-            ["pass_start", "segment_start", "window_start", "shear_start", "done", "told", "told_condition", "ended"];
+        let bits = ["fills", "segment_start", "window_start", "shear_start", "told", "told_condition"];
         for (name, width) in words.into_iter().chain(bits.map(|name| (name, 1))) {
             k.wire(name, k.constant(width, 0));
         }
@@ -210,15 +291,26 @@ impl Contacts {
 struct Inputs<'k> {
     rst: Expr<'k>,
     start: Expr<'k>,
+    which: Expr<'k>,
     readable: Expr<'k>,
+    folded: Expr<'k>,
     taxels_valid: Expr<'k>,
     segmented: Expr<'k>,
     count: Expr<'k>,
     known: Expr<'k>,
     condition: Expr<'k>,
+    positive: Expr<'k>,
+    negative: Expr<'k>,
     position: [Expr<'k>; 2],
     ln_sigma: Expr<'k>,
-    tell: Expr<'k>,
+    values_begin: Expr<'k>,
+    searched: Expr<'k>,
+    fold_address: Expr<'k>,
+    window_address: Expr<'k>,
+    shear_address: Expr<'k>,
+    forces_address: Expr<'k>,
+    sent_address: Expr<'k>,
+    sends_labels: Expr<'k>,
 }
 
 impl Shape {
@@ -227,6 +319,16 @@ impl Shape {
         count_bits(self.contacts + 1)
     }
 
+    /// Width of the section.
+    fn section_bits(self) -> usize {
+        if self.contacts > 0 {
+            SECTION_BITS
+        } else {
+            count_bits(self.cases)
+        }
+    }
+
+    /// Width of the index of a contact.
     fn contact_bits(self) -> usize {
         count_bits(self.contacts.max(1))
     }
@@ -236,15 +338,26 @@ impl Shape {
         Inputs {
             rst: bit("rst"),
             start: bit("start"),
+            which: k.input("which", count_bits(self.cases)),
             readable: bit("readable"),
+            folded: bit("folded"),
             taxels_valid: bit("taxels_valid"),
             segmented: bit("segmented"),
             count: k.input("count", self.label_bits()),
             known: bit("known"),
             condition: bit("condition"),
+            positive: bit("positive"),
+            negative: bit("negative"),
             position: ["position_x", "position_y"].map(|name| k.input(name, position_bits())),
             ln_sigma: k.input("ln_sigma", self.score_bits),
-            tell: bit("tell"),
+            values_begin: bit("values_begin"),
+            searched: bit("searched"),
+            fold_address: k.input("fold_address", count_bits(self.frame_quads)),
+            window_address: k.input("window_address", count_bits(self.quads)),
+            shear_address: k.input("shear_address", count_bits(self.quads)),
+            forces_address: k.input("forces_address", count_bits(self.frame_steps)),
+            sent_address: k.input("sent_address", count_bits(self.quads)),
+            sends_labels: bit("sends_labels"),
         }
     }
 
@@ -279,8 +392,7 @@ impl Shape {
         let stepped = k.wire("stepped", is(State::Step) & complete);
         let last_step = step.is(self.steps as u64 - 1);
         let steps = k.wire("steps", (segmented & !own.count.any()) | (known & last_contact) | (stepped & !last_step));
-        let finishes = k.wire("finishes", stepped & last_step);
-        let tells = k.wire("tells", is(State::Result) & own.tell);
+        let tells = k.wire("tells", is(State::Result) & own.values_begin);
         let told_label = k.register("told_label", Type::unsigned(label_bits));
         let ends = k.wire("ends", is(State::Tell) & told_label.is(self.contacts as u64));
 
@@ -301,7 +413,7 @@ impl Shape {
             section.set(k.constant(SECTION_BITS, 2));
         });
         k.when(stepped & !last_step, || step.set(step.plus(1)));
-        k.when(finishes, || goes(State::Result));
+        k.when(stepped & last_step, || goes(State::Result));
         k.when(tells, || {
             goes(State::Tell);
             told_label.set(k.constant(label_bits, 0));
@@ -316,8 +428,19 @@ impl Shape {
         pulse("segment_start", segments);
         pulse("window_start", is(State::Place));
         pulse("shear_start", steps);
-        pulse("done", finishes);
         pulse("ended", ends);
+        k.wire("begins", k.named("ended"));
+        k.comment("All windows have been read when the first step begins.");
+        pulse("free", steps & !is(State::Step));
+        k.wire("fills", own.taxels_valid & is(State::First));
+        k.wire("estimate_start", k.named("window_start"));
+        let enabled = if self.both_signs { own.positive & own.negative } else { own.positive | own.negative };
+        let enabled = k.wire("enabled", enabled);
+        let reads = is(State::Contact);
+        k.wire("quad_address", reads.mux(own.window_address.resize(own.fold_address.bits()), own.fold_address));
+        let sent = own.sends_labels.mux(own.sent_address, own.forces_address.resize(own.sent_address.bits()));
+        let label_address = reads.mux(own.window_address, is(State::Step).mux(own.shear_address, sent));
+        k.wire("label_address", label_address);
         k.wire("pass_start", own.readable | k.named("window_start") | k.named("shear_start"));
 
         k.comment("What is known of each contact.");
@@ -331,8 +454,7 @@ impl Shape {
             let all: Vec<Expr<'_>> = (0..self.contacts).rev().map(own_now).collect();
             positions[axis].set(concat(&all));
         }
-        let own_condition =
-            |at: usize| (known & contact.is(at as u64)).mux(own.condition, conditions.at(at)) & !own.start;
+        let own_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !own.start;
         conditions.set(concat(&(0..self.contacts).rev().map(own_condition).collect::<Vec<_>>()));
         let ln_sigma = k.memory("ln_sigma_of", self.contacts, self.score_bits, Contents::Undefined);
         ln_sigma.write(known, *contact, own.ln_sigma);
@@ -363,7 +485,16 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { quads: 5, steps: 3, contacts: 6, score_bits: 32 };
+    const SHAPE: Shape = Shape {
+        quads: 5,
+        steps: 3,
+        contacts: 6,
+        score_bits: 32,
+        both_signs: true,
+        cases: 1,
+        frame_quads: 5,
+        frame_steps: 5,
+    };
 
     /// What is waited for.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -381,6 +512,15 @@ mod tests {
         Telling(usize),
     }
 
+    /// Place of each input that is more than a pulse.
+    const COUNT: usize = 7;
+    const SIGNS: [usize; 2] = [10, 11];
+    const MU: usize = 12;
+    const FOLD: usize = 17;
+
+    /// What is told of a contact: whether it has a μ, the position of μ, ln σ.
+    type Told = (bool, [Word; 2], Word);
+
     /// Inputs in the order of the block. What pulses next follows from what was waited for.
     struct Sequence {
         waits: Option<Waits>,
@@ -388,9 +528,9 @@ mod tests {
         count: usize,
         section: Option<u64>,
         contact: Option<usize>,
-        /// Condition, position and ln σ of each contact that is known.
-        all: Vec<(bool, [Word; 2], Word)>,
-        /// The pulses of this cycle: segment, window, shear, done, ended.
+        /// The contacts that are known.
+        all: Vec<Told>,
+        /// The pulses of this cycle: segment, window, shear, end, free.
         pulses: [bool; 5],
     }
 
@@ -400,10 +540,16 @@ mod tests {
             Sequence { waits, quads: 0, count: 0, section, contact, all: Vec::new(), pulses: [false; 5] }
         }
 
-        /// The positions on an axis of the contacts known, with what was kept of others: not compared.
+        /// The positions on an axis, once those of all contacts are known.
         fn positions(&self, axis: usize) -> Option<Word> {
             let all: Vec<i64> = self.all.iter().map(|own| own.1[axis].signed(0, position_bits())).collect();
             (all.len() == SHAPE.contacts).then(|| Word::of_fields(&all, position_bits()))
+        }
+
+        /// The first step begins.
+        fn step(&mut self) -> Option<Waits> {
+            (self.pulses[2], self.pulses[4], self.section) = (true, true, Some(2));
+            Some(Waits::Step(0))
         }
     }
 
@@ -411,25 +557,40 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let known = self.waits.is_some();
             let bit = |value: bool| known.then(|| value.into());
-            let [segment, window, shear, done, ended] = self.pulses;
+            let high = |input: usize| inputs[input].number() == 1;
+            let [segment, window, shear, ended, free] = self.pulses;
             let telling = match self.waits {
                 Some(Waits::Telling(label)) => Some(label),
                 _ => None,
             };
             let own = telling.map(|label| label.checked_sub(1).and_then(|at| self.all.get(at)).filter(|own| own.0));
-            let word = |of: &dyn Fn(&(bool, [Word; 2], Word)) -> Word| own.map(|own| own.map_or(Word::default(), of));
-            let contact = self.contact.map(|contact| Word::from(contact as u64));
+            let word = |of: &dyn Fn(&Told) -> Word| own.map(|own| own.map_or(Word::default(), of));
+            let reads = matches!(self.waits, Some(Waits::Mu(_)));
+            let [fold, at_window, at_shear, at_forces, at_sent] = [0, 1, 2, 3, 4].map(|own| inputs[FOLD + own]);
+            let labels = match self.waits {
+                Some(Waits::Mu(_)) => at_window,
+                Some(Waits::Step(_)) => at_shear,
+                _ if high(FOLD + 5) => at_sent,
+                _ => at_forces,
+            };
+            let [positive, negative] = SIGNS.map(high);
             vec![
-                contact,
+                self.contact.map(|contact| Word::from(contact as u64)),
                 self.contact.map(|contact| Word::from(contact as u64 + 1)),
                 self.section.map(Word::from),
                 telling.map(|label| Word::from(label as u64)),
                 bit(segment),
                 bit(window),
                 bit(shear),
-                bit(done),
                 bit(ended),
-                bit(window || shear || inputs[2].number() == 1),
+                bit(ended),
+                bit(free),
+                bit(high(5) && self.waits == Some(Waits::First)),
+                bit(window),
+                Some((positive && negative).into()),
+                known.then_some(if reads { at_window } else { fold }),
+                known.then_some(labels),
+                bit(window || shear || high(3)),
                 self.positions(0),
                 self.positions(1),
                 bit(telling.is_some()),
@@ -441,8 +602,9 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, start, _, taxels, segmented] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() == 1);
-            let [known, condition, tell] = [6, 7, 11].map(|input| inputs[input].number() == 1);
+            let high = |input: usize| inputs[input].number() == 1;
+            let (rst, start, taxels, segmented) = (high(0), high(1), high(5), high(6));
+            let (known, begins) = (high(8), high(15));
             self.pulses = [false; 5];
             self.quads += usize::from(taxels);
             let complete = taxels && self.quads == SHAPE.quads;
@@ -453,32 +615,30 @@ mod tests {
             match self.waits {
                 Some(Waits::First) if complete => (next, self.pulses[0]) = (Some(Waits::Segments), true),
                 Some(Waits::Segments) if segmented => {
-                    self.count = inputs[5].number() as usize;
-                    (next, self.contact) = (Some(Waits::Middle(0)), Some(0));
-                    if self.count == 0 {
-                        (next, self.pulses[2], self.section) = (Some(Waits::Step(0)), true, Some(2));
-                    }
+                    (self.count, self.contact) = (inputs[COUNT].number() as usize, Some(0));
+                    next = if self.count == 0 { self.step() } else { Some(Waits::Middle(0)) };
                 }
                 Some(Waits::Middle(contact)) => {
                     (next, self.pulses[1], self.section) = (Some(Waits::Mu(contact)), true, Some(1));
                 }
                 Some(Waits::Mu(contact)) if known => {
-                    self.all.push((condition, [inputs[8], inputs[9]], inputs[10]));
+                    let condition = SIGNS.iter().all(|input| high(*input));
+                    self.all.push((condition, [inputs[MU], inputs[MU + 1]], inputs[MU + 2]));
                     if contact + 1 < self.count {
                         (next, self.contact) = (Some(Waits::Middle(contact + 1)), Some(contact + 1));
                     } else {
-                        (next, self.pulses[2], self.section) = (Some(Waits::Step(0)), true, Some(2));
+                        next = self.step();
                     }
                 }
                 Some(Waits::Step(step)) if complete => {
                     let last = step + 1 == SHAPE.steps;
                     next = Some(if last { Waits::Tell } else { Waits::Step(step + 1) });
-                    self.pulses[if last { 3 } else { 2 }] = true;
+                    self.pulses[2] = !last;
                 }
-                Some(Waits::Tell) if tell => next = Some(Waits::Telling(0)),
+                Some(Waits::Tell) if begins => next = Some(Waits::Telling(0)),
                 Some(Waits::Telling(label)) => {
-                    self.pulses[4] = label == SHAPE.contacts;
-                    next = Some(if self.pulses[4] { Waits::Start } else { Waits::Telling(label + 1) });
+                    self.pulses[3] = label == SHAPE.contacts;
+                    next = Some(if self.pulses[3] { Waits::Start } else { Waits::Telling(label + 1) });
                 }
                 _ => {}
             }
@@ -504,20 +664,27 @@ mod tests {
             let mut put = |random: &mut fastrand::Rng, model: &mut Sequence, [rst, start, answers]: [bool; 3]| {
                 let waits = model.waits;
                 let answer = |wanted: bool| Word::from(answers && wanted);
-                let inputs = vec![
+                let mut inputs = vec![
                     rst.into(),
                     start.into(),
+                    Word::default(),
                     answer(waits == Some(Waits::First)),
+                    random.bool().into(),
                     answer(matches!(waits, Some(Waits::First | Waits::Step(_)))),
                     answer(waits == Some(Waits::Segments)),
                     Word::from(count as u64),
                     answer(matches!(waits, Some(Waits::Mu(_)))),
                     random.bool().into(),
+                    random.bool().into(),
+                    random.bool().into(),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     random_word(random, SHAPE.score_bits),
                     answer(waits == Some(Waits::Tell)),
+                    random.bool().into(),
                 ];
+                inputs.extend((0..5).map(|_| Word::from(random.u64(..SHAPE.quads as u64))));
+                inputs.push(random.bool().into());
                 model.clock(&inputs);
                 all.push(inputs);
             };

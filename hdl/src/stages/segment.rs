@@ -27,6 +27,9 @@
 //! 2·line + 1, so that the middle is their quotient by twice the weight, rounded down.
 
 use dermis_golden::fixed::stages::segment::cycles::Segmentation;
+use dermis_golden::fixed::stages::segment::word_shift;
+use dermis_golden::fixed::Model;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -65,6 +68,10 @@ pub struct Segment {
     pub count: Wire<Out>,
     /// There were more contacts or basins than there may be.
     pub overflow: Signal<Out, Bit>,
+    /// The contacts of a quad are written; high for one cycle per quad, in their order.
+    pub labelled: Signal<Out, Bit>,
+    /// Those contacts, signed, a bit wider than a label; valid with `labelled`.
+    pub labelled_quad: Wire<Out>,
     /// Contacts of the four taxels of a quad, 0 for none, else 1 + index; two cycles after `label_address`.
     pub labels: Wire<Out>,
     /// Row of the taxel in the middle of a contact; one cycle after `contact`.
@@ -78,10 +85,74 @@ kernel_block!(
     Segment,
     clock clk,
     inputs [rst, fill_quad, fill, fill_address, start, label_address, contact],
-    outputs [done, count, overflow, labels, middle_row, middle_col]
+    outputs [done, count, overflow, labelled, labelled_quad, labels, middle_row, middle_col]
 );
 
 impl Segment {
+    /// For the contacts of `model`; without contacts all outputs are constant 0.
+    pub fn of_model(model: &Model) -> Self {
+        let formats = model.formats();
+        let lane = formats.vector_bits as usize + 2;
+        match &model.by_contact {
+            Some(contacts) => {
+                let (sensor, most) = (&model.scene.sensor, model.contacts());
+                let segmentation = Segmentation { sensor, segmenter: &contacts.segmenter, most };
+                Segment::new(&segmentation, lane, word_shift(formats) as usize)
+            }
+            None => Segment::nothing(model.layout(), lane),
+        }
+    }
+
+    /// Constant 0 in the place of a segmentation, for quads with lanes of `lane` bits.
+    fn nothing(layout: Quads, lane: usize) -> Self {
+        let (quad, bits) = (count_bits(layout.len()), count_bits(1));
+        let k = Builder::new("segment");
+        k.comment("There are no contacts.");
+        for (name, width) in [
+            ("rst", 1),
+            ("fill_quad", 4 * lane),
+            ("fill", 1),
+            ("fill_address", quad),
+            ("start", 1),
+            ("label_address", quad),
+            ("contact", bits),
+        ] {
+            k.input(name, width);
+        }
+        for (name, width) in [
+            ("done", 1),
+            ("count", bits),
+            ("overflow", 1),
+            ("labelled", 1),
+            ("labelled_quad", 4 * (bits + 1)),
+            ("labels", 4 * bits),
+            ("middle_row", count_bits(layout.rows)),
+            ("middle_col", count_bits(layout.cols)),
+        ] {
+            k.wire(name, k.constant(width, 0));
+        }
+        let block = Segment {
+            clk: Default::default(),
+            rst: Default::default(),
+            fill_quad: Wire::new(4 * lane),
+            fill: Default::default(),
+            fill_address: Wire::new(quad),
+            start: Default::default(),
+            label_address: Wire::new(quad),
+            contact: Wire::new(bits),
+            done: Default::default(),
+            count: Wire::new(bits),
+            overflow: Default::default(),
+            labelled: Default::default(),
+            labelled_quad: Wire::new(4 * (bits + 1)),
+            labels: Wire::new(4 * bits),
+            middle_row: Wire::new(count_bits(layout.rows)),
+            middle_col: Wire::new(count_bits(layout.cols)),
+            kernel: Body::default(),
+        };
+        block.bind(k.finish())
+    }
+
     /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
     pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
         let shape = Shape::new(segmentation, lane, low);
@@ -98,6 +169,8 @@ impl Segment {
             done: Default::default(),
             count: Wire::new(shape.label()),
             overflow: Default::default(),
+            labelled: Default::default(),
+            labelled_quad: Wire::new(4 * (shape.label() + 1)),
             labels: Wire::new(4 * shape.label()),
             middle_row: Wire::new(count_bits(shape.rows)),
             middle_col: Wire::new(count_bits(shape.cols)),

@@ -218,7 +218,7 @@ mod tests {
         }
     }
 
-    fn requests_are_in_order(model: &Model, defects: bool) {
+    fn requests_are_in_order(model: &Model, has_defects: bool) {
         let mut random = fastrand::Rng::with_seed(9);
         let mut sending = Sending::new(model);
         let mut which = 0;
@@ -248,7 +248,7 @@ mod tests {
             Change::value("", "released__part", |k| k.named("parts__value")),
             Change::value("", "finish", |k| k.named("step") & k.named("status__q") & k.named("words__last")),
         ];
-        let defects = if defects { &defects[..] } else { &[] };
+        let defects = if has_defects { &defects[..] } else { &[] };
         check_with_defects(subject, &stimulus, || Sending::new(model), defects);
     }
 }

@@ -8,7 +8,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
 use dermis_golden::fixed::stages::shear::{LATENCY, MEAN};
-use dermis_golden::fixed::words::formats::Formats;
+use dermis_golden::fixed::Model;
 use dermis_golden::segment::NONE;
 use rust_hdl::prelude::*;
 
@@ -67,10 +67,10 @@ struct Shape {
 }
 
 impl Shear {
-    /// With the widths of `formats`, for up to `most` contacts.
-    pub fn new(formats: &Formats, most: usize) -> Self {
-        let contacts = if formats.by_contact() { most } else { 0 };
-        Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts })
+    /// For the contacts of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = model.formats();
+        Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts: model.contacts() })
     }
 
     fn of(shape: Shape) -> Self {
@@ -193,7 +193,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use dermis_golden::fixed::stages::shear::{cycles, shear};
-    use dermis_golden::fixed::Model;
+    use dermis_golden::fixed::words::formats::Formats;
     use dermis_golden::scene::Scene;
 
     use super::*;

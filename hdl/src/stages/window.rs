@@ -18,7 +18,7 @@ use rust_hdl::prelude::*;
 use super::normalise::left_shift;
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
-use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtracted, TaxelPlace};
+use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtracted, TaxelPlace, MASK_BITS};
 use crate::wire::{Wire, Word};
 
 /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
@@ -74,9 +74,6 @@ kernel_block!(
     ]
 );
 
-/// Width of a field of the mask: one word of 0 or 1, signed, and the growth of the sum.
-const MASK_BITS: usize = 4;
-
 /// Cycles from the scan of a taxel until its code has been chosen from its quad, and until it enters the sums of its own.
 const CODE: usize = 7;
 const SUM: usize = 9;
@@ -85,7 +82,7 @@ impl Window {
     /// For the windows of `model`.
     pub fn new(model: &Model) -> Self {
         let (formats, layout) = (model.formats(), model.layout());
-        let (bits, label_bits) = (formats.input_bits as usize, count_bits(model.scene.partition.max_contacts + 1));
+        let (bits, label_bits) = (formats.input_bits as usize, count_bits(model.contacts() + 1));
         let quads = model.by_contact.as_ref().map_or(1, |contacts| contacts.window.quads().len());
         let address = count_bits(layout.len());
         let block = Window {

@@ -134,6 +134,11 @@ impl Plan {
         }
     }
 
+    /// Largest number of contacts with a μ of its own; 0 where there is one μ.
+    pub fn contacts(&self) -> usize {
+        self.by_contact.as_ref().map_or(0, |_| self.scene.partition.max_contacts)
+    }
+
     /// Whether the hardware has several cases and chooses one per frame.
     pub fn chooses(&self) -> bool {
         self.cases.len() > 1

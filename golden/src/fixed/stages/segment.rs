@@ -33,9 +33,14 @@ pub struct Segmented {
     pub cycles: u64,
 }
 
+/// Right shift from a word of the search to one of the segmentation.
+pub fn word_shift(formats: &Formats) -> u32 {
+    formats.search_bits[0] - 1 - WORD_BITS
+}
+
 /// The word of the segmentation for a p₀ in words of the search.
 pub fn word(formats: &Formats, p: i64) -> i64 {
-    p.max(0) >> (formats.search_bits[0] - 1 - WORD_BITS)
+    p.max(0) >> word_shift(formats)
 }
 
 /// Segments p₀, of which `words` are the [words](word), row-major, into at most `most` contacts.

@@ -44,10 +44,12 @@ pub const FRAMES_SHIFT: u32 = 16;
 pub const LABEL_BITS: u32 = 4;
 /// Labels in a word of a beat, the first in the lowest bits.
 const LABELS_PER_WORD: usize = (32 / LABEL_BITS) as usize;
+/// Labels in a beat.
+pub const LABELS_PER_BEAT: usize = 3 * LABELS_PER_WORD;
 
 /// Number of beats with the labels of so many taxels.
 pub fn label_beats(taxels: usize) -> usize {
-    taxels.div_ceil(3 * LABELS_PER_WORD)
+    taxels.div_ceil(LABELS_PER_BEAT)
 }
 
 /// The beats with these labels, row-major, each below 16; zeros after the last.

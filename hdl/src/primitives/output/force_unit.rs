@@ -156,9 +156,9 @@ struct Shape {
 /// Number of subarrays of a case, or where each contact has a μ of its own, of labels: each has a μ, from which all statuses
 /// but that of label 0 are told.
 fn parts(model: &Model, case: &CasePlan) -> usize {
-    match model.formats().by_contact() {
-        true => 1 + model.scene.partition.max_contacts,
-        false => case.parts.len(),
+    match model.contacts() {
+        0 => case.parts.len(),
+        most => 1 + most,
     }
 }
 

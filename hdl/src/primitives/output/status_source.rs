@@ -99,7 +99,7 @@ impl StatusSource {
                 (false, false) => Gives::Search,
             },
             subarrays: largest(&counts),
-            contacts: if formats.by_contact() { model.scene.partition.max_contacts } else { 0 },
+            contacts: model.contacts(),
             score_bits: formats.score_bits as usize,
         })
     }

@@ -46,6 +46,8 @@ pub struct OperandSource {
     pub quad: Wire<Out>,
     /// `quad` holds a quad.
     pub valid: Signal<Out, Bit>,
+    /// It is one of a window or its mask.
+    pub of_window: Signal<Out, Bit>,
     kernel: Body,
 }
 
@@ -53,7 +55,7 @@ kernel_block!(
     OperandSource,
     clock clk,
     inputs [rst, own, own_valid, images, images_valid, window, mask, window_valid, sheared, sheared_valid],
-    outputs [quad, valid]
+    outputs [quad, valid, of_window]
 );
 
 /// What decides the circuit.
@@ -98,6 +100,7 @@ impl OperandSource {
             sheared_valid: Default::default(),
             quad: Wire::new(4 * shape.data),
             valid: Default::default(),
+            of_window: Default::default(),
             kernel: Body::default(),
         };
         block.bind(shape.kernel())
@@ -120,6 +123,7 @@ impl Shape {
             };
             k.wire("quad", quad);
             k.wire("valid", valid);
+            k.wire("of_window", k.constant(1, 0));
             return k.finish();
         };
         let place = k.state("place", Type::unsigned(count_bits(quads)), rst, 0);
@@ -139,7 +143,8 @@ impl Shape {
         let window = concat(&[3, 2, 1, 0].map(wide));
         let made = images_valid.mux(images, sheared);
         k.wire("quad", window_valid.mux(window, masks.mux(mask, made)));
-        k.wire("valid", window_valid | *masks | images_valid | sheared_valid);
+        let of_window = k.wire("of_window", window_valid | *masks);
+        k.wire("valid", of_window | images_valid | sheared_valid);
         k.finish()
     }
 }
@@ -167,7 +172,7 @@ mod tests {
             let Shape { data, limb, network, window: quads } = self.shape;
             if quads.is_none() {
                 let quad = if images && network { Some(inputs[3]) } else { own.then_some(inputs[1]) };
-                return vec![quad, Some((own || images && network).into())];
+                return vec![quad, Some((own || images && network).into()), Some(Word::default())];
             }
             let mask = self.masks.as_ref().zip(self.next).map(|(masks, next)| {
                 Word::of_fields(&[0, 1, 2, 3].map(|lane| masks[next].signed(lane, MASK_BITS) * MASKED), data)
@@ -175,8 +180,8 @@ mod tests {
             let read = Word::of_fields(&[0, 1, 2, 3].map(|lane| inputs[5].signed(lane, limb)), data);
             let made = [(window, read), (images, inputs[3]), (sheared, inputs[8])];
             let made = made.into_iter().find_map(|(given, quad)| given.then_some(quad));
-            let valid = self.masks.as_ref().map(|_| (mask.or(made).is_some()).into());
-            vec![mask.or(made), valid]
+            let bit = |value: bool| self.masks.as_ref().map(|_| value.into());
+            vec![mask.or(made), bit(window || mask.is_some()), bit(mask.or(made).is_some())]
         }
 
         fn clock(&mut self, inputs: &[Word]) {

@@ -4,7 +4,7 @@ use dermis_golden::fixed::plan::resources::Holds;
 
 use super::control::*;
 use super::walk::Order;
-use crate::language::{Contents, Expr, Type};
+use crate::language::{concat, Contents, Expr, Type};
 use crate::primitives::count_bits;
 
 /// Ticks of `MIDDLE` in which the moments along the rows and the columns are compared.
@@ -31,6 +31,9 @@ impl<'k> Circuit<'k> {
         let memory = memory.holds(Holds::Labels);
         let whole = k.delay("label_quad_ends", self.is(LABEL) & order.quads_end);
         memory.write(whole, k.delay("label_quad_address", *self.quad), quad);
+        k.wire("labelled", whole);
+        let signed = |lane: usize| self.zero(1).concat(quad.slice(lane * bits, bits));
+        k.wire("labelled_quad", concat(&[3, 2, 1, 0].map(signed)));
         let address = k.input("label_address", self.quad.bits());
         k.delay("labels", k.delay("labels_read", memory.read(address)));
         k.when(self.is(LABEL) & order.last_quad, || self.ending.set(k.constant(1, 1)));
