@@ -35,6 +35,8 @@ pub const WIDTH: f64 = 0.8;
 const MIN_PITCHES: f64 = 0.75;
 /// Bits of the largest floating-point force as a word.
 pub const PEAK_BITS: i32 = 30;
+/// Width of a word of the bit-true model, without a sign.
+pub const WORD_BITS: u32 = 16;
 /// Fraction bits of a weight of the smoothing.
 pub const WEIGHT_BITS: u32 = 8;
 /// Fraction bits of the inverse distance between neighbours, in units of the smaller pitch.

@@ -22,7 +22,8 @@ use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtr
 use crate::wire::{Wire, Word};
 
 /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
-/// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked.
+/// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked. The array is one
+/// subarray.
 ///
 /// Without contacts all outputs are constant 0.
 #[derive(LogicBlock)]
@@ -74,8 +75,9 @@ kernel_block!(
     ]
 );
 
-/// Cycles from the scan of a taxel until its code has been chosen from its quad, and until it enters the sums of its own.
+/// Cycles from the scan of a taxel until its code has been chosen from the quad that was read.
 const CODE: usize = 7;
+/// Cycles from the scan of a taxel until its shifted code enters the sums of the window's quad.
 const SUM: usize = 9;
 
 impl Window {
@@ -178,12 +180,14 @@ impl<'k> Ports<'k> {
         self.rst | self.start
     }
 
-    /// `value` so many cycles later; a bit of control is 0 after a reset or a start.
-    fn later(&self, name: &str, value: Expr<'k>, cycles: usize, is_control: bool) -> Expr<'k> {
-        (0..cycles).fold(value, |value, number| match is_control {
-            true => self.bit(&format!("{name}_{number}"), value),
-            false => self.k.delay(&format!("{name}_{number}"), value),
-        })
+    /// A bit so many cycles later, 0 after a reset or a start.
+    fn bit_later(&self, name: &str, value: Expr<'k>, cycles: usize) -> Expr<'k> {
+        (0..cycles).fold(value, |value, number| self.bit(&format!("{name}_{number}"), value))
+    }
+
+    /// A word so many cycles later.
+    fn later(&self, name: &str, value: Expr<'k>, cycles: usize) -> Expr<'k> {
+        (0..cycles).fold(value, |value, number| self.k.delay(&format!("{name}_{number}"), value))
     }
 
     fn window(&self, model: &Model, window: &learned::Window) {
@@ -191,10 +195,8 @@ impl<'k> Ports<'k> {
         let scanned = self.scan(window, model.layout());
         let [code, own, masked] = self.code(model, &scanned);
 
-        k.comment(
-            "First sweep: the magnitude, from which the shift follows; both: signs. The second sweep repeats them.",
-        );
-        let valid = self.later("valid", scanned.valid, CODE, true);
+        k.comment("First sweep: magnitude and signs. The second sweep finds the same ones.");
+        let valid = self.bit_later("valid", scanned.valid, CODE);
         let gathered = |name: &str, value: Expr<'k>| {
             let held = k.state(name, Type::unsigned(value.bits()), self.restarts(), 0);
             held.set(*held | value);
@@ -209,15 +211,15 @@ impl<'k> Ports<'k> {
 
         k.comment("Second sweep: codes and mask are shifted and folded, a taxel per cycle.");
         let shift = k.delay("shift", left_shift(k, magnitude));
-        let shifted = k.delay("shifted", k.delay("near", code).shift_left_by(shift));
-        let sums = self.sums(shifted, self.later("lane", scanned.lane, SUM, false));
+        let shifted = k.delay("shifted", k.delay("code_later", code).shift_left_by(shift));
+        let sums = self.sums(shifted, self.later("lane", scanned.lane, SUM));
         let low = model.formats().input_low_bits as usize;
         k.wire("write_quad", concat(&sums.map(|sum| sum.slice(low, sum.bits() - low))));
         let mask = k.register("mask", Type::unsigned(Quads::LANES));
-        mask.set(self.later("masked_code", masked, SUM - CODE, false).concat(mask.slice(1, Quads::LANES - 1)));
+        mask.set(self.later("masked_code", masked, SUM - CODE).concat(mask.slice(1, Quads::LANES - 1)));
         k.wire("mask_quad", mask.table(4 * MASK_BITS, &folded_masks()));
 
-        let ended = self.later("ends_quad", scanned.ends_quad, SUM, true);
+        let ended = self.bit_later("ends_quad", scanned.ends_quad, SUM);
         let write = self.bit("write", ended);
         let quads = window.quads().len();
         let address = k.state("write_address", Type::unsigned(count_bits(quads)), self.restarts(), 0);
@@ -244,9 +246,7 @@ impl<'k> Ports<'k> {
         k.when(sweep_ends, || again.set(k.constant(1, 1)));
         scanning.set(self.start | (*scanning & !(sweep_ends & *again)));
 
-        k.comment(
-            "Row and column in the array, modulo a power of two that tells lines beyond either end from its own.",
-        );
+        k.comment("Row and column, modulo a power of two beyond the last line of any window.");
         let line = |axis: usize, near: Expr<'k>, far: Expr<'k>, own: usize, lines: usize| {
             let name = ["row", "col"][axis];
             let bits = count_bits(lines + own);
@@ -287,8 +287,8 @@ impl<'k> Ports<'k> {
         });
         let masked = is_dead.map_or(scanned.outside, |dead| scanned.outside | dead);
         // With the quad.
-        let masked = self.later("masked", masked, 4, false);
-        let from = self.later("from", place.lower.concat(place.right), 4, false);
+        let masked = self.later("masked", masked, 4);
+        let from = self.later("from", place.lower.concat(place.right), 4);
         let chosen = |quad: Expr<'k>| {
             let bits = quad.bits() / Quads::LANES;
             let lane = |lane: usize| quad.slice(lane * bits, bits);

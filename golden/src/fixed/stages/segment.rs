@@ -13,12 +13,9 @@
 pub mod cycles;
 
 use crate::fixed::words::formats::Formats;
-use crate::segment::{Segmenter, NONE};
+use crate::segment::{Segmenter, NONE, WORD_BITS};
 use crate::sensor::Sensor;
 use cycles::{Course, Segmentation};
-
-/// Width of a word, without a sign.
-pub const WORD_BITS: u32 = 16;
 
 /// The contacts of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

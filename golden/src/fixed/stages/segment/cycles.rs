@@ -19,8 +19,7 @@
 //! | label the quads and add the moments | 20 Q + 4 |
 //! | middle: for each contact its row and column | 2 (row + column) + 7 |
 
-use super::WORD_BITS;
-use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS};
+use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 
