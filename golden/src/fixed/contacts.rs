@@ -22,6 +22,8 @@ pub struct Contacts {
     pub all: Vec<Contact>,
     /// Whether there were more contacts or basins than there may be.
     pub overflow: bool,
+    /// Cycles of the segmentation.
+    pub segment_cycles: u64,
 }
 
 /// One contact.
@@ -72,7 +74,8 @@ impl Passes<'_> {
             passes.streams.sheared.extend(sheared.iter().flatten());
             passes.operands.sheared.push(sheared);
         });
-        (Contacts { labels: found.labels, all, overflow: found.overflow }, values)
+        let segment_cycles = found.cycles;
+        (Contacts { labels: found.labels, all, overflow: found.overflow, segment_cycles }, values)
     }
 }
 

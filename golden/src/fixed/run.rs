@@ -4,7 +4,9 @@
 //! prepare ── receive ── choose ── each subarray of the chosen case ── force ── send
 //! ```
 
+use super::contacts::Contacts;
 use super::model::Model;
+use super::plan::contact_cycles::Course;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
 use super::stages::forces::Force;
@@ -37,9 +39,9 @@ pub struct Trace {
     pub status: Vec<[i32; 3]>,
     /// The words of each stage, in pipeline order.
     pub stages: Vec<Stage>,
-    /// Cycle counts of the frame at full speed; 0 for contacts, which have no hardware yet.
+    /// Cycle counts of the frame at full speed.
     pub cycles: Cycles,
-    /// Cycles from the last input beat to each output beat, status included, at full speed; none for contacts.
+    /// Cycles from the last input beat to each output beat, status included, at full speed.
     pub beat_cycles: Vec<u64>,
 }
 
@@ -62,11 +64,10 @@ impl Model {
         let solve = |part: &Subarray| SubarrayTrace::new(self, case, &part.gather(sensor, codes));
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
-        let (cycles, sending) = match self.by_contact {
-            // Contacts have no hardware whose cycles could be stated.
-            Some(_) => Default::default(),
-            None => (Cycles::of_case(self, case, &searched), BeatCycles::new(self, case, &searched)),
-        };
+        let course = |contacts: &Contacts| Course { segment: contacts.segment_cycles, contacts: contacts.all.len() };
+        let course = solved.iter().find_map(|solved| solved.contacts.as_ref()).map(course);
+        let sending = BeatCycles::new(self, case, &searched, course);
+        let cycles = Cycles::of_beats(self, &sending);
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
 
@@ -128,7 +129,6 @@ impl Model {
             "choose" => self.chooses(),
             "estimate" | "relax" => self.has_network(),
             "segment" | "window" | "shear" => self.by_contact.is_some(),
-            "search" => self.by_contact.is_none(),
             _ => true,
         });
         Trace {

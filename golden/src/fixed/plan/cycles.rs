@@ -22,6 +22,7 @@
 
 use serde::Serialize;
 
+use super::contact_cycles::{ContactCycles, Course};
 use super::contents::{CasePlan, Plan};
 use super::serial;
 use super::storage::Storage;
@@ -29,8 +30,9 @@ use crate::board::EngineKind;
 use crate::fixed::stages::choose;
 use crate::fixed::stages::estimate::{REDUCTIONS, REDUCTION_CYCLES};
 use crate::fixed::stages::search::COARSE_CENTRES;
+use crate::fixed::stages::send::LABELS_PER_BEAT;
 use crate::fixed::words::formats::{Formats, HALVINGS};
-use crate::fixed::words::schedule::{accumulations, Operand, Product, Target};
+use crate::fixed::words::schedule::{accumulations, Axis, Operand, Product, Section, Target};
 use crate::symmetry::quads::Quads;
 
 /// Cycles from the last input beat to the start of the frame.
@@ -47,7 +49,7 @@ const OPERAND: u64 = 5;
 /// Additional cycles for the product of an operand and μ, where there is a network.
 const SCALE: u64 = 3;
 /// Additional cycles for the sum with v_00 in `relax`, where there is a network.
-const RELAX: u64 = 3;
+pub(super) const RELAX: u64 = 3;
 /// Cycles from a row of a hidden layer until its images can be read as an operand.
 const IMAGES: u64 = 5;
 /// Cycles from the second row of the last layer until μ can be read, beyond its reductions: output 1, saturation 1, operand 1.
@@ -55,7 +57,7 @@ const ESTIMATE: u64 = 3;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
-const UNFOLD: u64 = 6;
+pub(super) const UNFOLD: u64 = 6;
 /// Cycles for the choice of a step's taxels, where a quad takes several.
 const SPLIT: u64 = 1;
 /// Cycles from the start of a sweep to its best candidate, beyond its steps: memory 3, Taylor shift 4, candidates 2,
@@ -71,6 +73,11 @@ pub const SHORTEST_SWEEP: u64 = 4;
 const LAST_SWEEP: u64 = 8;
 /// Cycles from a subarray's values to the sending of them, where nothing is searched.
 const UNSEARCHED: u64 = 3;
+/// Cycles from the values of a frame with contacts to the sending of them, beyond one for each contact that there may be: the
+/// status of the taxels of no contact, and two until they can be requested.
+const TOLD: u64 = 2;
+/// Cycles from the last force, or a beat of labels, to the next beat of labels: a label per cycle, and their memory.
+pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 6;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
 /// Cycles from the beginning of a subarray's values to the output of a force of it.
@@ -130,12 +137,17 @@ impl Cycles {
     }
 
     /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
-    /// is searched.
+    /// is searched; of contacts the largest counts.
     pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
+        Cycles::of_beats(plan, &BeatCycles::new(plan, case, searched, Course::longest(plan)))
+    }
+
+    /// The counts of a frame whose beats leave in these cycles, without the choice of the case.
+    pub(in crate::fixed) fn of_beats(plan: &Plan, sending: &BeatCycles) -> Self {
         let codes = (plan.scene.sensor.taxels() * plan.scene.input.frames_per_result()) as u64;
         let interval = if plan.board.engine == EngineKind::Serial { serial::BEAT } else { 1 };
-        let beats = BeatCycles::new(plan, case, searched).beats;
-        let [first_output, latency] = [beats.first(), beats.last()].map(|beat| beat.copied().unwrap_or(0));
+        let [first_output, latency] =
+            [sending.beats.first(), sending.beats.last()].map(|beat| beat.copied().unwrap_or(0));
         Cycles { first_output, latency, total: codes + latency, interval }
     }
 
@@ -160,15 +172,15 @@ pub(in crate::fixed) struct BeatCycles {
 }
 
 impl BeatCycles {
-    /// Of a frame that `case` solves; `searched[k]` says whether subarray k is searched.
-    pub fn new(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
-        let count = plan.force_beats() + case.status_beats();
+    /// Of a frame that `case` solves; `searched[k]` says whether subarray k is searched, `course` what was found of contacts.
+    pub fn new(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>) -> Self {
+        let count = plan.force_beats() + plan.status_beats_of(case);
         if plan.board.engine == EngineKind::Serial {
             let first = serial::first_output(&case.formats, searched.contains(&true));
             let beats = (0..count as u64).map(|beat| first + beat * serial::BEAT).collect();
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
-        let forces = forces(plan, case, &values(plan, case, searched));
+        let forces = forces(plan, case, &values(plan, case, searched, course));
         let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + ACCEPT + SEND);
         let before = plan.prepare.latency();
         let beats = match plan.sends_resultants() {
@@ -176,7 +188,11 @@ impl BeatCycles {
             true => (before + last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
             false => {
                 let forces = forces.iter().map(|force| before + force + ACCEPT + SEND);
-                forces.chain(before + last + 1..).take(count).collect()
+                let labels = plan.force_beats() - forces.len();
+                let labels = (1..=labels as u64).map(|beat| before + last + beat * LABELS);
+                let sent: Vec<u64> = forces.chain(labels).collect();
+                let next = sent.last().map_or(0, |beat| beat + 1);
+                sent.into_iter().chain(next..).take(count).collect()
             }
         };
         BeatCycles { counted: first, beats }
@@ -184,8 +200,8 @@ impl BeatCycles {
 }
 
 /// Cycles from the start of a frame to the first value of each subarray.
-fn values(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Vec<u64> {
-    let passes = passes(case);
+fn values(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>) -> Vec<u64> {
+    let passes = passes(plan, case, course);
     let early = early_values(plan, case);
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
     let (mut complete, mut searched_at) = (0, 0);
@@ -222,9 +238,12 @@ pub(super) fn forces(plan: &Plan, case: &CasePlan, values: &[u64]) -> Vec<u64> {
 }
 
 /// Cycles from the start of a subarray until its passes are complete.
-pub(super) fn passes(case: &CasePlan) -> u64 {
+pub(super) fn passes(plan: &Plan, case: &CasePlan, course: Option<Course>) -> u64 {
     let CasePlan { formats, storage, .. } = case;
-    timeline(formats, storage).last_row + if formats.has_network() { RELAX } else { 0 } + UNFOLD
+    match (&plan.by_contact, course) {
+        (Some(contacts), Some(course)) => ContactCycles::new(case, contacts, course).complete,
+        _ => whole(formats, storage).last_row + if formats.has_network() { RELAX } else { 0 } + UNFOLD,
+    }
 }
 
 /// Cycles from the hand-over of a subarray to the end of its values; `searching`: it is searched.
@@ -237,7 +256,8 @@ pub(super) fn search(plan: &Plan, case: &CasePlan, searching: bool) -> u64 {
     let sweeps = chained * coarse_period(formats, formats.quads) + awaited * (scored + SET_UP);
     match plan.searches() {
         true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + steps + LAST_SWEEP + split,
-        false => UNSEARCHED,
+        // Of contacts the statuses are told first.
+        false => UNSEARCHED + if plan.contacts() > 0 { TOLD + plan.contacts() as u64 } else { 0 },
     }
 }
 
@@ -248,32 +268,57 @@ pub fn lane_utilisation(plan: &Plan) -> f64 {
     if plan.board.engine == EngineKind::Serial {
         return serial::lane_utilisation(formats);
     }
-    let Timeline { first_issue, last_issue, products, .. } = timeline(formats, storage);
+    let Timeline { first_issue, last_issue, products, .. } = whole(formats, storage);
     let lanes = 4 * formats.lanes_per_parity as u64;
     products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64
 }
 
-/// Timing of a subarray's products, in cycles from its start.
-struct Timeline {
+/// Timing of a section's products, in cycles from its start; of the first section from that of the subarray.
+pub(super) struct Timeline {
     first_issue: u64,
     last_issue: u64,
     /// Multiplications done; in the last group of rows some lanes may be idle.
     products: u64,
     /// Cycle in which the last row leaves the lanes.
-    last_row: u64,
+    pub last_row: u64,
+    /// Cycle from which μ can be read, after the layers of a network.
+    pub known: u64,
 }
 
-fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
+/// When the products of a section may begin.
+#[derive(Clone, Copy)]
+pub(super) struct Begins {
+    /// The first cycle in which one can be issued.
+    pub issue: u64,
+    /// When the first two operand vectors can be read, where other stages than the passes give them.
+    pub given: [u64; 2],
+}
+
+impl Begins {
+    /// Of the first section of a subarray.
+    pub fn first(storage: &Storage) -> Begins {
+        Begins { issue: FOLD + storage.lead as u64, given: [0; 2] }
+    }
+}
+
+/// All products of a subarray as one section.
+fn whole(formats: &Formats, storage: &Storage) -> Timeline {
+    let section = Section { accumulations: accumulations(formats), operands: Vec::new() };
+    timeline(formats, storage, &section, Begins::first(storage))
+}
+
+/// The timing of a section.
+pub(super) fn timeline(formats: &Formats, storage: &Storage, section: &Section, begins: Begins) -> Timeline {
     let (quads, per_parity) = (formats.quads as u64, formats.lanes_per_parity as u64);
     let network = formats.has_network();
     let lanes = LANES + if storage.listed { COLUMNS } else { 0 } + if network { SCALE } else { 0 };
-    let first_issue = FOLD + storage.lead as u64;
+    let first_issue = begins.issue;
     // `free` is the first cycle in which a product can be issued.
     let (mut now, mut free, mut products_done) = (first_issue, first_issue, 0);
     // When the vectors, the images of the layers, and at the end μ can be read.
     let (mut vectors, mut layers): (Vec<u64>, Vec<u64>) = Default::default();
     let mut last_row = 0;
-    for (target, products) in &accumulations(formats) {
+    for (target, products) in &section.accumulations {
         // Rows of all groups but the last, where the rows of a vector end with the last quad.
         let groups = storage.groups_of(products);
         let last_rows = match target {
@@ -284,8 +329,8 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
             (_, Target::Vector(0)) | (Operand::One, _) => 0,
             (Operand::InputHigh | Operand::InputLow, _) => vectors[0],
             (Operand::Vector(index), _) => vectors[index].max(layers.last().copied().unwrap_or(0)),
-            // Of contacts, which have no hardware whose cycles could be counted.
-            (Operand::Window | Operand::Mask | Operand::Shear(..), _) => 0,
+            (Operand::Window | Operand::Shear(_, Axis::X), _) => begins.given[0],
+            (Operand::Mask | Operand::Shear(_, Axis::Y), _) => begins.given[1],
             (Operand::Layer(index), _) => layers[index],
         };
         for group in 0..groups {
@@ -318,5 +363,6 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
             }
         }
     }
-    Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }
+    let known = layers.last().copied().unwrap_or(0);
+    Timeline { first_issue, last_issue: now - 1, products: products_done, last_row, known }
 }

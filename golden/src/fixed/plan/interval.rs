@@ -12,10 +12,12 @@
 //! ```
 //! The timing follows the hardware cycle by cycle; the co-simulation compares.
 
+use super::contact_cycles::{ContactCycles, Course};
 use super::contents::{CasePlan, Plan};
-use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, NEXT, SEND};
+use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
 use crate::board::EngineKind;
+use crate::fixed::stages::send::label_beats;
 use crate::fixed::stages::{choose, resultants};
 
 /// Cycles from the hand-over of a frame's last subarray, or from the end of the last frame, to the next frame.
@@ -36,7 +38,9 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
 
 fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
     let taxels = plan.scene.sensor.taxels() as u64;
-    let (passes, search) = (passes(case), search(plan, case, true));
+    let course = Course::longest(plan);
+    let (passes, search) = (passes(plan, case, course), search(plan, case, true));
+    let contacts = plan.by_contact.as_ref().zip(course).map(|(own, course)| ContactCycles::new(case, own, course));
     let (quads, parts) = (case.formats.quads as u64, case.parts.len());
     let early = early_values(plan, case);
     // From the end of a send to the end of the values of a search whose last sweep waited for it.
@@ -48,6 +52,10 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
     let sums = match plan.sends_resultants() {
         true => resultants::LATENCY - 1 + (resultants::BEATS * parts) as u64,
         false => 0,
+    };
+    let labels = match plan.contacts() {
+        0 => 0,
+        _ => label_beats(plan.scene.sensor.taxels()) as u64 * LABELS,
     };
     // When the last frame's last code arrived, its search ended, its forces had been sent, the next frame can begin.
     let (mut received, mut searched, mut sent, mut begin) = (0, 0, 0, 0);
@@ -70,11 +78,12 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         }
         let before = sent;
         let forces = forces(plan, case, &values).last().map_or(0, |last| last + 1);
-        sent = forces + SEND + sums + case.status_beats() as u64;
+        sent = forces + SEND + sums + labels + plan.status_beats_of(case) as u64;
         interval = sent - before;
         // Codes that are averaged are taken while the frame buffer is full, the sums are not.
-        received =
-            (received + taxels * plan.scene.input.frames_per_result() as u64).max(start + quads + FOLDED + taxels - 1);
+        // Windows are read from the frame buffer until the μ of the last contact is known.
+        let free = start + contacts.map_or(quads + FOLDED, |contacts| contacts.free + 1);
+        received = (received + taxels * plan.scene.input.frames_per_result() as u64).max(free + taxels - 1);
         let passed = if plan.resources.overlaps { handed_over } else { sent };
         begin = (received + ACCEPT + choice).max(passed + BEGIN);
     }

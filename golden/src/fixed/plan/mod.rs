@@ -15,6 +15,7 @@
 //! | [`contents`] | the plan itself, and what it has for each case |
 //! | [`cases`] | which partition cases share the hardware |
 //! | [`cycles`] | duration of a frame |
+//! | [`contact_cycles`] | the part of it that depends on the contacts |
 //! | [`interval`] | cycles from one frame to the next |
 //! | [`check`] | the signature of the coefficient memory |
 //! | [`feature_costs`] | the plan with each optional feature added, or without it |
@@ -22,6 +23,7 @@
 
 pub mod cases;
 pub mod check;
+pub mod contact_cycles;
 pub mod contents;
 pub mod cycles;
 pub mod feature_costs;

@@ -2,7 +2,7 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::segment::cycles::Segmentation;
-use dermis_golden::fixed::stages::segment::WORD_BITS;
+use dermis_golden::segment::WORD_BITS;
 use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS};
 
 use crate::language::{concat, Builder, Contents, Expr, MemoryPort, Net, Type};

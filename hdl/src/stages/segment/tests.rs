@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::segment::cycles::MOST;
-use dermis_golden::fixed::stages::segment::{segment, Segmented, WORD_BITS};
+use dermis_golden::fixed::stages::segment::{segment, Segmented};
+use dermis_golden::segment::WORD_BITS;
 use dermis_golden::segment::{Segmenter, WIDTH};
 use dermis_golden::sensor::Sensor;
 use dermis_golden::symmetry::quads::Quads;

@@ -1,0 +1,67 @@
+//! Cycles of the passes of a frame where each contact has a μ of its own. They depend on what [`segment`] finds.
+//!
+//! ```text
+//! v_00 ── segment ── for each contact: 2, window, layers, μ ── 1 ── for each step: shear, products, relax, unfold
+//! ```
+//! [`segment`]: crate::fixed::stages::segment
+
+use super::contents::{CasePlan, ContactPlan, Plan};
+use super::cycles::{timeline, Begins, RELAX, UNFOLD};
+use crate::fixed::stages::segment::cycles::Segmentation;
+use crate::fixed::stages::{shear, window};
+use crate::fixed::words::schedule::{sections, Section};
+
+/// Cycles from the end of the segmentation, or from the μ of a contact, to the start of the next contact's window: the middle
+/// of the contact, the start.
+const PLACE: u64 = 2;
+/// Cycles from the last μ, or from the end of the segmentation without a contact, to the start of the first step.
+const STEP: u64 = 1;
+
+/// What the cycles of a frame depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Course {
+    /// Cycles of the segmentation.
+    pub segment: u64,
+    /// Number of contacts with a μ of their own.
+    pub contacts: usize,
+}
+
+/// Cycles from the start of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ContactCycles {
+    /// Until the frame buffer is free.
+    pub free: u64,
+    /// Until the passes are complete.
+    pub complete: u64,
+}
+
+impl Course {
+    /// The course with most cycles: as many contacts as there may be, and the longest segmentation. `None` where there is one μ.
+    pub fn longest(plan: &Plan) -> Option<Course> {
+        let own = plan.by_contact.as_ref()?;
+        let (sensor, most) = (&plan.scene.sensor, plan.contacts());
+        let segment = Segmentation { sensor, segmenter: &own.segmenter, most }.longest();
+        Some(Course { segment, contacts: most })
+    }
+}
+
+impl ContactCycles {
+    /// Of a frame of this course.
+    pub fn new(case: &CasePlan, contacts: &ContactPlan, course: Course) -> ContactCycles {
+        let CasePlan { formats, storage, .. } = case;
+        let quads = formats.quads as u64;
+        let all = sections(formats);
+        let unfolded =
+            |section: &Section, begins| timeline(formats, storage, section, begins).last_row + RELAX + UNFOLD;
+        let first = unfolded(&all[0], Begins::first(storage));
+        let window = window::cycles(&contacts.window);
+        // A quad can be read one cycle after it was written, and the mask follows the window.
+        let given = [window, window + contacts.window.quads().len() as u64];
+        let mu = timeline(formats, storage, &all[1], Begins { issue: 1, given }).known - 1;
+        let read = shear::cycles(formats.quads) + 1;
+        let step = unfolded(&all[2], Begins { issue: 1, given: [read - quads, read] });
+        let known = first + course.segment + course.contacts as u64 * (PLACE + mu);
+        let free = known + STEP;
+        ContactCycles { free, complete: free + formats.degree as u64 * step }
+    }
+}
