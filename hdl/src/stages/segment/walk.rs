@@ -117,12 +117,12 @@ impl<'k> Circuit<'k> {
         k.when(self.is(CLIMB) | self.is(BORDERS) & *self.moves, || {
             heading.set(self.is(BORDERS).mux(borders, climbs));
         });
-        let ahead = k.wire("ahead", runs & (!last | ends | moves) | walks & passes);
+        let ahead = k.wire("ahead", runs & (!last | ends | moves));
         let steps = self.steps_out.low(DIRECTION) & (walks & !known).repeat(DIRECTION);
         let direction = *heading | steps | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION);
         let direction = k.wire("direction", direction);
         let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
-        let from_window = k.wire("from_window", smooths & last & !ends);
+        let from_window = k.wire("from_window", smooths & last & !ends | self.is(WALK) & known & !passes);
         let from_point = k.wire("from_point", smooths & !from_window | self.is(WALK) & !known);
         let own = self.is(LABEL).mux(*self.target, *self.address);
         let from = from_window.mux(*window, from_point.mux(*self.point, own));
@@ -130,6 +130,8 @@ impl<'k> Circuit<'k> {
         let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 1);
         k.when(reads, || self.point.set(next));
         k.when(runs & last, || window.set(next));
+        // In WALK the address is that of the next taxel, the window that of the taxel from which a walk starts.
+        k.when(walks & !known & !*walking, || window.set(*self.point));
         k.when(walks, || {
             walking.set(!(passes));
             back.set(known & *walking & !passes | *back & !known);
@@ -166,7 +168,7 @@ impl<'k> Circuit<'k> {
             (self.is(ALONG_COLUMNS) & smoothed, ALONG_COLUMNS, CLIMB),
             (self.at(CLIMB, 5) & *self.ending, CLIMB, CLEAR),
             (cleared, CLEAR, WALK),
-            (walks & passes & last_taxel, WALK, BORDERS),
+            (walks & passes & self.address.equals(address(taxels)), WALK, BORDERS),
             (labels, SETTLE, LABEL),
         ];
         for (end, from, to) in ends {
@@ -181,7 +183,6 @@ impl<'k> Circuit<'k> {
         let restarts = k.wire("restarts", ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end).unwrap());
         k.when(restarts, || {
             let registers = [
-                self.address,
                 self.row,
                 self.col,
                 self.quad,
@@ -199,6 +200,7 @@ impl<'k> Circuit<'k> {
                 runs_register,
             ];
             registers.iter().for_each(|register| register.set(self.zero(register.bits())));
+            self.address.set(cleared.resize(self.address.bits()));
             self.mirror.set(address(shape.cols - 1));
         });
         Order { beside: valids.at(2), joins, quads_end, last_quad, fresh: climbed.fresh, next: climbed.next }
