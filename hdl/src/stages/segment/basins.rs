@@ -204,8 +204,8 @@ impl<'k> Circuit<'k> {
         let held = *held ^ subtracts.repeat(shape.sum);
         let addend = (subtracts | self.is(JOIN)).mux(held, self.product.resize(shape.sum));
         let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
-        let writes = zeros | sums | self.goes_on(less);
-        self.loads.write(writes, place, total & (!zeros).repeat(shape.sum));
+        // A moment is not read again when it is less than what is held.
+        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));
         less
     }
 
