@@ -200,9 +200,12 @@ impl<'k> Circuit<'k> {
         let joins = self.at(JOIN, 1) & list.into.any();
         let labels = self.is(LABEL) & *self.adds & self.tick.low(2).any();
         let sums = later("sums_up", borders | joins | labels);
-        let subtracts = k.wire("subtracts", self.is(MIDDLE) & self.tick.low(2).all());
+        // In MIDDLE the sums are compared, and written, at every fourth tick or the second after that.
+        let compares = self.is(MIDDLE) & !self.tick.at(0) & self.tick.any();
+        let holds = k.delay("holds", compares | self.is(JOIN));
+        let subtracts = k.delay("subtracts", compares);
         let held = *held ^ subtracts.repeat(shape.sum);
-        let addend = (subtracts | self.is(JOIN)).mux(held, self.product.resize(shape.sum));
+        let addend = holds.mux(held, self.product.resize(shape.sum));
         let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
         // A moment is not read again when it is less than what is held.
         self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));

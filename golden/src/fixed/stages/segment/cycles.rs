@@ -17,7 +17,7 @@
 //! | order: for each of the remaining the largest load | B + 6 |
 //! | … then settle the contact of every basin | 68 |
 //! | label the quads and add the moments | 20 Q + 4 |
-//! | middle: for each contact its row and column | 2 (row + column) + 7 |
+//! | middle: for each contact its row and column | 2 (row + column) + 9 |
 
 use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
 use crate::sensor::Sensor;
@@ -135,7 +135,7 @@ impl Segmentation<'_> {
     /// Cycles from the start to the end.
     pub fn cycles(&self, course: &Course) -> u64 {
         let joined = course.joins.iter().map(|join| round(join.basins, join.small, true)).sum::<u64>();
-        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 7) as u64).sum::<u64>();
+        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 9) as u64).sum::<u64>();
         let readings = self.sensor.taxels() + 2 * course.steps + course.walks;
         let joining = joined + round(course.contacts, false, false) + order(course.contacts);
         self.fixed() + cleared(course.basins) + 3 * (readings + course.borders) as u64 + joining + middles
@@ -147,7 +147,7 @@ impl Segmentation<'_> {
         let (rows, cols, taxels) = (self.sensor.rows, self.sensor.cols, self.sensor.taxels());
         let basins = BASINS.min(taxels);
         let pairs = rows * (cols - 1) + (rows - 1) * cols + 2 * (rows - 1) * (cols - 1);
-        let middle = |contacts: usize| (contacts.min(self.most) * (2 * (rows + cols) + 3)) as u64;
+        let middle = |contacts: usize| (contacts.min(self.most) * (2 * (rows + cols) + 5)) as u64;
         let joining = |contacts: usize| {
             let joined = (contacts + 1..=basins).map(|left| round(left, true, true).max(round(left, false, true)));
             joined.sum::<u64>() + round(contacts, false, false) + order(contacts) + middle(contacts)
