@@ -127,8 +127,8 @@ impl<'k> Circuit<'k> {
         let larger = k.wire("larger", list.best.less(saddle));
         let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
-        let least = self.difference.top().mux(self.words_out, *self.base);
-        k.when(meets, || list.best.set(least));
+        let least = k.delay("is_less", self.difference.top()).mux(self.words_out, *self.base);
+        k.when(differs & stall.is(1), || list.best.set(least));
         k.when(self.at(JOIN, BEST), || list.best.set(saddle));
 
         let bar = k.delay("bar", self.bars.read(*self.cursor));

@@ -152,7 +152,7 @@ impl<'k> Circuit<'k> {
         k.when(*self.moves, || valids.set(valids.low(4).concat(within)));
 
         k.when(self.tick.is(3), || self.base.set(self.words_out));
-        let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2);
+        let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2) & *self.moves;
         k.when(bare, || self.base.set(self.zero(shape.smoothed)));
         let climbed = self.climb(valids.top());
         self.write(walks & *back & !known, unpacks | self.at(LABEL, 0), of_lane, &climbed);
