@@ -185,8 +185,9 @@ fn kernel(shape: &Shape) -> Kernel {
     {
         let circuit = Circuit::new(&k, shape);
         let order = circuit.order();
-        circuit.tables(&order);
+        let list = circuit.tables(&order);
         circuit.labels(&order);
+        circuit.begin_pairs(&list);
     }
     k.finish()
 }

@@ -26,7 +26,7 @@ const MERGED: u64 = 6;
 const TOLD: u64 = 3;
 
 /// Registers of the tables alone.
-struct List<'k> {
+pub(super) struct List<'k> {
     /// The lower basin of the pairs.
     outer: Net<'k>,
     /// The pair that was found; of a basin with its load the one before and itself.
@@ -50,6 +50,11 @@ struct List<'k> {
 }
 
 impl<'k> Circuit<'k> {
+    /// The pairs of a basin with a small load begin with their saddles.
+    pub(super) fn begin_pairs(&self, list: &List<'k>) {
+        self.begin(self.at(LEAST, TOLD) & !*list.ranks & *list.found, FIRST);
+    }
+
     /// Every number of a basin is in the list.
     pub(super) fn cleared(&self) -> Expr<'k> {
         self.is(CLEAR) & self.lower.equals(*self.higher) & self.higher.equals(*self.count)
@@ -61,7 +66,7 @@ impl<'k> Circuit<'k> {
     }
 
     /// The tables, filled in the `order` of the taxels.
-    pub(super) fn tables(&self, order: &Order<'k>) {
+    pub(super) fn tables(&self, order: &Order<'k>) -> List<'k> {
         let k = self.k;
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         k.comment("List of the basins");
@@ -77,6 +82,7 @@ impl<'k> Circuit<'k> {
         let less = self.loads(&list);
         self.middles(less);
         self.list(&list, order.joins);
+        list
     }
 
     /// The saddles and the bars; which pair is to be joined.
@@ -235,7 +241,6 @@ impl<'k> Circuit<'k> {
             list.found.set(zero(1));
             list.outer.set(*list.gone);
         });
-        self.turn(told & !ranks & found, FIRST);
 
         k.when(self.at(PAIRS, LOWER), || {
             list.outer.set(list.next);

@@ -1,5 +1,7 @@
 //! What the parts of the circuit share: sizes, registers, memories, the multiplier; and the sequence of the steps.
 
+use std::cell::RefCell;
+
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::segment::cycles::Segmentation;
 use dermis_golden::fixed::stages::segment::WORD_BITS;
@@ -138,6 +140,8 @@ pub(super) struct Circuit<'k> {
     pub(super) shape: &'k Shape,
     start: Expr<'k>,
     state: [Net<'k>; STATES.len()],
+    /// When a state ends.
+    leaves: RefCell<Vec<Expr<'k>>>,
     pub(super) tick: Net<'k>,
 
     /// Taxel, or upper left taxel of a quad; its row and column, or those of the quad; upper right taxel of the quad.
@@ -295,6 +299,7 @@ impl<'k> Circuit<'k> {
             shape,
             start,
             state,
+            leaves: RefCell::default(),
             tick,
             address,
             row,
@@ -366,9 +371,16 @@ impl<'k> Circuit<'k> {
         self.k.when(when, || {
             self.state[from].set(self.zero(1));
             self.state[to].set(self.k.constant(1, 1));
-            self.tick.set(self.zero(4));
             set();
         });
+        self.leaves.borrow_mut().push(when);
+    }
+
+    /// Every state begins at tick 0, or `when` at another.
+    pub(super) fn begin(&self, when: Expr<'k>, tick: u64) {
+        let leaves = self.leaves.borrow().iter().copied().reduce(|any, leaves| any | leaves);
+        self.k.when(leaves.unwrap_or(self.zero(1)), || self.tick.set(self.zero(4)));
+        self.turn(when, tick);
     }
 
     /// Goes to a tick of the step if `when`.

@@ -77,8 +77,9 @@ impl<'k> Circuit<'k> {
             self.mirror.set((*self.mirror + step).low(self.address.bits()));
         });
         k.when(quads_end, || self.quad.set(self.quad.plus(1)));
-        let last_taxel = k.wire("last_taxel", self.address.is(taxels as u64 - 1));
-        let last_quad = k.wire("last_quad", quads_end & self.quad.is(shape.quad_count() as u64 - 1));
+        let last_taxel = k.delay("last_taxel", self.address.is(taxels as u64 - 1));
+        let last_quad = k.delay("quads_last", self.quad.is(shape.quad_count() as u64 - 1));
+        let last_quad = k.wire("last_quad", quads_end & last_quad);
         k.when(begins, || {
             self.begun.set(constant(1, 1));
             self.ending.set(last_taxel);
@@ -168,7 +169,7 @@ impl<'k> Circuit<'k> {
             (self.is(ALONG_COLUMNS) & smoothed, ALONG_COLUMNS, CLIMB),
             (self.at(CLIMB, 5) & *self.ending, CLIMB, CLEAR),
             (cleared, CLEAR, WALK),
-            (walks & passes & self.address.equals(address(taxels)), WALK, BORDERS),
+            (walks & passes & k.delay("beyond_last", self.address.equals(address(taxels))), WALK, BORDERS),
             (labels, SETTLE, LABEL),
         ];
         for (end, from, to) in ends {
