@@ -138,6 +138,7 @@ impl Shape {
 pub(super) struct Circuit<'k> {
     pub(super) k: &'k Builder,
     pub(super) shape: &'k Shape,
+    pub(super) rst: Expr<'k>,
     start: Expr<'k>,
     state: [Net<'k>; STATES.len()],
     /// When a state ends.
@@ -297,6 +298,7 @@ impl<'k> Circuit<'k> {
         Circuit {
             k,
             shape,
+            rst,
             start,
             state,
             leaves: RefCell::default(),

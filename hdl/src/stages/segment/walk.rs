@@ -14,12 +14,12 @@ const NEXT: u64 = 5;
 
 /// What the order of the taxels says to the other parts.
 pub(super) struct Order<'k> {
-    /// The neighbour whose word is there in step `BORDERS` is within the array.
+    /// The neighbour whose word is there in `BORDERS` is within the array.
     pub(super) beside: Expr<'k>,
-    /// The steps end in this cycle: to join, to add the moments.
+    /// `BORDERS` ends.
     pub(super) joins: Expr<'k>,
+    /// A quad ends; the last one does.
     pub(super) quads_end: Expr<'k>,
-    /// The last quad ends.
     pub(super) last_quad: Expr<'k>,
     /// A basin is found, with this number.
     pub(super) fresh: Expr<'k>,
@@ -59,9 +59,12 @@ impl<'k> Circuit<'k> {
         let in_quads = k.wire("in_quads", self.among(&[UNPACK, LABEL]));
         let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
         let known = self.steps_out.at(BASIN);
-        // Both registers are what their names say of the present tick.
-        let walks = k.delay("walks", self.at(WALK, 1));
-        let runs = k.register("runs", Type::unsigned(1));
+        // An entry is there in WALK, a tap in the smoothing.
+        let walks = k.state("walks", Type::unsigned(1), self.rst, 0);
+        walks.set(self.at(WALK, 1));
+        let walks = *walks;
+        let tap_there = k.register("runs", Type::unsigned(1));
+        let runs = tap_there.get();
         let passes = k.wire("passes", known & (*back | !*walking));
         let begins = k.wire("begins", self.at(CLIMB, 9) | self.at(BORDERS, 4) & *self.moves);
         let advances = k.wire("advances", quads_end | begins | walks & passes);
@@ -102,8 +105,7 @@ impl<'k> Circuit<'k> {
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
         let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_out.at(FRACTION + 1 + flag));
-        runs.set(smooths & self.tick.any());
-        let (runs_register, runs) = (runs, *runs);
+        tap_there.set(smooths & self.tick.any());
         let [along_row, along_column] = shape.tap_counts();
         let tap = |number: usize| constant(self.tap.bits(), number);
         let wraps = [(along_row - 1, 0), (along_row + along_column - 1, along_row)];
@@ -134,7 +136,7 @@ impl<'k> Circuit<'k> {
         // In WALK the address is that of the next taxel, the window that of the taxel from which a walk starts.
         k.when(walks & !known & !*walking, || window.set(*self.point));
         k.when(walks, || {
-            walking.set(!(passes));
+            walking.set(!passes);
             back.set(known & *walking & !passes | *back & !known);
             k.when(known & !passes, || self.own.set(self.steps_out.low(BASIN)));
         });
@@ -181,7 +183,8 @@ impl<'k> Circuit<'k> {
                 _ => {}
             });
         }
-        let restarts = k.wire("restarts", ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end).unwrap());
+        let restarts = ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end);
+        let restarts = k.wire("restarts", restarts.unwrap_or(self.zero(1)));
         k.when(restarts, || {
             let registers = [
                 self.row,
@@ -198,7 +201,7 @@ impl<'k> Circuit<'k> {
                 back,
                 valids,
                 heading,
-                runs_register,
+                tap_there,
             ];
             registers.iter().for_each(|register| register.set(self.zero(register.bits())));
             self.address.set(cleared.resize(self.address.bits()));

@@ -23,6 +23,8 @@ use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_B
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 
+/// Width of a tap in the memory of the hardware: a weight and three flags.
+pub const TAP_BITS: usize = WEIGHT_BITS as usize + 4;
 /// Largest number of contacts of the hardware.
 pub const MOST: usize = 8;
 /// Cycles from the start to the first step, and from the last to the end.
@@ -114,6 +116,11 @@ impl Segmentation<'_> {
         window.weights.iter().enumerate().map(|place| (at(place).0, &place.1[at(place).1])).collect()
     }
 
+    /// Number of taps along a row (`axis` 0) or a column.
+    pub fn tap_count(&self, axis: usize) -> usize {
+        self.taps(axis).iter().map(|(_, weights)| weights.len()).sum()
+    }
+
     /// Width of a smoothed word, without a sign: the weights of a place may add up to slightly more than one.
     pub fn smoothed_bits(&self) -> u32 {
         let smoothed = |most: i64, axis: usize| {
@@ -160,8 +167,7 @@ impl Segmentation<'_> {
     fn fixed(&self) -> u64 {
         let (rows, cols, taxels, quads) =
             (self.sensor.rows, self.sensor.cols, self.sensor.taxels(), self.quads().len());
-        let taps = |axis: usize| self.taps(axis).iter().map(|(_, weights)| weights.len()).sum::<usize>();
-        let smooth = rows * taps(0) + cols * taps(1) + 14;
+        let smooth = rows * self.tap_count(0) + cols * self.tap_count(1) + 14;
         (7 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 4) as u64 + ENDS
     }
 }
