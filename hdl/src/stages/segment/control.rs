@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::fixed::stages::segment::cycles::Segmentation;
+use dermis_golden::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
 use dermis_golden::fixed::stages::segment::WORD_BITS;
 use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS};
 
@@ -19,7 +19,7 @@ pub(super) const WORD: usize = WORD_BITS as usize;
 /// Fraction bits of a weight.
 pub(super) const FRACTION: usize = WEIGHT_BITS as usize;
 /// Width of a factor of the multiplier: a weight, a slope, an odd number for a line.
-const FACTOR: usize = FRACTION + 1;
+const FACTOR: usize = TAP_BITS - 3;
 /// Factor by which a maximum becomes its bar, as a weight.
 const BAR: u64 = (SADDLE[0] << WEIGHT_BITS) as u64 / SADDLE[1] as u64;
 /// What rounds a bar up.
@@ -260,7 +260,7 @@ impl<'k> Circuit<'k> {
         let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
         let taps: Vec<(usize, u64)> = shape.taps.concat().into_iter().enumerate().collect();
         let tap = register("tap", count_bits(taps.len()));
-        let windows = k.memory("windows", taps.len(), FACTOR + 3, Contents::Words(taps)).style("block");
+        let windows = k.memory("windows", taps.len(), TAP_BITS, Contents::Words(taps)).style("block");
         let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
 
         k.comment("Multiplier and the sum of its products");
