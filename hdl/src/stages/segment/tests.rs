@@ -122,6 +122,15 @@ impl<'a> Segmenting<'a> {
         Segmenting { array, p, reset: false, found: None, left: 0, labels: vec![None; 2].into(), contact: None }
     }
 
+    /// The quad whose labels are written: the last one five cycles before the middles, each twenty cycles before the next.
+    fn labelled(&self) -> Option<usize> {
+        let middles = &self.found.as_ref()?.middles;
+        let after: usize = middles.iter().map(|[row, col]| 2 * (row + col) + 9).sum();
+        let left = (self.left as usize).checked_sub(after + 6)?;
+        let quad = self.array.layout().len().checked_sub(left / 20 + 1)?;
+        left.is_multiple_of(20).then_some(quad)
+    }
+
     fn runs(&self) -> bool {
         self.left > 1
     }
@@ -132,9 +141,11 @@ impl Reference for Segmenting<'_> {
         let found = self.found.as_ref().filter(|_| self.left <= 1);
         let layout = self.array.layout();
         let bits = count_bits(self.array.most + 1);
-        let labels = found.zip(self.labels[0]).map(|(found, quad)| {
+        let word = |found: &Segmented, quad: usize, bits: usize| {
             Word::of_fields(&[0, 1, 2, 3].map(|lane| found.labels[layout.taxel(quad, lane)] as i64), bits)
-        });
+        };
+        let labels = found.zip(self.labels[0]).map(|(found, quad)| word(found, quad, bits));
+        let labelled = self.labelled();
         let middle = found.zip(self.contact).and_then(|(found, contact)| found.middles.get(contact));
         let number = |number: usize| Word::from(number as u64);
         vec![
@@ -143,6 +154,8 @@ impl Reference for Segmenting<'_> {
             self.reset.then(|| (self.left == 1).into()),
             middle.map(|middle| number(middle[0])),
             middle.map(|middle| number(middle[1])),
+            self.reset.then(|| labelled.is_some().into()),
+            labelled.zip(self.found.as_ref()).map(|(quad, found)| word(found, quad, bits + 1)),
             labels,
         ]
     }
@@ -229,7 +242,7 @@ fn defects_are_found() {
             Segment::new(&array.segmentation(), LANE, LOW),
             changes,
             inputs [rst, start, fill, fill_address, fill_quad, contact, label_address],
-            outputs [count, overflow, done, middle_row, middle_col, labels],
+            outputs [count, overflow, done, middle_row, middle_col, labelled, labelled_quad, labels],
         )
     };
     let defects = [
