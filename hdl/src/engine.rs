@@ -32,8 +32,8 @@ use crate::primitives::{
 };
 use crate::stage_list::engine;
 use crate::stages::{
-    Banks, Contacts, Estimate, Fold, Forces, Labels, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax, Rescale,
-    Resultants, Search, SearchPorts, Segment, Send, Shear, Unfold, Unsearched, Window,
+    Banks, Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax,
+    Rescale, Resultants, Search, SearchPorts, Segment, Send, Shear, Unfold, Unsearched, Window,
 };
 use crate::wire::Wire;
 
@@ -121,7 +121,7 @@ engine! {
             search: SearchStage => "stages/search.rs",
             forces: Forces => "stages/forces.rs",
             send: Send => "stages/send.rs",
-            labels: Labels => "stages/labels.rs",
+            label_beats: LabelBeats => "stages/label_beats.rs",
             resultants: Resultants => "stages/resultants.rs",
         }
         control {
@@ -203,7 +203,7 @@ impl Engine {
             segment: Segment::of_model(model),
             contacts: Contacts::new(model),
             window: Window::new(model),
-            labels: Labels::new(model, forces.m_axis_tdata.width()),
+            label_beats: LabelBeats::new(model, forces.m_axis_tdata.width()),
             shear: Shear::new(model),
             network: Constant::new(model.has_network()),
             several: Constant::new(model.contacts() > 0),
@@ -284,8 +284,8 @@ impl Logic for Engine {
         self.contacts.rst.next = self.rst.val();
         self.window.clk.next = self.clk.val();
         self.window.rst.next = self.rst.val();
-        self.labels.clk.next = self.clk.val();
-        self.labels.rst.next = self.rst.val();
+        self.label_beats.clk.next = self.clk.val();
+        self.label_beats.rst.next = self.rst.val();
         self.shear.clk.next = self.clk.val();
         self.shear.rst.next = self.rst.val();
         self.operands.clk.next = self.clk.val();
@@ -525,8 +525,8 @@ impl Logic for Engine {
         self.contacts.window_address.next = self.window.quad_address.val();
         self.contacts.shear_address.next = self.shear.label_address.val();
         self.contacts.forces_address.next = self.forces.label_address.val();
-        self.contacts.sent_address.next = self.labels.label_address.val();
-        self.contacts.sends_labels.next = self.labels.reads.val();
+        self.contacts.sent_address.next = self.label_beats.label_address.val();
+        self.contacts.sends_labels.next = self.label_beats.reads.val();
         self.segment.fill_quad.next = self.unfold.taxels.val();
         self.segment.fill.next = self.contacts.fills.val();
         self.segment.fill_address.next = self.unfold.address.val();
@@ -539,7 +539,7 @@ impl Logic for Engine {
         self.window.label.next = self.contacts.label.val();
         self.window.quad.next = self.receive.quad.val();
         self.window.labels.next = self.segment.labels.val();
-        self.operands.window.next = self.window.write_quad.val();
+        self.operands.window_quad.next = self.window.write_quad.val();
         self.operands.mask.next = self.window.mask_quad.val();
         self.operands.window_valid.next = self.window.write.val();
         self.shear.clear.next = self.start.val();
@@ -613,16 +613,16 @@ impl Logic for Engine {
         self.forces.lane.next = self.send.lane.val();
         self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
         self.send.m_axis_tlast.next = self.forces.m_axis_tlast.val();
-        self.send.m_axis_tready.next = self.labels.s_axis_tready.val();
-        self.forces.m_axis_tready.next = self.labels.s_axis_tready.val();
-        self.labels.s_axis_tdata.next = self.forces.m_axis_tdata.val();
-        self.labels.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
-        self.labels.s_axis_tlast.next = self.forces.m_axis_tlast.val();
-        self.labels.labels.next = self.segment.labels.val();
-        self.labels.m_axis_tready.next = self.resultants.s_axis_tready.val();
-        self.resultants.s_axis_tdata.next = self.labels.m_axis_tdata.val();
-        self.resultants.s_axis_tvalid.next = self.labels.m_axis_tvalid.val();
-        self.resultants.s_axis_tlast.next = self.labels.m_axis_tlast.val();
+        self.send.m_axis_tready.next = self.label_beats.s_axis_tready.val();
+        self.forces.m_axis_tready.next = self.label_beats.s_axis_tready.val();
+        self.label_beats.s_axis_tdata.next = self.forces.m_axis_tdata.val();
+        self.label_beats.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
+        self.label_beats.s_axis_tlast.next = self.forces.m_axis_tlast.val();
+        self.label_beats.labels.next = self.segment.labels.val();
+        self.label_beats.m_axis_tready.next = self.resultants.s_axis_tready.val();
+        self.resultants.s_axis_tdata.next = self.label_beats.m_axis_tdata.val();
+        self.resultants.s_axis_tvalid.next = self.label_beats.m_axis_tvalid.val();
+        self.resultants.s_axis_tlast.next = self.label_beats.m_axis_tlast.val();
         self.resultants.m_axis_tready.next = self.m_axis_tready.val();
         self.m_axis_tdata.next = self.resultants.m_axis_tdata.val();
         self.m_axis_tvalid.next = self.resultants.m_axis_tvalid.val();

@@ -73,9 +73,9 @@ pub struct Contacts {
     pub shear_address: Wire<In>,
     /// Address of the step whose labels `forces` reads.
     pub forces_address: Wire<In>,
-    /// Address of the quad whose labels `labels` reads.
+    /// Address of the quad whose labels `label_beats` reads.
     pub sent_address: Wire<In>,
-    /// `labels` reads labels.
+    /// `label_beats` reads labels.
     pub sends_labels: Signal<In, Bit>,
     /// Section of the passes: of contacts 0 for v_00, 1 for the layers, 2 for a step; else the case.
     pub section: Wire<Out>,

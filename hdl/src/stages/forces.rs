@@ -207,7 +207,7 @@ mod tests {
         values: MemoryReference<Word>,
         /// Step of the next values.
         step: usize,
-        asked: usize,
+        asked: Option<usize>,
         unit: Requests,
         leaving: List,
     }
@@ -220,7 +220,7 @@ mod tests {
             Integers {
                 values: MemoryReference::new(steps(model), 2),
                 step: 0,
-                asked: 0,
+                asked: None,
                 unit: Requests::new(model.clone()),
                 leaving: List::default(),
             }
@@ -238,7 +238,9 @@ mod tests {
 
     impl Reference for Integers {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
-            self.leaving.outputs(&[])
+            let mut all = self.leaving.outputs(&[]);
+            all.push(self.asked.map(|asked| Word::from(asked as u64)));
+            all
         }
 
         fn clock(&mut self, inputs: &[Word]) {
@@ -249,8 +251,8 @@ mod tests {
             self.leaving.clock(&[inputs[0], inputs[5], written, last, beat, ready]);
             self.unit.clock(&of_unit);
             let write = (valid.number() == 1).then_some((self.step, inputs[VALUES]));
-            self.values.clock(Some(self.asked), write);
-            self.asked = address.number() as usize;
+            self.values.clock(Some(self.asked.unwrap_or(0)), write);
+            self.asked = Some(address.number() as usize);
             self.step = if inputs[2].number() == 1 { 0 } else { self.step + valid.number() as usize };
         }
     }
@@ -320,7 +322,7 @@ mod tests {
                     normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels,
                     overflow, values_valid, address, m_axis_tready,
                 ],
-                outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata],
+                outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata, label_address],
             )
         };
         let defects = [

@@ -3,7 +3,7 @@
 //!
 //! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` connect
 //! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
-//! `estimate`, `relax`, `unsearched`, `resultants` and `window` are [kernels](crate::language).
+//! `estimate`, `relax`, `unsearched`, `segment`, `resultants` and `window` are [kernels](crate::language).
 //!
 //! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
 //! `search` in a scene without one. Both pairs have the same ports. `estimate` and `relax` work where a network gives μ; in other
@@ -15,7 +15,7 @@ mod contacts;
 mod estimate;
 mod fold;
 mod forces;
-mod labels;
+mod label_beats;
 mod normalise;
 mod pass;
 mod prepare;
@@ -37,7 +37,7 @@ pub use contacts::Contacts;
 pub use estimate::Estimate;
 pub use fold::Fold;
 pub use forces::Forces;
-pub use labels::Labels;
+pub use label_beats::LabelBeats;
 pub use normalise::Normalise;
 pub use pass::Pass;
 pub use prepare::Prepare;

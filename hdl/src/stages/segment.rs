@@ -4,24 +4,24 @@
 //! quads -- unpack --> words -- smooth --> q -- climb --> steps -- walk --> basins -- join, order --> contacts --> labels
 //!                                                                                        moments --> middles
 //! ```
-//! One sequencer with one multiplier. Its steps and their cycles are in `cycles` of the bit-true model, which predicts the
-//! cycles of a frame exactly:
+//! One sequencer with one multiplier. `cycles` of the bit-true model predicts the cycles of a frame exactly; n taxels, Q quads,
+//! B basins in the list, t taps of a window along all lines:
 //!
-//! | state | does | table, memory |
-//! |---|---|---|
-//! | `UNPACK` | words of the quads, row-major | quads → words |
-//! | `ALONG_ROWS`, `ALONG_COLUMNS` | products with the weights of a window, read in their order | words → steps → words |
-//! | `CLIMB` | products of the rise to eight neighbours with the slope; the largest. Maxima get a number and a bar | steps, bars |
-//! | `CLEAR` | the saddles of the basins that there are are 0, so are their loads; a list of them | saddles, loads, chain |
-//! | `WALK` | from each taxel up to the first with a basin, and once more to write that basin | steps |
-//! | `BORDERS` | load of each basin; the smaller word of two neighbours in different basins | loads, saddles |
-//! | `LEAST` | the smallest load, or in the end the largest | loads, chain |
-//! | `PAIRS` | the highest saddle: of a basin with a small load, or of all pairs | saddles, bars |
-//! | `JOIN` | load, bar and saddles of two basins become one's | loads, bars, saddles, chain |
-//! | `TAKE` | the next contact, which leaves the list | chain |
-//! | `SETTLE` | the contact of every basin | chain |
-//! | `LABEL` | labels of the quads; weight and moments of each contact | label quads, loads |
-//! | `MIDDLE` | row and column: how many times twice the weight is in a moment | loads, middles |
+//! | state | does | table, memory | cycles |
+//! |---|---|---|---|
+//! | `UNPACK` | words of the quads, row-major | quads → words | 7 Q |
+//! | `ALONG_ROWS`, `ALONG_COLUMNS` | products with the weights of a window, read in their order; written transposed | words → steps → words | t + 7 |
+//! | `CLIMB` | products of the rise to eight neighbours with the slope; the largest. Maxima get a number and a bar | steps, bars | 10 n + 6 |
+//! | `CLEAR` | the saddles of the basins are 0, so are their loads; a list of them | saddles, loads, chain | (B + 1)(B + 2)/2 |
+//! | `WALK` | from each taxel up to the first with a basin, and once more to write that basin | steps | 3 per reading |
+//! | `BORDERS` | load of each basin; the smaller word of two neighbours in different basins | loads, saddles | 5 n + 3, 3 per pair |
+//! | `LEAST` | the smallest load, or in the end the largest | loads, chain | B + 4 |
+//! | `PAIRS` | the highest saddle: of a basin with a small load, or of all pairs | saddles, bars | 3 per saddle, 4 per lower basin |
+//! | `JOIN` | load, bar and saddles of two basins become one's | loads, bars, saddles, chain | 4 B + 3 |
+//! | `TAKE` | the next contact, which leaves the list | chain | 2 |
+//! | `SETTLE` | the contact of every basin | chain | 64 |
+//! | `LABEL` | labels of the quads; weight and moments of each contact | label quads, loads | 20 Q + 4 |
+//! | `MIDDLE` | row and column: how many times twice the weight is in a moment | loads, middles | 2 (row + column) + 9 |
 //!
 //! The bar of a maximum m is ⌈29 m/32⌉: a saddle is high if it is not below the lower bar. Moments are sums of the word times
 //! 2·line + 1, so that the middle is their quotient by twice the weight, rounded down.
@@ -185,8 +185,9 @@ fn kernel(shape: &Shape) -> Kernel {
     {
         let circuit = Circuit::new(&k, shape);
         let order = circuit.order();
-        circuit.tables(&order);
+        let list = circuit.tables(&order);
         circuit.labels(&order);
+        circuit.begin_pairs(&list);
     }
     k.finish()
 }

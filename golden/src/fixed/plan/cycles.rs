@@ -77,7 +77,7 @@ const UNSEARCHED: u64 = 3;
 /// status of the taxels of no contact, and two until they can be requested.
 const TOLD: u64 = 2;
 /// Cycles from the last force, or a beat of labels, to the next beat of labels: a label per cycle, and their memory.
-pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 6;
+pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 5;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
 /// Cycles from the beginning of a subarray's values to the output of a force of it.

@@ -24,11 +24,13 @@ use super::storage::{word_bits, LaidOut, Storage};
 use crate::board::Board;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
+use crate::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
 use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use crate::fixed::words::network::POSITION_BITS as MU_BITS;
 use crate::fixed::words::schedule::sections;
 use crate::scene::{ForceOutput, Scene};
+use crate::segment::{BASINS, WEIGHT_BITS, WORD_BITS};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;
@@ -169,6 +171,15 @@ pub struct Memory {
     pub large_rams: usize,
 }
 
+impl Memory {
+    /// A memory in block RAM, or in distributed RAM if it has at most `shallow` words that are not part of the design.
+    fn new(holds: Holds, [words, bits]: [usize; 2], board: &Board, shallow: usize) -> Self {
+        let in_blocks = holds.is_rom() || words > shallow;
+        let block_rams = if in_blocks { board.block_rams_for(words, bits) } else { 0 };
+        Memory { holds, words, bits, block_rams, large_rams: 0 }
+    }
+}
+
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }
@@ -224,13 +235,7 @@ impl Resources {
         let listed = cases.iter().any(|case| case.storage.listed);
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
         let quad = |bits: u32| 4 * bits as usize;
-        let memory = |holds: Holds, words: usize, bits: usize| Memory {
-            holds,
-            words,
-            bits,
-            block_rams: if holds.is_rom() || words > shallow { board.block_rams_for(words, bits) } else { 0 },
-            large_rams: 0,
-        };
+        let memory = |holds: Holds, words: usize, bits: usize| Memory::new(holds, [words, bits], board, shallow);
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
         let mut memories = Vec::new();
         if input.calibration.is_some() || input.tare.is_some() {
@@ -346,6 +351,35 @@ impl Resources {
     pub fn fits(&self, board: &Board) -> bool {
         self.block_rams() < board.block_rams as usize
     }
+}
+
+/// Memories of `segment` on `board`. The tables of the basins and the middles are read asynchronously, in distributed RAM.
+pub fn segment_memories(segmentation: &Segmentation, board: &Board) -> Vec<Memory> {
+    let (taxels, quads) = (segmentation.sensor.taxels(), segmentation.quads().len());
+    let taps = [0, 1].map(|axis| segmentation.tap_count(axis));
+    let [smoothed, sum] = [segmentation.smoothed_bits(), segmentation.sum_bits()].map(|bits| bits as usize);
+    let (table, basin) = (BASINS + 1, count_bits(BASINS + 1));
+    let [lane, label] = [WORD_BITS as usize + 1, count_bits(segmentation.most + 1)];
+    let blocks = [
+        (Holds::SegmentQuads, quads, 4 * lane),
+        (Holds::Smoothed, taxels, smoothed),
+        (Holds::Steps, taxels, smoothed.max(basin + 1)),
+        (Holds::Windows, taps.iter().sum(), TAP_BITS),
+        (Holds::Saddles, table * table, smoothed),
+        (Holds::Labels, quads, 4 * label),
+    ];
+    let tables = [(Holds::Chain, basin + 1), (Holds::Loads, sum), (Holds::Bars, smoothed)];
+    let axes = [segmentation.sensor.rows, segmentation.sensor.cols].map(count_bits);
+    let middles = axes.into_iter().enumerate().map(|(axis, bits)| (Holds::Middles(axis), segmentation.most, bits));
+    let distributed = tables.into_iter().map(|(holds, bits)| (holds, table, bits)).chain(middles);
+    let shallow = board.distributed_words[0];
+    let blocks = blocks.into_iter().map(|(holds, words, bits)| Memory::new(holds, [words, bits], board, shallow));
+    blocks.chain(distributed.map(|(holds, words, bits)| Memory::new(holds, [words, bits], board, words))).collect()
+}
+
+/// Number of multipliers of `segment`: differences of smoothed words times slopes, words times weights.
+pub fn segment_multipliers(segmentation: &Segmentation, board: &Board) -> usize {
+    board.multipliers_for(segmentation.smoothed_bits() + 1, WEIGHT_BITS + 2)
 }
 
 /// Number of multipliers of the resultants: X fz⁺ and Y fz⁺.

@@ -15,7 +15,7 @@ use crate::wire::Wire;
 /// |---|---|
 /// | with a search | `own`: v_ij |
 /// | one μ by a network | `own`: v_00 and p; `images`: of the layers, and when μ is known |
-/// | a μ for each contact | `window`, then as many quads of its mask; `images`; `sheared` |
+/// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
 ///
 /// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
 #[derive(LogicBlock)]
@@ -33,10 +33,10 @@ pub struct OperandSource {
     /// `images` holds a quad.
     pub images_valid: Signal<In, Bit>,
     /// High limbs of a contact's window, signed; valid with `window_valid`.
-    pub window: Wire<In>,
+    pub window_quad: Wire<In>,
     /// Folded mask of the same quad, in units of the word of a masked taxel, signed; valid with `window_valid`.
     pub mask: Wire<In>,
-    /// `window` and `mask` hold a quad.
+    /// `window_quad` and `mask` hold a quad.
     pub window_valid: Signal<In, Bit>,
     /// Operands of `shear`, `data_bits` each, signed; valid with `sheared_valid`.
     pub sheared: Wire<In>,
@@ -54,7 +54,7 @@ pub struct OperandSource {
 kernel_block!(
     OperandSource,
     clock clk,
-    inputs [rst, own, own_valid, images, images_valid, window, mask, window_valid, sheared, sheared_valid],
+    inputs [rst, own, own_valid, images, images_valid, window_quad, mask, window_valid, sheared, sheared_valid],
     outputs [quad, valid, of_window]
 );
 
@@ -93,7 +93,7 @@ impl OperandSource {
             own_valid: Default::default(),
             images: Wire::new(4 * shape.data),
             images_valid: Default::default(),
-            window: Wire::new(4 * shape.limb),
+            window_quad: Wire::new(4 * shape.limb),
             mask: Wire::new(4 * MASK_BITS),
             window_valid: Default::default(),
             sheared: Wire::new(4 * shape.data),
@@ -113,7 +113,7 @@ impl Shape {
         let rst = k.input("rst", 1);
         let (own, own_valid) = (k.input("own", 4 * self.data), k.input("own_valid", 1));
         let (images, images_valid) = (k.input("images", 4 * self.data), k.input("images_valid", 1));
-        let (window, mask) = (k.input("window", 4 * self.limb), k.input("mask", 4 * MASK_BITS));
+        let (window, mask) = (k.input("window_quad", 4 * self.limb), k.input("mask", 4 * MASK_BITS));
         let window_valid = k.input("window_valid", 1);
         let (sheared, sheared_valid) = (k.input("sheared", 4 * self.data), k.input("sheared_valid", 1));
         let Some(quads) = self.window else {

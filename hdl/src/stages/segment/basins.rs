@@ -26,7 +26,7 @@ const MERGED: u64 = 6;
 const TOLD: u64 = 3;
 
 /// Registers of the tables alone.
-struct List<'k> {
+pub(super) struct List<'k> {
     /// The lower basin of the pairs.
     outer: Net<'k>,
     /// The pair that was found; of a basin with its load the one before and itself.
@@ -50,6 +50,11 @@ struct List<'k> {
 }
 
 impl<'k> Circuit<'k> {
+    /// The pairs of a basin with a small load begin with their saddles.
+    pub(super) fn begin_pairs(&self, list: &List<'k>) {
+        self.begin(self.at(LEAST, TOLD) & !*list.ranks & *list.found, FIRST);
+    }
+
     /// Every number of a basin is in the list.
     pub(super) fn cleared(&self) -> Expr<'k> {
         self.is(CLEAR) & self.lower.equals(*self.higher) & self.higher.equals(*self.count)
@@ -61,7 +66,7 @@ impl<'k> Circuit<'k> {
     }
 
     /// The tables, filled in the `order` of the taxels.
-    pub(super) fn tables(&self, order: &Order<'k>) {
+    pub(super) fn tables(&self, order: &Order<'k>) -> List<'k> {
         let k = self.k;
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         k.comment("List of the basins");
@@ -77,6 +82,7 @@ impl<'k> Circuit<'k> {
         let less = self.loads(&list);
         self.middles(less);
         self.list(&list, order.joins);
+        list
     }
 
     /// The saddles and the bars; which pair is to be joined.
@@ -127,8 +133,8 @@ impl<'k> Circuit<'k> {
         let larger = k.wire("larger", list.best.less(saddle));
         let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
-        let least = self.difference.top().mux(self.words_out, *self.base);
-        k.when(meets, || list.best.set(least));
+        let least = k.delay("is_less", self.difference.top()).mux(self.words_out, *self.base);
+        k.when(differs & stall.is(1), || list.best.set(least));
         k.when(self.at(JOIN, BEST), || list.best.set(saddle));
 
         let bar = k.delay("bar", self.bars.read(*self.cursor));
@@ -200,12 +206,15 @@ impl<'k> Circuit<'k> {
         let joins = self.at(JOIN, 1) & list.into.any();
         let labels = self.is(LABEL) & *self.adds & self.tick.low(2).any();
         let sums = later("sums_up", borders | joins | labels);
-        let subtracts = k.wire("subtracts", self.is(MIDDLE) & self.tick.low(2).all());
+        // In MIDDLE the sums are compared, and written, at every fourth tick or the second after that.
+        let compares = self.is(MIDDLE) & !self.tick.at(0) & self.tick.any();
+        let holds = k.delay("holds", compares | self.is(JOIN));
+        let subtracts = k.delay("subtracts", compares);
         let held = *held ^ subtracts.repeat(shape.sum);
-        let addend = (subtracts | self.is(JOIN)).mux(held, self.product.resize(shape.sum));
+        let addend = holds.mux(held, self.product.resize(shape.sum));
         let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
-        let writes = zeros | sums | self.goes_on(less);
-        self.loads.write(writes, place, total & (!zeros).repeat(shape.sum));
+        // A moment is not read again when it is less than what is held.
+        self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));
         less
     }
 
@@ -232,7 +241,6 @@ impl<'k> Circuit<'k> {
             list.found.set(zero(1));
             list.outer.set(*list.gone);
         });
-        self.turn(told & !ranks & found, FIRST);
 
         k.when(self.at(PAIRS, LOWER), || {
             list.outer.set(list.next);

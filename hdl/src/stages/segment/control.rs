@@ -1,9 +1,10 @@
 //! What the parts of the circuit share: sizes, registers, memories, the multiplier; and the sequence of the steps.
 
+use std::cell::RefCell;
+
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::fixed::stages::segment::cycles::Segmentation;
-use dermis_golden::segment::WORD_BITS;
-use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS};
+use dermis_golden::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
+use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 
 use crate::language::{concat, Builder, Contents, Expr, MemoryPort, Net, Type};
 use crate::primitives::count_bits;
@@ -17,7 +18,7 @@ pub(super) const WORD: usize = WORD_BITS as usize;
 /// Fraction bits of a weight.
 pub(super) const FRACTION: usize = WEIGHT_BITS as usize;
 /// Width of a factor of the multiplier: a weight, a slope, an odd number for a line.
-const FACTOR: usize = FRACTION + 1;
+const FACTOR: usize = TAP_BITS - 3;
 /// Factor by which a maximum becomes its bar, as a weight.
 const BAR: u64 = (SADDLE[0] << WEIGHT_BITS) as u64 / SADDLE[1] as u64;
 /// What rounds a bar up.
@@ -136,8 +137,11 @@ impl Shape {
 pub(super) struct Circuit<'k> {
     pub(super) k: &'k Builder,
     pub(super) shape: &'k Shape,
+    pub(super) rst: Expr<'k>,
     start: Expr<'k>,
     state: [Net<'k>; STATES.len()],
+    /// When a state ends.
+    leaves: RefCell<Vec<Expr<'k>>>,
     pub(super) tick: Net<'k>,
 
     /// Taxel, or upper left taxel of a quad; its row and column, or those of the quad; upper right taxel of the quad.
@@ -255,7 +259,7 @@ impl<'k> Circuit<'k> {
         let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
         let taps: Vec<(usize, u64)> = shape.taps.concat().into_iter().enumerate().collect();
         let tap = register("tap", count_bits(taps.len()));
-        let windows = k.memory("windows", taps.len(), FACTOR + 3, Contents::Words(taps)).style("block");
+        let windows = k.memory("windows", taps.len(), TAP_BITS, Contents::Words(taps)).style("block");
         let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
 
         k.comment("Multiplier and the sum of its products");
@@ -293,8 +297,10 @@ impl<'k> Circuit<'k> {
         Circuit {
             k,
             shape,
+            rst,
             start,
             state,
+            leaves: RefCell::default(),
             tick,
             address,
             row,
@@ -366,9 +372,16 @@ impl<'k> Circuit<'k> {
         self.k.when(when, || {
             self.state[from].set(self.zero(1));
             self.state[to].set(self.k.constant(1, 1));
-            self.tick.set(self.zero(4));
             set();
         });
+        self.leaves.borrow_mut().push(when);
+    }
+
+    /// Every state begins at tick 0, or `when` at another.
+    pub(super) fn begin(&self, when: Expr<'k>, tick: u64) {
+        let leaves = self.leaves.borrow().iter().copied().reduce(|any, leaves| any | leaves);
+        self.k.when(leaves.unwrap_or(self.zero(1)), || self.tick.set(self.zero(4)));
+        self.turn(when, tick);
     }
 
     /// Goes to a tick of the step if `when`.

@@ -7,9 +7,9 @@ use super::walk::Order;
 use crate::language::{concat, Contents, Expr, Type};
 use crate::primitives::count_bits;
 
-/// Ticks of `MIDDLE` in which the moments along the rows and the columns are compared.
-const ROW: u64 = 3;
-const COLUMN: u64 = 7;
+/// Ticks of `MIDDLE` after those in which the moments along the rows and the columns are compared.
+const ROW: u64 = 4;
+const COLUMN: u64 = 8;
 
 impl<'k> Circuit<'k> {
     /// The contact of each taxel, and the labels of the quads.
@@ -40,38 +40,31 @@ impl<'k> Circuit<'k> {
         self.enter(self.at(LABEL, 3) & *self.ending, [LABEL, MIDDLE], || ());
     }
 
-    /// Whether the line of a middle is further: the sum of a contact is not `less` than what is held, twice its weight.
-    pub(super) fn goes_on(&self, less: Expr<'k>) -> Expr<'k> {
-        let last = |lines: usize| self.line.is(lines as u64 - 1);
-        let [row, col] = [(ROW, self.shape.rows), (COLUMN, self.shape.cols)];
-        let further = |(tick, lines): (u64, usize)| self.at(MIDDLE, tick) & !last(lines);
-        (further(row) | further(col)) & !less
-    }
-
-    /// The middles, and the end.
+    /// The middles, and the end. The sum of a contact was `less` than what is held, twice its weight, or is written again.
     pub(super) fn middles(&self, less: Expr<'k>) {
         let (k, tick) = (self.k, self.tick);
         let bits = count_bits(self.shape.most);
-        let goes_on = self.goes_on(less);
         k.comment("Middles");
-        // A sum that was written is read again in the next tick, and compared in the one after.
+        let less = k.delay("was_less", less);
+        let (row, column) = (self.at(MIDDLE, ROW), self.at(MIDDLE, COLUMN));
+        let last = |lines: usize| self.line.is(lines as u64 - 1);
+        let ends = row.mux(last(self.shape.rows), last(self.shape.cols)) | less;
+        let ends = k.wire("line_found", ends);
         k.when(self.is(MIDDLE), || tick.set(tick.plus(1)));
-        self.turn(self.at(MIDDLE, ROW + 1), ROW);
-        self.turn(self.at(MIDDLE, COLUMN + 1), COLUMN);
-        self.turn(self.at(MIDDLE, ROW) & !goes_on, ROW + 2);
-        self.turn(self.at(MIDDLE, COLUMN) & !goes_on, 0);
-        let compares = self.is(MIDDLE) & tick.low(2).all();
-        let line = self.line.plus(1) & goes_on.repeat(self.line.bits());
-        k.when(self.at(MIDDLE, 0) | compares, || self.line.set(line));
-        k.when(self.at(MIDDLE, COLUMN) & !goes_on, || self.higher.set(self.higher.plus(1)));
-        let ends = k.wire("ends", self.at(MIDDLE, 0) & self.higher.equals(self.kept.resize(BASIN)));
-        self.enter(ends, [MIDDLE, IDLE], || ());
-        self.done.set(ends);
+        self.turn(row & !ends, ROW - 1);
+        self.turn(column, 0);
+        self.turn(column & !ends, COLUMN - 1);
+        k.when(self.at(MIDDLE, 0), || self.line.set(self.zero(self.line.bits())));
+        k.when(row | column, || self.line.set(self.line.plus(1) & (!ends).repeat(self.line.bits())));
+        k.when(column & ends, || self.higher.set(self.higher.plus(1)));
+        let done = k.wire("ends", self.at(MIDDLE, 0) & self.higher.equals(self.kept.resize(BASIN)));
+        self.enter(done, [MIDDLE, IDLE], || ());
+        self.done.set(done);
         let contact = k.input("contact", bits);
         for (axis, (name, lines)) in [("middle_row", self.row), ("middle_col", self.col)].into_iter().enumerate() {
             let memory = k.memory(&format!("{name}s"), self.shape.most, lines.bits(), Contents::Undefined).unchecked();
             let memory = memory.holds(Holds::Middles(axis));
-            let writes = self.at(MIDDLE, [ROW, COLUMN][axis]) & !goes_on;
+            let writes = [row, column][axis] & ends;
             memory.write(writes, self.higher.low(bits), self.line.low(lines.bits()));
             k.delay(name, memory.read(contact));
         }

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use dermis_golden::board::Board;
+use dermis_golden::fixed::plan::resources::{segment_memories, segment_multipliers};
 use dermis_golden::fixed::stages::segment::cycles::MOST;
 use dermis_golden::fixed::stages::segment::{segment, Segmented};
 use dermis_golden::segment::WORD_BITS;
@@ -10,7 +12,8 @@ use dermis_golden::sensor::Sensor;
 use dermis_golden::symmetry::quads::Quads;
 
 use super::*;
-use crate::language::testbench::{check, random_word, Reference};
+use crate::language::testbench::{block_subject, check, check_with_defects, random_word, Reference};
+use crate::language::Change;
 use crate::wire::Word;
 
 /// Width of a lane and lowest bit of a word in it.
@@ -120,6 +123,15 @@ impl<'a> Segmenting<'a> {
         Segmenting { array, p, reset: false, found: None, left: 0, labels: vec![None; 2].into(), contact: None }
     }
 
+    /// The quad whose labels are written: the last one five cycles before the middles, each twenty cycles before the next.
+    fn labelled(&self) -> Option<usize> {
+        let middles = &self.found.as_ref()?.middles;
+        let after: usize = middles.iter().map(|[row, col]| 2 * (row + col) + 9).sum();
+        let left = (self.left as usize).checked_sub(after + 6)?;
+        let quad = self.array.layout().len().checked_sub(left / 20 + 1)?;
+        left.is_multiple_of(20).then_some(quad)
+    }
+
     fn runs(&self) -> bool {
         self.left > 1
     }
@@ -130,9 +142,11 @@ impl Reference for Segmenting<'_> {
         let found = self.found.as_ref().filter(|_| self.left <= 1);
         let layout = self.array.layout();
         let bits = count_bits(self.array.most + 1);
-        let labels = found.zip(self.labels[0]).map(|(found, quad)| {
+        let word = |found: &Segmented, quad: usize, bits: usize| {
             Word::of_fields(&[0, 1, 2, 3].map(|lane| found.labels[layout.taxel(quad, lane)] as i64), bits)
-        });
+        };
+        let labels = found.zip(self.labels[0]).map(|(found, quad)| word(found, quad, bits));
+        let labelled = self.labelled();
         let middle = found.zip(self.contact).and_then(|(found, contact)| found.middles.get(contact));
         let number = |number: usize| Word::from(number as u64);
         vec![
@@ -141,6 +155,8 @@ impl Reference for Segmenting<'_> {
             self.reset.then(|| (self.left == 1).into()),
             middle.map(|middle| number(middle[0])),
             middle.map(|middle| number(middle[1])),
+            self.reset.then(|| labelled.is_some().into()),
+            labelled.zip(self.found.as_ref()).map(|(quad, found)| word(found, quad, bits + 1)),
             labels,
         ]
     }
@@ -218,127 +234,42 @@ fn contacts_are_those_of_the_model() {
     }
 }
 
+/// Defects that the frames find.
 #[test]
-fn debug_segment() {
-    use crate::language::Simulation;
-    for (rows, cols, most, sharp) in [
-        (2, 3, 8, false),
-        (8, 8, 2, false),
-        (7, 12, 8, false),
-        (10, 10, 8, false),
-        (16, 16, 8, true),
-        (20, 20, 8, false),
-    ] {
-        let array = if sharp { Array::sharp(rows, cols) } else { Array::new(rows, cols, most) };
-        let block = Segment::new(&array.segmentation(), LANE, LOW);
-        let kernel = block.kernel.kernel();
-        let mut sim = Simulation::new(kernel);
-        let slot = |name: &str| sim.slot_of(kernel, name).unwrap();
-        let names = [
-            "rst",
-            "start",
-            "fill",
-            "fill_address",
-            "fill_quad",
-            "done",
-            "tick",
-            "count",
-            "overflow",
-            "middle_row",
-            "middle_col",
-            "contact",
-            "label_address",
-            "labels",
-        ];
-        let slots: Vec<usize> = names.iter().map(|n| slot(n)).collect();
-        let at = |n: &str| slots[names.iter().position(|m| *m == n).unwrap()];
-        let mut random = fastrand::Rng::with_seed(1);
-        println!("{rows}x{cols} longest {}", array.segmentation().longest());
-        for index in 0..30 {
-            let p = frame(&array.sensor, index % KINDS, &mut random);
-            sim.set(at("rst"), &[u64::from(index == 0)]);
-            sim.set(at("start"), &[0]);
-            sim.show();
-            sim.clock();
-            sim.set(at("rst"), &[0]);
-            for (address, quad) in array.quads(&p).into_iter().enumerate() {
-                sim.set(at("fill"), &[1]);
-                sim.set(at("fill_address"), &[address as u64]);
-                sim.set(at("fill_quad"), &quad.limbs()[..2]);
-                sim.show();
-                sim.clock();
-            }
-            sim.set(at("fill"), &[0]);
-            let found = segment(&array.sensor, &array.segmenter, &words(&p), array.most);
-            let basins = array.segmenter.segment(&words(&p));
-            let course =
-                dermis_golden::fixed::stages::segment::cycles::Course::of(&array.sensor, &basins, &found.middles);
-            let mut states = std::collections::BTreeMap::new();
-            let mut cycles = 0;
-            sim.set(at("start"), &[1]);
-            loop {
-                sim.show();
-                *states.entry(sim.get(at("tick"), 1)[0]).or_insert(0) += 1;
-                if sim.get(at("done"), 1)[0] == 1 || cycles > 100_000 {
-                    break;
-                }
-                sim.clock();
-                sim.set(at("start"), &[0]);
-                cycles += 1;
-            }
-            let mut middles = Vec::new();
-            for contact in 0..found.middles.len() {
-                sim.set(at("contact"), &[contact as u64]);
-                sim.show();
-                sim.clock();
-                sim.show();
-                middles.push(["middle_row", "middle_col"].map(|n| sim.get(at(n), 1)[0] as usize));
-            }
-            let mut labels = vec![0; array.sensor.taxels()];
-            let layout = array.layout();
-            for quad in 0..layout.len() {
-                sim.set(at("label_address"), &[quad as u64]);
-                for _ in 0..2 {
-                    sim.show();
-                    sim.clock();
-                }
-                sim.show();
-                let word = sim.get(at("labels"), 1)[0];
-                let bits = count_bits(array.most + 1);
-                (0..4).for_each(|lane| {
-                    labels[layout.taxel(quad, lane)] = (word >> (bits * lane) & ((1 << bits) - 1)) as usize
-                });
-            }
-            let ok = [
-                cycles == found.cycles,
-                sim.get(at("count"), 1)[0] as usize == found.middles.len(),
-                (sim.get(at("overflow"), 1)[0] == 1) == found.overflow,
-                middles == found.middles,
-                labels == found.labels,
-            ];
-            println!(
-                "kind {} cycles {cycles} expected {} ok {ok:?} basins {} joins {} contacts {}",
-                index % KINDS,
-                found.cycles,
-                course.basins,
-                course.joins.len(),
-                course.contacts
-            );
-            if !ok.iter().all(|ok| *ok) {
-                println!("  {states:?} {course:?}\n {middles:?} {:?}", found.middles);
-            }
-        }
-    }
+fn defects_are_found() {
+    let array = Array::new(6, 7, 3);
+    let subject = |changes: &[Change]| {
+        block_subject!(
+            Segment::new(&array.segmentation(), LANE, LOW),
+            changes,
+            inputs [rst, start, fill, fill_address, fill_quad, contact, label_address],
+            outputs [count, overflow, done, middle_row, middle_col, labelled, labelled_quad, labels],
+        )
+    };
+    let defects = [
+        Change::value("", "larger", |k| k.constant(1, 1)),
+        Change::value("", "turned", |k| k.constant(1, 0)),
+        Change::value("", "unlinks", |k| k.constant(1, 0)),
+        Change::value("", "diagonal", |k| k.constant(1, 1)),
+        Change::value("", "line_found", |k| k.constant(1, 1)),
+    ];
+    let kinds: Vec<usize> = (0..2 * KINDS).map(|index| index % KINDS).collect();
+    check_with_defects(subject, &stimulus(&array, &kinds, 7), || Segmenting::new(&array), &defects);
 }
+
+/// The plan lists every memory of the block.
 #[test]
-fn debug_verilog() {
-    for (rows, cols) in [(10, 10), (20, 20)] {
-        let array = Array::new(rows, cols, MOST);
-        let mut block = Segment::new(&array.segmentation(), LANE, LOW);
-        block.connect_all();
-        let text =
-            crate::language::Hierarchy::of(&block)
-                .verilog("segment", &crate::language::Attributes::new(), &|_, _| None);
-        std::fs::write(format!("/tmp/seg{rows}.v"), text).unwrap();
+fn memories_are_those_of_the_plan() {
+    let board = Board::load("ulx3s-85f").unwrap();
+    for array in [Array::new(20, 20, MOST), Array::new(7, 12, 3)] {
+        let block = Segment::new(&array.segmentation(), LANE, LOW);
+        let memories = block.kernel.kernel().memories();
+        let mut own: Vec<_> = memories.iter().map(|m| (m.label.clone().unwrap(), m.words, m.bits)).collect();
+        let planned = segment_memories(&array.segmentation(), &board);
+        let mut planned: Vec<_> = planned.iter().map(|m| (m.holds.to_string(), m.words, m.bits)).collect();
+        own.sort();
+        planned.sort();
+        assert_eq!(own, planned);
     }
+    assert_eq!(segment_multipliers(&Array::new(20, 20, MOST).segmentation(), &board), 1);
 }

@@ -14,12 +14,12 @@ const NEXT: u64 = 5;
 
 /// What the order of the taxels says to the other parts.
 pub(super) struct Order<'k> {
-    /// The neighbour whose word is there in step `BORDERS` is within the array.
+    /// The neighbour whose word is there in `BORDERS` is within the array.
     pub(super) beside: Expr<'k>,
-    /// The steps end in this cycle: to join, to add the moments.
+    /// `BORDERS` ends.
     pub(super) joins: Expr<'k>,
+    /// A quad ends; the last one does.
     pub(super) quads_end: Expr<'k>,
-    /// The last quad ends.
     pub(super) last_quad: Expr<'k>,
     /// A basin is found, with this number.
     pub(super) fresh: Expr<'k>,
@@ -59,9 +59,12 @@ impl<'k> Circuit<'k> {
         let in_quads = k.wire("in_quads", self.among(&[UNPACK, LABEL]));
         let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
         let known = self.steps_out.at(BASIN);
-        // Both registers are what their names say of the present tick.
-        let walks = k.delay("walks", self.at(WALK, 1));
-        let runs = k.register("runs", Type::unsigned(1));
+        // An entry is there in WALK, a tap in the smoothing.
+        let walks = k.state("walks", Type::unsigned(1), self.rst, 0);
+        walks.set(self.at(WALK, 1));
+        let walks = *walks;
+        let tap_there = k.register("runs", Type::unsigned(1));
+        let runs = tap_there.get();
         let passes = k.wire("passes", known & (*back | !*walking));
         let begins = k.wire("begins", self.at(CLIMB, 9) | self.at(BORDERS, 4) & *self.moves);
         let advances = k.wire("advances", quads_end | begins | walks & passes);
@@ -77,8 +80,9 @@ impl<'k> Circuit<'k> {
             self.mirror.set((*self.mirror + step).low(self.address.bits()));
         });
         k.when(quads_end, || self.quad.set(self.quad.plus(1)));
-        let last_taxel = k.wire("last_taxel", self.address.is(taxels as u64 - 1));
-        let last_quad = k.wire("last_quad", quads_end & self.quad.is(shape.quad_count() as u64 - 1));
+        let last_taxel = k.delay("last_taxel", self.address.is(taxels as u64 - 1));
+        let last_quad = k.delay("quads_last", self.quad.is(shape.quad_count() as u64 - 1));
+        let last_quad = k.wire("last_quad", quads_end & last_quad);
         k.when(begins, || {
             self.begun.set(constant(1, 1));
             self.ending.set(last_taxel);
@@ -101,8 +105,7 @@ impl<'k> Circuit<'k> {
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
         let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_out.at(FRACTION + 1 + flag));
-        runs.set(smooths & self.tick.any());
-        let (runs_register, runs) = (runs, *runs);
+        tap_there.set(smooths & self.tick.any());
         let [along_row, along_column] = shape.tap_counts();
         let tap = |number: usize| constant(self.tap.bits(), number);
         let wraps = [(along_row - 1, 0), (along_row + along_column - 1, along_row)];
@@ -117,12 +120,12 @@ impl<'k> Circuit<'k> {
         k.when(self.is(CLIMB) | self.is(BORDERS) & *self.moves, || {
             heading.set(self.is(BORDERS).mux(borders, climbs));
         });
-        let ahead = k.wire("ahead", runs & (!last | ends | moves) | walks & passes);
+        let ahead = k.wire("ahead", runs & (!last | ends | moves));
         let steps = self.steps_out.low(DIRECTION) & (walks & !known).repeat(DIRECTION);
         let direction = *heading | steps | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION);
         let direction = k.wire("direction", direction);
         let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
-        let from_window = k.wire("from_window", smooths & last & !ends);
+        let from_window = k.wire("from_window", smooths & last & !ends | self.is(WALK) & known & !passes);
         let from_point = k.wire("from_point", smooths & !from_window | self.is(WALK) & !known);
         let own = self.is(LABEL).mux(*self.target, *self.address);
         let from = from_window.mux(*window, from_point.mux(*self.point, own));
@@ -130,8 +133,10 @@ impl<'k> Circuit<'k> {
         let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 1);
         k.when(reads, || self.point.set(next));
         k.when(runs & last, || window.set(next));
+        // In WALK the address is that of the next taxel, the window that of the taxel from which a walk starts.
+        k.when(walks & !known & !*walking, || window.set(*self.point));
         k.when(walks, || {
-            walking.set(!(passes));
+            walking.set(!passes);
             back.set(known & *walking & !passes | *back & !known);
             k.when(known & !passes, || self.own.set(self.steps_out.low(BASIN)));
         });
@@ -150,7 +155,7 @@ impl<'k> Circuit<'k> {
         k.when(*self.moves, || valids.set(valids.low(4).concat(within)));
 
         k.when(self.tick.is(3), || self.base.set(self.words_out));
-        let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2);
+        let bare = !self.among(&[CLIMB, BORDERS]) | self.at(CLIMB, 1) | self.at(BORDERS, 2) & *self.moves;
         k.when(bare, || self.base.set(self.zero(shape.smoothed)));
         let climbed = self.climb(valids.top());
         self.write(walks & *back & !known, unpacks | self.at(LABEL, 0), of_lane, &climbed);
@@ -166,7 +171,7 @@ impl<'k> Circuit<'k> {
             (self.is(ALONG_COLUMNS) & smoothed, ALONG_COLUMNS, CLIMB),
             (self.at(CLIMB, 5) & *self.ending, CLIMB, CLEAR),
             (cleared, CLEAR, WALK),
-            (walks & passes & last_taxel, WALK, BORDERS),
+            (walks & passes & k.delay("beyond_last", self.address.equals(address(taxels))), WALK, BORDERS),
             (labels, SETTLE, LABEL),
         ];
         for (end, from, to) in ends {
@@ -178,10 +183,10 @@ impl<'k> Circuit<'k> {
                 _ => {}
             });
         }
-        let restarts = k.wire("restarts", ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end).unwrap());
+        let restarts = ends.map(|(end, ..)| end).into_iter().reduce(|any, end| any | end);
+        let restarts = k.wire("restarts", restarts.unwrap_or(self.zero(1)));
         k.when(restarts, || {
             let registers = [
-                self.address,
                 self.row,
                 self.col,
                 self.quad,
@@ -196,9 +201,10 @@ impl<'k> Circuit<'k> {
                 back,
                 valids,
                 heading,
-                runs_register,
+                tap_there,
             ];
             registers.iter().for_each(|register| register.set(self.zero(register.bits())));
+            self.address.set(cleared.resize(self.address.bits()));
             self.mirror.set(address(shape.cols - 1));
         });
         Order { beside: valids.at(2), joins, quads_end, last_quad, fresh: climbed.fresh, next: climbed.next }

@@ -17,12 +17,14 @@
 //! | order: for each of the remaining the largest load | B + 6 |
 //! | … then settle the contact of every basin | 68 |
 //! | label the quads and add the moments | 20 Q + 4 |
-//! | middle: for each contact its row and column | 2 (row + column) + 7 |
+//! | middle: for each contact its row and column | 2 (row + column) + 9 |
 
 use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 
+/// Width of a tap in the memory of the hardware: a weight up to one, and three flags.
+pub const TAP_BITS: usize = WEIGHT_BITS as usize + 4;
 /// Largest number of contacts of the hardware.
 pub const MOST: usize = 8;
 /// Cycles from the start to the first step, and from the last to the end.
@@ -114,6 +116,11 @@ impl Segmentation<'_> {
         window.weights.iter().enumerate().map(|place| (at(place).0, &place.1[at(place).1])).collect()
     }
 
+    /// Number of taps along a row (`axis` 0) or a column.
+    pub fn tap_count(&self, axis: usize) -> usize {
+        self.taps(axis).iter().map(|(_, weights)| weights.len()).sum()
+    }
+
     /// Width of a smoothed word, without a sign: the weights of a place may add up to slightly more than one.
     pub fn smoothed_bits(&self) -> u32 {
         let smoothed = |most: i64, axis: usize| {
@@ -135,7 +142,7 @@ impl Segmentation<'_> {
     /// Cycles from the start to the end.
     pub fn cycles(&self, course: &Course) -> u64 {
         let joined = course.joins.iter().map(|join| round(join.basins, join.small, true)).sum::<u64>();
-        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 7) as u64).sum::<u64>();
+        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 9) as u64).sum::<u64>();
         let readings = self.sensor.taxels() + 2 * course.steps + course.walks;
         let joining = joined + round(course.contacts, false, false) + order(course.contacts);
         self.fixed() + cleared(course.basins) + 3 * (readings + course.borders) as u64 + joining + middles
@@ -147,7 +154,7 @@ impl Segmentation<'_> {
         let (rows, cols, taxels) = (self.sensor.rows, self.sensor.cols, self.sensor.taxels());
         let basins = BASINS.min(taxels);
         let pairs = rows * (cols - 1) + (rows - 1) * cols + 2 * (rows - 1) * (cols - 1);
-        let middle = |contacts: usize| (contacts.min(self.most) * (2 * (rows + cols) + 3)) as u64;
+        let middle = |contacts: usize| (contacts.min(self.most) * (2 * (rows + cols) + 5)) as u64;
         let joining = |contacts: usize| {
             let joined = (contacts + 1..=basins).map(|left| round(left, true, true).max(round(left, false, true)));
             joined.sum::<u64>() + round(contacts, false, false) + order(contacts) + middle(contacts)
@@ -160,8 +167,7 @@ impl Segmentation<'_> {
     fn fixed(&self) -> u64 {
         let (rows, cols, taxels, quads) =
             (self.sensor.rows, self.sensor.cols, self.sensor.taxels(), self.quads().len());
-        let taps = |axis: usize| self.taps(axis).iter().map(|(_, weights)| weights.len()).sum::<usize>();
-        let smooth = rows * taps(0) + cols * taps(1) + 14;
+        let smooth = rows * self.tap_count(0) + cols * self.tap_count(1) + 14;
         (7 * quads + smooth + 10 * taxels + 6 + 5 * taxels + 3 + 20 * quads + 4) as u64 + ENDS
     }
 }

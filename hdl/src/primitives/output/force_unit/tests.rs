@@ -212,7 +212,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             random_word(&mut random, block.score.width()),
             random_word(&mut random, SATURATION_BITS),
             random_word(&mut random, CYCLE_BITS),
-            Word::of_fields(&[(); 4].map(|()| random.i64(..parts as i64)), label_bits(model)),
+            Word::of_fields(&[(); 4].map(|()| random.i64(0..parts as i64)), label_bits(model)),
             random.bool().into(),
         ]
     };

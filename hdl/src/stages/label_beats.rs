@@ -1,4 +1,4 @@
-//! Stage `labels`: the contact of each taxel, on the output stream between forces and statuses.
+//! Stage `label_beats`: the contact of each taxel, on the output stream between forces and statuses.
 //!
 //! The beats of the forces pass. Then the labels are read row-major, one a cycle, into the next beat, and the stream in front
 //! of it waits; then the statuses pass.
@@ -19,7 +19,7 @@ use crate::wire::Wire;
 /// ```
 /// Without contacts the stream passes on wires.
 #[derive(LogicBlock)]
-pub struct Labels {
+pub struct LabelBeats {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
@@ -40,17 +40,17 @@ pub struct Labels {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// Labels are being read.
+    /// LabelBeats are being read.
     pub reads: Signal<Out, Bit>,
     /// Address of the quad whose labels are needed.
     pub label_address: Wire<Out>,
-    /// Labels of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
+    /// LabelBeats of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
     pub labels: Wire<In>,
     kernel: Body,
 }
 
 kernel_block!(
-    Labels,
+    LabelBeats,
     clock clk,
     inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, labels],
     outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, reads, label_address]
@@ -69,14 +69,14 @@ struct Shape {
 /// Cycles from the scan of a taxel until its label is in the beat.
 const READ: usize = 5;
 
-impl Labels {
+impl LabelBeats {
     /// For beats of `bits` bits of `model`.
     pub fn new(model: &Model, bits: usize) -> Self {
-        Labels::of(Shape { layout: model.layout(), bits, contacts: model.contacts() })
+        LabelBeats::of(Shape { layout: model.layout(), bits, contacts: model.contacts() })
     }
 
     fn of(shape: Shape) -> Self {
-        let block = Labels {
+        let block = LabelBeats {
             clk: Default::default(),
             rst: Default::default(),
             s_axis_tdata: Wire::new(shape.bits),
@@ -103,7 +103,7 @@ impl Shape {
     }
 
     fn kernel(self) -> Kernel {
-        let k = Builder::new("labels");
+        let k = Builder::new("label_beats");
         let rst = k.input("rst", 1);
         let (data, given) = (k.input("s_axis_tdata", self.bits), k.input("s_axis_tvalid", 1));
         let (last, taken) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
@@ -205,7 +205,7 @@ mod tests {
     const SHAPE: Shape = Shape { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8 };
     const BITS: usize = 4;
     /// Cycles from the beat before to one of labels, at full speed.
-    const CYCLES: usize = LABELS_PER_BEAT + READ;
+    const CYCLES: usize = LABELS_PER_BEAT + READ - 1;
 
     /// The labels of a frame, and the beats that passed in it; a beat of labels is offered from a cycle on.
     struct Sent {
@@ -328,6 +328,6 @@ mod tests {
     fn labels_follow_the_forces() {
         let mut random = fastrand::Rng::with_seed(4);
         let labels: Vec<usize> = (0..35).map(|_| random.usize(..=SHAPE.contacts)).collect();
-        check(Labels::of(SHAPE).kernel.kernel(), &stimulus(&labels), &mut Sent::new(&labels));
+        check(LabelBeats::of(SHAPE).kernel.kernel(), &stimulus(&labels), &mut Sent::new(&labels));
     }
 }
