@@ -25,13 +25,12 @@ use crate::board::Board;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
-use crate::fixed::stages::segment::WORD_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use crate::fixed::words::network::POSITION_BITS as MU_BITS;
 use crate::fixed::words::schedule::sections;
 use crate::scene::{ForceOutput, Scene};
-use crate::segment::{BASINS, WEIGHT_BITS};
+use crate::segment::{BASINS, WEIGHT_BITS, WORD_BITS};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use dermis_golden::board::Board;
 use dermis_golden::fixed::plan::resources::{segment_memories, segment_multipliers};
 use dermis_golden::fixed::stages::segment::cycles::MOST;
-use dermis_golden::fixed::stages::segment::{segment, Segmented, WORD_BITS};
-use dermis_golden::segment::{Segmenter, WIDTH};
+use dermis_golden::fixed::stages::segment::{segment, Segmented};
+use dermis_golden::segment::{Segmenter, WIDTH, WORD_BITS};
 use dermis_golden::sensor::Sensor;
 use dermis_golden::symmetry::quads::Quads;
 
