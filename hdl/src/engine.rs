@@ -125,8 +125,8 @@ engine! {
             resultants: Resultants => "stages/resultants.rs",
         }
         control {
-            operands: OperandSource,
-            told: StatusSource,
+            operand_source: OperandSource,
+            status_source: StatusSource,
             begins: BitDelay,
             computing: Dff,
             first: Dff,
@@ -207,8 +207,8 @@ impl Engine {
             shear: Shear::new(model),
             network: Constant::new(model.has_network()),
             several: Constant::new(model.contacts() > 0),
-            operands: OperandSource::new(model),
-            told: StatusSource::new(model),
+            operand_source: OperandSource::new(model),
+            status_source: StatusSource::new(model),
             relax: Relax::new(formats),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
@@ -288,8 +288,8 @@ impl Logic for Engine {
         self.label_beats.rst.next = self.rst.val();
         self.shear.clk.next = self.clk.val();
         self.shear.rst.next = self.rst.val();
-        self.operands.clk.next = self.clk.val();
-        self.operands.rst.next = self.rst.val();
+        self.operand_source.clk.next = self.clk.val();
+        self.operand_source.rst.next = self.rst.val();
         self.relax.clk.next = self.clk.val();
         self.relax.rst.next = self.rst.val();
         self.unfold.clk.next = self.clk.val();
@@ -493,12 +493,12 @@ impl Logic for Engine {
         self.relax.rescaled.next = self.rescale.saturations.val();
         self.relax.estimated.next = self.estimate.saturations.val();
         self.relax.sheared.next = self.shear.saturations.val();
-        self.operands.own.next = self.relax.operands.val();
-        self.operands.own_valid.next = self.relax.operands_valid.val();
-        self.operands.images.next = self.estimate.operands.val();
-        self.operands.images_valid.next = self.estimate.operands_valid.val();
-        self.pass.vector_quad.next = self.operands.quad.val();
-        self.pass.vector_valid.next = self.operands.valid.val();
+        self.operand_source.own.next = self.relax.operands.val();
+        self.operand_source.own_valid.next = self.relax.operands_valid.val();
+        self.operand_source.images.next = self.estimate.operands.val();
+        self.operand_source.images_valid.next = self.estimate.operands_valid.val();
+        self.pass.vector_quad.next = self.operand_source.quad.val();
+        self.pass.vector_valid.next = self.operand_source.valid.val();
         self.pass.position_x.next = self.estimate.position_x.val();
         self.pass.position_y.next = self.estimate.position_y.val();
         self.unfold.start.next = self.start.val();
@@ -539,9 +539,9 @@ impl Logic for Engine {
         self.window.label.next = self.contacts.label.val();
         self.window.quad.next = self.receive.quad.val();
         self.window.labels.next = self.segment.labels.val();
-        self.operands.window_quad.next = self.window.write_quad.val();
-        self.operands.mask.next = self.window.mask_quad.val();
-        self.operands.window_valid.next = self.window.write.val();
+        self.operand_source.window_quad.next = self.window.write_quad.val();
+        self.operand_source.mask.next = self.window.mask_quad.val();
+        self.operand_source.window_valid.next = self.window.write.val();
         self.shear.clear.next = self.start.val();
         self.shear.operands.next = self.relax.operands.val();
         self.shear.operands_valid.next = self.relax.operands_valid.val();
@@ -549,8 +549,8 @@ impl Logic for Engine {
         self.shear.labels.next = self.segment.labels.val();
         self.shear.positions_x.next = self.contacts.positions_x.val();
         self.shear.positions_y.next = self.contacts.positions_y.val();
-        self.operands.sheared.next = self.shear.sheared.val();
-        self.operands.sheared_valid.next = self.shear.sheared_valid.val();
+        self.operand_source.sheared.next = self.shear.sheared.val();
+        self.operand_source.sheared_valid.next = self.shear.sheared_valid.val();
 
         comment!("unfold -> search");
         self.search.fill_quad.next = self.unfold.taxels.val();
@@ -572,35 +572,35 @@ impl Logic for Engine {
                 self.forces.begin_frame.next = self.search.settled.val();
             }
         }
-        self.told.settled.next = self.search.settled.val();
-        self.told.subarray.next = self.searched_part.kept.val();
-        self.told.searched.next = self.searched_condition.q.val();
-        self.told.best_x.next = self.search.best_x.val();
-        self.told.best_y.next = self.search.best_y.val();
-        self.told.best_score.next = self.search.score.val();
-        self.told.candidate.next = self.search.found.val();
-        self.told.mu_x.next = self.estimate.position_x.val();
-        self.told.mu_y.next = self.estimate.position_y.val();
-        self.told.ln_sigma.next = self.estimate.ln_sigma.val();
-        self.told.told.next = self.contacts.told.val();
-        self.told.told_label.next = self.contacts.told_label.val();
-        self.told.told_x.next = self.contacts.told_x.val();
-        self.told.told_y.next = self.contacts.told_y.val();
-        self.told.told_ln_sigma.next = self.contacts.told_ln_sigma.val();
-        self.told.told_condition.next = self.contacts.told_condition.val();
+        self.status_source.settled.next = self.search.settled.val();
+        self.status_source.subarray.next = self.searched_part.kept.val();
+        self.status_source.searched.next = self.searched_condition.q.val();
+        self.status_source.best_x.next = self.search.best_x.val();
+        self.status_source.best_y.next = self.search.best_y.val();
+        self.status_source.best_score.next = self.search.score.val();
+        self.status_source.candidate.next = self.search.found.val();
+        self.status_source.mu_x.next = self.estimate.position_x.val();
+        self.status_source.mu_y.next = self.estimate.position_y.val();
+        self.status_source.ln_sigma.next = self.estimate.ln_sigma.val();
+        self.status_source.told.next = self.contacts.told.val();
+        self.status_source.told_label.next = self.contacts.told_label.val();
+        self.status_source.told_x.next = self.contacts.told_x.val();
+        self.status_source.told_y.next = self.contacts.told_y.val();
+        self.status_source.told_ln_sigma.next = self.contacts.told_ln_sigma.val();
+        self.status_source.told_condition.next = self.contacts.told_condition.val();
         self.forces.labels.next = self.segment.labels.val();
         self.forces.overflow.next = self.segment.overflow.val();
-        self.forces.start.next = self.told.start.val();
-        self.forces.part.next = self.told.part.val();
-        self.forces.position_x.next = self.told.position_x.val();
-        self.forces.position_y.next = self.told.position_y.val();
-        self.forces.score.next = self.told.score.val();
-        self.forces.found.next = self.told.found.val();
+        self.forces.start.next = self.status_source.start.val();
+        self.forces.part.next = self.status_source.part.val();
+        self.forces.position_x.next = self.status_source.position_x.val();
+        self.forces.position_y.next = self.status_source.position_y.val();
+        self.forces.score.next = self.status_source.score.val();
+        self.forces.found.next = self.status_source.found.val();
         self.forces.normalise.next = self.searched_normalise.kept.val();
         self.forces.rescale.next = self.searched_rescale.kept.val();
         self.forces.saturations.next = self.searched_saturations.kept.val();
         self.forces.damaged.next = self.searched_damaged.kept.val();
-        self.forces.condition.next = self.told.condition.val();
+        self.forces.condition.next = self.status_source.condition.val();
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.frame_cycles.cycles.val();
         self.send.start.next = self.begin_send.val();

@@ -182,7 +182,7 @@ streams!(engine::Engine {
     fold: fold.folded_valid => [signed fold.folded; PARITIES],
     pass: pass.quad_valid => [signed pass.quad; PARITIES],
     segment if several.val: segment.labelled => [signed segment.labelled_quad; TAXELS],
-    window if several.val: operands.of_window => [signed operands.quad; PARITIES],
+    window if several.val: operand_source.of_window => [signed operand_source.quad; PARITIES],
     estimate if network.val: estimate.operands_valid => [signed estimate.operands; PARITIES],
     shear if several.val: shear.sheared_valid => [signed shear.sheared; PARITIES],
     rescale: rescale.words_valid => [signed rescale.words; PARITIES],

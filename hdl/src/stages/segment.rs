@@ -58,9 +58,9 @@ pub struct Segment {
     pub fill_address: Wire<In>,
     /// All quads have been filled in: start. Ignored from then to `done`.
     pub start: Signal<In, Bit>,
-    /// Quad whose labels are asked.
+    /// Address of the quad whose labels are asked; taken in every cycle.
     pub label_address: Wire<In>,
-    /// Index of the contact whose middle is asked.
+    /// Index of the contact whose middle is asked; taken in every cycle.
     pub contact: Wire<In>,
     /// Outputs are valid from now to the next `start`; high for one cycle.
     pub done: Signal<Out, Bit>,

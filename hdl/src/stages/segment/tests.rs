@@ -6,8 +6,7 @@ use dermis_golden::board::Board;
 use dermis_golden::fixed::plan::resources::{segment_memories, segment_multipliers};
 use dermis_golden::fixed::stages::segment::cycles::MOST;
 use dermis_golden::fixed::stages::segment::{segment, Segmented};
-use dermis_golden::segment::WORD_BITS;
-use dermis_golden::segment::{Segmenter, WIDTH};
+use dermis_golden::segment::{Segmenter, WIDTH, WORD_BITS};
 use dermis_golden::sensor::Sensor;
 use dermis_golden::symmetry::quads::Quads;
 
