@@ -4,10 +4,7 @@ use std::collections::VecDeque;
 
 use dermis_golden::fixed::Model;
 
-use dermis_golden::generator::draws::{DrawOptions, Draws};
-
 use super::Engine;
-use crate::device::Inputs;
 use crate::language::testbench::{check_with_defects, random_word, Reference};
 use crate::language::Change;
 use crate::scenes::{learned, model};
@@ -141,57 +138,25 @@ fn with_a_network_beats_leave_in_the_cycles_of_the_model() {
         let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
         let defects = [
             Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
-            Change::value("", "relax__images_valid", |k| k.constant(1, 0)),
+            Change::value("", "operand_source__images_valid", |k| k.constant(1, 0)),
         ];
         check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
     }
 }
 
-/// Each stage passes on the words of the model, and the beats are those of the model, whatever the contacts.
 #[test]
-fn contacts_pass_on_the_words_of_the_model() {
-    let model = learned(8, 9, &[7], "mu_max = 0.3\n[partition]\ncase = \"contacts\"\nmax_contacts = 3\n");
-    let mut engine = Engine::new(&model);
-    let draws = Draws::new(&model.scene, DrawOptions { contacts: 2, seed: 4, ..Default::default() }).unwrap();
-    let taps = crate::taps::taps(&engine);
-    for number in 0..3 {
-        let codes = model.codes(&draws.frame(number).unwrap().frame).unwrap().codes;
-        let trace = model.run(&codes);
-        let mut inputs = Inputs { m_ready: true, rst: number == 0, ..Inputs::default() };
-        let mut passed: Vec<Vec<Vec<i64>>> = vec![Vec::new(); taps.len()];
-        let (mut sent, mut beats) = (0, Vec::new());
-        for cycle in 0..60_000 {
-            inputs.rst = number == 0 && cycle < 3;
-            inputs.s_valid = !inputs.rst && sent < codes.len();
-            inputs.s_data = codes.get(sent).copied().unwrap_or(0);
-            inputs.s_last = sent + 1 == codes.len();
-            let mut words = Vec::new();
-            let outputs = crate::simulate::cycle(&mut engine, &inputs, |engine| words = crate::taps::words(engine));
-            for (own, word) in passed.iter_mut().zip(words) {
-                own.extend(word);
-            }
-            sent += usize::from(outputs.s_ready && inputs.s_valid);
-            if outputs.m_valid {
-                beats.push(outputs.m_data);
-                if outputs.m_last {
-                    println!("frame {number}: {cycle} cycles, model {:?}", trace.cycles);
-                    break;
-                }
-            }
-        }
-        for (tap, own) in taps.iter().zip(&passed) {
-            let wanted = &trace.stages.iter().find(|stage| stage.name == tap.name).unwrap().words;
-            let first = own.iter().zip(wanted).position(|(own, wanted)| own != wanted);
-            println!("{}: {} of {}, first other {first:?}", tap.name, own.len(), wanted.len());
-            if let Some(at) = first {
-                println!("   {:?} {:?}", own[at], wanted[at]);
-            }
-        }
-        let wanted: Vec<[i32; 3]> = trace.beats.iter().chain(&trace.status).copied().collect();
-        let first = beats.iter().zip(&wanted).position(|(own, wanted)| own != wanted);
-        println!("beats: {} of {}, first other {first:?}", beats.len(), wanted.len());
-        if let Some(at) = first {
-            println!("   {:?} {:?}", beats[at], wanted[at]);
-        }
+fn contacts_leave_in_the_cycles_of_the_model() {
+    let contacts = "mu_max = 0.3\n[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
+    let narrow = "mu_max = 0.05\n[input]\ndead = [[1, 2]]\n[partition]\ncase = \"contacts\"\n[fixed]\nlanes = 4\n\
+                  input_bits = 18\ndata_bits = 12\ncoef_bits = 12\ninverse_bits = 20\n";
+    for (rows, cols, hidden, more) in [(4, 5, vec![7], contacts), (3, 4, vec![5, 4], narrow)] {
+        let model = learned(rows, cols, &hidden, more);
+        let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
+        let defects = [
+            Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
+            Change::value("", "shear__labels", |k| k.constant(1, 0)),
+            Change::value("", "operand_source__mask", |k| k.constant(1, 0)),
+        ];
+        check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
     }
 }

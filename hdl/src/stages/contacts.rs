@@ -35,7 +35,7 @@ pub struct Contacts {
     pub rst: Signal<In, Bit>,
     /// A subarray starts.
     pub start: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
     /// The products of v_00 may begin.
     pub readable: Signal<In, Bit>,
@@ -65,15 +65,15 @@ pub struct Contacts {
     pub values_begin: Signal<In, Bit>,
     /// The search of a subarray has ended; high for one cycle.
     pub searched: Signal<In, Bit>,
-    /// Address of the quad that `fold` reads from the frame buffer.
+    /// Address of the quad that `fold` reads from the frame buffer; in every cycle but those of a window.
     pub fold_address: Wire<In>,
-    /// Address of the quad that `window` reads there, and of its labels.
+    /// Address of the quad that `window` reads there, and of its labels; from `window_start` to `known`.
     pub window_address: Wire<In>,
-    /// Address of the quad whose labels `shear` reads.
+    /// Address of the quad whose labels `shear` reads; in a step.
     pub shear_address: Wire<In>,
-    /// Address of the step whose labels `forces` reads.
+    /// Address of the step whose labels `forces` reads; after the last step.
     pub forces_address: Wire<In>,
-    /// Address of the quad whose labels `label_beats` reads.
+    /// Address of the quad whose labels `label_beats` reads; with `sends_labels`.
     pub sent_address: Wire<In>,
     /// `label_beats` reads labels.
     pub sends_labels: Signal<In, Bit>,
@@ -83,17 +83,17 @@ pub struct Contacts {
     pub pass_start: Signal<Out, Bit>,
     /// The frame buffer may be overwritten.
     pub free: Signal<Out, Bit>,
-    /// Address of the quad to read from the frame buffer.
+    /// Address of the quad to read from the frame buffer; combinational.
     pub quad_address: Wire<Out>,
-    /// Address of the quad whose labels are needed.
+    /// Address of the quad whose labels are needed; combinational.
     pub label_address: Wire<Out>,
     /// The taxels of `unfold` are those of v_00.
     pub fills: Signal<Out, Bit>,
     /// v_00 is filled in: find the contacts.
     pub segment_start: Signal<Out, Bit>,
-    /// Index of the contact.
+    /// Index of the contact; from the cycle after `segmented`, or after `known` of the contact before.
     pub contact: Wire<Out>,
-    /// Label of its taxels: one more.
+    /// Label of its taxels, one more; as `contact`.
     pub label: Wire<Out>,
     /// Read the window around it; its layers begin.
     pub window_start: Signal<Out, Bit>,
@@ -103,9 +103,9 @@ pub struct Contacts {
     pub enabled: Signal<Out, Bit>,
     /// Make the operands of a step.
     pub shear_start: Signal<Out, Bit>,
-    /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits.
+    /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits; from `known` of the contact on.
     pub positions_x: Wire<Out>,
-    /// The same of μ2.
+    /// The same of μ2; as `positions_x`.
     pub positions_y: Wire<Out>,
     /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
     pub told: Signal<Out, Bit>,

@@ -65,7 +65,7 @@ pub struct Forces {
     pub saturations: Wire<In>,
     /// Cycle counter of the frame; sampled for its first beat.
     pub cycles: Wire<In>,
-    /// Address of the quad whose labels are needed.
+    /// Address of the word whose labels are needed; one cycle after `address`.
     pub label_address: Wire<Out>,
     /// Labels of that quad, two cycles after `label_address`; one bit each without contacts.
     pub labels: Wire<In>,

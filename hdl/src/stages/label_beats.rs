@@ -42,7 +42,7 @@ pub struct LabelBeats {
     pub m_axis_tlast: Signal<Out, Bit>,
     /// LabelBeats are being read.
     pub reads: Signal<Out, Bit>,
-    /// Address of the quad whose labels are needed.
+    /// Address of the quad whose labels are needed; with `reads`.
     pub label_address: Wire<Out>,
     /// LabelBeats of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
     pub labels: Wire<In>,

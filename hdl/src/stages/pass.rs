@@ -31,7 +31,7 @@ pub struct Pass {
     pub input_address: Wire<Out>,
     /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
-    /// Four parities of a finished v_ij, of the images of a layer, or of p, `data_bits` each, signed, quads in order; valid with
+    /// Four parities of a finished v_ij, of the images of a layer, or of p, `operand_bits` each, signed, quads in order; valid with
     /// `vector_valid`.
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
@@ -77,12 +77,12 @@ impl Pass {
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);
-        let network = model.has_network();
+        let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
-        let scaling = OperandScale::latency(network);
-        let parity_bits = 4 * formats.data_bits as usize;
+        let scaling = OperandScale::latency(scales);
+        let parity_bits = 4 * formats.operand_bits() as usize;
         Pass {
             clk: Default::default(),
             rst: Default::default(),
@@ -110,7 +110,7 @@ impl Pass {
             valid: BitDelay::new(3 + scaling + pass_program.latency()),
             coefficient_address: Delay::new(pass_program.coefficient_address.width(), scaling),
             select: OperandSelect::new(formats),
-            scale: OperandScale::new(network),
+            scale: OperandScale::new(scales),
             pass_program,
             lanes,
             issue: Default::default(),
@@ -393,7 +393,7 @@ mod tests {
                 if column.last {
                     let last = if column.layer { usize::MAX } else { own.quads };
                     let count = own.lanes_per_parity.min(last - first);
-                    let leave = self.cycle + self.latency() + 7 + OperandScale::latency(own.has_network());
+                    let leave = self.cycle + self.latency() + 7 + OperandScale::latency(own.scales_operands());
                     let rows = (0..count).map(|row| (leave + row, (column.accumulation, first + row)));
                     self.rows.iter_mut().for_each(|all| all.extend(rows.clone()));
                 }
@@ -404,7 +404,7 @@ mod tests {
             self.issued.push_front(issued);
             self.issued.truncate(10);
             if valid == 1 && self.quads.len() < self.section().operands.iter().sum() {
-                self.quads.push(quad(4, formats.data_bits));
+                self.quads.push(quad(4, formats.operand_bits()));
             }
             self.position = [6, 7].map(|input| inputs[input].signed(0, position_bits()));
             self.cycle += 1;
@@ -457,7 +457,7 @@ mod tests {
                     Word::from(which as u64),
                     (at == 12).into(),
                     read.unwrap_or_else(|| random_word(&mut random, 4 * formats.fold_bits as usize)),
-                    random_word(&mut random, 4 * formats.data_bits as usize),
+                    random_word(&mut random, 4 * formats.operand_bits() as usize),
                     valid.into(),
                     position[0],
                     position[1],

@@ -64,7 +64,7 @@ pub struct Segment {
     pub contact: Wire<In>,
     /// Outputs are valid from now to the next `start`; high for one cycle.
     pub done: Signal<Out, Bit>,
-    /// Number of contacts.
+    /// Number of contacts; valid from `done` to the next `start`.
     pub count: Wire<Out>,
     /// There were more contacts or basins than there may be.
     pub overflow: Signal<Out, Bit>,

@@ -33,13 +33,13 @@ pub struct Shear {
     pub operands_valid: Signal<In, Bit>,
     /// All quads of p are there: their operands leave.
     pub start: Signal<In, Bit>,
-    /// Address of the quad whose labels are needed.
+    /// Address of the quad whose labels are needed; from the cycle after `start`, one per cycle.
     pub label_address: Wire<Out>,
     /// Contact of each lane of that quad, 0 for none, else 1 …; two cycles after `label_address`.
     pub labels: Wire<In>,
     /// Position of μ1 of each contact in mu_max/384, signed, contact 1 in the low bits; constant while operands leave.
     pub positions_x: Wire<In>,
-    /// The same of μ2.
+    /// The same of μ2; as `positions_x`.
     pub positions_y: Wire<In>,
     /// Four parities, `data_bits` each, signed; valid with `sheared_valid`.
     pub sheared: Wire<Out>,

@@ -44,7 +44,7 @@ pub struct Window {
     pub quad_address: Wire<Out>,
     /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
     pub quad: Wire<In>,
-    /// Address of a quad of labels, the same as `quad_address`.
+    /// Address of a quad of labels; the same as `quad_address`.
     pub label_address: Wire<Out>,
     /// Labels of the quad's four taxels; two cycles after `label_address`.
     pub labels: Wire<In>,

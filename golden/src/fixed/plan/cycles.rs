@@ -46,7 +46,7 @@ const LANES: u64 = 8;
 const COLUMNS: u64 = 2;
 /// Cycles from a row until it can be read as an operand: rescaler, operand memory.
 const OPERAND: u64 = 5;
-/// Additional cycles for the product of an operand and μ, where there is a network.
+/// Additional cycles for the product of an operand and μ, where a network gives one μ.
 const SCALE: u64 = 3;
 /// Additional cycles for the sum with v_00 in `relax`, where there is a network.
 pub(super) const RELAX: u64 = 3;
@@ -311,7 +311,7 @@ fn whole(formats: &Formats, storage: &Storage) -> Timeline {
 pub(super) fn timeline(formats: &Formats, storage: &Storage, section: &Section, begins: Begins) -> Timeline {
     let (quads, per_parity) = (formats.quads as u64, formats.lanes_per_parity as u64);
     let network = formats.has_network();
-    let lanes = LANES + if storage.listed { COLUMNS } else { 0 } + if network { SCALE } else { 0 };
+    let lanes = LANES + if storage.listed { COLUMNS } else { 0 } + if formats.scales_operands() { SCALE } else { 0 };
     let first_issue = begins.issue;
     // `free` is the first cycle in which a product can be issued.
     let (mut now, mut free, mut products_done) = (first_issue, first_issue, 0);

@@ -30,7 +30,7 @@ use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BIT
 use crate::fixed::words::network::POSITION_BITS as MU_BITS;
 use crate::fixed::words::schedule::sections;
 use crate::scene::{ForceOutput, Scene};
-use crate::segment::{BASINS, WEIGHT_BITS, WORD_BITS};
+use crate::segment::{Segmenter, BASINS, WEIGHT_BITS, WIDTH, WORD_BITS};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;
@@ -252,7 +252,7 @@ impl Resources {
         memories.push(memory(Holds::Folded, quads, quad(f.fold_bits)));
         if f.degree > 0 {
             // Of several cases the largest is the first.
-            memories.push(memory(Holds::Operands(0), operand_words(f), quad(f.data_bits)));
+            memories.push(memory(Holds::Operands(0), operand_words(f), quad(f.operand_bits())));
         }
         memories.push(memory(Holds::Coefficients, wide, word_bits(f)));
         if narrow > 0 {
@@ -268,6 +268,11 @@ impl Resources {
         if f.has_network() {
             memories.push(memory(Holds::First, quads, quad(f.vector_bits)));
         }
+        let segmenter = f.by_contact().then(|| Segmenter::new(&scene.sensor, WIDTH));
+        if let Some(own) = &segmenter {
+            memories.push(memory(Holds::Sheared, quads, quad(f.data_bits)));
+            memories.extend(segment_memories(&segmentation(scene, own), board, shallow));
+        }
         let searches = f.searches();
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| searches) {
             memories.push(memory(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
@@ -282,15 +287,16 @@ impl Resources {
             None => 0,
         };
         // Operands times μ, and the size of μ.
-        let (scale, size) = match f.has_network() {
-            true => (4 * board.multipliers_for(f.data_bits, MU_BITS), 2 * board.multipliers_for(MU_BITS, MU_BITS)),
-            false => (0, 0),
-        };
+        let scale = 4 * board.multipliers_for(f.data_bits, MU_BITS);
+        let of = |wanted: bool, count: usize| if wanted { count } else { 0 };
+        let segments = segmenter.as_ref().map_or(0, |own| segment_multipliers(&segmentation(scene, own), board));
         let lane = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
         let multipliers = vec![
             ("prepare", calibrate),
-            ("pass", 4 * f.lanes_per_parity * lane + scale),
-            ("estimate", size),
+            ("pass", 4 * f.lanes_per_parity * lane + of(f.scales_operands(), scale)),
+            ("segment", segments),
+            ("estimate", of(f.has_network(), 2 * board.multipliers_for(MU_BITS, MU_BITS))),
+            ("shear", of(f.by_contact(), scale)),
             ("forces", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
@@ -353,8 +359,13 @@ impl Resources {
     }
 }
 
-/// Memories of `segment` on `board`. The tables of the basins and the middles are read asynchronously, in distributed RAM.
-pub fn segment_memories(segmentation: &Segmentation, board: &Board) -> Vec<Memory> {
+/// The segmentation of the contacts of a scene.
+fn segmentation<'a>(scene: &'a Scene, segmenter: &'a Segmenter) -> Segmentation<'a> {
+    Segmentation { sensor: &scene.sensor, segmenter, most: scene.partition.max_contacts }
+}
+
+/// Memories of `segment` on `board`, those of at most `shallow` words in distributed RAM. The tables of the basins and the middles are read asynchronously, in distributed RAM.
+pub fn segment_memories(segmentation: &Segmentation, board: &Board, shallow: usize) -> Vec<Memory> {
     let (taxels, quads) = (segmentation.sensor.taxels(), segmentation.quads().len());
     let taps = [0, 1].map(|axis| segmentation.tap_count(axis));
     let [smoothed, sum] = [segmentation.smoothed_bits(), segmentation.sum_bits()].map(|bits| bits as usize);
@@ -372,7 +383,6 @@ pub fn segment_memories(segmentation: &Segmentation, board: &Board) -> Vec<Memor
     let axes = [segmentation.sensor.rows, segmentation.sensor.cols].map(count_bits);
     let middles = axes.into_iter().enumerate().map(|(axis, bits)| (Holds::Middles(axis), segmentation.most, bits));
     let distributed = tables.into_iter().map(|(holds, bits)| (holds, table, bits)).chain(middles);
-    let shallow = board.distributed_words[0];
     let blocks = blocks.into_iter().map(|(holds, words, bits)| Memory::new(holds, [words, bits], board, shallow));
     blocks.chain(distributed.map(|(holds, words, bits)| Memory::new(holds, [words, bits], board, words))).collect()
 }

@@ -175,6 +175,20 @@ impl Formats {
         }
     }
 
+    /// Width of a word of the operand memory: of a v_ij, or where windows of contacts are in it, of a multiplier's operand.
+    pub fn operand_bits(&self) -> u32 {
+        if self.by_contact() {
+            MULTIPLIER_BITS
+        } else {
+            self.data_bits
+        }
+    }
+
+    /// Whether operands are multiplied by the one μ in front of the lanes.
+    pub fn scales_operands(&self) -> bool {
+        self.has_network() && !self.by_contact()
+    }
+
     /// Bit length to which v_00 is brought.
     pub fn full_length(&self) -> u32 {
         self.vector_bits - 1 - self.headroom

@@ -11,7 +11,7 @@ use crate::primitives::search::sweep::position_bits;
 use crate::wire::Wire;
 
 /// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
-/// [`latency`](OperandScale::latency) cycles later. Without a network there is no factor, and the operands pass on wires.
+/// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the operands pass on wires.
 #[derive(LogicBlock)]
 pub struct OperandScale {
     /// Clock; registers change on its rising edge.
@@ -36,7 +36,7 @@ const M: usize = MULTIPLIER_BITS as usize;
 const LATENCY: usize = 3;
 
 impl OperandScale {
-    /// `wanted`: there is a network.
+    /// `wanted`: a network gives one μ.
     pub fn new(wanted: bool) -> Self {
         let block = OperandScale {
             clk: Default::default(),

@@ -16,7 +16,7 @@ pub struct OperandSelect {
     pub clk: Signal<In, Clock>,
     /// Four parities of the folded input, `fold_bits` each, signed; taken in every cycle.
     pub input_quad: Wire<In>,
-    /// Four parities of a v_ij, `data_bits` each, signed; taken in every cycle.
+    /// Four parities of a v_ij, `operand_bits` each, signed; taken in every cycle.
     pub vector_quad: Wire<In>,
     /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, 3 = one, with a network, bits 3:2 flip, lane group t gets
     /// parity t XOR flip, bit 4 parities 1 and 2 (x and y) are exchanged first; valid with the quads.
@@ -48,7 +48,7 @@ impl OperandSelect {
     pub fn new(formats: &Formats) -> Self {
         let shape = Shape {
             fold: formats.fold_bits as usize,
-            data: formats.data_bits as usize,
+            data: formats.operand_bits() as usize,
             low: formats.input_low_bits as usize,
             align: formats.limb_align as usize,
             one: formats.has_network(),

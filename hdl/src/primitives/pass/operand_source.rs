@@ -5,7 +5,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Kernel, Type};
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
@@ -42,7 +42,7 @@ pub struct OperandSource {
     pub sheared: Wire<In>,
     /// `sheared` holds a quad.
     pub sheared_valid: Signal<In, Bit>,
-    /// A quad of operands, `data_bits` each, signed; valid with `valid`.
+    /// A quad of operands, `operand_bits` each, signed; valid with `valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a quad.
     pub valid: Signal<Out, Bit>,
@@ -62,6 +62,8 @@ kernel_block!(
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     data: usize,
+    /// Width of an operand.
+    operand: usize,
     /// Width of a word of the window.
     limb: usize,
     network: bool,
@@ -78,6 +80,7 @@ impl OperandSource {
         let formats = model.formats();
         OperandSource::of(Shape {
             data: formats.data_bits as usize,
+            operand: formats.operand_bits() as usize,
             limb: (formats.fold_bits - formats.input_low_bits) as usize,
             network: formats.has_network(),
             window: formats.window_quads,
@@ -98,7 +101,7 @@ impl OperandSource {
             window_valid: Default::default(),
             sheared: Wire::new(4 * shape.data),
             sheared_valid: Default::default(),
-            quad: Wire::new(4 * shape.data),
+            quad: Wire::new(4 * shape.operand),
             valid: Default::default(),
             of_window: Default::default(),
             kernel: Body::default(),
@@ -134,18 +137,23 @@ impl Shape {
         let memory = k.memory("mask_of", quads, 4 * MASK_BITS, Contents::Undefined);
         memory.write(window_valid, *place, mask);
         let kept = memory.read(*place);
-        let field = |lane: usize| {
-            let words = kept.slice(lane * MASK_BITS, MASK_BITS).signed();
-            words.shift_left(MASKED.trailing_zeros() as usize).resize(self.data).unsigned()
-        };
-        let mask = concat(&[3, 2, 1, 0].map(field));
-        let wide = |lane: usize| window.slice(lane * self.limb, self.limb).signed().resize(self.data).unsigned();
-        let window = concat(&[3, 2, 1, 0].map(wide));
-        let made = images_valid.mux(images, sheared);
+        let masked = MASKED.trailing_zeros() as usize;
+        let mask = self.operands(kept, MASK_BITS, masked);
+        let window = self.operands(window, self.limb, 0);
+        let made = self.operands(images_valid.mux(images, sheared), self.data, 0);
         k.wire("quad", window_valid.mux(window, masks.mux(mask, made)));
         let of_window = k.wire("of_window", window_valid | *masks);
         k.wire("valid", of_window | images_valid | sheared_valid);
         k.finish()
+    }
+}
+
+impl Shape {
+    /// Four signed fields of `bits` bits as operands, times 2^`shift`.
+    fn operands<'k>(self, quad: Expr<'k>, bits: usize, shift: usize) -> Expr<'k> {
+        let field =
+            |lane: usize| quad.slice(lane * bits, bits).signed().shift_left(shift).resize(self.operand).unsigned();
+        concat(&[3, 2, 1, 0].map(field))
     }
 }
 
@@ -155,7 +163,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { data: 18, limb: 17, network: true, window: Some(5) };
+    const SHAPE: Shape = Shape { data: 14, operand: 18, limb: 17, network: true, window: Some(5) };
 
     /// Inputs in the order of the block.
     struct Sources {
@@ -169,16 +177,19 @@ mod tests {
     impl Reference for Sources {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let [own, images, window, sheared] = [2, 4, 7, 9].map(|input| inputs[input].number() == 1);
-            let Shape { data, limb, network, window: quads } = self.shape;
+            let Shape { data, operand, limb, network, window: quads } = self.shape;
             if quads.is_none() {
                 let quad = if images && network { Some(inputs[3]) } else { own.then_some(inputs[1]) };
                 return vec![quad, Some((own || images && network).into()), Some(Word::default())];
             }
             let mask = self.masks.as_ref().zip(self.next).map(|(masks, next)| {
-                Word::of_fields(&[0, 1, 2, 3].map(|lane| masks[next].signed(lane, MASK_BITS) * MASKED), data)
+                Word::of_fields(&[0, 1, 2, 3].map(|lane| masks[next].signed(lane, MASK_BITS) * MASKED), operand)
             });
-            let read = Word::of_fields(&[0, 1, 2, 3].map(|lane| inputs[5].signed(lane, limb)), data);
-            let made = [(window, read), (images, inputs[3]), (sheared, inputs[8])];
+            let wide =
+                |quad: Word, bits: usize| Word::of_fields(&[0, 1, 2, 3].map(|lane| quad.signed(lane, bits)), operand);
+            let read = wide(inputs[5], limb);
+            let [image, step] = [3, 8].map(|input: usize| wide(inputs[input], data));
+            let made = [(window, read), (images, image), (sheared, step)];
             let made = made.into_iter().find_map(|(given, quad)| given.then_some(quad));
             let bit = |value: bool| self.masks.as_ref().map(|_| value.into());
             vec![mask.or(made), bit(window || mask.is_some()), bit(mask.or(made).is_some())]
@@ -240,7 +251,11 @@ mod tests {
 
     #[test]
     fn quads_of_one_stage_at_a_time_pass_on() {
-        for shape in [SHAPE, Shape { window: None, ..SHAPE }, Shape { window: None, network: false, ..SHAPE }] {
+        for shape in [
+            SHAPE,
+            Shape { window: None, operand: SHAPE.data, ..SHAPE },
+            Shape { window: None, operand: SHAPE.data, network: false, ..SHAPE },
+        ] {
             let mut sources = Sources { shape, masks: None, next: None };
             check(OperandSource::of(shape).kernel.kernel(), &stimulus(shape), &mut sources);
         }

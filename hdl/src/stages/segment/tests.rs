@@ -264,7 +264,7 @@ fn memories_are_those_of_the_plan() {
         let block = Segment::new(&array.segmentation(), LANE, LOW);
         let memories = block.kernel.kernel().memories();
         let mut own: Vec<_> = memories.iter().map(|m| (m.label.clone().unwrap(), m.words, m.bits)).collect();
-        let planned = segment_memories(&array.segmentation(), &board);
+        let planned = segment_memories(&array.segmentation(), &board, board.distributed_words[0]);
         let mut planned: Vec<_> = planned.iter().map(|m| (m.holds.to_string(), m.words, m.bits)).collect();
         own.sort();
         planned.sort();
