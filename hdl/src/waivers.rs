@@ -7,13 +7,17 @@ use crate::device::Tap;
 use crate::language::Hierarchy;
 
 /// Reasons why an output of a block inside another one is not read, and the outputs.
-const UNREAD: [(&str, &[&str]); 3] = [
+const UNREAD: [(&str, &[&str]); 4] = [
     (
         "these counters are cleared from outside; their end is not needed.",
         &["column__last", "frame_quads__last", "quads__last"],
     ),
     ("only `last` of this counter is used.", &["period__value"]),
     ("`receive` writes by mask and `send` reads by lane, both outputs of one block.", &["scan__mask", "scan__lane"]),
+    (
+        "constant without contacts, of which the test bench observes them.",
+        &["operand_source__of_window", "segment__labelled", "segment__labelled_quad"],
+    ),
 ];
 /// The same for the signals of taps.
 const OBSERVED: &str = "taps that the test bench observes; synthesis removes them.";
@@ -32,14 +36,15 @@ pub(crate) fn waivers(hierarchy: &Hierarchy, taps: &[Tap]) -> String {
             let _ = writeln!(text, "lint_off -rule UNUSEDSIGNAL -file \"*.v\" -match \"Signal is not used: '{name}'\"");
         }
     };
-    let all: BTreeSet<&str> = hierarchy.kernels().flat_map(|(_, kernel)| kernel.unread()).collect();
-    for (reason, names) in UNREAD {
-        waive(reason, names.iter().copied().filter(|name| all.contains(name)).collect());
-    }
     let top: BTreeSet<&str> =
         hierarchy.kernels().filter(|(path, _)| path.is_empty()).flat_map(|(_, top)| top.unread()).collect();
     let signals = taps.iter().flat_map(|tap| tap.valid.iter().chain(tap.word.iter().map(|signal| &signal.name)));
     let observed: BTreeSet<&str> = signals.map(String::as_str).filter(|name| top.contains(name)).collect();
+    let all: BTreeSet<&str> = hierarchy.kernels().flat_map(|(_, kernel)| kernel.unread()).collect();
+    for (reason, names) in UNREAD {
+        let is_unread = |name: &&str| all.contains(name) && !observed.contains(name);
+        waive(reason, names.iter().copied().filter(is_unread).collect());
+    }
     waive(OBSERVED, observed.into_iter().collect());
     text
 }

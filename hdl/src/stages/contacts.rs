@@ -191,6 +191,11 @@ impl Contacts {
         })
     }
 
+    /// Whether each contact has a μ of its own.
+    pub(crate) fn are_wanted(&self) -> bool {
+        !self.kernel.kernel().memories().is_empty()
+    }
+
     fn of(shape: Shape) -> Self {
         let label = shape.label_bits();
         let positions = shape.contacts.max(1) * position_bits();

@@ -77,6 +77,11 @@ impl Relax {
         })
     }
 
+    /// Whether a network gives μ.
+    pub(crate) fn is_wanted(&self) -> bool {
+        !self.kernel.kernel().memories().is_empty()
+    }
+
     fn of(shape: Shape) -> Self {
         let block = Relax {
             clk: Default::default(),

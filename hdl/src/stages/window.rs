@@ -40,18 +40,14 @@ pub struct Window {
     pub middle_col: Wire<In>,
     /// Label of the contact's taxels, from 1 on; valid with `start`.
     pub label: Wire<In>,
-    /// Address of a quad of the frame buffer; 0 for a taxel beyond the array.
+    /// Address of a quad of the frame buffer, and of its labels; 0 for a taxel beyond the array.
     pub quad_address: Wire<Out>,
     /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
     pub quad: Wire<In>,
-    /// Address of a quad of labels; the same as `quad_address`.
-    pub label_address: Wire<Out>,
-    /// Labels of the quad's four taxels; two cycles after `label_address`.
+    /// Labels of the quad's four taxels; two cycles after `quad_address`.
     pub labels: Wire<In>,
     /// A quad is written to the window memory.
     pub write: Signal<Out, Bit>,
-    /// Address of the quad; valid with `write`.
-    pub write_address: Wire<Out>,
     /// High limbs of the four parities of the quad, signed; valid with `write`.
     pub write_quad: Wire<Out>,
     /// Folded mask of the quad in units of [`MASKED`](dermis_golden::fixed::words::network::MASKED), four signed fields of
@@ -61,8 +57,6 @@ pub struct Window {
     pub positive: Signal<Out, Bit>,
     /// A code of these taxels is below minus the noise floor; valid as `positive`.
     pub negative: Signal<Out, Bit>,
-    /// The window has been written; high for one cycle, the cycle after the last `write`.
-    pub done: Signal<Out, Bit>,
     kernel: Body,
 }
 
@@ -70,9 +64,7 @@ kernel_block!(
     Window,
     clock clk,
     inputs [rst, start, middle_row, middle_col, label, quad, labels],
-    outputs [
-        quad_address, label_address, write, write_address, write_quad, mask_quad, positive, negative, done
-    ]
+    outputs [quad_address, write, write_quad, mask_quad, positive, negative]
 );
 
 /// Cycles from the scan of a taxel until its code has been chosen from the quad that was read.
@@ -85,7 +77,6 @@ impl Window {
     pub fn new(model: &Model) -> Self {
         let (formats, layout) = (model.formats(), model.layout());
         let (bits, label_bits) = (formats.input_bits as usize, count_bits(model.contacts() + 1));
-        let quads = model.by_contact.as_ref().map_or(1, |contacts| contacts.window.quads().len());
         let address = count_bits(layout.len());
         let block = Window {
             clk: Default::default(),
@@ -96,15 +87,12 @@ impl Window {
             label: Wire::new(label_bits),
             quad_address: Wire::new(address),
             quad: Wire::new(4 * bits),
-            label_address: Wire::new(address),
             labels: Wire::new(4 * label_bits),
             write: Default::default(),
-            write_address: Wire::new(count_bits(quads)),
             write_quad: Wire::new(4 * (formats.fold_bits - formats.input_low_bits) as usize),
             mask_quad: Wire::new(4 * MASK_BITS),
             positive: Default::default(),
             negative: Default::default(),
-            done: Default::default(),
             kernel: Body::default(),
         };
         let kernel = block.kernel_of(model);
@@ -128,12 +116,10 @@ impl Window {
                 k.comment("There are no contacts.");
                 let words = [
                     ("quad_address", self.quad_address.width()),
-                    ("label_address", self.label_address.width()),
-                    ("write_address", self.write_address.width()),
                     ("write_quad", self.write_quad.width()),
                     ("mask_quad", self.mask_quad.width()),
                 ];
-                let bits = ["write", "positive", "negative", "done"].map(|name| (name, 1));
+                let bits = ["write", "positive", "negative"].map(|name| (name, 1));
                 for (name, width) in words.into_iter().chain(bits) {
                     k.wire(name, k.constant(width, 0));
                 }
@@ -220,11 +206,7 @@ impl<'k> Ports<'k> {
         k.wire("mask_quad", mask.table(4 * MASK_BITS, &folded_masks()));
 
         let ended = self.bit_later("ends_quad", scanned.ends_quad, SUM);
-        let write = self.bit("write", ended);
-        let quads = window.quads().len();
-        let address = k.state("write_address", Type::unsigned(count_bits(quads)), self.restarts(), 0);
-        k.when(write, || address.set(address.plus(1)));
-        self.bit("done", write & address.is(quads as u64 - 1));
+        self.bit("write", ended);
     }
 
     /// Scans the window twice: quad by quad, in each the four lanes.
@@ -276,8 +258,7 @@ impl<'k> Ports<'k> {
         let place = TaxelPlace::of(k, layout, scanned.place);
         let near = [0, 1].map(|axis| k.delay(["near_row", "near_col"][axis], place.near[axis]));
         let first = k.constant(count_bits(layout.len()), 0);
-        let address = k.delay("quad_address", quad_address_of(k, layout, near, first));
-        k.wire("label_address", address);
+        k.delay("quad_address", quad_address_of(k, layout, near, first));
         let is_dead = (!model.dead.is_empty()).then(|| {
             let table = (0..1usize << (row.bits() + col.bits())).map(|at| {
                 let (row, col) = (at >> col.bits(), at % (1 << col.bits()));

@@ -6,7 +6,7 @@
 //! [`segment`]: crate::fixed::stages::segment
 
 use super::contents::{CasePlan, ContactPlan, Plan};
-use super::cycles::{timeline, Begins, RELAX, UNFOLD};
+use super::timeline::{timeline, Begins, RELAX, UNFOLD};
 use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::{shear, window};
 use crate::fixed::words::schedule::{sections, Section};

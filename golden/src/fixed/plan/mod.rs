@@ -15,6 +15,7 @@
 //! | [`contents`] | the plan itself, and what it has for each case |
 //! | [`cases`] | which partition cases share the hardware |
 //! | [`cycles`] | duration of a frame |
+//! | [`timeline`] | when the products are issued, and when their rows leave |
 //! | [`contact_cycles`] | the part of it that depends on the contacts |
 //! | [`interval`] | cycles from one frame to the next |
 //! | [`check`] | the signature of the coefficient memory |
@@ -33,4 +34,5 @@ pub mod interval;
 pub mod resources;
 pub mod serial;
 pub mod storage;
+pub mod timeline;
 pub mod widths;

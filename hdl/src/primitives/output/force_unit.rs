@@ -4,6 +4,7 @@ use dermis_golden::fixed::plan::cycles::ACCEPT;
 use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -210,7 +211,7 @@ impl ForceUnit {
             score: Wire::new(shape.score_bits),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
-            labels: Wire::new(shape.lanes * shape.label_bits()),
+            labels: Wire::new(Quads::LANES * shape.label_bits()),
             overflow: Default::default(),
             valid: Default::default(),
             last: Default::default(),
@@ -288,7 +289,7 @@ impl Shape {
         let frames = k.input("frames", self.frames_bits.unwrap_or(1));
         let score = k.input("score", self.score_bits).signed();
         let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
-        let (labels, overflow) = (k.input("labels", self.lanes * self.label_bits()), k.input("overflow", 1));
+        let (labels, overflow) = (k.input("labels", Quads::LANES * self.label_bits()), k.input("overflow", 1));
 
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
         let offers = k.state("offers", Type::unsigned(ASKED), rst, 0);

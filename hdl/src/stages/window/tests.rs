@@ -145,7 +145,7 @@ impl Reference for Windows<'_> {
         let (formats, own) = (self.model.formats(), window_of(self.model));
         let known = |bit: bool| self.reset.then(|| Word::from(bit));
         let Some((contact, words, since)) = &self.now else {
-            return [vec![None, None, known(false)], vec![None; 5], vec![known(false)]].concat();
+            return [vec![None, known(false)], vec![None; 4]].concat();
         };
         let (layout, quads) = (self.model.layout(), own.quads().len());
         let address = since.checked_sub(5).filter(|read| *read < 8 * quads).map(|read| {
@@ -162,14 +162,11 @@ impl Reference for Windows<'_> {
         let Received { positive, negative, .. } = words.own;
         vec![
             address,
-            address,
             known(quad.is_some()),
-            quad.map(|quad| Word::from(quad as u64)),
             quad.map(|quad| word(words.input[quad], formats.fold_bits - formats.input_low_bits)),
             quad.map(|quad| word(words.mask[quad].map(|mask| mask / MASKED), MASK_BITS as u32)),
             is_over.then(|| positive.into()),
             is_over.then(|| negative.into()),
-            known(*since == cycles(&own) as usize),
         ]
     }
 
@@ -193,9 +190,7 @@ fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
         Window::new(model),
         changes,
         inputs [rst, start, middle_row, middle_col, label, quad, labels],
-        outputs [
-            quad_address, label_address, write, write_address, write_quad, mask_quad, positive, negative, done
-        ],
+        outputs [quad_address, write, write_quad, mask_quad, positive, negative],
     )
 }
 
@@ -229,7 +224,6 @@ fn a_window_that_differs_is_found() {
         Change::value("", "shift", |k| k.constant(5, 3)),
         Change::value("", "valid_6", |k| k.constant(1, 1)),
         Change::value("", "ends_quad_0", |k| k.named("quad_ends")),
-        Change::value("", "done", |k| k.named("write")),
     ];
     check_with_defects(|changes| subject(&model, changes), &inputs, || reference(&model, &contacts), &defects);
 }
@@ -239,6 +233,6 @@ fn a_window_that_differs_is_found() {
 fn without_contacts_there_is_no_window() {
     let block = Window::new(&model(4, 5, ""));
     let widths = [1, 1, 2, 3, 4, 80, 16];
-    let outputs = |_: &[Word]| vec![Some(Word::default()); 9];
-    check(block.kernel.kernel(), &random_words(100, &widths), &mut Pipeline::new(0, 9, outputs));
+    let outputs = |_: &[Word]| vec![Some(Word::default()); 6];
+    check(block.kernel.kernel(), &random_words(100, &widths), &mut Pipeline::new(0, 6, outputs));
 }
