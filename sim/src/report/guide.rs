@@ -30,6 +30,8 @@ use crate::progress::Progress;
 const NOISY: &str = "sensor-1-noisy";
 /// These stages.
 const OF_NETWORK: [&str; 2] = ["estimate", "relax"];
+/// The stages of contacts, which no built-in scene has.
+const OF_CONTACTS: [&str; 5] = ["segment", "contacts", "window", "shear", "label_beats"];
 /// The frame with two feet, and the scene of its sensor.
 const FEET: (&str, &str) = ("s4-plantar-two-feet", "sensor-4");
 
@@ -56,7 +58,10 @@ pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
     let scene = Scene::builtin(SCENE)?;
     let stages = traces(&scene, build)?;
-    let own = |trace: &&Trace| !OF_NETWORK.contains(&trace.block.name);
+    let own = |trace: &&Trace| {
+        let name = &trace.block.name;
+        !OF_NETWORK.contains(name) && !OF_CONTACTS.contains(name)
+    };
     for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)).filter(own) {
         files.push(timing_picture(&scene.name, stage)?);
     }
