@@ -8,6 +8,10 @@
 //! Where a network gives μ, rows of its layers go from `pass` to `estimate`, whose images are operands again; `relax`, between
 //! `rescale` and `unfold`, adds v_00 to the products of each step. In other scenes both are wires.
 //!
+//! Where each contact has a μ of its own, `contacts` starts the stages in turn: v_00 goes to `segment`; for each contact `window`
+//! gives the operands of the first layer; for each step `shear` gives those of the products; `label_beats` adds the labels to the
+//! stream. The frame buffer is free when the last window has been read.
+//!
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.

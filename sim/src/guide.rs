@@ -54,6 +54,7 @@ pages! {
     "architecture/estimate.md" estimate,
     "architecture/rescale.md" rescale,
     "architecture/relax.md" relax,
+    "architecture/contacts.md" contacts,
     "architecture/unfold.md" unfold,
     "architecture/search.md" search,
     "architecture/forces.md" forces,

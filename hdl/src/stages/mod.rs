@@ -3,11 +3,12 @@
 //!
 //! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` connect
 //! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
-//! `estimate`, `relax`, `unsearched`, `segment`, `resultants` and `window` are [kernels](crate::language).
+//! `estimate`, `relax`, `segment`, `contacts`, `window`, `shear`, `label_beats`, `unsearched` and `resultants` are
+//! [kernels](crate::language).
 //!
 //! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
-//! `search` in a scene without one. Both pairs have the same ports. `estimate` and `relax` work where a network gives μ; in other
-//! scenes they are wires.
+//! `search` in a scene without one. Both pairs have the same ports. `estimate` and `relax` work where a network gives μ, `segment`,
+//! `contacts`, `window`, `shear` and `label_beats` where it gives one for each contact; in other scenes they are wires.
 
 mod banks;
 mod choose;

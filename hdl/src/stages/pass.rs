@@ -22,8 +22,8 @@ pub struct Pass {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case, constant while a frame is computed; of contacts that of the [section](dermis_golden::fixed::words::schedule::sections), constant from
-    /// `start` until its last row.
+    /// Index of the case, constant while a frame is computed; of contacts that of the
+    /// [section](dermis_golden::fixed::words::schedule::sections), constant from `start` until its last row.
     pub which: Wire<In>,
     /// The products of a subarray may begin while its input is still being written; of contacts those of a section.
     pub start: Signal<In, Bit>,
@@ -31,8 +31,8 @@ pub struct Pass {
     pub input_address: Wire<Out>,
     /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
-    /// Four parities of a finished v_ij, of the images of a layer, or of p, `operand_bits` each, signed, quads in order; valid with
-    /// `vector_valid`.
+    /// Four parities of an operand, of a v_ij, the images of a layer, a window or p, `operand_bits` each, signed, quads in order;
+    /// valid with `vector_valid`.
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,

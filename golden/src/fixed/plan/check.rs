@@ -1,8 +1,8 @@
 //! The coefficient check, `hardware.coefficient_check = "signature"`: whether the coefficient memory still holds the
 //! generated coefficients.
 //!
-//! For each word (all lanes wide) that the passes of a [section](crate::fixed::words::schedule::sections) read, the parity of the word's bits advances a 32-bit
-//! signature
+//! For each word (all lanes wide) that the passes of a [section](crate::fixed::words::schedule::sections) read, the parity of the
+//! word's bits advances a 32-bit signature
 //! ```text
 //! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the section's first word
 //! ```

@@ -364,7 +364,8 @@ fn segmentation<'a>(scene: &'a Scene, segmenter: &'a Segmenter) -> Segmentation<
     Segmentation { sensor: &scene.sensor, segmenter, most: scene.partition.max_contacts }
 }
 
-/// Memories of `segment` on `board`, those of at most `shallow` words in distributed RAM. The tables of the basins and the middles are read asynchronously, in distributed RAM.
+/// Memories of `segment` on `board`, those of at most `shallow` words in distributed RAM. So are the tables of the basins and the
+/// middles, which are read asynchronously.
 pub fn segment_memories(segmentation: &Segmentation, board: &Board, shallow: usize) -> Vec<Memory> {
     let (taxels, quads) = (segmentation.sensor.taxels(), segmentation.quads().len());
     let taps = [0, 1].map(|axis| segmentation.tap_count(axis));
