@@ -65,3 +65,36 @@ impl ContactCycles {
         ContactCycles { free, complete: free + formats.degree as u64 * step }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::plan::cycles::Cycles;
+    use crate::fixed::Model;
+    use crate::generator::draws::{DrawOptions, Draws};
+    use crate::learned::{with_network, Training};
+    use crate::partition::Case;
+    use crate::scene::{EstimatorKind, Scene};
+
+    /// At 100 MHz every frame is within its millisecond, whatever is found; four drawn contacts take less.
+    #[test]
+    fn any_frame_is_within_a_millisecond() {
+        for (sensor, bound, drawn) in [("sensor-1", 100_000, 30_000), ("sensor-3", 100_000, 90_000)] {
+            let mut scene = Scene::builtin(sensor).unwrap();
+            scene.partition.case = Case::Contacts;
+            scene.search.estimator = EstimatorKind::Learned;
+            let (scene, _file) = with_network(scene, &Training::trial(&[80, 40, 20])).unwrap();
+            let model = Model::without_fit_check(&scene).unwrap();
+            let longest = Cycles::longest(&model).latency;
+            assert!(longest < bound, "{sensor}: {longest} cycles");
+            let draws = Draws::new(&scene, DrawOptions { contacts: 4, seed: 6, ..Default::default() }).unwrap();
+            let frames: Vec<_> = (0..8).filter_map(|number| draws.frame(number).ok()).collect();
+            assert!(!frames.is_empty());
+            for frame in frames {
+                let trace = model.run(&model.codes(&frame.frame).unwrap().codes);
+                let own = trace.cycles.latency;
+                assert!(own < drawn && own < longest, "{sensor}: {own} cycles");
+            }
+        }
+    }
+}
