@@ -68,7 +68,6 @@ impl ContactCycles {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::fixed::plan::cycles::Cycles;
     use crate::fixed::Model;
     use crate::generator::draws::{DrawOptions, Draws};
