@@ -1,7 +1,7 @@
 //! Segment: the contact to which each taxel belongs, from the normal forces alone.
 //!
 //! The algorithm is one of integers, the same for both models: the forces are words, those of the floating-point model are
-//! first brought to [`PEAK_BITS`] bits. Every step is one that hardware, which has no contacts yet, can do with one multiplier,
+//! first brought to [`PEAK_BITS`] bits. Every step is one that hardware can do with one multiplier,
 //! comparisons and memories.
 //!
 //! ```text

@@ -22,7 +22,7 @@ pub use address::case_equal::CaseEqual;
 pub use address::counter::{count_bits, Counter};
 pub use address::lane_mask::LaneMask;
 pub use address::quad_address::{frame_quads, QuadAddress};
-pub(crate) use address::quad_address::{quad_address_of, Place as TaxelPlace};
+pub(crate) use address::quad_address::{lane_of, quad_address_of, Place as TaxelPlace};
 pub use address::scan::Scan;
 pub use address::transposed_place::TransposedPlace;
 pub(crate) use arithmetic::butterfly::subtracted;

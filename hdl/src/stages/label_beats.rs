@@ -10,7 +10,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{Body, Builder, Expr, Kernel, Type};
-use crate::primitives::{count_bits, quad_address_of, TaxelPlace};
+use crate::primitives::{count_bits, lane_of, quad_address_of, TaxelPlace};
 use crate::wire::Wire;
 
 /// ```text
@@ -146,10 +146,8 @@ impl Shape {
         k.delay("label_address", quad_address_of(&k, self.layout, near, first));
         let from = later(&k, rst, "from", own.lower.concat(own.right));
         let (arrives, empty) = (later(&k, rst, "arrives", scans), later(&k, rst, "empty", *beyond));
-        let bits = self.label_bits();
-        let lane = |lane: usize| labels.slice(lane * bits, bits);
-        let label = from.at(1).mux(from.at(0).mux(lane(3), lane(2)), from.at(0).mux(lane(1), lane(0)));
-        let label = (label & (!empty).repeat(bits)).extend(LABEL_BITS as usize);
+        let label = lane_of(labels, Quads::LANES, from) & (!empty).repeat(self.label_bits());
+        let label = label.extend(LABEL_BITS as usize);
         let word = k.register("word", Type::unsigned(self.bits));
         k.when(arrives, || word.set(label.concat(word.slice(LABEL_BITS as usize, self.bits - LABEL_BITS as usize))));
         let arrived = counter("arrived", LABELS_PER_BEAT + 1);
@@ -227,8 +225,7 @@ mod tests {
 
         /// The beat of labels that is offered.
         fn offered(&self) -> Option<Word> {
-            let (beat, from) = self.next.filter(|(_, from)| *from <= self.cycle)?;
-            let _ = from;
+            let (beat, _) = self.next.filter(|(_, from)| *from <= self.cycle)?;
             Some(Word::of_fields(&labels_to_beats(&self.labels)[beat].map(i64::from), 32))
         }
 

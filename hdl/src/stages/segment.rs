@@ -94,11 +94,7 @@ impl Segment {
         let formats = model.formats();
         let lane = formats.vector_bits as usize + 2;
         match &model.by_contact {
-            Some(contacts) => {
-                let (sensor, most) = (&model.scene.sensor, model.contacts());
-                let segmentation = Segmentation { sensor, segmenter: &contacts.segmenter, most };
-                Segment::new(&segmentation, lane, word_shift(formats) as usize)
-            }
+            Some(contacts) => Segment::new(&contacts.segmentation(&model.scene), lane, word_shift(formats) as usize),
             None => Segment::nothing(model.layout(), lane),
         }
     }
@@ -131,33 +127,19 @@ impl Segment {
         ] {
             k.wire(name, k.constant(width, 0));
         }
-        let block = Segment {
-            clk: Default::default(),
-            rst: Default::default(),
-            fill_quad: Wire::new(4 * lane),
-            fill: Default::default(),
-            fill_address: Wire::new(quad),
-            start: Default::default(),
-            label_address: Wire::new(quad),
-            contact: Wire::new(bits),
-            done: Default::default(),
-            count: Wire::new(bits),
-            overflow: Default::default(),
-            labelled: Default::default(),
-            labelled_quad: Wire::new(4 * (bits + 1)),
-            labels: Wire::new(4 * bits),
-            middle_row: Wire::new(count_bits(layout.rows)),
-            middle_col: Wire::new(count_bits(layout.cols)),
-            kernel: Body::default(),
-        };
-        block.bind(k.finish())
+        Segment::with(layout, lane, bits, bits).bind(k.finish())
     }
 
     /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
     pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
         let shape = Shape::new(segmentation, lane, low);
-        let quad = count_bits(shape.quad_count());
-        let block = Segment {
+        Segment::with(segmentation.quads(), lane, count_bits(shape.most), shape.label()).bind(kernel(&shape))
+    }
+
+    /// The ports for quads of `layout` with lanes of `lane` bits, indices of contacts of `contact` bits and labels of `label`.
+    fn with(layout: Quads, lane: usize, contact: usize, label: usize) -> Self {
+        let quad = count_bits(layout.len());
+        Segment {
             clk: Default::default(),
             rst: Default::default(),
             fill_quad: Wire::new(4 * lane),
@@ -165,18 +147,17 @@ impl Segment {
             fill_address: Wire::new(quad),
             start: Default::default(),
             label_address: Wire::new(quad),
-            contact: Wire::new(count_bits(shape.most)),
+            contact: Wire::new(contact),
             done: Default::default(),
-            count: Wire::new(shape.label()),
+            count: Wire::new(label),
             overflow: Default::default(),
             labelled: Default::default(),
-            labelled_quad: Wire::new(4 * (shape.label() + 1)),
-            labels: Wire::new(4 * shape.label()),
-            middle_row: Wire::new(count_bits(shape.rows)),
-            middle_col: Wire::new(count_bits(shape.cols)),
+            labelled_quad: Wire::new(4 * (label + 1)),
+            labels: Wire::new(4 * label),
+            middle_row: Wire::new(count_bits(layout.rows)),
+            middle_col: Wire::new(count_bits(layout.cols)),
             kernel: Body::default(),
-        };
-        block.bind(kernel(&shape))
+        }
     }
 }
 

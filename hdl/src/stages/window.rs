@@ -18,7 +18,9 @@ use rust_hdl::prelude::*;
 use super::normalise::left_shift;
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
-use crate::primitives::{beyond, count_bits, magnitude_of, quad_address_of, subtracted, TaxelPlace, MASK_BITS};
+use crate::primitives::{
+    beyond, count_bits, lane_of, magnitude_of, quad_address_of, subtracted, TaxelPlace, MASK_BITS,
+};
 use crate::wire::{Wire, Word};
 
 /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
@@ -270,11 +272,7 @@ impl<'k> Ports<'k> {
         // With the quad.
         let masked = self.later("masked", masked, 4);
         let from = self.later("from", place.lower.concat(place.right), 4);
-        let chosen = |quad: Expr<'k>| {
-            let bits = quad.bits() / Quads::LANES;
-            let lane = |lane: usize| quad.slice(lane * bits, bits);
-            from.at(1).mux(from.at(0).mux(lane(3), lane(2)), from.at(0).mux(lane(1), lane(0)))
-        };
+        let chosen = |quad: Expr<'k>| lane_of(quad, Quads::LANES, from);
         let bits = self.quad.bits() / Quads::LANES;
         let code = k.delay("code", chosen(self.quad) & (!masked).repeat(bits));
         let label = k.register("contact", Type::unsigned(self.label.bits()));

@@ -6,6 +6,7 @@ use crate::board::Board;
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::prepare::Prepare;
 use crate::fixed::stages::resultants;
+use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
@@ -63,6 +64,14 @@ pub struct ContactPlan {
     pub segmenter: Segmenter,
     /// The window around a contact.
     pub window: Window,
+}
+
+impl ContactPlan {
+    /// The segmentation in hardware, for the array and the largest number of contacts of `scene`.
+    pub fn segmentation<'a>(&'a self, scene: &'a Scene) -> Segmentation<'a> {
+        let (sensor, most) = (&scene.sensor, scene.partition.max_contacts);
+        Segmentation { sensor, segmenter: &self.segmenter, most }
+    }
 }
 
 /// A case that divides the array but was left out, because a design with it exceeds the board.

@@ -107,6 +107,18 @@ pub(crate) fn quad_address_of<'k>(
     (first + times(k, row, layout.quad_cols(), bits) + col).resize(bits)
 }
 
+/// The field of a memory word of `lanes` fields that belongs to `lane`, 2 bits.
+pub(crate) fn lane_of<'k>(word: Expr<'k>, lanes: usize, lane: Expr<'k>) -> Expr<'k> {
+    let bits = word.bits() / lanes;
+    let of = |lane: usize| word.slice(lane * bits, bits);
+    let pair = |first: usize| lane.at(0).mux(of(first + 1), of(first));
+    match lanes {
+        1 => of(0),
+        2 => pair(0),
+        _ => lane.at(1).mux(pair(2), pair(0)),
+    }
+}
+
 impl QuadAddress {
     fn kernel_of(&self, cases: &[(Quads, Grid)], frame_quads: usize, lanes: usize) -> Kernel {
         let k = Builder::combinational("quad_address");

@@ -11,6 +11,7 @@ use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::address::quad_address::lane_of;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
 use crate::primitives::frame::sliding_mean::frames_bits;
@@ -317,7 +318,7 @@ impl Shape {
         shifts.write(start_2, part_2, shift);
         let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
 
-        let value = k.delay("value", self.of_lane(quad, v, lane_value).signed());
+        let value = k.delay("value", lane_of(quad, self.lanes, lane_value).signed());
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let z = k.delay("moved_z", doubled.shift_right_by(shift));
@@ -325,7 +326,7 @@ impl Shape {
             false => (None, None),
             true => {
                 let at_value = match self.contacts {
-                    true => self.of_lane(labels, self.label_bits(), lane_value),
+                    true => lane_of(labels, Quads::LANES, lane_value),
                     false => part_after(READ_STEPS),
                 };
                 let shear = |name: &str, position| {
@@ -416,17 +417,6 @@ impl Shape {
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
         k.finish()
-    }
-
-    /// The field of a lane, of `bits` bits.
-    fn of_lane<'k>(&self, fields: Expr<'k>, bits: usize, lane: Expr<'k>) -> Expr<'k> {
-        let of = |lane: usize| fields.slice(lane * bits, bits);
-        let pair = |first: usize| lane.at(0).mux(of(first + 1), of(first));
-        match self.lanes {
-            1 => of(0),
-            2 => pair(0),
-            _ => lane.at(1).mux(pair(2), pair(0)),
-        }
     }
 
     /// The μ word of a position, two cycles later.

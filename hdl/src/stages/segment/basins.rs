@@ -41,11 +41,13 @@ pub(super) struct List<'k> {
     best: Net<'k>,
     /// Bar of another basin.
     hold: Net<'k>,
-    /// The basin after the cursor; the same a cycle later, in `JOIN` without the one that is gone.
+    /// Output of `chain`: the successor, in the list, of the basin at the cursor.
     follows: Expr<'k>,
+    /// `follows` registered once; in `JOIN` the successor of the removed basin in place of the removed one.
     next: Expr<'k>,
-    /// The basin that is gone was after the cursor of the cycle before, and what was after that.
+    /// `follows` was the removed basin, registered once.
     unlinks: Expr<'k>,
+    /// Successor of the removed basin.
     after: Net<'k>,
 }
 
