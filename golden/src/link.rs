@@ -28,7 +28,7 @@ pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 
 /// Version of the packet format; a host rejects any other.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Bytes of a packet besides its payload: [`Header`] and CRC.
 pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
 /// Bytes of the CRC-32 after the payload.

@@ -18,14 +18,6 @@ pub enum HdlError {
         /// The feature that would be omitted.
         what: &'static str,
     },
-    /// The bit-true model has what the scene asks for, the hardware has not.
-    #[error("{field} = {value} is not available in hardware yet; the bit-true model has it: dermis reconstruct --engine fixed")]
-    OnlyModel {
-        /// Field of the scene.
-        field: &'static str,
-        /// Its value.
-        value: String,
-    },
     /// The scene's link cannot be built.
     #[error(transparent)]
     Link(#[from] LinkError),

@@ -82,23 +82,11 @@ pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
 
 /// The engine of `model`, after rust-hdl's checks.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
-    require_hardware(model)?;
     let design: Box<dyn Design> = match model.board.engine {
         EngineKind::Serial => checked(serial::Engine::new(model))?,
         EngineKind::Parallel => checked(engine::Engine::new(model))?,
     };
     Ok(design)
-}
-
-/// Checks that there are blocks for everything that the bit-true model does.
-///
-/// # Errors
-/// [`HdlError::OnlyModel`] names what the hardware lacks.
-pub fn require_hardware(model: &Model) -> Result<(), HdlError> {
-    match model.by_contact {
-        Some(_) => Err(HdlError::OnlyModel { field: "partition.case", value: model.scene.partition.case.to_string() }),
-        None => Ok(()),
-    }
 }
 
 fn checked<E: Design + 'static>(engine: E) -> Result<Box<dyn Design>, HdlError> {

@@ -6,8 +6,8 @@ use super::error::LinkError;
 use super::payload::{Identity, Sums};
 use super::{code_bytes, Kind, BEAT_BYTES, VERSION};
 use crate::board::EngineKind;
-use crate::fixed::stages::send::STATUS_BEATS;
-use crate::fixed::words::coefficients::Blocks;
+use crate::fixed::stages::send::{LABEL_BITS, STATUS_BEATS};
+use crate::fixed::words::schedule::Kind as Words;
 use crate::fixed::Plan;
 use crate::scene::{Condition, ForceOutput};
 
@@ -47,8 +47,9 @@ impl Identity {
             scene: scene_hash(plan),
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             bit_rate: scene.hardware.link.bit_rate(board)?,
-            subarrays: plan.parts().len() as u16,
+            statuses: (plan.status_beats() / STATUS_BEATS) as u16,
             left_out: REQUESTS.into_iter().filter(|&kind| !supports(board.engine, kind)).map(bit).sum(),
+            label_bits: if plan.by_contact.is_some() { LABEL_BITS as u8 } else { 0 },
         })
     }
 
@@ -65,24 +66,24 @@ pub fn supports(engine: EngineKind, kind: Kind) -> bool {
 }
 
 /// Bit of a request in [`Identity::left_out`].
-fn bit(kind: Kind) -> u16 {
+fn bit(kind: Kind) -> u8 {
     1 << (kind as u8 - 1)
 }
 
 /// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.
 pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
     let taxels = plan.scene.sensor.taxels();
-    let status = plan.status_beats() * BEAT_BYTES;
+    let others = (plan.label_beats() + plan.status_beats()) * BEAT_BYTES;
     [
         ("codes", code_bytes(plan.formats().code_bits) * taxels),
-        ("resultants", Sums::BYTES + status),
-        ("forces", BEAT_BYTES * taxels + status),
+        ("resultants", Sums::BYTES + others),
+        ("forces", BEAT_BYTES * taxels + others),
     ]
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
-/// condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, and the quantised
-/// matrices with the columns kept. The names of scene and board and the clock are not included.
+/// condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, the quantised matrices with
+/// the columns kept, the network, and what finds the contacts. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
     let sensor = &plan.scene.sensor;
     let text = json!({
@@ -96,16 +97,17 @@ pub fn scene_hash(plan: &Plan) -> u32 {
         "columns": plan.storage().columns,
         "zero": plan.prepare.zero,
         "gain": plan.prepare.gain,
+        "contacts": plan.by_contact.as_ref().map(|contacts| (plan.contacts(), sensor, contacts.window)),
     });
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());
     plan.dead.iter().for_each(|taxel| hash.update(&(*taxel as u64).to_le_bytes()));
     let quantised = plan.quantised();
-    let coefficients = |blocks: &Blocks, hash: &mut crc32fast::Hasher| {
-        blocks.coefficients().for_each(|coefficient| hash.update(&coefficient.to_le_bytes()));
-    };
-    for blocks in [&quantised.inverse, &quantised.ax, &quantised.ay] {
-        coefficients(blocks, &mut hash);
+    let layers = 0..quantised.network.as_ref().map_or(0, |network| network.layers.len());
+    let network = layers.flat_map(|layer| [Words::Layer(layer), Words::Bias(layer)]);
+    let kinds = [Words::InverseHigh, Words::Ax, Words::Ay, Words::Mask].into_iter().chain(network);
+    for flipped in kinds.flat_map(|kind| quantised.flips(kind)) {
+        flipped.parity.iter().flatten().for_each(|word| hash.update(&word.to_le_bytes()));
     }
     hash.finalize()
 }

@@ -75,7 +75,7 @@ payload! {
         cols: u16,
         /// Width of a code in bits.
         input_bits: u8,
-        /// Status beats per subarray.
+        /// Beats of a status.
         status_beats: u8,
         /// CRC-32 of everything in the scene that determines the bits of the answers.
         scene: u32,
@@ -83,10 +83,12 @@ payload! {
         clock_hz: u32,
         /// Bit rate of the link, bit/s: that of the UART, or the highest clock of the SPI.
         bit_rate: u32,
-        /// Number of subarrays.
-        subarrays: u16,
+        /// Statuses of a frame: one per subarray, or one per contact that may have a μ of its own.
+        statuses: u16,
         /// Requests that the board does not support and counts as of unknown type: bit k − 1 for type k.
-        left_out: u16,
+        left_out: u8,
+        /// Width of the label of a taxel's contact in the labels before the statuses; 0: there are no labels.
+        label_bits: u8,
     }
 }
 

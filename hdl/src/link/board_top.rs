@@ -10,7 +10,6 @@ use super::{Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::Dff;
-use crate::simulate::require_hardware;
 use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
@@ -168,7 +167,6 @@ pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
             what: "a μ search",
         });
     }
-    require_hardware(model)?;
     match (model.board.engine, model.scene.hardware.link) {
         (EngineKind::Parallel, LinkKind::Uart) => checked(BoardTop::new(model)?),
         (EngineKind::Parallel, LinkKind::Spi) => checked(SpiBoardTop::new(model)?),

@@ -70,8 +70,8 @@ pub struct Shape {
     pub cols: usize,
     /// Width of a code, in bits.
     pub input_bits: u32,
-    /// Status beats per frame.
-    pub status_beats: usize,
+    /// Beats of labels and statuses of a frame, after the forces.
+    pub other_beats: usize,
     /// The board also answers requests for resultants.
     pub resultants: bool,
     /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
@@ -82,23 +82,24 @@ impl Shape {
     /// The shape of the scene of `model`.
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
-        let (input_bits, status_beats) = (model.formats().code_bits, model.status_beats());
+        let input_bits = model.formats().code_bits;
+        let other_beats = model.label_beats() + model.status_beats();
         let resultants = supports(model.board.engine, Kind::FrameForResultants);
         let frames = match model.board.engine {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,
         };
-        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats, resultants, frames }
+        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, other_beats, resultants, frames }
     }
 
     /// Bytes of the payload of an answer, by source.
     fn payloads(&self) -> [usize; 4] {
-        let status = self.status_beats * BEAT_BYTES;
+        let others = self.other_beats * BEAT_BYTES;
         let mut bytes = [0; 4];
         bytes[IDENTITY] = Identity::BYTES;
         bytes[COUNTERS] = Counters::BYTES;
-        bytes[RESULTANTS] = Sums::BYTES + status;
-        bytes[FORCES] = self.rows * self.cols * BEAT_BYTES + status;
+        bytes[RESULTANTS] = Sums::BYTES + others;
+        bytes[FORCES] = self.rows * self.cols * BEAT_BYTES + others;
         bytes
     }
 }

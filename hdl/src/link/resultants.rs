@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn the_sums_are_those_of_the_model() {
         for (rows, cols) in [(3, 5), (6, 2)] {
-            let shape = Shape { rows, cols, input_bits: 12, status_beats: STATUS_BEATS, resultants: true, frames: 4 };
+            let shape = Shape { rows, cols, input_bits: 12, other_beats: STATUS_BEATS, resultants: true, frames: 4 };
             let mut answers = Answers { rows, cols, ..Answers::default() };
             check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);
         }

@@ -83,8 +83,8 @@ impl dermis_link {
             status: dermis_status::Damaged,
             text: format!("an answer of type {} has {bytes} bytes", packet.kind.name()),
         })?;
-        let result = match &answer.beats {
-            Some(beats) => dermis_result::of_model(self.model.decode(&[readings], "board", beats, &answer.status)?),
+        let result = match answer.decode(&self.model, &readings)? {
+            Some(result) => dermis_result::of_model(result),
             None => dermis_result::of_board(PhysicalAnswer::new(&self.model, &readings, &answer)?),
         };
         Ok((dermis_answer::Result, Some(result)))

@@ -13,7 +13,7 @@ use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::float::Golden;
 use dermis_golden::noise::expected::{expected, Expectation, StatedNoise};
 use dermis_golden::scene::Scene;
-use dermis_hdl::{explain::explain, generate, manifest, require_hardware};
+use dermis_hdl::{explain::explain, generate, manifest};
 
 use super::inputs::{estimator_instead, BoardOverride};
 use crate::progress::Progress;
@@ -84,10 +84,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     let golden = Golden::new(&scene).map_err(|error| refused(error.into()))?;
     let noise = StatedNoise::of(&scene, arguments.peak)?;
     let (hardware, hardware_refused) = match Model::new(&scene) {
-        Ok(model) => match require_hardware(&model) {
-            Ok(()) => (Some(hardware(&scene, &model)?), None),
-            Err(reason) => (None, Some(reason.to_string())),
-        },
+        Ok(model) => (Some(hardware(&scene, &model)?), None),
         Err(defect @ (FixedError::Internal(_) | FixedError::Beats { .. })) => return Err(defect.into()),
         Err(reason) => (None, Some(reason.to_string())),
     };

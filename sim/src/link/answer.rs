@@ -6,14 +6,16 @@ use std::time::SystemTime;
 use anyhow::Result;
 use dermis_golden::checks::Checks;
 use dermis_golden::fixed::stages::send::{
-    Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
+    labels_of_beats, Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT,
+    STATUS_BEATS,
 };
 use dermis_golden::fixed::words::formats::MU_STEPS;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::flags::{frame_flags, Flag};
 use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::input::Input;
 use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
+use dermis_golden::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 /// A board's answer to a frame, in LSBs.
@@ -22,7 +24,9 @@ pub struct Answer {
     /// Sums over all taxels.
     pub sums: Sums,
     /// Forces `[fx, fy, fz]` of all taxels, row-major, if requested.
-    pub beats: Option<Vec<[i32; 3]>>,
+    pub forces: Option<Vec<[i32; 3]>>,
+    /// Beats of labels; none where there is one μ.
+    pub labels: Vec<[i32; 3]>,
     /// Status beats.
     pub status: Vec<[i32; 3]>,
     /// Comparison with the bit-true model: `None` if not requested, else the first difference or `Some(None)`.
@@ -34,35 +38,55 @@ pub struct Answer {
 impl Answer {
     /// Parses the payload of a forces or resultants packet; `None` if its length is wrong.
     pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
-        let (front, status) = bytes.split_at_checked(bytes.len().checked_sub(model.status_beats() * BEAT_BYTES)?)?;
-        let status = beats_of_bytes(status)?;
+        let others = (model.label_beats() + model.status_beats()) * BEAT_BYTES;
+        let (front, others) = bytes.split_at_checked(bytes.len().checked_sub(others)?)?;
+        let mut labels = beats_of_bytes(others)?;
+        let status = labels.split_off(model.label_beats());
         let sensor = &model.scene.sensor;
-        let beats = if forces { Some(beats_of_bytes(front)?) } else { None };
-        let sums = match &beats {
-            Some(beats) if beats.len() != sensor.taxels() => return None,
-            Some(beats) => Sums::of(beats, sensor.cols),
+        let forces = if forces { Some(beats_of_bytes(front)?) } else { None };
+        let sums = match &forces {
+            Some(forces) if forces.len() != sensor.taxels() => return None,
+            Some(forces) => Sums::of(forces, sensor.cols),
             None => Sums::of_bytes(front)?,
         };
-        Some(Answer { sums, beats, status, difference: None, received_at: SystemTime::now() })
+        Some(Answer { sums, forces, labels, status, difference: None, received_at: SystemTime::now() })
     }
 
     /// The first difference from the bit-true model's result for `codes`, `None` if equal. The framing flag is ignored:
     /// it depends on packets dropped earlier, which the model does not see.
     pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
-        let cols = model.scene.sensor.cols;
-        let pairs = self.beats.iter().flatten().zip(&trace.beats).enumerate();
+        let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
+        let (forces, labels) = trace.beats.split_at(taxels.min(trace.beats.len()));
+        let pairs = self.forces.iter().flatten().zip(forces).enumerate();
         let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
         if let Some((index, (got, expected))) = differing.next() {
             return Some(format!("row {}, column {}: force {got:?}, model {expected:?}", index / cols, index % cols));
         }
-        let expected = Sums::of(&trace.beats, cols);
+        let expected = Sums::of(forces, cols);
         if self.sums != expected {
             return Some(format!("sums {:?}, model {expected:?}", self.sums));
+        }
+        let read = |beats| labels_of_beats(beats, taxels);
+        let mut differing = std::iter::zip(read(&self.labels), read(labels)).enumerate();
+        if let Some((index, (got, expected))) = differing.find(|(_, (got, expected))| got != expected) {
+            return Some(format!("row {}, column {}: label {got}, model {expected}", index / cols, index % cols));
         }
         let mut status = self.status.clone();
         status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(FLAG_FRAMING as i32));
         (status != trace.status).then(|| format!("status {status:?}, model {:?}", trace.status))
+    }
+
+    /// The result of this answer to `readings`; `None` if it has no forces.
+    ///
+    /// # Errors
+    /// An answer that the model cannot decode.
+    pub fn decode(&self, model: &Model, readings: &Frame) -> Result<Option<Reconstruction>, FixedError> {
+        let decode = |forces: &Vec<[i32; 3]>| {
+            let beats = [forces.as_slice(), &self.labels].concat();
+            model.decode(std::slice::from_ref(readings), "board", &beats, &self.status)
+        };
+        self.forces.as_ref().map(decode).transpose()
     }
 
     fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
@@ -74,7 +98,7 @@ impl Answer {
         self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
     }
 
-    /// |μ| over `search.mu_max`; none with several subarrays, whose loads the resultants do not tell.
+    /// |μ| over `search.mu_max`; none with several subarrays or contacts, whose loads the resultants do not tell.
     fn mu_share(&self) -> Option<f64> {
         let mut all = self.statuses();
         let (first, others) = (all.next(), all.next());
@@ -98,12 +122,16 @@ impl Answer {
         let of_frame = frame_flags(&model.scene, frame, &model.codes(frame)?, noise_MPa);
         let mut flags: BTreeSet<Flag> = of_frame.into_iter().collect();
         flags.extend(checks.flags(&model.scene));
-        for status in self.statuses() {
+        // The statuses of contacts that are not there say nothing of μ.
+        let labels = labels_of_beats(&self.labels, model.scene.sensor.taxels());
+        let of_taxels = |slot: usize| labels.is_empty() || labels.contains(&(slot + 1));
+        for (slot, status) in self.statuses().enumerate() {
             let has = |bit: u32| status.flags & bit != 0;
             let saturated = status.rescale_saturations + status.force_saturations > 0;
             let all = [
                 (has(FLAG_NO_CONTACT), Flag::NoContact),
-                (!has(FLAG_CONDITION), Flag::ConditionUnmet),
+                (has(FLAG_MORE_CONTACTS), Flag::TooManyContacts),
+                (of_taxels(slot) && !has(FLAG_CONDITION), Flag::ConditionUnmet),
                 (has(FLAG_CONDITION) && !has(FLAG_FOUND), Flag::NoCompression),
                 (saturated, Flag::Saturated),
             ];
@@ -128,6 +156,9 @@ pub struct PhysicalAnswer {
     pub checks: Checks,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
+    /// The contacts, that with the largest load first; of a board that tells them apart, if forces are requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contacts: Option<Vec<FoundContact>>,
     /// Force per taxel, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forces_N: Option<Forces>,
@@ -140,7 +171,7 @@ impl PhysicalAnswer {
     /// The answer to the `readings` sent, in physical units.
     ///
     /// # Errors
-    /// A frame of another sensor.
+    /// A frame of another sensor; an answer that the model cannot decode.
     pub fn new(model: &Model, readings: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
         let frame = &model.stress(std::slice::from_ref(readings))?;
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
@@ -150,6 +181,10 @@ impl PhysicalAnswer {
         let centre = sums.centre();
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
         let checks = answer.checks(model, readings, frame)?;
+        let decoded = match (&answer.forces, model.label_beats()) {
+            (Some(_), 1..) => answer.decode(model, readings)?,
+            _ => None,
+        };
         let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
         let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
         Ok(PhysicalAnswer {
@@ -159,7 +194,8 @@ impl PhysicalAnswer {
             flags: answer.flags(model, frame, &checks)?,
             checks,
             dropped_before: answer.dropped_before(),
-            forces_N: answer.beats.as_ref().map(forces),
+            contacts: decoded.and_then(|result| result.contacts()),
+            forces_N: answer.forces.as_ref().map(forces),
             equal: answer.difference.as_ref().map(Option::is_none),
         })
     }

@@ -64,7 +64,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         if self.check {
             answer.difference = Some(answer.compare_with_model(&self.model, &codes));
         }
-        answer.beats = answer.beats.filter(|_| self.forces);
+        answer.forces = answer.forces.filter(|_| self.forces);
         Ok((frame, answer))
     }
 
@@ -73,8 +73,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     /// # Errors
     /// An answer that the model cannot decode.
     pub fn decode(&self, readings: &Frame, answer: &Answer) -> Result<Option<Reconstruction>, FixedError> {
-        let decode = |beats| self.model.decode(std::slice::from_ref(readings), "board", beats, &answer.status);
-        answer.beats.as_deref().map(decode).transpose()
+        answer.decode(&self.model, readings)
     }
 }
 

@@ -139,6 +139,6 @@ fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
     let mut session = Session::new(client, model, None, false, true).unwrap();
     let (_, answer) = session.request(&Frame::shipped(&scene)[0]).unwrap();
-    assert_eq!((answer.difference, answer.beats), (Some(None), None));
+    assert_eq!((answer.difference, answer.forces), (Some(None), None));
     assert_ne!(answer.sums.fz, 0);
 }

@@ -191,11 +191,15 @@ impl Plan {
     /// Number of output beats of a frame before its status: forces and labels, or resultants.
     pub fn force_beats(&self) -> usize {
         let taxels = self.scene.sensor.taxels();
-        match (self.sends_resultants(), &self.by_contact) {
-            (true, _) => resultants::BEATS * self.parts().len(),
-            (false, None) => taxels,
-            (false, Some(_)) => taxels + label_beats(taxels),
+        match self.sends_resultants() {
+            true => resultants::BEATS * self.parts().len(),
+            false => taxels + self.label_beats(),
         }
+    }
+
+    /// Number of output beats with labels, between forces and statuses; 0 where there is one μ.
+    pub fn label_beats(&self) -> usize {
+        self.by_contact.as_ref().map_or(0, |_| label_beats(self.scene.sensor.taxels()))
     }
 
     /// Cycles by which the first beat of resultants is later than the first beat of forces would be.

@@ -10,7 +10,7 @@ use crate::language::testbench::{block_subject, check_with_defects, Reference, S
 use crate::language::Change;
 use crate::wire::Word;
 
-const SHAPE: Shape = Shape { rows: 3, cols: 4, input_bits: 12, status_beats: 3, resultants: true, frames: 4 };
+const SHAPE: Shape = Shape { rows: 3, cols: 4, input_bits: 12, other_beats: 3, resultants: true, frames: 4 };
 const TAXELS: usize = SHAPE.rows * SHAPE.cols;
 /// Packets between two resets.
 const PACKETS: usize = 12;
@@ -174,7 +174,7 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
             continue;
         }
         around.counters.taken += 1;
-        let count = if is_frame { TAXELS + SHAPE.status_beats } else { 0 };
+        let count = if is_frame { TAXELS + SHAPE.other_beats } else { 0 };
         let mut value = || random.i32(..) >> random.u32(..32);
         let beats: Vec<[i32; 3]> = (0..count).map(|_| [(); 3].map(|()| value())).collect();
         let of_beats = |beats: &[[i32; 3]]| -> Vec<u8> {

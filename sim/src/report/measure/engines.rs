@@ -9,7 +9,7 @@ use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::{subarrays, Case};
 use dermis_golden::scene::{EstimatorKind, Scene};
-use dermis_hdl::{generate, require_hardware};
+use dermis_hdl::generate;
 
 use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
 use super::timing::Timing;
@@ -68,10 +68,7 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
     let engine = Golden::new(&scene.for_hardware())?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
     let bit_true = match Model::for_frames(&scene, &frames) {
-        Ok(model) => match require_hardware(&model) {
-            Ok(()) => Ok(bit_true(model, &frames, options)?),
-            Err(reason) => Err(reason.to_string()),
-        },
+        Ok(model) => Ok(bit_true(model, &frames, options)?),
         Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
             Err(in_one_line(&error.to_string()))
         }

@@ -12,7 +12,6 @@ use dermis_golden::frame::Frame;
 use dermis_golden::import::Imported;
 use dermis_golden::reception::full_scale;
 use dermis_golden::reconstruct::Reconstruction;
-use dermis_hdl::require_hardware;
 
 use super::clock::clock;
 use crate::compare::{comparable_forces, difference, median, Difference};
@@ -63,10 +62,7 @@ pub fn recorded(imported: Imported, interrupt: &Interrupt) -> Result<Recorded> {
     let engine = Golden::new(&imported.scene)?;
     let (golden, seconds) = timed(&frames, interrupt, |frame| Ok(engine.run(frame)?))?;
     let fixed = match Model::new(&imported.scene) {
-        Ok(model) => match require_hardware(&model) {
-            Ok(()) => Ok(fixed(&model, &frames, &golden, interrupt)?),
-            Err(reason) => Err(reason.to_string()),
-        },
+        Ok(model) => Ok(fixed(&model, &frames, &golden, interrupt)?),
         Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
             // The first line without the list of changes that it announces.
             let text = error.to_string();
