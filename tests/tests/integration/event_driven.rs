@@ -180,16 +180,25 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
 }
 
 #[test]
-fn with_a_network_nothing_is_undefined_either() {
-    let text =
-        "name = \"network\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n";
-    let (scene, _file) = with_network(text, &[13, 7]);
-    let frames = [Frame::eq2(&scene.sensor), Frame::from_stress("plain", &scene.sensor, vec![0.1; 20]).unwrap()];
-    let (hardware, vectors) = of_scene(&scene, &frames);
-    for stimulus in [Stimulus::FullSpeed, Stimulus::Stalls { seed: 2 }] {
-        let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
-        assert_equal(&findings, stimulus);
-        assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
+fn with_a_network_and_with_contacts_nothing_is_undefined_either() {
+    let contacts = "[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
+    for more in ["", contacts] {
+        let text = format!(
+            "name = \"network\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n{more}"
+        );
+        let (scene, _file) = with_network(&text, &[13, 7]);
+        let frames = [Frame::eq2(&scene.sensor), Frame::from_stress("plain", &scene.sensor, vec![0.1; 20]).unwrap()];
+        let (hardware, vectors) = of_scene(&scene, &frames);
+        for stimulus in [Stimulus::FullSpeed, Stimulus::Stalls { seed: 2 }] {
+            let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
+            assert_equal(&findings, stimulus);
+            assert!(
+                undefined.is_empty(),
+                "{more} {stimulus}: {} {:?}",
+                undefined.len(),
+                &undefined[..undefined.len().min(9)]
+            );
+        }
     }
 }
 

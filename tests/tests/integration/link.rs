@@ -13,8 +13,8 @@ use dermis_golden::link::{
 use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::link::{HostUart, UartSymbol};
-use dermis_tests::{build_dir, scene, variants};
+use dermis_sim::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
+use dermis_tests::{build_dir, scene, variants, with_network};
 
 mod spi;
 
@@ -67,11 +67,13 @@ impl Questions {
             status[0][2] |= FLAG_FRAMING as i32;
         }
         let bytes = |beats: &[[i32; 3]]| -> Vec<u8> { beats.iter().flatten().flat_map(|w| w.to_le_bytes()).collect() };
+        let sensor = &self.model.scene.sensor;
+        let (forces, labels) = trace.beats.split_at(sensor.taxels());
         let front = match kind {
-            Kind::FrameForForces => bytes(&trace.beats),
-            _ => Sums::of(&trace.beats, self.model.scene.sensor.cols).to_bytes(),
+            Kind::FrameForForces => bytes(forces),
+            _ => Sums::of(forces, sensor.cols).to_bytes(),
         };
-        Packet { kind: kind.answer(), sequence, payload: [front, bytes(&status)].concat() }
+        Packet { kind: kind.answer(), sequence, payload: [front, bytes(labels), bytes(&status)].concat() }
     }
 }
 
@@ -264,9 +266,16 @@ fn shipped(scene: &Scene) -> Questions {
 
 /// A small array; a small mu_max makes a small search.
 fn small(text: &str) -> Questions {
+    extremes(Model::new(&Scene::parse(&small_text(text), "small").unwrap()).unwrap())
+}
+
+fn small_text(text: &str) -> String {
     let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
-    let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
-    let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
+    format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}")
+}
+
+/// Frames of the largest codes.
+fn extremes(model: Model) -> Questions {
     let (taxels, bits) = (model.scene.sensor.taxels(), model.formats().input_bits);
     let largest = (1i32 << (bits - 1)) - 1;
     let codes = vec![
@@ -282,6 +291,39 @@ const TWO_SUBARRAYS: &str = "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2
 /// 2×3 taxels with one-byte codes.
 const SINGLE_BYTE: &str =
     "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n";
+
+/// Labels between forces and statuses, a status for each of two contacts; the host reads the contacts.
+#[test]
+fn contacts_are_answered_with_their_labels() {
+    let text =
+        "rows = 5\ncols = 6\n[partition]\ncase = \"contacts\"\nmax_contacts = 2\n[input]\nfull_scale_MPa = 0.5\n";
+    let (scene, _file) = with_network(&small_text(text), &[6]);
+    let mut questions = extremes(Model::new(&scene).unwrap());
+    let pressed = |taxel: usize| if [7, 8, 22, 28].contains(&taxel) { 0.3 } else { 0.001 };
+    let frame = Frame::from_stress("two", &scene.sensor, (0..30).map(pressed).collect()).unwrap();
+    questions.codes[0] = questions.model.codes(&frame).unwrap().codes;
+    let mut board = Board::of(questions, &[Simulator::Verilator, Simulator::RustHdl]);
+    board.send(&Packet::request(Kind::Identify, 3).to_wire());
+    let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
+    assert_eq!((identity.statuses, identity.label_bits), (2, 4));
+    let mut payload = Vec::new();
+    for (index, kind) in [(1, Kind::FrameForForces), (0, Kind::FrameForResultants), (0, Kind::FrameForForces)] {
+        board.send(&board.frame(index, kind, 5).to_wire());
+        let (mut answers, wanted) = (board.receive(), board.answer(index, kind, 5, false));
+        assert!(answers == [wanted], "frame {index}, {kind:?}");
+        payload = answers.remove(0).payload;
+    }
+    let answer = Answer::of_bytes(&board.model, &payload, true).unwrap();
+    assert_eq!(answer.compare_with_model(&board.model, &board.codes[0]), None);
+    let contacts = PhysicalAnswer::new(&board.model, &frame, &answer).unwrap().contacts.unwrap();
+    let of_model = board.model.reconstruct(&frame).unwrap().contacts().unwrap();
+    assert_eq!((contacts.len(), &contacts), (2, &of_model));
+    // A label that is not the model's is found.
+    let mut other = answer.clone();
+    other.labels[0][0] ^= 1;
+    let found = other.compare_with_model(&board.model, &board.codes[0]).unwrap();
+    assert!(found.starts_with("row 0, column 0: label"), "{found}");
+}
 
 #[test]
 fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped() {

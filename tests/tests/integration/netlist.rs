@@ -59,6 +59,15 @@ fn the_netlist_of_a_network_equals_the_model() {
     assert!(netlist.is_equal(), "{:?}", netlist.kept);
 }
 
+#[test]
+fn the_netlist_of_contacts_equals_the_model() {
+    let (scene, _file) =
+        with_network(&format!("{SCENE}mu_max = 0.05\n[partition]\ncase = \"contacts\"\nmax_contacts = 2\n"), &[5]);
+    let (hardware, frames) = of_scene(&scene);
+    let netlist = findings(&hardware, &frames, Simulator::Netlist);
+    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+}
+
 /// The output is that of block `last`.
 fn netlist_and_defect(board: &str, mu_max: &str, last: &str) {
     let (mut hardware, frames) = setup(board, mu_max);

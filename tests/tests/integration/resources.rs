@@ -15,6 +15,7 @@ use dermis_hdl::usage::total;
 use dermis_hdl::{generate, Generated};
 use dermis_sim::flow::synthesis::{cells, commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
+use dermis_tests::with_network;
 use serde_json::Value;
 
 /// Largest relative error of the estimated flip-flops and LUTs; here it is 10 and 11 %.
@@ -28,6 +29,15 @@ fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
 fn small(name: &str, more: &str) -> Model {
     let sensor = "[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     Model::new(&Scene::parse(&format!("name = \"{name}\"\n{sensor}{more}"), name).unwrap()).unwrap()
+}
+
+/// A scene with a network of a few steps that finds contacts.
+fn contacts(lanes: usize) -> Model {
+    let text = format!(
+        "name = \"contacts\"\n[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+         [partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n"
+    );
+    Model::new(&with_network(&text, &[20, 10]).0).unwrap()
 }
 
 #[test]
@@ -50,6 +60,8 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
             scene.fixed.lanes = Some(16);
             Model::new(&scene).unwrap()
         },
+        // Contacts: segmentation, window, labels, the mask of the window.
+        contacts(16),
         // A lane word that is no multiple of a block RAM's; deep coefficients.
         small("deep", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
     ];
