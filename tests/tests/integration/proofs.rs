@@ -19,6 +19,7 @@
 //! | `operand_writer.v`: addresses are inside the operand memory; "complete" means complete | `pass`'s operand writer |
 //! | `packer.v`: header, words, CRC between two ENDs; an offered byte stays | the link's packer |
 //! | `roundtrip.v`: decoding restores the encoded bytes, with or without IDLE bytes in between | the link's encoder and decoder |
+//! | `label_beats.v`: labels leave between forces and statuses, those of every taxel in its place | `label_beats` |
 //! | `sums.v`: forces are accepted, four words sent, the status passed on | the link's resultants |
 //!
 //! Not proved, but verified by co-simulation: the UART's shift registers, the SPI slave's two clocks, the link's
@@ -54,15 +55,19 @@ fn model(more: &str) -> Model {
 
 /// The same with Cz⁺ of `bits` bits.
 fn with_inverse(bits: u32, more: &str) -> Model {
-    let text = format!(
-        "name = \"proofs\"\n[sensor]\nrows = {ROWS}\ncols = {COLS}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
-         thickness_mm = 3.0\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = {bits}\n\
-         [search]\nmu_max = 0.05\n{more}"
-    );
+    let text = text(bits, more);
     let folder = tempfile::tempdir().unwrap();
     let line = |row: &[i32]| row.iter().map(i32::to_string).collect::<Vec<_>>().join(",") + "\n";
     std::fs::write(folder.path().join("tare.csv"), ZEROS.chunks(COLS).map(line).collect::<String>()).unwrap();
     Model::new(&Scene::parse(&text, folder.path().join("proofs.toml").to_str().unwrap()).unwrap()).unwrap()
+}
+
+fn text(inverse_bits: u32, more: &str) -> String {
+    format!(
+        "name = \"proofs\"\n[sensor]\nrows = {ROWS}\ncols = {COLS}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+         thickness_mm = 3.0\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = {inverse_bits}\n\
+         [search]\nmu_max = 0.05\n{more}"
+    )
 }
 
 fn prepared() -> Model {

@@ -89,6 +89,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let layers: Vec<String> = plan.formats().layers.iter().map(usize::to_string).collect();
         add("network", true, format!("layers of {} rows", layers.join(", ")), &|| plain(scene));
     }
+    if plan.contacts() > 0 {
+        add("contacts", true, format!("a μ for each of {} at most", plan.contacts()), &|| plain(scene));
+    }
     if degree > 0 {
         let cubic = degree == MAX_DEGREE;
         add("polynomial of degree 3", cubic, "degree 3".into(), &|| {

@@ -1,15 +1,17 @@
 //! Proofs for the blocks between the streams: rounding of the rescaler, queues, and the link's output.
 
 use dermis_golden::fixed::plan::resources::count_bits;
-use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::stages::send::{LABELS_PER_BEAT, LABEL_BITS, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
+use dermis_golden::symmetry::quads::Quads;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::QUEUE_PLACES;
+use dermis_tests::with_network;
 
 use super::prover::{number, Hardware, Proof};
-use super::{model, with_inverse, COLS, ROWS};
+use super::{model, text, with_inverse, COLS, ROWS};
 
 /// The widths of a model's rescaler.
 fn widths(model: &Model) -> Vec<(&'static str, String)> {
@@ -134,6 +136,38 @@ fn the_link_takes_and_gives_each_byte_once() {
         Change::within("link__decoder", "escaped", |k| [k.named("valid") & !k.named("is_idle"), k.named("valid")]),
     ];
     Proof { hardware, property: "roundtrip.v", given: both, defects, open_products: false }.run();
+}
+
+#[test]
+fn labels_leave_between_forces_and_statuses() {
+    let contacts = "[partition]\ncase = \"contacts\"\nmax_contacts = 2\n";
+    let (scene, _file) = with_network(&text(20, contacts), &[4]);
+    let model = Model::new(&scene).unwrap();
+    let (quads, bits) = (Quads { rows: ROWS, cols: COLS }, count_bits(model.contacts() + 1));
+    let address = count_bits(quads.len());
+    let label = |taxel: usize| format!("own[{} +: {bits}]", bits * taxel);
+    let lanes =
+        |quad: usize| (0..Quads::LANES).rev().map(|lane| label(quads.taxel(quad, lane))).collect::<Vec<_>>().join(", ");
+    let quad = |quad: usize| format!("      {address}'d{quad}: quad = {{{}}};\n", lanes(quad));
+    let wanted = |taxel: usize| format!("{}'d0, {}", LABEL_BITS as usize - bits, label(taxel));
+    let given = vec![
+        ("BLOCK", "@TOP@__label_beats".into()),
+        ("BITS", number(bits)),
+        ("ADDRESS", number(address)),
+        ("QUADS", (0..quads.len()).map(quad).collect()),
+        ("WANTED", (0..ROWS * COLS).rev().map(wanted).collect::<Vec<_>>().join(", ")),
+        ("TAXELS", number(ROWS * COLS)),
+        ("LAST", number(ROWS * COLS + model.status_beats() - 1)),
+        ("MOST", number(LABELS_PER_BEAT + 5)),
+    ];
+    let block = "label_beats";
+    let defects = vec![
+        // A label is taken a cycle early; places beyond the last taxel are not 0; a beat passes while labels are read.
+        Change::value(block, "arrives_4", |k| k.named("arrives_2")),
+        Change::value(block, "empty_4", |k| k.constant(1, 0)),
+        Change::value(block, "s_axis_tready", |k| k.named("m_axis_tready")),
+    ];
+    Proof { hardware: Hardware::Engine(&model), property: "label_beats.v", given, defects, open_products: true }.run();
 }
 
 #[test]
