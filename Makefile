@@ -2,7 +2,7 @@
 
 SCENE     ?= sensor-1
 BOARD     ?=
-SCENES    ?= sensor-1 sensor-1-noisy eight-by-eight
+SCENES    ?= sensor-1 sensor-1-noisy eight-by-eight eight-by-eight-contacts
 BUILD     ?= build
 TOOLS      = $(BUILD)/tools
 CARGO     ?= cargo

@@ -13,7 +13,7 @@
 //! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "search"), `degree` (none; 1 … 8) |
-//! | | `network` (none; a file, or "dermis:sensor-1", "dermis:sensor-1-unipolar") |
+//! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
@@ -470,6 +470,14 @@ impl Scene {
         };
         let search = SearchSpec { estimator, ..self.search.clone() };
         Scene { search, ..self.clone() }
+    }
+
+    /// The cases in which the scene can be compared: `all`, or with a network the scene's own, for which it was trained.
+    pub fn cases_of(&self, all: &[Case]) -> Vec<Case> {
+        match self.for_hardware().search.estimator {
+            EstimatorKind::Network => vec![self.partition.case],
+            _ => all.to_vec(),
+        }
     }
 
     /// The scene of a sensor with defaults for everything else; `name` is used in reports.

@@ -49,7 +49,7 @@ use tempfile::NamedTempFile;
 const SHOWN: usize = 3;
 
 /// Scenes verified on the shipped frames.
-pub const SCENES: [&str; 3] = ["sensor-1", "sensor-1-noisy", "eight-by-eight"];
+pub const SCENES: [&str; 4] = ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"];
 
 /// A built-in scene and its shipped half-space frames.
 ///

@@ -18,7 +18,7 @@ use crate::report::{self, Format};
 /// Arguments of `dermis table`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  dermis table                                       every built-in scene, cases 0 to 3
+  dermis table                                       every built-in scene, cases 0 to 3, with a network its own
   dermis table sensor-1 --case 0 --format csv
   dermis table sensor-3 --case adaptive --case contacts --case 4x2
   dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Built-in names or paths of scenes; default: all built-in ones.
     #[arg(required_if_eq("cosim", "true"))]
     scenes: Vec<String>,
-    /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3.
+    /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3, with a network the scene's own.
     #[arg(long = "case", value_name = "CASE")]
     cases: Vec<Case>,
     #[command(flatten)]
@@ -72,7 +72,6 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
     let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
     let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
-    let cases = if cases.is_empty() { &numbered } else { cases };
     let mut rows = Vec::new();
     for name in &scenes {
         let (scene, frames) = if drawn.frames > 0 {
@@ -82,6 +81,8 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
         } else {
             shipped(name, "draw some with --fresh")?
         };
+        let own = scene.cases_of(&numbered);
+        let cases = if cases.is_empty() { &own } else { cases };
         let bar = Progress::steps(&format!("{}: errors", scene.name), (cases.len() * frames.len()) as u64);
         let mut done = 0;
         let mut step = || {

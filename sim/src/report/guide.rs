@@ -26,12 +26,11 @@ use crate::cosim::block_timing::{timing, traces, SCENE};
 use crate::jobs::Interrupt;
 use crate::progress::Progress;
 
-/// The scene of the stages that only a network needs.
-const NOISY: &str = "sensor-1-noisy";
-/// These stages.
-const OF_NETWORK: [&str; 2] = ["estimate", "relax"];
-/// The stages of contacts, which no built-in scene has.
-const OF_CONTACTS: [&str; 5] = ["segment", "contacts", "window", "shear", "label_beats"];
+/// Scenes whose hardware has stages that [`SCENE`] has not, and these stages.
+const OTHERS: [(&str, &[&str]); 2] = [
+    ("sensor-1-noisy", &["estimate", "relax"]),
+    ("eight-by-eight-contacts", &["segment", "contacts", "window", "shear", "label_beats"]),
+];
 /// The frame with two feet, and the scene of its sensor.
 const FEET: (&str, &str) = ("s4-plantar-two-feet", "sensor-4");
 
@@ -58,16 +57,14 @@ pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
     let scene = Scene::builtin(SCENE)?;
     let stages = traces(&scene, build)?;
-    let own = |trace: &&Trace| {
-        let name = &trace.block.name;
-        !OF_NETWORK.contains(name) && !OF_CONTACTS.contains(name)
-    };
+    let own = |trace: &&Trace| OTHERS.iter().all(|(_, stages)| !stages.contains(&trace.block.name));
     for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)).filter(own) {
         files.push(timing_picture(&scene.name, stage)?);
     }
-    let noisy = Scene::builtin(NOISY)?;
-    for stage in traces(&noisy, build)?.iter().filter(|trace| OF_NETWORK.contains(&trace.block.name)) {
-        files.push(timing_picture(&noisy.name, stage)?);
+    for (other, stages) in OTHERS {
+        for stage in traces(&Scene::builtin(other)?, build)?.iter().filter(|trace| stages.contains(&trace.block.name)) {
+            files.push(timing_picture(other, stage)?);
+        }
     }
     let mut choosing = scene;
     choosing.partition.case = Case::Adaptive;

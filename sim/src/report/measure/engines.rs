@@ -37,12 +37,16 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
             return Err(anyhow!("scene {}: no frame is shipped for {}", scene.name, scene.sensor));
         }
         let network = scene.for_hardware().estimator() == EstimatorKind::Network;
-        for &case in cases.iter().filter(|case| !network || **case == Case::WHOLE) {
+        for case in scene.cases_of(cases) {
             let mut scene = scene.clone();
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
             let largest = match case {
                 // One μ per contact over the whole array; equal to case 0 for a single contact.
-                Case::Contacts if !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) => None,
+                Case::Contacts
+                    if !network && !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) =>
+                {
+                    None
+                }
                 Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
                 Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),
             };
@@ -118,9 +122,10 @@ fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue
 
 /// The quick variant co-simulates the scenes of `make run`.
 fn is_simulated(scene: &Scene, options: &Options) -> bool {
-    let first = scene.partition.case == Case::WHOLE
-        && ["sensor-1", "sensor-1-noisy", "eight-by-eight"].contains(&scene.name.as_str());
-    options.simulate && (!options.quick || first)
+    let first =
+        ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"].contains(&scene.name.as_str());
+    let own = Scene::builtin(&scene.name).is_ok_and(|own| own.partition.case == scene.partition.case);
+    options.simulate && (!options.quick || first && own)
 }
 
 /// Measures every CPU engine that supports the case.
