@@ -398,8 +398,8 @@ impl Shape {
         let last_step = step.is(self.steps as u64 - 1);
         let steps = k.wire("steps", (segmented & !own.count.any()) | (known & last_contact) | (stepped & !last_step));
         let tells = k.wire("tells", is(State::Result) & own.values_begin);
-        let told_label = k.register("told_label", Type::unsigned(label_bits));
-        let ends = k.wire("ends", is(State::Tell) & told_label.is(self.contacts as u64));
+        let tells_of = k.register("tells_of", Type::unsigned(label_bits));
+        let ends = k.wire("ends", is(State::Tell) & tells_of.is(self.contacts as u64));
 
         k.when(segments, || goes(State::Segment));
         k.when(segmented, || {
@@ -421,9 +421,9 @@ impl Shape {
         k.when(stepped & last_step, || goes(State::Result));
         k.when(tells, || {
             goes(State::Tell);
-            told_label.set(k.constant(label_bits, 0));
+            tells_of.set(k.constant(label_bits, 0));
         });
-        k.when(is(State::Tell), || told_label.set(told_label.plus(1)));
+        k.when(is(State::Tell), || tells_of.set(tells_of.plus(1)));
         k.when(ends, || goes(State::Idle));
         k.when(own.start, || {
             goes(State::First);
@@ -465,15 +465,16 @@ impl Shape {
         ln_sigma.write(known, *contact, own.ln_sigma);
 
         k.comment("Contacts that there are not have no condition, and what has no condition has no μ.");
-        let telling = k.wire("told", is(State::Tell));
-        let condition = self.of_label(&k, *told_label, |at| conditions.at(at)) & telling;
-        let condition = k.wire("told_condition", condition);
+        pulse("told", is(State::Tell));
+        k.delay("told_label", *tells_of);
+        let condition = k.wire("condition_of", self.of_label(&k, *tells_of, |at| conditions.at(at)));
+        k.delay("told_condition", condition);
         for (axis, name) in ["told_x", "told_y"].into_iter().enumerate() {
-            let position = self.of_label(&k, *told_label, |at| positions[axis].slice(index(at), position_bits()));
-            k.wire(name, position & condition.repeat(position_bits()));
+            let position = self.of_label(&k, *tells_of, |at| positions[axis].slice(index(at), position_bits()));
+            k.delay(name, position & condition.repeat(position_bits()));
         }
-        let word = ln_sigma.read(told_label.minus(1).low(self.contact_bits()));
-        k.wire("told_ln_sigma", word & condition.repeat(self.score_bits));
+        let word = ln_sigma.read(tells_of.minus(1).low(self.contact_bits()));
+        k.delay("told_ln_sigma", word & condition.repeat(self.score_bits));
         k.finish()
     }
 
@@ -537,12 +538,14 @@ mod tests {
         all: Vec<Told>,
         /// The pulses of this cycle: segment, window, shear, end, free.
         pulses: [bool; 5],
+        /// The label that is told in this cycle, and what is told if it has a μ.
+        told: Option<(usize, Option<Told>)>,
     }
 
     impl Sequence {
         fn new() -> Self {
             let (waits, section, contact) = (None, None, None);
-            Sequence { waits, quads: 0, count: 0, section, contact, all: Vec::new(), pulses: [false; 5] }
+            Sequence { waits, quads: 0, count: 0, section, contact, all: Vec::new(), pulses: [false; 5], told: None }
         }
 
         /// The positions on an axis, once those of all contacts are known.
@@ -564,12 +567,8 @@ mod tests {
             let bit = |value: bool| known.then(|| value.into());
             let high = |input: usize| inputs[input].number() == 1;
             let [segment, window, shear, ended, free] = self.pulses;
-            let telling = match self.waits {
-                Some(Waits::Telling(label)) => Some(label),
-                _ => None,
-            };
-            let own = telling.map(|label| label.checked_sub(1).and_then(|at| self.all.get(at)).filter(|own| own.0));
-            let word = |of: &dyn Fn(&Told) -> Word| own.map(|own| own.map_or(Word::default(), of));
+            let own = self.told.as_ref().map(|told| &told.1);
+            let word = |of: &dyn Fn(&Told) -> Word| own.map(|own| own.as_ref().map_or(Word::default(), of));
             let reads = matches!(self.waits, Some(Waits::Mu(_)));
             let [fold, at_window, at_shear, at_forces, at_sent] = [0, 1, 2, 3, 4].map(|own| inputs[FOLD + own]);
             let labels = match self.waits {
@@ -583,7 +582,6 @@ mod tests {
                 self.contact.map(|contact| Word::from(contact as u64)),
                 self.contact.map(|contact| Word::from(contact as u64 + 1)),
                 self.section.map(Word::from),
-                telling.map(|label| Word::from(label as u64)),
                 bit(segment),
                 bit(window),
                 bit(shear),
@@ -598,8 +596,9 @@ mod tests {
                 bit(window || shear || high(3)),
                 self.positions(0),
                 self.positions(1),
-                bit(telling.is_some()),
-                bit(own.flatten().is_some()),
+                bit(self.told.is_some()),
+                self.told.as_ref().map(|told| Word::from(told.0 as u64)),
+                own.map(|own| own.is_some().into()),
                 word(&|own| own.1[0]),
                 word(&|own| own.1[1]),
                 word(&|own| own.2),
@@ -611,6 +610,12 @@ mod tests {
             let (rst, start, taxels, segmented) = (high(0), high(1), high(5), high(6));
             let (known, begins) = (high(8), high(15));
             self.pulses = [false; 5];
+            self.told = match self.waits {
+                Some(Waits::Telling(label)) => {
+                    Some((label, label.checked_sub(1).and_then(|at| self.all.get(at)).filter(|own| own.0).copied()))
+                }
+                _ => None,
+            };
             self.quads += usize::from(taxels);
             let complete = taxels && self.quads == SHAPE.quads;
             if complete {
@@ -653,7 +658,7 @@ mod tests {
                 self.waits = self.waits.map(|_| Waits::First);
             }
             if rst {
-                (self.waits, self.pulses) = (Some(Waits::Start), [false; 5]);
+                (self.waits, self.pulses, self.told) = (Some(Waits::Start), [false; 5], None);
             }
         }
     }
