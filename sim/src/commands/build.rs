@@ -62,7 +62,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
         generated.add_integration(&model);
     }
     let explained = explain(&model)?;
-    generated.add_explained(&explained);
+    generated.add_explained(&model, &explained);
     drop(progress);
     std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
     let mut text = String::new();
@@ -78,6 +78,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     }
     if with_features {
         text.push_str(&report::features(&explained));
+        text.push_str(&report::program(&model));
     }
     Ok(text)
 }

@@ -54,7 +54,7 @@ pub use measure::{trace, ComparedWords};
 pub use noise::{noise, noise_medians};
 pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes};
 pub use ports::{blocks, ports};
-pub use resource_report::{features, resources};
+pub use resource_report::{features, program, resources};
 pub use result::{difference, reconstruction};
 pub use sections::stability_picture;
 pub use stability::stability;

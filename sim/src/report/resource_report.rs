@@ -1,6 +1,8 @@
 //! Resources of a generated design and its optional features, as text.
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::cycles::lane_utilisation;
+use dermis_golden::fixed::plan::program::listing;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::explain::{Explained, Saved};
 use dermis_hdl::usage::{total, StageUsage, Usage};
@@ -26,6 +28,22 @@ pub fn resources(model: &Model, usage: &StageUsage) -> String {
         100.0 * lane_utilisation(model),
     ));
     text
+}
+
+/// The program of the passes as a table; none for the serial engine, which has no lanes.
+pub fn program(model: &Model) -> String {
+    if model.board.engine == EngineKind::Serial {
+        return String::new();
+    }
+    let several = model.chooses();
+    let rows = listing(model.cases()).into_iter().map(|own| {
+        let section = if several { format!("case {}, {}", own.case, own.section) } else { own.section.to_owned() };
+        let [step, group, flip] = [own.step, own.group, own.flip].map(|number| number.to_string());
+        let [coefficients, cycles] = [own.coefficients, own.cycles].map(|number| number.to_string());
+        vec![section, own.matrix, own.operand, own.result, step, group, flip, coefficients, cycles]
+    });
+    let head = ["runs", "matrix", "operand", "result", "step", "row group", "flip", "first word", "cycles"];
+    format!("\nprogram of the passes:\n{}", aligned(4, &head, rows.collect()))
 }
 
 /// The optional features that the scene uses, then a table of those left out.

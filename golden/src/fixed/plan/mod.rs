@@ -18,6 +18,7 @@
 //! | [`timeline`] | when the products are issued, and when their rows leave |
 //! | [`contact_cycles`] | the part of it that depends on the contacts |
 //! | [`interval`] | cycles from one frame to the next |
+//! | [`program`] | the instructions of the passes |
 //! | [`check`] | the signature of the coefficient memory |
 //! | [`feature_costs`] | the plan with each optional feature added, or without it |
 //! | [`fit_suggestions`] | changes that make a scene fit its board |
@@ -31,6 +32,7 @@ pub mod feature_costs;
 pub mod fit;
 pub mod fit_suggestions;
 pub mod interval;
+pub mod program;
 pub mod resources;
 pub mod serial;
 pub mod storage;

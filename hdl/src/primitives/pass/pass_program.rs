@@ -1,7 +1,8 @@
 //! Schedule of the matrix passes as a table of instructions.
 
+use dermis_golden::fixed::plan::program::{instructions, Instruction};
 use dermis_golden::fixed::plan::resources::{operand_words, Holds};
-use dermis_golden::fixed::words::schedule::{operand_number, sections, Axis, Operand, Section, Target};
+use dermis_golden::fixed::words::schedule::{sections, Axis, Operand, Section, Target};
 use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
@@ -31,8 +32,6 @@ pub struct Step {
     pub layer: bool,
     /// Last product of an accumulation.
     pub last: bool,
-    /// First step of a section.
-    pub opens: bool,
     /// Last step of a section.
     pub ends: bool,
     /// Number of operand vectors that must be readable before this step.
@@ -48,46 +47,27 @@ pub fn programs(model: &Model) -> Vec<(&CasePlan, Section)> {
     all
 }
 
-/// The steps of a section: for each accumulation, for each group of rows, its products.
+/// The steps of a section: its [instructions](dermis_golden::fixed::plan::program).
 fn unroll((case, section): &(&CasePlan, Section)) -> Vec<Step> {
-    let CasePlan { formats, storage, .. } = case;
-    let first = |number: usize| section.operands[..number].iter().sum::<usize>();
-    let mut steps = Vec::new();
-    for (target, products) in &section.accumulations {
-        let layer = matches!(target, Target::Layer(_));
-        for group in 0..storage.groups_of(products) {
-            for (index, product) in products.iter().enumerate() {
-                let number = operand_number(formats, product.operand);
-                let needs = match (product.operand, number) {
-                    // p is read once μ is known.
-                    (Operand::Vector(_), Some(number)) => number.max(formats.layers.len()) + 1,
-                    (_, Some(number)) => number + 1,
-                    // The first layer waits for v_00, so that one vector is written after the other.
-                    (Operand::InputHigh, None) => usize::from(layer),
-                    (_, None) => 0,
-                };
-                steps.push(Step {
-                    coefficients: storage.address_of(product.matrix, group),
-                    columns: storage.columns_of(product.matrix, group).len(),
-                    operand: number.map_or(0, first),
-                    kind: match product.operand {
-                        Operand::InputHigh => 1,
-                        Operand::InputLow => 2,
-                        Operand::One => 3,
-                        _ => 0,
-                    },
-                    flip: product.matrix.flip as u64,
-                    transposed: product.transposed,
-                    factor: product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
-                    layer,
-                    last: index + 1 == products.len(),
-                    opens: steps.is_empty(),
-                    ends: false,
-                    needs,
-                });
-            }
-        }
-    }
+    let step = |own: Instruction| Step {
+        coefficients: own.coefficients,
+        columns: own.columns,
+        operand: own.operand,
+        kind: match own.product.operand {
+            Operand::InputHigh => 1,
+            Operand::InputLow => 2,
+            Operand::One => 3,
+            _ => 0,
+        },
+        flip: own.product.matrix.flip as u64,
+        transposed: own.product.transposed,
+        factor: own.product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
+        layer: matches!(own.target, Target::Layer(_)),
+        last: own.last,
+        ends: false,
+        needs: own.needs,
+    };
+    let mut steps: Vec<Step> = instructions(case, section).into_iter().map(step).collect();
     if let Some(step) = steps.last_mut() {
         step.ends = true;
     }
@@ -421,7 +401,6 @@ mod tests {
             factor: if control.layers { random.u64(..3) } else { 0 },
             layer: control.layers && random.bool(),
             last: random.bool(),
-            opens: index == 0,
             ends: index + 1 == count,
             needs: random.usize(..=VECTORS),
         };
@@ -453,13 +432,13 @@ mod tests {
     impl Program {
         /// Addresses, selection and control for `column` of the present step.
         fn put(&self, column: usize) -> [Option<Word>; 5] {
-            let Some((step, _)) = &self.now else { return [None; 5] };
+            let Some((step, index)) = &self.now else { return [None; 5] };
             let address = step.coefficients + column;
             let quad = self.shape.list.get(address).map_or(column, |pair| pair[usize::from(step.transposed)]);
             let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
             let last = step.last && column + 1 == step.columns;
             let Control { layers, opens } = self.shape.control;
-            let opens = u64::from(opens && step.opens && column == 0) << usize::from(layers);
+            let opens = u64::from(opens && *index == 0 && column == 0) << usize::from(layers);
             let control = (opens | u64::from(step.layer)) << 1 | u64::from(last);
             [address as u64, (step.operand + quad) as u64, source, step.factor, control]
                 .map(|word| Some(Word::from(word)))
