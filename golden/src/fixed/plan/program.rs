@@ -200,13 +200,17 @@ mod tests {
 
     #[test]
     fn an_instruction_is_named_as_the_equations_are() {
-        let model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-        let listed = listing(model.cases());
-        let of = |result: &str| -> Vec<String> {
-            let own = listed.iter().filter(|own| own.result == result && own.group == 0);
+        let of = |scene: &str, result: &str| -> Vec<String> {
+            let model = Model::new(&Scene::builtin(scene).unwrap()).unwrap();
+            let own = listing(model.cases()).into_iter().filter(|own| own.result == result && own.group == 0);
             own.map(|own| format!("{} · {}", own.matrix, own.operand)).collect()
         };
-        assert_eq!(of("v_11"), ["−Ax · v_10, x and y exchanged", "−Ax · v_01"]);
+        assert_eq!(of("eight-by-eight", "v_11"), ["−Ay · v_10", "−Ax · v_01"]);
+        // Square taxels in a square subarray: Ay is Ax transposed.
+        let mut square = Scene::builtin("sensor-4").unwrap();
+        square.partition.case = crate::partition::Case::numbered(1).unwrap();
+        let listed = listing(Model::new(&square).unwrap().cases());
+        assert!(listed.iter().any(|own| own.result == "v_01" && own.operand == "v_00, x and y exchanged"));
         let model = Model::new(&Scene::builtin("eight-by-eight-contacts").unwrap()).unwrap();
         let listed = listing(model.cases());
         let step: Vec<&str> = listed.iter().filter(|own| own.result == "p").map(|own| own.operand.as_str()).collect();
