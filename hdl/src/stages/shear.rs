@@ -139,16 +139,18 @@ impl Shape {
         });
         k.when(start, || running.set(k.constant(1, 1)));
         k.wire("label_address", *quad);
-        let read = k.delay("read_out", k.delay("read", memory.read(*quad)));
-        let axis = k.delay("axis2", k.delay("axis1", *second));
+        let read = k.delay("read_2", k.delay("read_1", k.delay("read", memory.read(*quad))));
+        k.comment("Labels and the positions of an axis are registered: from memory to multiplier is too long a way.");
+        let labels = k.delay("labels_held", labels);
+        let axis = k.delay("axis_2", k.delay("axis_1", *second));
+        let positions = k.delay("positions", axis.mux(positions[1], positions[0]));
 
         let lane = |lane: usize| {
             k.scope(&format!("taxel_{lane}"), || {
                 let taxel = hadamard(read)[lane].round_shift(MEAN as usize).low(self.data);
                 let taxel = k.delay("taxel", taxel.unsigned()).signed();
                 let label = labels.slice(lane * self.label_bits(), self.label_bits());
-                let [x, y] = positions.map(|all| self.position_of(&k, label, all));
-                let position = k.delay("position", axis.mux(y, x)).signed();
+                let position = k.delay("position", self.position_of(&k, label, positions)).signed();
                 let product = k.delay("product", taxel * position);
                 // Below 3/4 of a taxel.
                 k.delay("sheared", product.round_shift(POSITION_SHIFT as usize).low(self.data).unsigned())

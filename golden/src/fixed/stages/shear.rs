@@ -14,7 +14,7 @@ use crate::segment::NONE;
 use crate::symmetry::parity::hadamard;
 
 /// Cycles from the cycle in which all quads of p are there to the first operand.
-pub const LATENCY: u64 = 8;
+pub const LATENCY: u64 = 9;
 
 /// Cycles from that cycle to the last operand of an array of `quads` quads, one operand per cycle.
 pub fn cycles(quads: usize) -> u64 {
