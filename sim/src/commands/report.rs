@@ -134,7 +134,7 @@ fn shipped_recordings(options: &Options) -> Result<Section> {
 
 fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
     let choices = choose(measured, options)?;
-    let first = noise(measured, measure::noise(measured, options)?.as_ref())?;
+    let first = noise(measured, &measure::noise(measured, options)?)?;
     let others = vec![
         choice(measured, &choices),
         time(measured)?,

@@ -28,7 +28,7 @@ pub use engines::measure;
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
 pub use measured::{BitTrue, ContactCount, Engine, Measured, Options, Point};
-pub use noise::noise;
+pub use noise::{noise, NoiseStudy};
 pub use objective_map::{objective_map, ObjectiveMap};
 pub use recordings::{recorded, Recorded, MOST_FRAMES};
 pub use stability::{conditions, extremes};

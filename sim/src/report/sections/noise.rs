@@ -1,27 +1,53 @@
-//! The report's first page: error against noise beside error against run time, for the first scene.
+//! The report's first page: error against noise beside error against run time, for the first scene; then scenes with a network.
 
 use anyhow::Result;
 use dermis_golden::noise::ShapeRow;
 
 use super::super::document::{percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
-use super::super::measure::Measured;
+use super::super::measure::{Measured, NoiseStudy};
 use super::super::pictures::{scatter, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::pictures as time_pictures;
 
-/// The section; `noise` is the scene's name with its rows.
+/// The section.
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn noise(measured: &[Measured], noise: Option<&(String, Vec<ShapeRow>)>) -> Result<Option<Section>> {
-    let Some((scene, rows)) = noise else { return Ok(None) };
-    let time = time_pictures(scene, measured)?.into_iter().next();
-    let time = time.map(|time| Picture { id: format!("first-{}", time.id), ..time });
+pub fn noise(measured: &[Measured], studies: &[NoiseStudy]) -> Result<Option<Section>> {
+    let (told, others): (Vec<&NoiseStudy>, Vec<&NoiseStudy>) = studies.iter().partition(|study| study.told);
+    let mut items = Vec::new();
+    for study in &told {
+        let time = time_pictures(&study.scene, measured)?.into_iter().next();
+        let time = time.map(|time| Picture { id: format!("first-{}", time.id), ..time });
+        items.push(Item::Text(
+            "Left: what noise costs, with the hardware's search and the estimators of the golden model. Right: what time buys, \
+             without noise. Both for contacts whose forces are known."
+                .into(),
+        ));
+        items.push(Item::Pictures(std::iter::once(picture(study)?).chain(time).collect()));
+        items.push(Item::Table(table(study)));
+    }
+    if !others.is_empty() {
+        let text = "Scenes with a network, which are one design whatever the noise: the golden model with what the scene names and \
+                    with the hardware's estimator, and the hardware, which is equal to its bit-true model. With contacts of their \
+                    own the error is over the sum of all tangential forces.";
+        items.push(Item::Text(text.into()));
+        items.push(Item::Pictures(others.iter().map(|study| picture(study)).collect::<Result<_>>()?));
+        items.extend(others.iter().map(|study| Item::Table(table(study))));
+    }
+    let title = "Error against noise, and against run time".into();
+    Ok((!items.is_empty()).then_some(Section { id: "noise", title, items }))
+}
+
+fn table(study: &NoiseStudy) -> Table {
+    let NoiseStudy { scene, told, rows } = study;
+    let (draws, contacts) = rows.first().map_or((0, 0), |row| (row.summary.draws, row.contacts));
     let caption = format!(
-        "Shear error of the resultant on {} drawn frames of {scene} (Hertz, punch, ring, rectangle and tilted pressures in \
-         equal shares), noise stated in the scene; bound: Cramér–Rao for a smooth pressure on a known support; none: no \
-         shear, and Σ b·area for the normal force",
-        rows.first().map_or(0, |row| row.summary.draws)
+        "Shear error of the resultant on {draws} drawn frames of {scene} with {contacts} {} each (Hertz, punch, ring, rectangle \
+         and tilted pressures in equal shares), noise {} in the scene; bound: Cramér–Rao for a smooth pressure on a known \
+         support; none: no shear, and Σ b·area for the normal force",
+        if contacts == 1 { "contact" } else { "contacts" },
+        if *told { "stated" } else { "not stated" },
     );
     let head = [
         "noise",
@@ -34,19 +60,8 @@ pub fn noise(measured: &[Measured], noise: Option<&(String, Vec<ShapeRow>)>) -> 
         "flagged",
         "bound, median",
     ];
-    let table = Table::new("noise", caption, &head, rows.iter().map(row).collect());
-    let text =
-        "Left: what noise costs, with the hardware's search and the estimators of the golden model. Right: what time \
-                buys, without noise. Both for contacts whose forces are known.";
-    Ok(Some(Section {
-        id: "noise",
-        title: "Error against noise, and against run time".into(),
-        items: vec![
-            Item::Text(text.into()),
-            Item::Pictures(std::iter::once(picture(scene, rows)?).chain(time).collect()),
-            Item::Table(table),
-        ],
-    }))
+    let id = if *told { "noise".to_owned() } else { format!("{scene}-noise") };
+    Table::new(id, caption, &head, rows.iter().map(row).collect())
 }
 
 fn row(row: &ShapeRow) -> Vec<Cell> {
@@ -64,7 +79,7 @@ fn row(row: &ShapeRow) -> Vec<Cell> {
     ]
 }
 
-fn picture(scene: &str, rows: &[ShapeRow]) -> Result<Picture> {
+fn picture(NoiseStudy { scene, rows, .. }: &NoiseStudy) -> Result<Picture> {
     // A logarithmic axis has no zero.
     let noisy: Vec<&ShapeRow> = rows.iter().filter(|row| row.noise > 0.0).collect();
     let mut names: Vec<&str> = Vec::new();
