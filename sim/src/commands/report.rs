@@ -181,7 +181,7 @@ fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     }
     if options.quick {
         intro.push(
-            "Quick variant: few random frames; hardware co-simulated for sensor-1 and eight-by-eight in case 0 only, \
+            "Quick variant: few random frames; hardware co-simulated for the scenes of `make run` in their own case only, \
              else with the bit-true model's cycle counts; no subarrays above 1200 taxels; literal Eq. 1 up to 200 \
              taxels; one sweep. dermis report without --quick runs everything."
                 .into(),
