@@ -8,6 +8,7 @@
 //! | in: per subarray | condition, centroids, μ, objective | –, mm, –, bits |
 //! | in: forces | 3 × taxels | N |
 //! | out: resultant | 3 | N |
+//! | out: wrench | 3, 3 | N, N mm |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
 mod contacts;
@@ -20,7 +21,7 @@ pub use contacts::FoundContact;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
-pub use output::{shear_sigma_N, Resultant};
+pub use output::{shear_sigma_N, Resultant, Wrench};
 
 use crate::checks::Checks;
 use crate::errors::Errors;
@@ -101,7 +102,7 @@ pub fn assemble(
     forces: Forces,
     flags: Vec<Flag>,
 ) -> Reconstruction {
-    let resultant_N = forces.resultant();
+    let (resultant_N, wrench) = (forces.resultant(), Wrench::of(&scene.sensor, &forces));
     if !forces.fz.is_empty() {
         for own in &mut subarrays {
             let normal_N = own.part().indices(&scene.sensor).map(|k| forces.fz[k]).sum();
@@ -126,17 +127,19 @@ pub fn assemble(
         forces_N: forces,
         flags: flags.into_iter().collect(),
         checks: Checks::default(),
-        extra: Extra::default(),
+        extra: Extra { wrench, ..Extra::default() },
     }
 }
 
 impl Reconstruction {
     /// The result with resultants in place of its forces: one per region if it has regions, else one per subarray.
     pub(crate) fn with_resultants(mut self, sensor: &Sensor) -> Reconstruction {
-        let of = |taxels: &mut dyn Iterator<Item = usize>| Resultant::of(sensor, &self.forces_N, taxels);
         let resultants = match &self.extra.regions {
-            Some(regions) => regions.iter().map(|region| of(&mut region.taxels.iter().copied())).collect(),
-            None => self.subarrays.iter().map(|own| of(&mut own.part().indices(sensor))).collect(),
+            Some(regions) => regions.iter().map(Region::resultant).collect(),
+            None => {
+                let of = |own: &SubarrayResult| Resultant::of(sensor, &self.forces_N, own.part().indices(sensor));
+                self.subarrays.iter().map(of).collect()
+            }
         };
         self.extra.resultants = Some(resultants);
         self.forces_N = Forces::default();

@@ -10,7 +10,7 @@
 //!
 //! Where each contact has a μ of its own, `contacts` starts the stages in turn: v_00 goes to `segment`; for each contact `window`
 //! gives the operands of the first layer; for each step `shear` gives those of the products; `label_beats` adds the labels to the
-//! stream. The frame buffer is free when the last window has been read.
+//! stream, or `resultants` sums the forces of each label. The frame buffer is free when the last window has been read.
 //!
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
@@ -185,7 +185,7 @@ impl Engine {
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let which = count_bits(counts.len());
         let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
-        let forces = Forces::new(model);
+        let (forces, resultants) = (Forces::new(model), Resultants::new(model));
         let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.scene.input.slides());
         let mut engine = Engine {
             clk: Default::default(),
@@ -194,7 +194,7 @@ impl Engine {
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(forces.m_axis_tdata.width()),
+            m_axis_tdata: Wire::new(resultants.m_axis_tdata.width()),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -214,7 +214,7 @@ impl Engine {
             search: SearchStage::new(model),
             forces,
             send: Send::new(model),
-            resultants: Resultants::new(model.sends_resultants(), &model.scene.sensor, model.grid()),
+            resultants,
             begins: BitDelay::new(1),
             computing: Default::default(),
             first: Default::default(),

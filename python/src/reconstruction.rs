@@ -82,6 +82,12 @@ impl Contact {
         self.0.mu_covariance.map(|[xx, xy, yy]| grid(py, &[xx, xy, xy, yy], [2, 2])).transpose()
     }
 
+    /// Number of its taxels; None where the estimator lets contacts overlap.
+    #[getter]
+    fn taxels(&self) -> Option<usize> {
+        self.0.taxels
+    }
+
     fn __repr__(&self) -> String {
         let [x, y, normal] = self.0.force_N;
         let sigma = self.0.sigma_N().map_or("None".to_owned(), |[x, y, z]| format!("[{x:.3}, {y:.3}, {z:.3}]"));
@@ -141,6 +147,13 @@ impl Reconstruction {
     #[getter]
     fn resultant_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.result.resultant_N)
+    }
+
+    /// Moment of the forces about the array's centre in N mm, shape (3,): about x, y, and the normal into the sensor; None where a
+    /// device sends sums of subarrays.
+    #[getter]
+    fn moment_Nmm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.result.extra.wrench.map(|wrench| array(py, wrench.moment_Nmm))
     }
 
     /// The contacts: with standard deviations of the force from the estimators "evidence" and "learned"; with

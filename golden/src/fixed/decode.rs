@@ -1,9 +1,11 @@
 //! Decode: the words of a device, or of this model, as a result in physical units.
 
+mod records;
+
+use self::records::Records;
 use super::error::FixedError;
 use super::model::Model;
 use super::plan::contents::CasePlan;
-use super::stages::resultants;
 use super::stages::send::{
     labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
     FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
@@ -18,7 +20,7 @@ use crate::input::Input;
 use crate::partition::Subarray;
 use crate::reception::{noise_floor_codes, receive, Received};
 use crate::reconstruct::{
-    assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, Resultant, SubarrayResult,
+    assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
 
 /// μ as a status has it.
@@ -73,18 +75,15 @@ impl Model {
         }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
         let taxels = self.scene.sensor.taxels();
-        let (beats, labels) = match self.by_contact {
-            Some(_) => (&beats[..taxels], Some(labels_of_beats(&beats[taxels..], taxels))),
-            None => (beats, None),
+        let records = Records::new(self, beats, lsb);
+        let forces = match records {
+            None => {
+                let axis = |axis: usize| beats[..taxels].iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
+                Forces { fx: axis(0), fy: axis(1), fz: axis(2) }
+            }
+            Some(_) => Forces::default(),
         };
-        let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
-        let forces = match self.sends_resultants() {
-            false => Forces { fx: axis(0), fy: axis(1), fz: axis(2) },
-            true => Forces::default(),
-        };
-        let resultants = self.sends_resultants().then(|| self.resultants(beats, lsb));
-        let sum = |all: &Vec<Resultant>| [0, 1, 2].map(|k| all.iter().map(|r| r.force_N[k]).sum::<f64>());
-        let resultant_N = resultants.as_ref().map_or_else(|| forces.resultant(), sum);
+        let resultant_N = records.as_ref().map_or_else(|| forces.resultant(), Records::resultant_N);
 
         if !resultant_N.iter().all(|sum| sum.is_finite()) {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
@@ -109,9 +108,18 @@ impl Model {
         let received = |part: &Subarray| {
             receive(sensor, part, &part.gather(sensor, &codes.codes), floor, self.scene.partition.condition)
         };
-        let regions: Option<Vec<Region>> = labels.map(|labels| {
-            let region = |(slot, status)| self.region(&labels, slot, status, &forces);
-            all.iter().enumerate().filter_map(region).collect()
+        let regions = self.by_contact.is_some().then(|| {
+            // The contact of each status: the taxels of its label, or the record after that of no contact.
+            let own: Vec<Region> = match &records {
+                None => {
+                    let labels = labels_of_beats(&beats[taxels..], taxels);
+                    let of = |slot| (0..taxels).filter(|&taxel| labels[taxel] == slot + 1).collect();
+                    (0..all.len()).map(|slot| Region::of_taxels(sensor, &forces, of(slot))).collect()
+                }
+                Some(records) => records.regions(),
+            };
+            let found = own.into_iter().zip(&all).filter(|(own, _)| own.taxel_count > 0);
+            found.map(|(own, status)| self.with_status(own, status)).collect::<Vec<Region>>()
         });
         if let Some(regions) = &regions {
             shear_spread = shear_spread_of(regions);
@@ -135,16 +143,24 @@ impl Model {
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
         result.extra.regions = regions;
-        if self.sends_resultants() {
+        if let Some(records) = &records {
             // Without forces per taxel only the device knows whether there is a contact.
             let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
-            for (own, of) in result.subarrays.iter_mut().zip(resultants.iter().flatten()) {
-                own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+            let resultants = match &result.extra.regions {
+                Some(regions) => regions.iter().map(Region::resultant).collect(),
+                None => records.resultants(),
+            };
+            if result.extra.regions.is_some() {
+                result.extra.wrench = Some(records.wrench());
+            } else {
+                for (own, of) in result.subarrays.iter_mut().zip(&resultants) {
+                    own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+                }
             }
-            result.extra.resultants = resultants;
+            result.extra.resultants = Some(resultants);
         }
         if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.
@@ -170,17 +186,12 @@ impl Model {
         StatusMu { condition, found, mu, estimate }
     }
 
-    /// The contact with the status in this slot, if there is one; `labels` are those of the taxels.
-    fn region(&self, labels: &[usize], slot: usize, status: &Status, forces: &Forces) -> Option<Region> {
-        let taxels: Vec<usize> = (0..labels.len()).filter(|&taxel| labels[taxel] == slot + 1).collect();
+    /// A contact with what its status says.
+    fn with_status(&self, own: Region, status: &Status) -> Region {
         let StatusMu { condition, mu, estimate, .. } = self.told(status);
-        let own = Region {
-            centroid_condition: condition,
-            mu,
-            objective_value: estimate.map(|estimate| estimate.found.objective),
-            ..Region::of_taxels(&self.scene.sensor, forces, taxels).with_sigma(estimate.and_then(|told| told.sigma))
-        };
-        (!own.taxels.is_empty()).then_some(own)
+        let objective_value = estimate.map(|estimate| estimate.found.objective);
+        let own = Region { centroid_condition: condition, mu, objective_value, ..own };
+        own.with_sigma(estimate.and_then(|told| told.sigma))
     }
 
     /// The case that a frame's status names; of a scene with one case, that case.
@@ -191,17 +202,5 @@ impl Model {
         let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
         let case = self.cases().iter().find(|case| case.number() == number);
         case.ok_or(FixedError::Internal("the status names a case that was not built"))
-    }
-
-    /// The resultants in a device's beats; one LSB of a force word is `lsb_N`.
-    fn resultants(&self, beats: &[[i32; 3]], lsb_N: f64) -> Vec<Resultant> {
-        let sensor = &self.scene.sensor;
-        let half_pitch = [sensor.pitch_x_mm / 2.0, sensor.pitch_y_mm / 2.0];
-        let resultant = |beats: &[[i32; 3]]| {
-            let [fx, fy, fz, pressed, x, y] = resultants::of_beats(beats).unwrap_or_default().map(|sum| sum as f64);
-            let centre = [x * half_pitch[0] / pressed, y * half_pitch[1] / pressed];
-            Resultant { force_N: [fx, fy, fz].map(|f| f * lsb_N), centre_mm: (pressed > 0.0).then_some(centre) }
-        };
-        beats.chunks(resultants::BEATS).map(resultant).collect()
     }
 }

@@ -12,7 +12,7 @@ use super::stages::choose;
 use super::stages::forces::Force;
 use super::stages::prepare::Prepared;
 use super::stages::receive::mask;
-use super::stages::resultants::{self, sums};
+use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
 use super::stages::send::{
     labels_to_beats, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT,
@@ -33,7 +33,7 @@ pub struct Stage {
 /// Everything the hardware computes for one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// Forces `[fx, fy, fz]` in force LSBs, row-major; with `output.forces = "resultants"` the sums of each subarray.
+    /// Forces `[fx, fy, fz]` in force LSBs, row-major; with `output.forces = "resultants"` the record of each subarray or label.
     pub beats: Vec<[i32; 3]>,
     /// Status beats, three words each ([`send`](super::stages::send)).
     pub status: Vec<[i32; 3]>,
@@ -99,7 +99,12 @@ impl Model {
         let most = self.scene.partition.max_contacts;
         let status = solved.iter().flat_map(|s| s.told(most).into_iter().flat_map(|told| beats_of(s, told)));
         let status = status.collect();
-        let labels = solved.iter().filter_map(|s| s.contacts.as_ref()).flat_map(|c| labels_to_beats(&c.labels));
+        let labels: Vec<usize> =
+            solved.iter().filter_map(|s| s.contacts.as_ref()).flat_map(|c| c.labels.iter().copied()).collect();
+        let record = |summed, index: usize| match summed {
+            Summed::Subarray => Record::of(sensor, case.parts[index].indices(sensor), &forces),
+            Summed::Label => Record::of(sensor, (0..labels.len()).filter(|&taxel| labels[taxel] == index), &forces),
+        };
         let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
             name,
             words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
@@ -132,9 +137,9 @@ impl Model {
             _ => true,
         });
         Trace {
-            beats: match self.sends_resultants() {
-                false => forces.iter().map(|f| f.words).chain(labels).collect(),
-                true => case.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
+            beats: match self.summed() {
+                None => forces.iter().map(|f| f.words).chain(labels_to_beats(&labels)).collect(),
+                Some(summed) => (0..self.records()).flat_map(|k| record(summed, k).beats(summed)).collect(),
             },
             status,
             stages: as_engine_streams(self.board.engine, stages),

@@ -3,7 +3,7 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: contacts of `evidence`, else regions | – | – |
-//! | out: force, μ, centre, standard deviations | per contact | N, –, mm |
+//! | out: force, μ, centre, standard deviations, number of taxels | per contact | N, –, mm, – |
 
 use super::{Reconstruction, Region};
 use crate::evidence::ContactEstimate;
@@ -26,6 +26,8 @@ pub struct FoundContact {
     pub mu_sigma: Option<[f64; 2]>,
     /// Covariance of μ, [xx, xy, yy].
     pub mu_covariance: Option<[f64; 3]>,
+    /// Number of its taxels; `None` where contacts overlap.
+    pub taxels: Option<usize>,
 }
 
 impl FoundContact {
@@ -47,6 +49,7 @@ impl From<&ContactEstimate> for FoundContact {
             mu: found.mu,
             mu_sigma: Some([0, 2].map(|axis| found.mu_covariance[axis].sqrt())),
             mu_covariance: Some(found.mu_covariance),
+            taxels: None,
         }
     }
 }
@@ -61,6 +64,7 @@ impl From<&Region> for FoundContact {
             mu: region.mu,
             mu_sigma: region.mu_sigma,
             mu_covariance: None,
+            taxels: Some(region.taxel_count),
         }
     }
 }

@@ -7,11 +7,12 @@
 //! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: truncation error of the series in μ |
 //! | `unipolar` | `input.unipolar = true` | clipped and filled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
+//! | `wrench` | a force per taxel, or a record for each contact | force and moment of the whole array |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
 //! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
-use super::output::{shear_sigma_N, Resultant};
+use super::output::{shear_sigma_N, Resultant, Wrench};
 use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::ContactEstimate;
 use crate::frame::Forces;
@@ -49,6 +50,9 @@ pub struct Extra {
     /// The forces of `output.forces = "resultants"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resultants: Option<Vec<Resultant>>,
+    /// Force and moment of the whole array; `None` where a device sends sums of subarrays, which do not have the moments.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrench: Option<Wrench>,
 }
 
 /// Statistics of the estimated tension.
@@ -88,7 +92,12 @@ pub struct RejectedCase {
 impl Region {
     /// A region with these taxels, ascending, and their `forces`; nothing is known of its μ.
     pub(crate) fn of_taxels(sensor: &Sensor, forces: &Forces, taxels: Vec<usize>) -> Region {
-        let Resultant { force_N: load_N, centre_mm } = Resultant::of(sensor, forces, taxels.iter().copied());
+        let own = Resultant::of(sensor, forces, taxels.iter().copied());
+        Region { taxel_count: taxels.len(), taxels, ..Region::of_resultant(own) }
+    }
+
+    /// A region with this force; nothing is known of its μ and its taxels.
+    pub(crate) fn of_resultant(Resultant { force_N, centre_mm }: Resultant) -> Region {
         Region {
             centroid_condition: false,
             mu: [0.0; 2],
@@ -96,9 +105,15 @@ impl Region {
             shear_sigma_N: None,
             objective_value: None,
             centre_mm,
-            load_N,
-            taxels,
+            load_N: force_N,
+            taxel_count: 0,
+            taxels: Vec::new(),
         }
+    }
+
+    /// The force of the region.
+    pub(crate) fn resultant(&self) -> Resultant {
+        Resultant { force_N: self.load_N, centre_mm: self.centre_mm }
     }
 
     /// The region with this standard deviation of μ, and that of the shear which follows from it.
@@ -134,6 +149,9 @@ pub struct Region {
     pub centre_mm: Option<[f64; 2]>,
     /// Sum of the reported forces in N, [x, y, normal].
     pub load_N: [f64; 3],
-    /// Row-major indices in the array of the region's taxels, ascending.
+    /// Number of the region's taxels.
+    #[serde(default)]
+    pub taxel_count: usize,
+    /// Row-major indices in the array of the region's taxels, ascending; empty where a device sends a record for each contact.
     pub taxels: Vec<usize>,
 }

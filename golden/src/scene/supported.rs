@@ -79,10 +79,10 @@ impl Scene {
             ),
             rule(several && search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with adaptive"),
             rule(
-                self.partition.case.grid().is_none() && self.output.forces == ForceOutput::Resultants,
+                several && self.output.forces == ForceOutput::Resultants,
                 "output.forces",
                 "resultants".to_string(),
-                "taxels, with adaptive or contacts",
+                "taxels, with adaptive",
             ),
             rule(
                 several && self.hardware.search_width.is_some_and(|width| width < Quads::LANES),

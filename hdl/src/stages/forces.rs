@@ -77,7 +77,8 @@ pub struct Forces {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
+    /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or a status beat; valid
+    /// with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
     quads: Counter,
     asked: Delay,

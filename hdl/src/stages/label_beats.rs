@@ -3,7 +3,7 @@
 //! The beats of the forces pass. Then the labels are read row-major, one a cycle, into the next beat, and the stream in front
 //! of it waits; then the statuses pass.
 
-use dermis_golden::fixed::stages::send::{label_beats, LABELS_PER_BEAT, LABEL_BITS};
+use dermis_golden::fixed::stages::send::{LABELS_PER_BEAT, LABEL_BITS};
 use dermis_golden::fixed::Model;
 use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
@@ -17,7 +17,7 @@ use crate::wire::Wire;
 /// s_axis --------------------> m_axis
 /// labels --> lane --> beat -----^
 /// ```
-/// Without contacts the stream passes on wires.
+/// Without contacts, and where a record of each takes the place of the forces, the stream passes on wires.
 #[derive(LogicBlock)]
 pub struct LabelBeats {
     /// Clock; registers change on its rising edge.
@@ -64,6 +64,8 @@ struct Shape {
     bits: usize,
     /// Largest number of contacts; 0 without contacts.
     contacts: usize,
+    /// Beats of labels in a frame; 0 where the output has none.
+    beats: usize,
 }
 
 /// Cycles from the scan of a taxel until its label is in the beat.
@@ -72,7 +74,8 @@ const READ: usize = 5;
 impl LabelBeats {
     /// For beats of `bits` bits of `model`.
     pub fn new(model: &Model, bits: usize) -> Self {
-        LabelBeats::of(Shape { layout: model.layout(), bits, contacts: model.contacts() })
+        let (contacts, beats) = (model.contacts(), model.label_beats());
+        LabelBeats::of(Shape { layout: model.layout(), bits, contacts, beats })
     }
 
     fn of(shape: Shape) -> Self {
@@ -108,8 +111,8 @@ impl Shape {
         let (data, given) = (k.input("s_axis_tdata", self.bits), k.input("s_axis_tvalid", 1));
         let (last, taken) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
         let labels = k.input("labels", Quads::LANES * self.label_bits());
-        if self.contacts == 0 {
-            k.comment("There are no contacts.");
+        if self.beats == 0 {
+            k.comment("There are no contacts, or a record of each in place of the labels.");
             for (name, value) in
                 [("m_axis_tdata", data), ("m_axis_tvalid", given), ("m_axis_tlast", last), ("s_axis_tready", taken)]
             {
@@ -119,7 +122,7 @@ impl Shape {
             k.wire("label_address", k.constant(count_bits(self.layout.len()), 0));
             return k.finish();
         }
-        let (taxels, beats) = (self.layout.rows * self.layout.cols, label_beats(self.layout.rows * self.layout.cols));
+        let (taxels, beats) = (self.layout.rows * self.layout.cols, self.beats);
         let counter = |name: &str, count: usize| k.state(name, Type::unsigned(count_bits(count)), rst, 0);
         let reads = k.state("reads", Type::unsigned(1), rst, 0);
         let passed = counter("passed", taxels + 1);
@@ -194,13 +197,13 @@ fn later<'k>(k: &'k Builder, rst: Expr<'k>, name: &str, value: Expr<'k>) -> Expr
 mod tests {
     use std::collections::VecDeque;
 
-    use dermis_golden::fixed::stages::send::labels_to_beats;
+    use dermis_golden::fixed::stages::send::{label_beats, labels_to_beats};
 
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8 };
+    const SHAPE: Shape = Shape { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8, beats: 2 };
     const BITS: usize = 4;
     /// Cycles from the beat before to one of labels, at full speed.
     const CYCLES: usize = LABELS_PER_BEAT + READ - 1;

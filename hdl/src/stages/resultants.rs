@@ -1,28 +1,32 @@
-//! Sums per subarray in place of a force per taxel.
+//! Sums per subarray or label in place of a force per taxel.
 
-use dermis_golden::fixed::stages::resultants::{BEATS, POSITION_BITS, SUMS, SUM_BITS};
+use dermis_golden::fixed::stages::resultants::{Summed, POSITION_BITS, SUM_BITS};
 use dermis_golden::fixed::words::formats::FORCE_BITS;
+use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
 use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// ```text
-/// s_axis (forces, row-major; status) --> X fz⁺, Y fz⁺ --> sums of each subarray --> m_axis (sums; status)
+/// s_axis (forces, row-major; status) --> moments --> sums of each subarray or label --> m_axis (sums; status)
 /// ```
 /// One force is accepted per cycle. The sums start to leave four cycles after the last force, then the status beats
 /// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
+///
+/// Where each contact has a μ of its own, a force comes with the label of its taxel, and the taxels of a label are counted.
 #[derive(LogicBlock)]
 pub struct Resultants {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// `{fz, fy, fx}` of a taxel, 32 bits signed each, or a status beat; valid with `s_axis_tvalid`.
+    /// `{fz, fy, fx}` of a taxel, 32 bits signed each, with contacts above them its label, or a status beat; valid with
+    /// `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
     /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
@@ -55,13 +59,63 @@ kernel_block!(
     outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
 );
 
+/// What tells to which sums a force is added.
+#[derive(Clone, Copy, Debug)]
+enum Parts {
+    /// The subarray of its taxel.
+    Subarrays(Grid),
+    /// Its label, one of so many.
+    Labels(usize),
+}
+
+impl Parts {
+    fn summed(self) -> Summed {
+        match self {
+            Parts::Subarrays(_) => Summed::Subarray,
+            Parts::Labels(_) => Summed::Label,
+        }
+    }
+
+    /// Subarrays along rows and columns.
+    fn grid(self) -> Grid {
+        match self {
+            Parts::Subarrays(grid) => grid,
+            Parts::Labels(_) => Grid { rows: 1, cols: 1 },
+        }
+    }
+
+    /// Number of records.
+    fn count(self) -> usize {
+        match self {
+            Parts::Subarrays(grid) => grid.rows * grid.cols,
+            Parts::Labels(count) => count,
+        }
+    }
+
+    /// Width of a beat of a force.
+    fn force_bits(self) -> usize {
+        match self {
+            Parts::Subarrays(_) => 3 * WORD,
+            Parts::Labels(count) => 3 * WORD + count_bits(count),
+        }
+    }
+}
+
 impl Resultants {
-    /// For the array `sensor` divided into `parts`; if sums are not `wanted`, the stream passes through.
-    pub fn new(wanted: bool, sensor: &Sensor, parts: Grid) -> Self {
+    /// The records of `model`; of a scene that asks for a force per taxel, the stream passes through.
+    pub fn new(model: &Model) -> Self {
+        let parts = model.summed().map(|summed| match summed {
+            Summed::Subarray => Parts::Subarrays(model.grid()),
+            Summed::Label => Parts::Labels(model.records()),
+        });
+        Resultants::of(parts, &model.scene.sensor)
+    }
+
+    fn of(parts: Option<Parts>, sensor: &Sensor) -> Self {
         let block = Resultants {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(3 * WORD),
+            s_axis_tdata: Wire::new(parts.map_or(3 * WORD, Parts::force_bits)),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -71,7 +125,7 @@ impl Resultants {
             m_axis_tlast: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(if wanted { sums(sensor, parts) } else { pass_through() })
+        block.bind(parts.map_or_else(pass_through, |parts| sums(sensor, parts)))
     }
 }
 
@@ -113,12 +167,12 @@ fn pick<'k>(index: Expr<'k>, values: &[Expr<'k>]) -> Expr<'k> {
     index.case(&arms, values[0])
 }
 
-fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
-    let count = parts.rows * parts.cols;
-    let (rows, cols) = (sensor.rows / parts.rows, sensor.cols / parts.cols);
+fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
+    let (count, grid, summed) = (parts.count(), parts.grid(), parts.summed());
+    let (rows, cols) = (sensor.rows / grid.rows, sensor.cols / grid.cols);
     let k = Builder::new("resultants");
     let rst = k.input("rst", 1);
-    let (data, valid) = (k.input("s_axis_tdata", 3 * WORD), k.input("s_axis_tvalid", 1));
+    let (data, valid) = (k.input("s_axis_tdata", parts.force_bits()), k.input("s_axis_tvalid", 1));
     let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
     let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
     let restart = k.net("restart", bit);
@@ -132,9 +186,9 @@ fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
 
     k.comment("The taxel of the next force: row and column in its subarray, and of its subarray.");
     let col = Lines::new(&k, "col", cols, *restart);
-    let part_col = Lines::new(&k, "part_col", parts.cols, *restart);
+    let part_col = Lines::new(&k, "part_col", grid.cols, *restart);
     let row = Lines::new(&k, "row", rows, *restart);
-    let part_row = Lines::new(&k, "part_row", parts.rows, *restart);
+    let part_row = Lines::new(&k, "part_row", grid.rows, *restart);
     let line_last = k.wire("line_last", col.is_last & part_col.is_last);
     let last_force = k.wire("last_force", line_last & row.is_last & part_row.is_last);
     let take = k.wire("take", *counting & valid);
@@ -157,51 +211,77 @@ fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
         k.when(last_force, || counting.set(zero));
     });
 
-    k.comment("A force and its products; the index of the subarray as a table, in place of a product.");
     let part_bits = count_bits(count);
-    let index = |k_part: usize| {
-        let (i, j) = (k_part / parts.cols, k_part % parts.cols);
-        let at = (i << part_col.count.bits() | j) as u64;
-        (at, k.constant(part_bits, k_part as u64))
+    let part = match parts {
+        Parts::Labels(_) => data.slice(3 * WORD, part_bits),
+        Parts::Subarrays(_) => {
+            k.comment("The index of the subarray as a table, in place of a product.");
+            let index = |k_part: usize| {
+                let (i, j) = (k_part / grid.cols, k_part % grid.cols);
+                let at = (i << part_col.count.bits() | j) as u64;
+                (at, k.constant(part_bits, k_part as u64))
+            };
+            let arms: Vec<(u64, Expr)> = (0..count).map(index).collect();
+            k.wire("part", part_row.count.concat(*part_col.count).case(&arms, k.constant(part_bits, 0)))
+        }
     };
-    let arms: Vec<(u64, Expr)> = (0..count).map(index).collect();
-    let part = k.wire("part", part_row.count.concat(*part_col.count).case(&arms, k.constant(part_bits, 0)));
     let part_2 = k.delay("part_2", k.delay("part_1", part));
+    k.comment("A force and its products; those with fz⁺ are 0 for a taxel in tension.");
     let component = |n: usize| data.slice(n * WORD, WORD).signed();
-    let force = ["fx", "fy", "fz"]
-        .iter()
-        .enumerate()
-        .map(|(n, name)| k.delay(name, k.delay(&format!("{name}_1"), component(n))));
-    let pressed = k.delay("pressed_1", data.top().mux(k.signed_constant(WORD, 0), component(2)));
-    let moments = [("moment_x", "x_1", *x), ("moment_y", "y_1", *y)];
-    let moments = moments.map(|(name, held, place)| k.delay(name, pressed * k.delay(held, place)));
-    let values: Vec<Expr> = force.chain([k.delay("pressed", pressed)]).chain(moments).collect();
+    let once = ["fx_1", "fy_1", "fz_1"].into_iter().enumerate().map(|(n, name)| k.delay(name, component(n)));
+    let once: Vec<Expr> = once.collect();
+    let force = [("fx", once[0]), ("fy", once[1]), ("fz", once[2])].map(|(name, value)| k.delay(name, value));
+    let places = [("x_1", *x), ("y_1", *y)].map(|(name, place)| k.delay(name, place));
+    let moment = |name: &str, force: usize, axis: usize| k.delay(name, once[force] * places[axis]);
+    let moments = [moment("moment_x", 2, 0), moment("moment_y", 2, 1)];
+    let tension = k.delay("tension", once[2].top());
+    let mut values: Vec<Expr> = force.to_vec();
+    let pressing = [force[2], moments[0], moments[1]];
+    values.extend(pressing.map(|value| tension.mux(k.signed_constant(value.bits(), 0), value)));
+    if summed == Summed::Label {
+        values.extend(moments);
+        values.extend([moment("shear_x", 1, 0), moment("shear_y", 0, 1)]);
+    }
 
     let adds = later("valid_2", later("valid_1", take));
     let settling = later("settling_1", take & last_force);
     let settling = [settling, later("settling_2", settling)];
     let settled = later("settling_3", settling[1]);
+    k.comment("The sums of each part; before its first force they are 0.");
     let part_out = k.state("part_out", Type::unsigned(part_bits), *restart, 0);
-    let sum = |n: usize| {
-        let one = |part: usize| k.state(&format!("sum_{n}_{part}"), Type::signed(SUM_BITS as usize), *restart, 0);
-        let own: Vec<Net> = (0..count).map(one).collect();
-        let present: Vec<Expr> = own.iter().map(Net::get).collect();
-        let sum = k.wire(&format!("next_{n}"), (pick(part_2, &present) + values[n]).resize(SUM_BITS as usize));
-        for (part, own) in own.iter().enumerate() {
-            k.when(adds & part_2.is(part as u64), || own.set(sum));
-        }
-        pick(*part_out, &present).extend(WIDE)
+    let at = k.wire("at", sending.mux(*part_out, part_2));
+    let begun = k.state("begun", Type::unsigned(count), *restart, 0);
+    let begins = |part: usize| begun.at(part) | (adds & part_2.is(part as u64));
+    begun.set(concat(&(0..count).rev().map(begins).collect::<Vec<_>>()));
+    let has_begun = pick(at, &(0..count).map(|part| begun.at(part)).collect::<Vec<_>>());
+    let has_begun = k.wire("has_begun", has_begun);
+    let kept = |name: &str, bits: usize| {
+        let memory = k.memory(name, count, bits, Contents::Undefined);
+        let present = k.wire(&format!("{name}_now"), memory.read(at) & has_begun.repeat(bits));
+        (memory, present)
     };
-    let all: Vec<Expr> = (0..SUMS).rev().map(sum).collect();
+    let sum = |(n, value): (usize, &Expr<'_>)| {
+        let (memory, present) = kept(&format!("sum_{n}"), SUM_BITS as usize);
+        let present = present.signed();
+        memory.write(adds, part_2, (present + *value).resize(SUM_BITS as usize).unsigned());
+        present.extend(WIDE).unsigned()
+    };
+    let mut all: Vec<Expr> = values.iter().enumerate().map(sum).collect();
+    if summed.counts() {
+        let (memory, present) = kept("taxels", count_bits(sensor.taxels() + 1));
+        memory.write(adds, part_2, present.plus(1));
+        all.push(present.extend(WORD));
+    }
+    all.reverse();
     let all = k.wire("all", concat(&all));
 
-    let quarter = k.state("quarter", Type::unsigned(2), *restart, 0);
-    let now: Vec<Expr> = (0..BEATS).map(|n| all.slice(n * 3 * WORD, 3 * WORD)).collect();
+    let beat = Lines::new(&k, "beat", summed.beats(), *restart);
+    let now: Vec<Expr> = (0..summed.beats()).map(|n| all.slice(n * 3 * WORD, 3 * WORD)).collect();
     let sent = k.wire("sent", *sending & ready);
     k.when(settled, || sending.set(one));
     k.when(sent, || {
-        quarter.set(quarter.plus(1));
-        k.when(quarter.is(BEATS as u64 - 1), || {
+        beat.step(&k);
+        k.when(beat.is_last, || {
             part_out.set(part_out.plus(1));
             k.when(part_out.is(count as u64 - 1), || sending.set(zero));
         });
@@ -212,17 +292,17 @@ fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
     k.wire("s_axis_tready", *counting | (passing & ready));
     k.wire("m_axis_tvalid", *sending | (passing & valid));
     k.wire("m_axis_tlast", passing & last);
-    k.wire("m_axis_tdata", sending.mux(pick(*quarter, &now), data));
+    k.wire("m_axis_tdata", sending.mux(pick(*beat.count, &now), data.low(3 * WORD)));
     k.finish()
 }
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::stages::resultants::{beats, half_pitches};
+    use dermis_golden::fixed::stages::resultants::{half_pitches, Record};
     use dermis_golden::scene::Scene;
 
     use super::*;
-    use crate::language::testbench::{check, random_word, Reference};
+    use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
     /// Cycles from the last force to complete sums.
@@ -231,43 +311,48 @@ mod tests {
     /// Adds up each force as it is taken.
     struct Sums {
         sensor: Sensor,
-        parts: Grid,
+        parts: Parts,
         reset: bool,
         taxel: usize,
         /// Remaining cycles until the sums are complete.
         settling: usize,
         /// Index of the next beat of sums.
         beat: usize,
-        sums: Vec<[i64; SUMS]>,
+        records: Vec<Record>,
     }
 
     impl Sums {
         fn restart(&mut self) {
-            let parts = self.sums.len();
-            (self.taxel, self.settling, self.beat, self.sums) = (0, 0, 0, vec![[0; SUMS]; parts]);
+            (self.taxel, self.settling, self.beat) = (0, 0, 0);
+            self.records.fill(Record::default());
         }
 
         fn counting(&self) -> bool {
             self.taxel < self.sensor.taxels()
         }
 
+        /// Number of beats of sums.
+        fn beats(&self) -> usize {
+            self.parts.summed().beats() * self.records.len()
+        }
+
         fn sending(&self) -> bool {
-            !self.counting() && self.settling == 0 && self.beat < BEATS * self.sums.len()
+            !self.counting() && self.settling == 0 && self.beat < self.beats()
         }
 
         fn passing(&self) -> bool {
-            !self.counting() && self.settling == 0 && self.beat == BEATS * self.sums.len()
+            !self.counting() && self.settling == 0 && self.beat == self.beats()
         }
 
         fn add(&mut self, data: &Word) {
-            let (sensor, parts, taxel) = (&self.sensor, self.parts, self.taxel);
+            let (sensor, taxel) = (&self.sensor, self.taxel);
             let (row, col) = (taxel / sensor.cols, taxel % sensor.cols);
-            let part = row / (sensor.rows / parts.rows) * parts.cols + col / (sensor.cols / parts.cols);
-            let [x, y] = half_pitches(sensor, taxel);
-            let [fx, fy, fz] = [0, 1, 2].map(|n| data.signed(n, WORD));
-            let pressed = fz.max(0);
-            let values = [fx, fy, fz, pressed, x * pressed, y * pressed];
-            self.sums[part].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            let part = match self.parts {
+                Parts::Labels(count) => data.field(3 * WORD, count_bits(count)) as usize,
+                Parts::Subarrays(Grid { rows, cols }) => row / (sensor.rows / rows) * cols + col / (sensor.cols / cols),
+            };
+            let force = [0, 1, 2].map(|n| data.signed(n, WORD) as i32);
+            self.records[part].add(half_pitches(sensor, taxel), force);
             self.taxel += 1;
             self.settling = SETTLE;
         }
@@ -281,10 +366,11 @@ mod tests {
             let [valid, last, ready] = [2, 3, 4].map(|k| inputs[k].number() == 1);
             let data = match self.sending() {
                 true => {
-                    let words = beats(&self.sums[self.beat / BEATS])[self.beat % BEATS];
+                    let (summed, beats) = (self.parts.summed(), self.parts.summed().beats());
+                    let words = self.records[self.beat / beats].beats(summed)[self.beat % beats];
                     Word::of_fields(&words.map(i64::from), WORD)
                 }
-                false => inputs[1],
+                false => Word::of_fields(&[0, 1, 2].map(|n| inputs[1].signed(n, WORD)), WORD),
             };
             vec![
                 Some((self.counting() || self.passing() && ready).into()),
@@ -314,31 +400,39 @@ mod tests {
         }
     }
 
-    fn are_those_of_the_model(rows: usize, cols: usize, parts: Grid) {
+    fn are_those_of_the_model(rows: usize, cols: usize, parts: Parts) {
         let text = format!(
             "name = \"sums\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"
         );
         let sensor = Scene::parse(&text, "sums.toml").unwrap().sensor;
-        let block = Resultants::new(true, &sensor, parts);
+        let block = Resultants::of(Some(parts), &sensor);
         let mut random = fastrand::Rng::with_seed(12);
         let inputs = |cycle: usize| {
+            let mut fields = [(); 3].map(|()| random.i64(..) >> random.u8(32..64)).to_vec();
+            if let Parts::Labels(count) = parts {
+                // Large labels are seldom, so that there are records without a taxel.
+                let most = random.usize(..count);
+                fields.push(random.usize(..=most) as i64);
+            }
             vec![
                 (cycle < 2 || random.u16(..400) == 0).into(),
-                random_word(&mut random, 3 * WORD),
+                Word::of_fields(&fields, WORD),
                 (random.u8(..4) > 0).into(),
                 (random.u8(..4) == 0).into(),
                 (random.u8(..4) > 0).into(),
             ]
         };
         let stimulus: Vec<Vec<Word>> = (0..6000).map(inputs).collect();
-        let sums = vec![[0; SUMS]; parts.rows * parts.cols];
-        let mut reference = Sums { sensor, parts, reset: false, taxel: 0, settling: 0, beat: 0, sums };
+        let records = vec![Record::default(); parts.count()];
+        let mut reference = Sums { sensor, parts, reset: false, taxel: 0, settling: 0, beat: 0, records };
         check(block.kernel.kernel(), &stimulus, &mut reference);
     }
 
     #[test]
     fn sums_are_those_of_the_model() {
-        are_those_of_the_model(4, 6, Grid { rows: 2, cols: 3 });
-        are_those_of_the_model(3, 5, Grid { rows: 1, cols: 1 });
+        are_those_of_the_model(4, 6, Parts::Subarrays(Grid { rows: 2, cols: 3 }));
+        are_those_of_the_model(3, 5, Parts::Subarrays(Grid { rows: 1, cols: 1 }));
+        are_those_of_the_model(3, 5, Parts::Labels(4));
+        are_those_of_the_model(4, 6, Parts::Labels(9));
     }
 }

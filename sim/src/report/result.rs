@@ -26,13 +26,20 @@ pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: 
 fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std::fmt::Result {
     let largest = result.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
-    let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &significant_digits(x, largest));
+    let axes = |values: [f64; 3], largest: f64| {
+        let [x, y, normal] = values.map(|x| sign(x).to_owned() + &significant_digits(x, largest));
+        format!("x {x}   y {y}   normal {normal}")
+    };
     writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
     writeln!(text, "full scale      {} MPa", significant_digits(full_scale_MPa, full_scale_MPa))?;
     if let Some(frames) = result.extra.mean_frames {
         writeln!(text, "sliding mean    {frames} frames")?;
     }
-    writeln!(text, "resultant, N    x {x1}   y {x2}   normal {x3}")?;
+    writeln!(text, "resultant, N    {}", axes(result.resultant_N, largest))?;
+    if let Some(wrench) = result.extra.wrench {
+        let largest = wrench.moment_Nmm.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        writeln!(text, "moment, N mm    {}", axes(wrench.moment_Nmm, largest))?;
+    }
     if let Some(e) = &result.error {
         let axes = [e.x1, e.x2, e.x3].map(percent);
         writeln!(text, "error           x {}   y {}   normal {}", axes[0], axes[1], axes[2])?;

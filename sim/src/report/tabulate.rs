@@ -223,6 +223,7 @@ mod tests {
             objective_value: None,
             centre_mm: Some([x, 0.0]),
             load_N,
+            taxel_count: 0,
             taxels: Vec::new(),
         };
         assert_eq!(

@@ -57,7 +57,9 @@ fn reconstruct() {
         ];
         // Standard deviations are the golden model's.
         top.extend((engine == "golden").then_some("contacts"));
+        top.push("wrench");
         assert_eq!(fields(&text, 1), top);
+        assert_eq!(fields(between(&text, "\"wrench\":", "}"), 1), ["force_N", "moment_Nmm"]);
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!((&value["scene"], &value["engine"]), (&"eight-by-eight".into(), &engine.into()));
         for axis in ["fx", "fy", "fz"] {

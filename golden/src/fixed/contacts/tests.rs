@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::generator::draws::{DrawOptions, Draws};
 use crate::learned::{with_network, Learned, OneContact, Training};
 use crate::reconstruct::{Reconstruction, Region};
-use crate::scene::Scene;
+use crate::scene::{ForceOutput, Scene};
 use tempfile::NamedTempFile;
 
 /// A scene of 13 × 18 taxels with a network of a few steps: as good as any to compare the models.
@@ -142,4 +142,53 @@ fn nothing_and_the_largest_codes() {
     };
     let result = model.reconstruct(&quiet).unwrap();
     assert!(result.flags.contains(&Flag::NoContact) && result.extra.regions == Some(Vec::new()));
+}
+
+/// A record of each contact tells what its forces tell: contacts in the same order with the same figures, and the same wrench.
+#[test]
+fn records_tell_what_forces_tell() {
+    let (scene, _file) = scene("", "max_contacts = 2\n");
+    let mut short = scene.clone();
+    short.output.forces = ForceOutput::Resultants;
+    let [forces, records] = [&scene, &short].map(|scene| Model::new(scene).unwrap());
+    let draws = Draws::new(&scene, DrawOptions { contacts: 3, seed: 5, ..Default::default() }).unwrap();
+    let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * (1.0 + a.abs()), "{a} and {b}");
+    let mut seen = [0; 2];
+    for drawn in (0..6).filter_map(|number| draws.frame(number).ok()) {
+        let frame = drawn.frame;
+        let trace = records.run(&records.readings(std::slice::from_ref(&frame)).unwrap());
+        assert_eq!((trace.beats.len(), records.force_beats()), (3 * 7, 3 * 7));
+        let [all, own] = [&forces, &records].map(|model| model.reconstruct(&frame).unwrap());
+        let [regions, told] = [&all, &own].map(|result| result.extra.regions.as_ref().unwrap());
+        assert_eq!(regions.len(), told.len());
+        for (region, told) in regions.iter().zip(told) {
+            assert_eq!((region.mu, region.mu_sigma, told.taxels.len()), (told.mu, told.mu_sigma, 0));
+            assert_eq!((region.taxels.len(), region.taxel_count), (told.taxel_count, told.taxel_count));
+            assert_eq!(region.centroid_condition, told.centroid_condition);
+            (0..3).for_each(|axis| near(region.load_N[axis], told.load_N[axis]));
+            for (a, b) in [(region.centre_mm, told.centre_mm), (region.shear_sigma_N, told.shear_sigma_N)] {
+                (0..2).for_each(|axis| near(a.unwrap()[axis], b.unwrap()[axis]));
+            }
+        }
+        assert_eq!(own.extra.resultants.as_ref().unwrap().len(), regions.len());
+        let [wrench, sums] = [&all, &own].map(|result| result.extra.wrench.unwrap());
+        for axis in 0..3 {
+            near(wrench.force_N[axis], sums.force_N[axis]);
+            near(wrench.moment_Nmm[axis], sums.moment_Nmm[axis]);
+            near(all.resultant_N[axis], own.resultant_N[axis]);
+        }
+        assert_eq!((&all.flags, all.error.is_some()), (&own.flags, own.error.is_some()));
+        // The taxels of no contact carry a part of the load.
+        let loads: f64 = told.iter().map(|region| region.load_N[2]).sum();
+        seen[0] += usize::from(told.iter().map(|region| region.taxel_count).sum::<usize>() < 234);
+        seen[1] += usize::from((own.resultant_N[2] - loads).abs() > 1e-3);
+    }
+    assert!(seen.iter().all(|&frames| frames > 2), "{seen:?}");
+    let quiet = records.decode(
+        &[Frame::from_stress("quiet", &scene.sensor, vec![0.0; 234]).unwrap()],
+        "fixed",
+        &[[i32::MIN; 3]; 21],
+        &[[0; 3]; 6],
+    );
+    assert!(quiet.is_ok(), "any words of a device are decoded: {quiet:?}");
 }

@@ -5,7 +5,7 @@ use super::storage::Storage;
 use crate::board::Board;
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::prepare::Prepare;
-use crate::fixed::stages::resultants;
+use crate::fixed::stages::resultants::{self, Summed};
 use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
@@ -183,23 +183,39 @@ impl Plan {
         self.scene.hardware.coefficient_check == CoefficientCheck::Signature
     }
 
-    /// Whether the output is one resultant per subarray instead of a force per taxel.
+    /// Whether the output is one resultant per subarray or contact instead of a force per taxel.
     pub fn sends_resultants(&self) -> bool {
         self.scene.output.forces == ForceOutput::Resultants
     }
 
-    /// Number of output beats of a frame before its status: forces and labels, or resultants.
-    pub fn force_beats(&self) -> usize {
-        let taxels = self.scene.sensor.taxels();
-        match self.sends_resultants() {
-            true => resultants::BEATS * self.parts().len(),
-            false => taxels + self.label_beats(),
+    /// Whose taxels each record of resultants sums; `None` where the output is a force per taxel.
+    pub fn summed(&self) -> Option<Summed> {
+        let summed = if self.by_contact.is_some() { Summed::Label } else { Summed::Subarray };
+        self.sends_resultants().then_some(summed)
+    }
+
+    /// Number of records of resultants: one per subarray, or per label, of which there is one more than contacts.
+    pub fn records(&self) -> usize {
+        match self.contacts() {
+            0 => self.parts().len(),
+            most => most + 1,
         }
     }
 
-    /// Number of output beats with labels, between forces and statuses; 0 where there is one μ.
+    /// Number of output beats with labels, between forces and statuses; 0 where there is one μ, or a record of each contact.
     pub fn label_beats(&self) -> usize {
-        self.by_contact.as_ref().map_or(0, |_| label_beats(self.scene.sensor.taxels()))
+        match &self.by_contact {
+            Some(_) if !self.sends_resultants() => label_beats(self.scene.sensor.taxels()),
+            _ => 0,
+        }
+    }
+
+    /// Number of output beats of a frame before its status: forces and labels, or resultants.
+    pub fn force_beats(&self) -> usize {
+        match self.summed() {
+            Some(summed) => summed.beats() * self.records(),
+            None => self.scene.sensor.taxels() + self.label_beats(),
+        }
     }
 
     /// Cycles by which the first beat of resultants is later than the first beat of forces would be.

@@ -165,8 +165,7 @@ impl BeatCycles {
             true => (before + last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
             false => {
                 let forces = forces.iter().map(|force| before + force + ACCEPT + SEND);
-                let labels = plan.force_beats() - forces.len();
-                let labels = (1..=labels as u64).map(|beat| before + last + beat * LABELS);
+                let labels = (1..=plan.label_beats() as u64).map(|beat| before + last + beat * LABELS);
                 let sent: Vec<u64> = forces.chain(labels).collect();
                 let next = sent.last().map_or(0, |beat| beat + 1);
                 sent.into_iter().chain(next..).take(count).collect()

@@ -17,7 +17,6 @@ use super::contents::{CasePlan, Plan};
 use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
 use crate::board::EngineKind;
-use crate::fixed::stages::send::label_beats;
 use crate::fixed::stages::{choose, resultants};
 
 /// Cycles from the hand-over of a frame's last subarray, or from the end of the last frame, to the next frame.
@@ -50,13 +49,10 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
     let choice = if plan.chooses() { choose::LATENCY } else { 0 };
     // Sums of forces leave between the last force and the status.
     let sums = match plan.sends_resultants() {
-        true => resultants::LATENCY - 1 + (resultants::BEATS * parts) as u64,
+        true => resultants::LATENCY - 1 + plan.force_beats() as u64,
         false => 0,
     };
-    let labels = match plan.contacts() {
-        0 => 0,
-        _ => label_beats(plan.scene.sensor.taxels()) as u64 * LABELS,
-    };
+    let labels = plan.label_beats() as u64 * LABELS;
     // When the last frame's last code arrived, its search ended, its forces had been sent, the next frame can begin.
     let (mut received, mut searched, mut sent, mut begin) = (0, 0, 0, 0);
     let mut interval = 0;

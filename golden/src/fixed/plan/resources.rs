@@ -298,7 +298,7 @@ impl Resources {
             ("estimate", of(f.has_network(), 2 * board.multipliers_for(MU_BITS, MU_BITS))),
             ("shear", of(f.by_contact(), scale)),
             ("forces", force_multipliers(f, board)),
-            ("resultants", resultant_multipliers(scene, board)),
+            ("resultants", resultant_multipliers(scene, f.by_contact(), board)),
         ];
         Resources { memories, multipliers, overlaps: overlaps && searches }
     }
@@ -393,11 +393,14 @@ pub fn segment_multipliers(segmentation: &Segmentation, board: &Board) -> usize 
     board.multipliers_for(segmentation.smoothed_bits() + 1, WEIGHT_BITS + 2)
 }
 
-/// Number of multipliers of the resultants: X fz⁺ and Y fz⁺.
-pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
+/// Number of multipliers of the resultants: X fz and Y fz, and of contacts X fy and Y fx.
+pub fn resultant_multipliers(scene: &Scene, by_contact: bool, board: &Board) -> usize {
     match scene.output.forces {
         ForceOutput::Taxels => 0,
-        ForceOutput::Resultants => 2 * board.multipliers_for(FORCE_BITS, POSITION_BITS + 1),
+        ForceOutput::Resultants => {
+            let products = if by_contact { 4 } else { 2 };
+            products * board.multipliers_for(FORCE_BITS, POSITION_BITS + 1)
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Force arithmetic: p(μ*) to force words, and the output beats with their status.
 
 use dermis_golden::fixed::plan::cycles::ACCEPT;
+use dermis_golden::fixed::stages::resultants::Summed;
 use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
@@ -29,7 +30,8 @@ use crate::wire::Wire;
 /// `begin_frame` clears the counts of the frame.
 ///
 /// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for each from 1 on,
-/// and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact.
+/// and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact. Where a record of each contact is sent,
+/// the label is above the force.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
     /// Clock; registers change on its rising edge.
@@ -86,7 +88,8 @@ pub struct ForceUnit {
     pub valid: Signal<Out, Bit>,
     /// The beat is the frame's last; valid with `valid`.
     pub last: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or three status words; valid with `valid`.
+    /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or three status words;
+    /// valid with `valid`.
     pub beat_data: Wire<Out>,
     kernel: Body,
 }
@@ -153,6 +156,8 @@ struct Shape {
     numbers: Vec<usize>,
     /// Each contact has a μ of its own.
     contacts: bool,
+    /// A force is sent with its label.
+    tells_labels: bool,
 }
 
 /// Number of subarrays of a case, or where each contact has a μ of its own, of labels: each has a μ, from which all statuses
@@ -185,6 +190,7 @@ impl ForceUnit {
             frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
             counts: model.cases().iter().map(|case| parts(model, case)).collect(),
             contacts: f.by_contact(),
+            tells_labels: model.summed() == Some(Summed::Label),
             numbers: model.cases().iter().map(number).collect(),
         };
         let part_bits = count_bits(shape.parts());
@@ -216,7 +222,7 @@ impl ForceUnit {
             overflow: Default::default(),
             valid: Default::default(),
             last: Default::default(),
-            beat_data: Wire::new(3 * WORD),
+            beat_data: Wire::new(shape.beat_bits()),
             kernel: Body::default(),
         };
         block.bind(shape.kernel())
@@ -274,6 +280,11 @@ impl Shape {
         }
     }
 
+    /// Width of a beat.
+    fn beat_bits(&self) -> usize {
+        3 * WORD + if self.tells_labels { self.label_bits() } else { 0 }
+    }
+
     fn kernel(&self) -> Kernel {
         let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
         let k = Builder::new("force_unit");
@@ -318,6 +329,7 @@ impl Shape {
         shifts.write(start_2, part_2, shift);
         let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
 
+        let label = lane_of(labels, Quads::LANES, lane_value);
         let value = k.delay("value", lane_of(quad, self.lanes, lane_value).signed());
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
@@ -325,10 +337,7 @@ impl Shape {
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
-                let at_value = match self.contacts {
-                    true => lane_of(labels, Quads::LANES, lane_value),
-                    false => part_after(READ_STEPS),
-                };
+                let at_value = if self.contacts { label } else { part_after(READ_STEPS) };
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);
@@ -394,7 +403,17 @@ impl Shape {
         let third = concat(&[word(*cycles_held), word(*force_saturations), word(rescale_saturations)]);
         let status = k.wire("status", beat_out.case(&[(1, first), (2, second)], third));
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
-        k.delay("beat_data", beat_out.is(0).mux(force, status));
+        let words = beat_out.is(0).mux(force, status);
+        let words = match self.tells_labels {
+            false => words,
+            true => {
+                let steps = ASKED - READ_STEPS;
+                travel(&k, "labels_sent", label, steps)
+                    .slice(self.label_bits() * (steps - 1), self.label_bits())
+                    .concat(words)
+            }
+        };
+        k.delay("beat_data", words);
         let valid = k.state("valid", bit, rst, 0);
         valid.set(leaves);
         let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();

@@ -147,7 +147,10 @@ impl Reference for Requests {
             if std::mem::take(&mut self.frame.counting) {
                 self.frame.cycles = (inputs[21].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
             }
-            let words = self.answer(entry, inputs).map(i64::from);
+            let mut words = self.answer(entry, inputs).map(i64::from).to_vec();
+            if self.model.summed() == Some(Summed::Label) {
+                words.push(entry.label as i64);
+            }
             let ends = parts(&self.model, &self.model.cases()[inputs[1].number() as usize]);
             (entry.beat == 3 && entry.part + 1 == ends, Word::of_fields(&words, WORD))
         });
@@ -238,5 +241,7 @@ fn beats_are_those_of_the_model() {
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
     is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
-    check_forces(learned(6, 5, &[7], "mu_max = 0.3\n[partition]\ncase = \"contacts\"\n"));
+    for more in ["", "[output]\nforces = \"resultants\"\n"] {
+        check_forces(learned(6, 5, &[7], &format!("mu_max = 0.3\n[partition]\ncase = \"contacts\"\n{more}")));
+    }
 }
