@@ -28,9 +28,9 @@ mod shapes;
 pub mod statistic;
 mod study;
 pub mod support_bound;
-mod unlike;
 #[cfg(test)]
 mod tests;
+mod unlike;
 
 pub use sensitivity::{sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};

@@ -196,7 +196,8 @@ impl Like<'_> {
         let draw = |contacts: usize| {
             let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
             let ratio = ratio.map(|ratio| ratio * scene.search.mu_max);
-            Draws::new(scene, DrawOptions { shapes, contacts, ratio, seed: self.seed, ..Default::default() })?.frame(number)
+            Draws::new(scene, DrawOptions { shapes, contacts, ratio, seed: self.seed, ..Default::default() })?
+                .frame(number)
         };
         // Where so many do not fit on the array, fewer.
         let drawn = (1..wanted).rev().fold(draw(wanted), |drawn, contacts| drawn.or_else(|_| draw(contacts)))?;
