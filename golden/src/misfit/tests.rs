@@ -108,7 +108,7 @@ fn the_study_counts_flags() {
     let scene = Scene::builtin("sensor-1-noisy").unwrap();
     let estimators = [Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware];
     let rows = unlike_study(&scene, 6, 3, &estimators, &|_, _| ()).unwrap();
-    let of = |name: &str| rows.iter().filter(move |row| row.frame.starts_with(name));
+    let of = |name: &'static str| rows.iter().filter(move |row| row.frame.starts_with(name));
     assert!(of("like the training").count() == 8 && of("checkerboard").count() == 4);
     for row in of("like the training") {
         assert!((row.flagged.value, row.flagged_if_stated.value) == (0.0, 0.0), "{row:?}");
