@@ -11,6 +11,7 @@
 //! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
+//! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
 //! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
@@ -87,6 +88,10 @@ pub struct Checks {
     /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub misfit_probability: Option<f64>,
+    /// What compressive forces at the network's μ leave of the stress, over what they leave of frames like those of its
+    /// training, see [`Misfit`](crate::misfit::Misfit); `None` where no network gave a μ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network_misfit: Option<f64>,
     /// Standard deviation of the shear over its size, the largest of all contacts; `None` with `search`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
@@ -108,20 +113,26 @@ impl Checks {
                 self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
             }
             Flag::ShearUnreliable => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
-            Flag::Misfit => match self.misfit_probability {
-                Some(probability) => Some(format!("probability {probability:.1e}")),
-                None => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
+            Flag::Misfit => match (self.misfit_probability, self.network_misfit) {
+                (probability, Some(misfit)) if misfit > 1.0 || probability.is_none() => {
+                    Some(format!("misfit {misfit:.3} times that of frames like the training"))
+                }
+                (Some(probability), _) => Some(format!("probability {probability:.1e}")),
+                _ => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
             },
             _ => None,
         }
     }
 
-    /// Whether noise explains what the estimate leaves: of the stated size, else of one that a sensor can have.
+    /// Whether the estimate leaves more than noise explains, of the stated size, else of one that a sensor can have, or more
+    /// than of frames like those of the network's training.
     fn misfits(&self) -> bool {
-        match self.misfit_probability {
-            Some(probability) => probability < MISFIT,
-            None => self.noise_MPa.is_some_and(|noise| noise > LOUD * self.peak_MPa),
-        }
+        let unlike = self.network_misfit.is_some_and(|misfit| misfit > 1.0);
+        unlike
+            || match self.misfit_probability {
+                Some(probability) => probability < MISFIT,
+                None => self.noise_MPa.is_some_and(|noise| noise > LOUD * self.peak_MPa),
+            }
     }
 
     /// The flags that the figures raise.

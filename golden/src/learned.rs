@@ -41,6 +41,7 @@ mod window;
 pub use composed::ComposedLayer;
 pub use error::LearnedError;
 pub use file::Signature;
+pub(crate) use frames::{GAINS, NOISE, RATIO};
 pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
 pub use training::{Stage, Training};
@@ -53,6 +54,7 @@ use crate::symmetry::quads::Quads;
 use faer::Mat;
 use features::{Features, Readings};
 use network::Network;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Largest file of a network in bytes.
@@ -126,14 +128,26 @@ impl Learned {
     /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`], [`LearnedError::Damaged`] or
     /// [`LearnedError::Mismatch`].
     pub fn of_scene(scene: &Scene) -> Result<Learned, LearnedError> {
-        let Some(path) = &scene.search.network else {
-            return Err(LearnedError::NoNetwork { scene: scene.name.clone() });
-        };
-        let file = path.display().to_string();
-        match SHIPPED.iter().find(|(name, _)| path.file_name().is_some_and(|file| file == *name)) {
-            Some((name, bytes)) => Learned::from_bytes(scene, bytes, name),
-            None => Learned::from_bytes(scene, &read(path, &file)?, &file),
-        }
+        let (bytes, file) = bytes_of(scene)?;
+        Learned::from_bytes(scene, &bytes, &file)
+    }
+
+    /// The limit of [`crate::misfit`] of the network that a scene names; `None` for a file without one.
+    ///
+    /// # Errors
+    /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`] or [`LearnedError::Damaged`].
+    pub fn misfit_limit(scene: &Scene) -> Result<Option<f64>, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        file::limit(&bytes, &file)
+    }
+
+    /// The bytes of the network that a scene names, with this limit of [`crate::misfit`]; its weights stay as they are.
+    ///
+    /// # Errors
+    /// As [`Learned::misfit_limit`].
+    pub fn with_misfit_limit(scene: &Scene, limit: f64) -> Result<Vec<u8>, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        file::with_limit(&bytes, limit, &file)
     }
 
     /// The network in the bytes of a file, for a scene; `file` names it in errors.
@@ -179,6 +193,18 @@ impl Learned {
             found.mean = found.mean.map(|mu| mu * self.signature.mu_max / size);
         }
         found
+    }
+}
+
+/// The bytes of the network that a scene names, and the name for errors.
+fn bytes_of(scene: &Scene) -> Result<(Cow<'static, [u8]>, String), LearnedError> {
+    let Some(path) = &scene.search.network else {
+        return Err(LearnedError::NoNetwork { scene: scene.name.clone() });
+    };
+    let file = path.display().to_string();
+    match SHIPPED.iter().find(|(name, _)| path.file_name().is_some_and(|file| file == *name)) {
+        Some((name, bytes)) => Ok((Cow::Borrowed(bytes), (*name).to_owned())),
+        None => Ok((Cow::Owned(read(path, &file)?), file)),
     }
 }
 

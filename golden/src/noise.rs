@@ -12,7 +12,7 @@
 //!
 //! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
 //! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
-//! [`sensitivities`] measures scenes that state something wrongly.
+//! [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training.
 //!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
 //! below the bound where it is wide.
@@ -30,7 +30,9 @@ mod study;
 pub mod support_bound;
 #[cfg(test)]
 mod tests;
+mod unlike;
 
 pub use sensitivity::{sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};
+pub use unlike::{misfit_limit, unlike_study, UnlikeRow};

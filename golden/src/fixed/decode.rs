@@ -89,7 +89,8 @@ impl Model {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let sensor = &self.scene.sensor;
-        let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_of_mean_MPa(readings.len()));
+        let noise_MPa = input.noise_of_mean_MPa(readings.len());
+        let mut flags = frame_flags(&self.scene, frame, &codes, noise_MPa);
         let mut subarrays = Vec::with_capacity(case.parts.len());
         let mut shear_spread = None;
         let all: Vec<Status> = status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
@@ -171,7 +172,8 @@ impl Model {
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
         let full_scale_share = input.full_scale_share(readings);
-        let checks = Checks { full_scale_share, shear_spread, ..result.figures(&self.scene, frame) };
+        let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
+        let checks = Checks { full_scale_share, network_misfit, shear_spread, ..result.figures(&self.scene, frame) };
         result.add_checks(&self.scene, checks);
         Ok(result)
     }

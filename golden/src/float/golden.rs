@@ -18,6 +18,7 @@ use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
+use crate::misfit::Misfit;
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::quantise;
 use crate::reception::{full_scale, noise_floor_codes, receive, Received};
@@ -38,6 +39,8 @@ pub struct Golden {
     pub(super) evidence: Option<Evidence>,
     /// The network that is asked for each contact, with `contacts`.
     pub(super) network: Option<Learned>,
+    /// The check of frames for which a network gives μ.
+    pub(super) misfit: Option<Misfit>,
 }
 
 /// A partition into equal rectangles with its matrices.
@@ -182,7 +185,8 @@ impl Golden {
             None => evidence,
             Some(shares) => evidence.with_noise_shares(shares),
         });
-        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network })
+        let misfit = Misfit::of_scene(scene)?;
+        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network, misfit })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.

@@ -70,6 +70,7 @@ impl Golden {
         result.extra.unipolar = report.map(misfit);
         let checks = Checks {
             full_scale_share: self.input.full_scale_share(readings),
+            network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
             load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
             ..result.figures(&self.scene, &frame)
         };

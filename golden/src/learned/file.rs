@@ -2,13 +2,15 @@
 //!
 //! ```text
 //! "dermis network 2\n"       magic and version
-//! JSON, "\n"                 signature and widths
+//! JSON, "\n"                 signature, widths, limit of the misfit
 //! per layer: largest output (f32)
 //!            row by row      bias (f32)
 //!            parity by parity, row by row
 //!                            scale (f32), weights of 12 bits, two in three bytes
 //! CRC-32                     of all before it
 //! ```
+//!
+//! The limit of [`crate::misfit`] is measured after the training; a file without one is read as well.
 //!
 //! Numbers are little-endian. A weight is its row's scale times a whole number of −2047 … 2047; a pair (u, v) of them, 2048
 //! added to each, is u + 4096 v; an odd row ends with v = 2048.
@@ -59,6 +61,8 @@ pub struct Signature {
 struct Head {
     signature: Signature,
     widths: Vec<usize>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    misfit_limit: Option<f64>,
 }
 
 impl Signature {
@@ -109,10 +113,8 @@ impl Signature {
 
 /// The bytes of a file.
 pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>, LearnedError> {
-    let head = Head { signature: signature.clone(), widths: network.widths() };
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(serde_json::to_vec(&head).map_err(|error| LearnedError::Encode(error.to_string()))?);
-    bytes.push(b'\n');
+    let head = Head { signature: signature.clone(), widths: network.widths(), misfit_limit: None };
+    let mut bytes = begin(&head)?;
     for layer in &network.layers {
         bytes.extend(layer.largest.to_le_bytes());
         bytes.extend(layer.bias.iter().flat_map(|bias| bias.to_le_bytes()));
@@ -128,9 +130,30 @@ pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>
             }
         }
     }
+    Ok(checked(bytes))
+}
+
+/// Magic and head.
+fn begin(head: &Head) -> Result<Vec<u8>, LearnedError> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(serde_json::to_vec(head).map_err(|error| LearnedError::Encode(error.to_string()))?);
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// The bytes with their check sum.
+fn checked(mut bytes: Vec<u8>) -> Vec<u8> {
     let crc = crc32fast::hash(&bytes);
     bytes.extend(crc.to_le_bytes());
-    Ok(bytes)
+    bytes
+}
+
+/// The bytes of a file with another limit of the misfit; the weights stay as they are. `file` names it in errors.
+pub(super) fn with_limit(bytes: &[u8], limit: f64, file: &str) -> Result<Vec<u8>, LearnedError> {
+    let (head, weights) = parts(bytes, file)?;
+    let mut own = begin(&Head { misfit_limit: Some(limit), ..head })?;
+    own.extend(weights);
+    Ok(checked(own))
 }
 
 /// The scale of a row's weights.
@@ -138,8 +161,8 @@ fn scale(row: RowRef<f32>) -> f32 {
     row.iter().fold(0.0f32, |most, weight| weight.abs().max(most)) / LARGEST
 }
 
-/// Network and signature of a file's bytes; `file` names it in errors.
-pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), LearnedError> {
+/// Head of a file's bytes, and the bytes of its weights; `file` names it in errors.
+fn parts<'a>(bytes: &'a [u8], file: &str) -> Result<(Head, &'a [u8]), LearnedError> {
     let damaged = |reason: &str| LearnedError::Damaged { file: file.to_owned(), reason: reason.to_owned() };
     let body = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin with \"dermis network 2\""))?;
     let (checked, crc) = bytes.split_last_chunk::<4>().ok_or_else(|| damaged("it is too short"))?;
@@ -155,9 +178,23 @@ pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), L
     if widths.first() != Some(&Features::channels(&head.signature.window)) || widths.last() != Some(&OUTPUT_CHANNELS) {
         return Err(damaged("its widths do not fit its window"));
     }
-    let mut rest = &body[end + 1..body.len() - 4];
+    if head.misfit_limit.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
+        return Err(damaged("its limit of the misfit is out of range"));
+    }
+    Ok((head, &body[end + 1..body.len() - 4]))
+}
+
+/// The limit of the misfit in a file's bytes; `file` names it in errors.
+pub(super) fn limit(bytes: &[u8], file: &str) -> Result<Option<f64>, LearnedError> {
+    Ok(parts(bytes, file)?.0.misfit_limit)
+}
+
+/// Network and signature of a file's bytes; `file` names it in errors.
+pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), LearnedError> {
+    let damaged = |reason: &str| LearnedError::Damaged { file: file.to_owned(), reason: reason.to_owned() };
+    let (head, mut rest) = parts(bytes, file)?;
     let mut layers = Vec::new();
-    for pair in widths.windows(2) {
+    for pair in head.widths.windows(2) {
         layers.push(layer(&mut rest, pair[0], pair[1]).ok_or_else(|| damaged("it is too short"))?);
     }
     if !rest.is_empty() {
@@ -231,6 +268,24 @@ mod tests {
         }
         for length in [0, 3, 17, bytes.len() - 1] {
             assert!(matches!(decode(&bytes[..length], "f"), Err(LearnedError::Damaged { .. })), "{length}");
+        }
+    }
+
+    /// The limit is written without a change of the weights; a file without one, as older versions wrote it, is read.
+    #[test]
+    fn the_limit_of_the_misfit_is_part_of_the_head() {
+        let (network, signature) = network();
+        let plain = encode(&network, &signature).unwrap();
+        assert_eq!(limit(&plain, "f").unwrap(), None);
+        let limited = with_limit(&plain, 0.9375, "f").unwrap();
+        assert_eq!(limit(&limited, "f").unwrap(), Some(0.9375));
+        assert_eq!(limited, with_limit(&with_limit(&plain, 2.0, "f").unwrap(), 0.9375, "f").unwrap());
+        let [a, b] = [&plain, &limited].map(|bytes| parts(bytes, "f").unwrap().1);
+        assert_eq!(a, b);
+        assert_eq!(decode(&limited, "f").unwrap().1, signature);
+        for bad in [0.0, -1.0] {
+            let bytes = with_limit(&plain, bad, "f").unwrap();
+            assert!(matches!(decode(&bytes, "f"), Err(LearnedError::Damaged { .. })), "{bad}");
         }
     }
 

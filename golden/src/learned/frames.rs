@@ -31,11 +31,11 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Largest ratio of shear to normal force, in units of mu_max.
-const RATIO: f64 = 0.85;
+pub(crate) const RATIO: f64 = 0.85;
 /// Range of the noise in units of the peak.
-const NOISE: [f64; 2] = [5e-5, 2e-2];
+pub(crate) const NOISE: [f64; 2] = [5e-5, 2e-2];
 /// Range of the gain spread where there is one.
-const GAINS: [f64; 2] = [2e-3, 3e-2];
+pub(crate) const GAINS: [f64; 2] = [2e-3, 3e-2];
 /// Share of the frames with more dead taxels than the scene has.
 const DEAD: f64 = 0.125;
 /// Largest share of the others' stress that a second round leaves.

@@ -15,6 +15,7 @@ impl Reconstruction {
             mu_share: mu_share(scene, self),
             border_share: border_share(&scene.sensor, &self.forces_N.fz),
             load_ratio: None,
+            network_misfit: None,
             ..self.checks
         }
     }

@@ -5,12 +5,13 @@
 //! | none | objectives on elliptic Hertz contacts, beside the bounds with 6 and 9 unknowns |
 //! | `--shapes` | estimators on drawn contacts of any shape, beside two baselines and the bound of a known support |
 //! | `--shapes --sensitivity` | errors if the scene states something wrongly, or the gains differ |
+//! | `--unlike` | how many frames like and unlike a network's training are flagged |
 
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::draws::{DrawOptions, Shape};
-use dermis_golden::noise::{sensitivities, shape_study, study, Candidate, ShapeStudy, Study};
+use dermis_golden::noise::{sensitivities, shape_study, study, unlike_study, Candidate, ShapeStudy, Study};
 use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
 
 use crate::progress::Progress;
@@ -31,7 +32,8 @@ const SENSITIVITY_LEVEL: f64 = 1e-3;
   dermis noise sensor-1 --shapes tilted,ring --unipolar --unstated --objective sparse --draws 20 --json
   dermis noise sensor-1 --shapes table --level 0.01 --gain-spread 0.01 --frames 64 --coverage
   dermis noise sensor-3 --shapes table --contacts 3 --level 0.0005
-  dermis noise sensor-1 --shapes table --sensitivity")]
+  dermis noise sensor-1 --shapes table --sensitivity
+  dermis noise sensor-1-noisy --unlike --estimator network --hardware --draws 10")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,
@@ -60,6 +62,9 @@ pub struct Arguments {
     /// The same as --format json.
     #[arg(long, conflicts_with_all = ["format", "medians"])]
     json: bool,
+    /// Of frames like and unlike the training of the scene's network, count those that are flagged.
+    #[arg(long, group = "drawn", conflicts_with_all = ["medians", "levels", "frames", "objectives"])]
+    unlike: bool,
     #[command(flatten)]
     shapes: ShapeArguments,
 }
@@ -69,13 +74,13 @@ pub struct Arguments {
 struct ShapeArguments {
     /// Draw these shapes in turn, those of a frame's contacts differ: mixed or all, table (all but asymmetric), or of hertz,
     /// punch, ring, rectangle, tilted, asymmetric, separated by commas.
-    #[arg(long, value_name = "SHAPES", value_parser = shapes)]
+    #[arg(long, value_name = "SHAPES", value_parser = shapes, group = "drawn")]
     shapes: Option<Shapes>,
     /// Estimator, repeatable; default: what the scene names.
-    #[arg(long = "estimator", value_name = "NAME", value_parser = estimator, requires = "shapes")]
+    #[arg(long = "estimator", value_name = "NAME", value_parser = estimator, requires = "drawn")]
     estimators: Vec<EstimatorKind>,
     /// Also the scene's hardware, by its bit-true model.
-    #[arg(long, requires = "shapes", conflicts_with = "sensitivity")]
+    #[arg(long, requires = "drawn", conflicts_with = "sensitivity")]
     hardware: bool,
     /// Number of contacts of a frame.
     #[arg(long, value_name = "N", default_value_t = 1, requires = "shapes")]
@@ -117,6 +122,12 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if let Some(Shapes(shapes)) = &arguments.shapes.shapes {
         return over_shapes(arguments, &scene, shapes, format);
     }
+    if arguments.unlike {
+        let bar = Progress::steps(&format!("{}: frames unlike the training", scene.name), 0);
+        let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
+        let rows = unlike_study(&scene, arguments.draws, arguments.seed, &candidates(arguments), &progress)?;
+        return report::unlike(&rows, format);
+    }
     let mut wanted = Study {
         draws: arguments.draws,
         seed: arguments.seed,
@@ -137,6 +148,21 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
 }
 
+/// The estimators to compare.
+fn candidates(arguments: &Arguments) -> Vec<Candidate> {
+    let own = &arguments.shapes;
+    let estimators = own.estimators.iter().copied().map(Candidate::Estimator);
+    let mut candidates: Vec<Candidate> =
+        estimators.chain(arguments.objectives.iter().copied().map(Candidate::Objective)).collect();
+    if candidates.is_empty() {
+        candidates.push(Candidate::Scene);
+    }
+    if own.hardware {
+        candidates.push(Candidate::Hardware);
+    }
+    candidates
+}
+
 fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: Format) -> Result<String> {
     let own = &arguments.shapes;
     let converter = Converter {
@@ -154,16 +180,8 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
         converter,
         ..Default::default()
     };
-    let estimators = own.estimators.iter().copied().map(Candidate::Estimator);
-    let mut candidates: Vec<Candidate> =
-        estimators.chain(arguments.objectives.iter().copied().map(Candidate::Objective)).collect();
-    if candidates.is_empty() {
-        candidates.push(Candidate::Scene);
-    }
-    if own.hardware {
-        candidates.push(Candidate::Hardware);
-    }
     let (draws, told, by_shape) = (arguments.draws, !own.unstated, own.coverage);
+    let candidates = candidates(arguments);
     let mut wanted = ShapeStudy { draws, options, told, candidates, by_shape, ..Default::default() };
     if !arguments.levels.is_empty() {
         wanted.levels = arguments.levels.clone();

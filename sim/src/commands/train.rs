@@ -1,12 +1,12 @@
 //! `dermis train`: a network for `search.estimator = "learned"`, trained on frames drawn from the scene's own physics.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::learned::{Learned, Stage, Training};
-use dermis_golden::noise::{shape_study, Candidate, ShapeStudy};
+use dermis_golden::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_golden::write::write;
 
@@ -17,6 +17,10 @@ use crate::report;
 const LEVELS: [f64; 4] = [0.0, 5e-4, 2e-3, 1e-2];
 /// Added to the seed of the training for the frames of the table.
 const FRESH: u64 = 1_000_003;
+/// Added to the seed of the training for the frames on which the limit of the misfit is measured.
+const MEASURED: u64 = 2_000_003;
+/// Largest number of them.
+const MOST_MEASURED: usize = 4096;
 
 /// Arguments of `dermis train`.
 #[derive(Args, Debug)]
@@ -24,6 +28,7 @@ const FRESH: u64 = 1_000_003;
   dermis train sensor-1 --steps 200 --contacts 500 --draws 10 --out quick.network     seconds: to see it work
   dermis train my-scene.toml                         my-scene.network beside it, a quarter of an hour
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
+  dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
 Then, in the scene: [search] with estimator = \"learned\" and network = \"my-scene.network\".
 Prints the errors on frames that were not in the training; exit code 1 if they are not better than no shear.")]
@@ -54,6 +59,9 @@ pub struct Arguments {
     /// The file; default: the scene's name with .network, beside the scene's file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Train nothing; measure the limit of the misfit for this network of the scene and write it into the file.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["steps", "batch", "hidden", "rate", "draws", "out"])]
+    limit_of: Option<PathBuf>,
 }
 
 /// Trains, writes the file, and returns text for stdout and whether the errors are below those of no shear.
@@ -75,6 +83,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         rate: arguments.rate,
         seed: arguments.seed,
     };
+    let frames = training.contacts.min(MOST_MEASURED);
+    if let Some(file) = &arguments.limit_of {
+        return Ok((measured(&mut scene, file, frames, training.seed)?, true));
+    }
     let out = arguments.out.clone().unwrap_or_else(|| {
         let beside = PathBuf::from(&arguments.scene);
         beside.with_file_name(format!("{}.network", scene.name))
@@ -96,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     })?;
     drop(bar);
     write(&out, &trained.bytes)?;
-    scene.search.network = Some(out.clone());
+    let limit = measured(&mut scene, &out, frames, training.seed)?;
     let mut text = format!(
         "{}: {} weights, {} bytes\ntraining        {} steps of {} frames, {} contacts drawn, seed {}\n",
         out.display(),
@@ -107,7 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         training.contacts,
         training.seed
     );
-    text.push_str(&format!("trained for     {}\n", describe(&trained.learned)));
+    text.push_str(&format!("trained for     {}\n{limit}", describe(&trained.learned)));
     for (steps, mean) in loss.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
         text.push_str(&format!("loss            {mean:8.4} at step {steps}\n"));
     }
@@ -126,6 +138,17 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let better =
         |row: &dermis_golden::noise::ShapeRow| row.estimator == "none" || row.summary.tangential.median.value < 1.0;
     Ok((text, rows.iter().all(better)))
+}
+
+/// Measures the limit of the misfit for the network in `file`, which the scene then names, and writes it into the file.
+fn measured(scene: &mut Scene, file: &Path, frames: usize, seed: u64) -> Result<String> {
+    scene.search.network = Some(file.to_owned());
+    let bar = Progress::steps(&format!("{}: limit of the misfit", scene.name), 0);
+    let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
+    let limit = misfit_limit(scene, frames, seed.wrapping_add(MEASURED), &progress)?;
+    let Some(limit) = limit else { bail!("{}: no frame of {frames} has a contact", file.display()) };
+    write(file, &Learned::with_misfit_limit(scene, limit)?)?;
+    Ok(format!("misfit limit    {limit:.4}, on {frames} frames\n"))
 }
 
 /// What a network was trained for.

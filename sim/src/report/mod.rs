@@ -52,7 +52,7 @@ pub use guide::{fixed_pictures, time_picture, timing_picture, PictureFile};
 pub use host::{equality, link_times, resultants, wire_times};
 pub use measure::{trace, ComparedWords};
 pub use noise::{noise, noise_medians};
-pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes};
+pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes, unlike};
 pub use ports::{blocks, ports};
 pub use resource_report::{features, program, resources};
 pub use result::{difference, reconstruction};

@@ -1,10 +1,10 @@
-//! The tables of `dermis noise --shapes`.
+//! The tables of `dermis noise --shapes` and `--unlike`.
 
 use anyhow::Result;
 use dermis_golden::noise::coverage::Coverage;
 use dermis_golden::noise::outcome::Summary;
 use dermis_golden::noise::statistic::{ErrorSpread, Interval};
-use dermis_golden::noise::{SensitivityRow, ShapeRow};
+use dermis_golden::noise::{SensitivityRow, ShapeRow, UnlikeRow};
 
 use super::table::{aligned, percent};
 use super::Format;
@@ -185,6 +185,43 @@ pub fn sensitivity(rows: &[SensitivityRow], level: f64, format: Format) -> Resul
             let mut text = aligned(4, &head, rows.iter().map(line).collect());
             let draws = rows.first().map_or(0, |row| row.summary.draws);
             text.push_str(&format!("\n{draws} frames, noise {} of max |b|; (…): 95 % interval\n", of(level)));
+            text
+        }
+    })
+}
+
+/// The table of frames like and unlike a network's training.
+///
+/// # Errors
+/// JSON that cannot be written.
+pub fn unlike(rows: &[UnlikeRow], format: Format) -> Result<String> {
+    let shares = |row: &UnlikeRow| [row.flagged, row.flagged_if_stated, row.any];
+    let misfit = |row: &UnlikeRow, none: &str| row.misfit.map_or(none.to_owned(), |misfit| format!("{misfit:.2}"));
+    Ok(match format {
+        Format::Json => serde_json::to_string(rows)? + "\n",
+        Format::Csv => {
+            let interval = |name: &str| format!("{name},{name}_low,{name}_high");
+            let shares_head = ["flagged", "flagged_if_stated", "any"].map(interval).join(",");
+            let mut text = format!("frame,estimator,frames,misfit,{shares_head}\n");
+            for row in rows {
+                let shares = shares(row).map(|own| format!("{},{},{}", own.value, own.low, own.high)).join(",");
+                let (frame, estimator, frames) = (&row.frame, &row.estimator, row.frames);
+                text.push_str(&format!("{frame},{estimator},{frames},{},{shares}\n", misfit(row, "")));
+            }
+            text
+        }
+        Format::Markdown => {
+            let head = ["frame", "estimator", "misfit median", "flag misfit", "noise stated", "any flag"];
+            let line = |row: &UnlikeRow| {
+                let [flagged, stated, any] = shares(row).map(|share| of(share.value));
+                vec![row.frame.clone(), row.estimator.clone(), misfit(row, "-"), flagged, stated, any]
+            };
+            let mut text = aligned(2, &head, rows.iter().map(line).collect());
+            let frames = rows.first().map_or(0, |row| row.frames);
+            text.push_str(&format!(
+                "\n{frames} frames of each kind; misfit: over its limit, noise not stated; flag misfit, any flag: share of \
+                 frames with it; noise stated: share with the flag misfit, had the scene stated the noise\n"
+            ));
             text
         }
     })

@@ -16,6 +16,7 @@ use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::{Prepare, Scale};
 use crate::learned::Window;
 use crate::matrices::{Matrices, MAX_DEGREE};
+use crate::misfit::Misfit;
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::scene::Scene;
 use crate::segment::{self, Segmenter};
@@ -139,6 +140,7 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
             segmenter: Segmenter::new(&scene.sensor, segment::WIDTH),
             window: Window::around_contact(&scene.sensor),
         }),
+        misfit: Misfit::of_scene(&scene)?,
         board: board.clone(),
         scene,
         cases: planned,

@@ -11,6 +11,7 @@ use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
 use crate::learned::Window;
+use crate::misfit::Misfit;
 use crate::partition::{Case, Grid, Subarray};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene};
 use crate::segment::Segmenter;
@@ -34,6 +35,8 @@ pub struct Plan {
     pub dead: Vec<usize>,
     /// Segmentation and window, where each contact has a μ of its own.
     pub by_contact: Option<ContactPlan>,
+    /// The check of decoded frames, where a network gives μ.
+    pub misfit: Option<Misfit>,
     /// Memories and multipliers.
     pub resources: Resources,
     /// Cases that divide the array but were left out; empty if the scene lists its cases.
