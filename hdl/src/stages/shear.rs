@@ -139,7 +139,7 @@ impl Shape {
         });
         k.when(start, || running.set(k.constant(1, 1)));
         k.wire("label_address", *quad);
-        let read = k.delay("read_2", k.delay("read_1", k.delay("read", memory.read(*quad))));
+        let read = k.delay("read_1", k.delay("read", memory.read(*quad)));
         k.comment("Labels and the positions of an axis are registered: from memory to multiplier is too long a way.");
         let labels = k.delay("labels_held", labels);
         let axis = k.delay("axis_2", k.delay("axis_1", *second));
@@ -148,7 +148,7 @@ impl Shape {
         let lane = |lane: usize| {
             k.scope(&format!("taxel_{lane}"), || {
                 let taxel = hadamard(read)[lane].round_shift(MEAN as usize).low(self.data);
-                let taxel = k.delay("taxel", taxel.unsigned()).signed();
+                let taxel = k.delay("taxel", k.delay("mean", taxel.unsigned())).signed();
                 let label = labels.slice(lane * self.label_bits(), self.label_bits());
                 let position = k.delay("position", self.position_of(&k, label, positions)).signed();
                 let product = k.delay("product", taxel * position);
