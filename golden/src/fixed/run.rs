@@ -43,6 +43,8 @@ pub struct Trace {
     pub cycles: Cycles,
     /// Cycles from the last input beat to each output beat, status included, at full speed.
     pub beat_cycles: Vec<u64>,
+    /// What the cycles depend on where each contact has a μ of its own; else `None`.
+    pub course: Option<Course>,
 }
 
 /// Stages that pass on single words, not quads, in the serial engine.
@@ -145,6 +147,7 @@ impl Model {
             stages: as_engine_streams(self.board.engine, stages),
             cycles: cycles.after_choice(self),
             beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
+            course,
         }
     }
 }

@@ -13,7 +13,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use dermis_golden::board::Board;
-use dermis_golden::fixed::plan::interval::frame_interval;
+use dermis_golden::fixed::plan::contact_cycles::Course;
+use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
 use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
@@ -64,7 +65,8 @@ pub struct Verified {
     /// Longest distance of two frames' last output beats where frames follow one another without a gap, in cycles;
     /// `None` without Verilator or with fewer than three frames.
     pub frame_interval: Option<u64>,
-    /// The same by the model, for frames of which every subarray is searched.
+    /// The same by the model, for frames of which every subarray is searched, with the contacts of these frames where each has
+    /// a μ of its own.
     pub planned_interval: u64,
     /// Labels of the runs, for example `verilator, full speed`.
     pub runs: Vec<String>,
@@ -89,7 +91,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         rows: Vec::new(),
         findings: Findings::default(),
         frame_interval: None,
-        planned_interval: frame_interval(&hardware.model, hardware.model.first()),
+        planned_interval: planned_interval(&hardware.model, &vectors),
         runs: Vec::new(),
         verilog: simulators.iter().any(|&simulator| simulator != Simulator::RustHdl),
     };
@@ -148,6 +150,13 @@ fn simulate(
         }
     }
     Ok(full_speed)
+}
+
+/// The interval of the model for these vectors.
+fn planned_interval(model: &Model, vectors: &[Vector]) -> u64 {
+    let courses: Option<Vec<Course>> = vectors.iter().map(|vector| vector.expected.course).collect();
+    let own = courses.and_then(|courses| interval::longest_interval(model, &courses));
+    own.unwrap_or_else(|| frame_interval(model, model.first()))
 }
 
 /// The longest distance of two frames' last output beats, from the second frame on: the first finds an idle device.

@@ -31,15 +31,23 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
             let beats = plan.scene.sensor.taxels() + case.status_beats();
             serial::frame_interval(&case.formats, beats as u64)
         }
-        EngineKind::Parallel => parallel(plan, case),
+        EngineKind::Parallel => {
+            parallel(plan, case, &[Course::longest(plan); SETTLED]).last().copied().unwrap_or_default()
+        }
     }
 }
 
-fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
+/// The longest of the intervals before the third and each later one of frames that follow one another, each with the contacts
+/// of its course; `None` with fewer than three.
+pub fn longest_interval(plan: &Plan, courses: &[Course]) -> Option<u64> {
+    let courses: Vec<Option<Course>> = courses.iter().copied().map(Some).collect();
+    parallel(plan, plan.first(), &courses).into_iter().skip(2).max()
+}
+
+/// Cycles between the last output beats of each frame and the one before, from an idle engine on.
+fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64> {
     let taxels = plan.scene.sensor.taxels() as u64;
-    let course = Course::longest(plan);
-    let (passes, search) = (passes(plan, case, course), search(plan, case, true));
-    let contacts = plan.by_contact.as_ref().zip(course).map(|(own, course)| ContactCycles::new(case, own, course));
+    let search = search(plan, case, true);
     let (quads, parts) = (case.formats.quads as u64, case.parts.len());
     let early = early_values(plan, case);
     // From the end of a send to the end of the values of a search whose last sweep waited for it.
@@ -55,8 +63,10 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
     let labels = plan.label_beats() as u64 * LABELS;
     // When the last frame's last code arrived, its search ended, its forces had been sent, the next frame can begin.
     let (mut received, mut searched, mut sent, mut begin) = (0, 0, 0, 0);
-    let mut interval = 0;
-    for _ in 0..SETTLED {
+    let mut intervals = Vec::with_capacity(courses.len());
+    for &course in courses {
+        let passes = passes(plan, case, course);
+        let contacts = plan.by_contact.as_ref().zip(course).map(|(own, course)| ContactCycles::new(case, own, course));
         let (mut start, mut handed_over) = (begin, 0);
         let mut values = Vec::with_capacity(parts);
         for part in 0..parts {
@@ -75,7 +85,7 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         let before = sent;
         let forces = forces(plan, case, &values).last().map_or(0, |last| last + 1);
         sent = forces + SEND + sums + labels + plan.status_beats_of(case) as u64;
-        interval = sent - before;
+        intervals.push(sent - before);
         // Codes that are averaged are taken while the frame buffer is full, the sums are not.
         // Windows are read from the frame buffer until the μ of the last contact is known.
         let free = start + contacts.map_or(quads + FOLDED, |contacts| contacts.free + 1);
@@ -83,5 +93,5 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         let passed = if plan.resources.overlaps { handed_over } else { sent };
         begin = (received + ACCEPT + choice).max(passed + BEGIN);
     }
-    interval
+    intervals
 }
