@@ -75,7 +75,7 @@ fn the_limit_of_the_file_decides() {
     let (scene, _file) = with_network(scene, &Training::trial(&[8])).unwrap();
     assert_eq!(run(&scene).checks.network_misfit, None);
     let refused = unlike_study(&scene, 1, 1, &[Candidate::Scene], &|_, _| ()).unwrap_err().to_string();
-    assert!(refused.starts_with("search.estimator = network is not allowed"), "{refused}");
+    assert!(refused.starts_with("search.network = ") && refused.contains("--limit-of"), "{refused}");
 }
 
 /// A scene of 13 × 18 taxels with a small network for several contacts, and the limit measured for it.

@@ -291,9 +291,10 @@ pub fn unlike_study(
     let mut scene = scene.clone();
     scene.search.noise_floor_MPa = 0.0;
     let Some(misfit) = Misfit::of_scene(&scene).map_err(golden)? else {
-        let value = scene.search.estimator.name().to_owned();
-        let allowed = "learned, with a network whose misfit limit is known (dermis train --limit-of)";
-        return Err(StudyError::Parameter { field: "search.estimator", value, allowed });
+        let value = scene.search.network.as_ref().map_or("none".to_owned(), |path| path.display().to_string());
+        let allowed =
+            "a network of search.estimator = learned with a limit of the misfit (dermis train --limit-of adds it)";
+        return Err(StudyError::Parameter { field: "search.network", value, allowed });
     };
     let kinds = Kind::all();
     let (like, done, total) = (Like::new(&scene, seed), AtomicUsize::new(0), kinds.len() * estimators.len() * draws);

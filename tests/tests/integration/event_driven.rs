@@ -182,7 +182,8 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
 #[test]
 fn with_a_network_and_with_contacts_nothing_is_undefined_either() {
     let contacts = "[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
-    for more in ["", contacts] {
+    let records = &format!("{contacts}[output]\nforces = \"resultants\"\n");
+    for more in ["", contacts, records] {
         let text = format!(
             "name = \"network\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n{more}"
         );

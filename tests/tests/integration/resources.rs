@@ -31,11 +31,11 @@ fn small(name: &str, more: &str) -> Model {
     Model::new(&Scene::parse(&format!("name = \"{name}\"\n{sensor}{more}"), name).unwrap()).unwrap()
 }
 
-/// A scene with a network of a few steps that finds contacts.
+/// A scene with a network of a few steps that finds contacts and sends a record of each.
 fn contacts(lanes: usize) -> Model {
     let text = format!(
         "name = \"contacts\"\n[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-         [partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n"
+         [partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n[output]\nforces = \"resultants\"\n"
     );
     Model::new(&with_network(&text, &[20, 10]).0).unwrap()
 }
@@ -60,7 +60,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
             scene.fixed.lanes = Some(16);
             Model::new(&scene).unwrap()
         },
-        // Contacts: segmentation, window, labels, the mask of the window.
+        // Contacts: segmentation, window, the mask of the window, moments of the records.
         contacts(16),
         // A lane word that is no multiple of a block RAM's; deep coefficients.
         small("deep", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
