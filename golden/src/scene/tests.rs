@@ -113,7 +113,7 @@ fn an_unknown_scene_names_the_nearest() {
     let text = Scene::load("sensor1").unwrap_err().to_string();
     assert!(text.contains("eight-by-eight") && text.ends_with("did you mean \"sensor-1\"?"), "{text}");
     let text = Scene::load("missing/sensor-3.toml").unwrap_err().to_string();
-    assert!(text.ends_with("eight-by-eight)"), "{text}");
+    assert!(text.ends_with("eight-by-eight-contacts)"), "{text}");
     let text = Scene::load("sensor-3.toml").unwrap_err().to_string();
     assert!(text.ends_with("did you mean \"sensor-3\"?"), "{text}");
     // Better none than a wrong one.
