@@ -5,10 +5,10 @@ use thiserror::Error;
 /// A scene or board cannot have a link.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LinkError {
-    /// The engine of the scene does not send one force per taxel and a fixed number of status beats for each frame.
+    /// The engine of the scene does not send a fixed number of beats for each frame.
     #[error(
-        "{field} = {value}: a board's link does not support it; it needs one frame per answer, one force per taxel and the \
-         same subarrays in every frame"
+        "{field} = {value}: a board's link does not support it; it needs one frame per answer and the same subarrays in every \
+         frame"
     )]
     Unsupported {
         /// The scene's field.

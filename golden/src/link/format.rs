@@ -14,7 +14,9 @@ pub(super) fn contents(kind: Kind) -> &'static str {
         }
         Kind::Identity => "identity",
         Kind::Counters => "counters",
-        Kind::Resultants => "sums, then labels and status beats",
+        Kind::Resultants => {
+            "sums, or the records of a board that answers no request for forces; then labels and status beats"
+        }
         Kind::Forces => "one beat per taxel, row-major, then labels and status beats",
     }
 }
@@ -73,7 +75,7 @@ frames may be in flight at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send).\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants).\n"
 }
 
 /// How a special byte is escaped in a packet.

@@ -9,7 +9,7 @@ use crate::board::EngineKind;
 use crate::fixed::stages::send::{LABEL_BITS, STATUS_BEATS};
 use crate::fixed::words::schedule::Kind as Words;
 use crate::fixed::Plan;
-use crate::scene::{Condition, ForceOutput};
+use crate::scene::Condition;
 
 /// All requests.
 const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
@@ -18,17 +18,14 @@ impl Identity {
     /// The identity of the hardware of `plan`.
     ///
     /// # Errors
-    /// [`LinkError`]: the scene averages, sends resultants only or chooses its case per frame; a payload is too long;
-    /// the board lacks the link or its clock is too slow for the bit rate.
+    /// [`LinkError`]: the scene averages or chooses its case per frame; a payload is too long; the board lacks the link or its
+    /// clock is too slow for the bit rate.
     pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
         let scene = &plan.scene;
         let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
         if scene.input.average > 0 {
             return refuse("input.average", scene.input.average.to_string());
-        }
-        if scene.output.forces != ForceOutput::Taxels {
-            return refuse("output.forces", "\"resultants\"".to_owned());
         }
         if plan.chooses() {
             return refuse("partition.case", scene.partition.case.to_string());
@@ -48,7 +45,7 @@ impl Identity {
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             bit_rate: scene.hardware.link.bit_rate(board)?,
             statuses: (plan.status_beats() / STATUS_BEATS) as u16,
-            left_out: REQUESTS.into_iter().filter(|&kind| !supports(board.engine, kind)).map(bit).sum(),
+            left_out: REQUESTS.into_iter().filter(|&kind| !supports(plan, kind)).map(bit).sum(),
             label_bits: if plan.by_contact.is_some() { LABEL_BITS as u8 } else { 0 },
         })
     }
@@ -59,10 +56,14 @@ impl Identity {
     }
 }
 
-/// Whether a board with this engine answers requests of this type. The serial engine has no resultants: logic cells are
-/// few, so the host adds up the forces.
-pub fn supports(engine: EngineKind, kind: Kind) -> bool {
-    engine == EngineKind::Parallel || kind != Kind::FrameForResultants
+/// Whether a board of this plan answers requests of this type. The serial engine has no resultants: logic cells are few, so
+/// the host adds up the forces. An engine that sends records has no forces.
+pub fn supports(plan: &Plan, kind: Kind) -> bool {
+    match kind {
+        Kind::FrameForResultants => plan.board.engine == EngineKind::Parallel,
+        Kind::FrameForForces => !plan.sends_resultants(),
+        _ => true,
+    }
 }
 
 /// Bit of a request in [`Identity::left_out`].
@@ -76,7 +77,7 @@ pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
     let others = (plan.label_beats() + plan.status_beats()) * BEAT_BYTES;
     [
         ("codes", code_bytes(plan.formats().code_bits) * taxels),
-        ("resultants", Sums::BYTES + others),
+        ("resultants", if plan.sends_resultants() { BEAT_BYTES * plan.force_beats() } else { Sums::BYTES } + others),
         ("forces", BEAT_BYTES * taxels + others),
     ]
 }

@@ -151,10 +151,19 @@ fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
         Identity::of(&model).unwrap_err().to_string()
     };
     assert!(refused(&|scene| scene.input.average = 2).starts_with("input.average = 2: "));
-    let resultants = refused(&|scene| scene.output.forces = crate::scene::ForceOutput::Resultants);
-    assert!(resultants.starts_with("output.forces = \"resultants\": "), "{resultants}");
     let long = refused(&|scene| scene.sensor.rows = 800);
     assert_eq!(long, "scene eight-by-eight: forces of 6400 taxels take 76836 bytes, a packet holds 65535");
+}
+
+/// Four beats of the one record and three of the status.
+#[test]
+fn records_are_the_resultants_of_a_board() {
+    let mut scene = Scene::builtin("eight-by-eight").unwrap();
+    scene.output.forces = crate::scene::ForceOutput::Resultants;
+    let plan = crate::fixed::plan::cases::planned(&scene).unwrap();
+    let identity = Identity::of(&plan).unwrap();
+    assert!(identity.supports(Kind::FrameForResultants) && !identity.supports(Kind::FrameForForces));
+    assert_eq!(payloads(&plan)[1], ("resultants", (4 + 3) * BEAT_BYTES));
 }
 
 #[test]

@@ -72,10 +72,40 @@ pub struct Shape {
     pub input_bits: u32,
     /// Beats of labels and statuses of a frame, after the forces.
     pub other_beats: usize,
-    /// The board also answers requests for resultants.
-    pub resultants: bool,
+    /// What the board answers a frame with.
+    pub answers: Answers,
     /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
     pub frames: usize,
+}
+
+/// What a board answers a frame with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answers {
+    /// Forces: the engine is a serial one.
+    Forces,
+    /// Forces, or their sums.
+    Both,
+    /// Records of subarrays or contacts, which the engine sends in so many beats in the place of forces.
+    Records {
+        /// Beats of all records of a frame.
+        beats: usize,
+    },
+}
+
+impl Answers {
+    /// Whether the engine is a fast one, whose streams are registered.
+    fn are_fast(self) -> bool {
+        self != Answers::Forces
+    }
+
+    /// Types of the requests with a frame.
+    fn requests(self) -> &'static [Kind] {
+        match self {
+            Answers::Forces => &[Kind::FrameForForces],
+            Answers::Both => &[Kind::FrameForResultants, Kind::FrameForForces],
+            Answers::Records { .. } => &[Kind::FrameForResultants],
+        }
+    }
 }
 
 impl Shape {
@@ -84,12 +114,16 @@ impl Shape {
         let sensor = &model.scene.sensor;
         let input_bits = model.formats().code_bits;
         let other_beats = model.label_beats() + model.status_beats();
-        let resultants = supports(model.board.engine, Kind::FrameForResultants);
+        let answers = match [Kind::FrameForResultants, Kind::FrameForForces].map(|kind| supports(model, kind)) {
+            [true, true] => Answers::Both,
+            [true, false] => Answers::Records { beats: model.force_beats() },
+            [false, _] => Answers::Forces,
+        };
         let frames = match model.board.engine {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,
         };
-        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, other_beats, resultants, frames }
+        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, other_beats, answers, frames }
     }
 
     /// Bytes of the payload of an answer, by source.
@@ -98,7 +132,11 @@ impl Shape {
         let mut bytes = [0; 4];
         bytes[IDENTITY] = Identity::BYTES;
         bytes[COUNTERS] = Counters::BYTES;
-        bytes[RESULTANTS] = Sums::BYTES + others;
+        bytes[RESULTANTS] = others
+            + match self.answers {
+                Answers::Records { beats } => beats * BEAT_BYTES,
+                Answers::Forces | Answers::Both => Sums::BYTES,
+            };
         bytes[FORCES] = self.rows * self.cols * BEAT_BYTES + others;
         bytes
     }
@@ -108,7 +146,7 @@ impl Shape {
 const IDENTITY: usize = 0;
 /// Source of an answer: the counters.
 const COUNTERS: usize = 1;
-/// Source of an answer: sums over the forces of the engine.
+/// Source of an answer: sums over the forces of the engine, or its records.
 const RESULTANTS: usize = 2;
 /// Source of an answer: all forces of the engine.
 const FORCES: usize = 3;

@@ -81,8 +81,7 @@ impl Parser {
             number: Wire::new(8),
             kernel: Body::default(),
         };
-        let resultants = shape.resultants.then_some(Kind::FrameForResultants as u8);
-        let frame_kinds: Vec<u8> = resultants.into_iter().chain([Kind::FrameForForces as u8]).collect();
+        let frame_kinds: Vec<u8> = shape.answers.requests().iter().map(|kind| *kind as u8).collect();
         block.bind(kernel(shape.rows * shape.cols * code_bytes(shape.input_bits), &frame_kinds))
     }
 }

@@ -2,13 +2,13 @@
 
 use rust_hdl::prelude::*;
 
-use super::Shape;
+use super::{Answers, Shape};
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Type};
 use crate::primitives::count_bits;
 use crate::wire::Wire;
 
-/// While `run`, beats pass as words; without resultants in the `shape` that is all. With `summarise`, the forces are
+/// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With `summarise`, the forces are
 /// added up, and four words of sums go out before the status beats. No multiplier is needed: for Σ column · fz, the sum
 /// of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times, once per cycle;
 /// likewise for rows.
@@ -76,9 +76,9 @@ impl Resultants {
         };
         let k = Builder::new("resultants");
         let ports = Ports::new(&k);
-        match shape.resultants {
-            true => sums(&k, ports, shape.rows, shape.cols),
-            false => pass(&k, ports),
+        match shape.answers {
+            Answers::Both => sums(&k, ports, shape.rows, shape.cols),
+            Answers::Forces | Answers::Records { .. } => pass(&k, ports),
         }
         block.bind(k.finish())
     }
@@ -219,7 +219,7 @@ mod tests {
 
     /// Adds the beats of a whole frame with the golden model's [`Sums`].
     #[derive(Clone, Default)]
-    struct Answers {
+    struct Expected {
         rows: usize,
         cols: usize,
         beats: Vec<[i32; 3]>,
@@ -231,7 +231,7 @@ mod tests {
         reset: bool,
     }
 
-    impl Answers {
+    impl Expected {
         fn passes(&self, inputs: &[Word]) -> bool {
             inputs[3].number() == 0 || self.after.is_some_and(|(_, words)| words == 4)
         }
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    impl Reference for Answers {
+    impl Reference for Expected {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             if !self.reset {
                 return vec![None; 4];
@@ -286,7 +286,7 @@ mod tests {
             self.passing = passes && before.was_taken;
             self.was_taken = taken;
             if rst {
-                *self = Answers { reset: true, rows: self.rows, cols: self.cols, ..Answers::default() };
+                *self = Expected { reset: true, rows: self.rows, cols: self.cols, ..Expected::default() };
             }
         }
     }
@@ -295,7 +295,7 @@ mod tests {
     /// accepted; no word is accepted in the cycle after one; resets.
     fn stimulus(cycles: usize, rows: usize, cols: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(21);
-        let mut answers = Answers { rows, cols, ..Answers::default() };
+        let mut answers = Expected { rows, cols, ..Expected::default() };
         let (mut at, mut pause, mut summarise, mut beat, mut offered, mut large) =
             (0, 0, false, Word::default(), false, false);
         let inputs = |cycle: usize| {
@@ -335,8 +335,9 @@ mod tests {
     #[test]
     fn the_sums_are_those_of_the_model() {
         for (rows, cols) in [(3, 5), (6, 2)] {
-            let shape = Shape { rows, cols, input_bits: 12, other_beats: STATUS_BEATS, resultants: true, frames: 4 };
-            let mut answers = Answers { rows, cols, ..Answers::default() };
+            let shape =
+                Shape { rows, cols, input_bits: 12, other_beats: STATUS_BEATS, answers: Answers::Both, frames: 4 };
+            let mut answers = Expected { rows, cols, ..Expected::default() };
             check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);
         }
     }

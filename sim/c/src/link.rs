@@ -174,8 +174,12 @@ pub unsafe extern "C" fn dermis_link_frame(
         let mut wire = unsafe { Wire::new(wire, capacity, size) }?;
         let link = unsafe { exclusive("link", link) }?;
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
-        if !supports(link.model.board.engine, kind) {
-            return Err(Error::input("forces = false is not allowed; the board's engine sends forces only"));
+        if !supports(&link.model, kind) {
+            let text = match forces {
+                true => "forces = true is not allowed; the board's engine sends records only",
+                false => "forces = false is not allowed; the board's engine sends forces only",
+            };
+            return Err(Error::input(text));
         }
         let scene = &link.model.scene;
         let frames = unsafe { frames(scene, stress_MPa, count) }?;

@@ -21,9 +21,9 @@ use serde::Serialize;
 /// A board's answer to a frame, in LSBs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// Sums over all taxels.
-    pub sums: Sums,
-    /// Forces `[fx, fy, fz]` of all taxels, row-major, if requested.
+    /// Sums over all taxels; of a board that sends records none.
+    pub sums: Option<Sums>,
+    /// Forces `[fx, fy, fz]` of all taxels, row-major, if requested; or the beats of the records.
     pub forces: Option<Vec<[i32; 3]>>,
     /// Beats of labels; none where there is one μ.
     pub labels: Vec<[i32; 3]>,
@@ -43,11 +43,13 @@ impl Answer {
         let mut labels = beats_of_bytes(others)?;
         let status = labels.split_off(model.label_beats());
         let sensor = &model.scene.sensor;
-        let forces = if forces { Some(beats_of_bytes(front)?) } else { None };
+        let records = model.sends_resultants();
+        let forces = if forces || records { Some(beats_of_bytes(front)?) } else { None };
         let sums = match &forces {
-            Some(forces) if forces.len() != sensor.taxels() => return None,
-            Some(forces) => Sums::of(forces, sensor.cols),
-            None => Sums::of_bytes(front)?,
+            Some(forces) if forces.len() + labels.len() != model.force_beats() => return None,
+            Some(_) if records => None,
+            Some(forces) => Some(Sums::of(forces, sensor.cols)),
+            None => Some(Sums::of_bytes(front)?),
         };
         Some(Answer { sums, forces, labels, status, difference: None, received_at: SystemTime::now() })
     }
@@ -57,15 +59,21 @@ impl Answer {
     pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
-        let (forces, labels) = trace.beats.split_at(taxels.min(trace.beats.len()));
+        let (forces, labels) = trace.beats.split_at(trace.beats.len() - model.label_beats());
         let pairs = self.forces.iter().flatten().zip(forces).enumerate();
         let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
         if let Some((index, (got, expected))) = differing.next() {
-            return Some(format!("row {}, column {}: force {got:?}, model {expected:?}", index / cols, index % cols));
+            let place = match model.sends_resultants() {
+                true => format!("beat {index} of the records:"),
+                false => format!("row {}, column {}: force", index / cols, index % cols),
+            };
+            return Some(format!("{place} {got:?}, model {expected:?}"));
         }
-        let expected = Sums::of(forces, cols);
-        if self.sums != expected {
-            return Some(format!("sums {:?}, model {expected:?}", self.sums));
+        if let Some(sums) = self.sums {
+            let expected = Sums::of(forces, cols);
+            if sums != expected {
+                return Some(format!("sums {sums:?}, model {expected:?}"));
+            }
         }
         let read = |beats| labels_of_beats(beats, taxels);
         let mut differing = std::iter::zip(read(&self.labels), read(labels)).enumerate();
@@ -148,15 +156,16 @@ pub struct PhysicalAnswer {
     pub resultant_N: [f64; 3],
     /// Centre of the normal forces relative to the array's centre, tension counted negative; none if their sum is zero.
     pub centre_mm: Option<[f64; 2]>,
-    /// Number of taxels with a normal force.
-    pub loaded: u64,
+    /// Number of taxels with a normal force; of a board that sends records none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loaded: Option<u64>,
     /// Flags, sorted.
     pub flags: Vec<Flag>,
     /// The figures behind the flags.
     pub checks: Checks,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
-    /// The contacts, that with the largest load first; of a board that tells them apart, if forces are requested.
+    /// The contacts, that with the largest load first; of a board that tells them apart, if it sends forces or records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contacts: Option<Vec<FoundContact>>,
     /// Force per taxel, if requested.
@@ -176,26 +185,35 @@ impl PhysicalAnswer {
         let frame = &model.stress(std::slice::from_ref(readings))?;
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
         let sensor = &model.scene.sensor;
-        let sums = &answer.sums;
         let [x0, y0] = sensor.position_mm(0, 0);
-        let centre = sums.centre();
+        let centre = answer.sums.and_then(|sums| sums.centre());
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
-        let checks = answer.checks(model, readings, frame)?;
-        let decoded = match (&answer.forces, model.label_beats()) {
-            (Some(_), 1..) => answer.decode(model, readings)?,
-            _ => None,
+        let decoded = match model.by_contact.is_some() || answer.sums.is_none() {
+            true => answer.decode(model, readings)?,
+            false => None,
+        };
+        let resultant_N = match (&answer.sums, &decoded) {
+            (Some(sums), _) => [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
+            (None, decoded) => decoded.as_ref().map_or([0.0; 3], |result| result.resultant_N),
+        };
+        let (checks, flags) = match (&answer.sums, &decoded) {
+            (None, Some(result)) => (result.checks, result.flags.clone()),
+            _ => {
+                let checks = answer.checks(model, readings, frame)?;
+                (checks, answer.flags(model, frame, &checks)?)
+            }
         };
         let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
         let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
         Ok(PhysicalAnswer {
-            resultant_N: [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
+            resultant_N,
             centre_mm,
-            loaded: sums.loaded,
-            flags: answer.flags(model, frame, &checks)?,
+            loaded: answer.sums.map(|sums| sums.loaded),
+            flags,
             checks,
             dropped_before: answer.dropped_before(),
             contacts: decoded.and_then(|result| result.contacts()),
-            forces_N: answer.forces.as_ref().map(forces),
+            forces_N: answer.forces.as_ref().filter(|_| !model.sends_resultants()).map(forces),
             equal: answer.difference.as_ref().map(Option::is_none),
         })
     }

@@ -58,13 +58,16 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
         let frame = self.subtract_tare(frame);
         let codes = self.model.readings(std::slice::from_ref(&frame))?;
-        // A board that cannot sum forces sends them all, and the host sums them.
-        let forces = self.forces || !self.identity.supports(Kind::FrameForResultants);
+        // A board that cannot sum forces sends them all, and the host sums them. One that sends records has no forces.
+        let forces = match self.forces {
+            true => self.identity.supports(Kind::FrameForForces),
+            false => !self.identity.supports(Kind::FrameForResultants),
+        };
         let mut answer = self.client.frame(&self.model, &codes, forces)?;
         if self.check {
             answer.difference = Some(answer.compare_with_model(&self.model, &codes));
         }
-        answer.forces = answer.forces.filter(|_| self.forces);
+        answer.forces = answer.forces.filter(|_| self.forces || !forces);
         Ok((frame, answer))
     }
 

@@ -16,7 +16,7 @@ pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> St
         physical.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
     format!(
         "{frame}: N x {x}   y {y}   normal {normal}   centre {centre}   taxels {}   flags {}\n{}",
-        physical.loaded,
+        physical.loaded.map_or("-".to_owned(), |loaded| loaded.to_string()),
         if flags.is_empty() { "none".to_owned() } else { flags.join(", ") },
         equality(answer),
     )
@@ -75,10 +75,13 @@ impl LinkTimes {
 
 /// The links that the model's board has.
 fn times(model: &Model) -> Vec<LinkTimes> {
-    let sums = supports(model.board.engine, Kind::FrameForResultants);
     let of = |(_, kind): (&str, LinkKind)| {
         let bit_rate = kind.bit_rate(&model.board).ok()?;
-        let sent = |packet: &str| sums || packet != Kind::Resultants.name();
+        let sent = |packet: &str| match packet {
+            _ if packet == Kind::Resultants.name() => supports(model, Kind::FrameForResultants),
+            _ if packet == Kind::Forces.name() => supports(model, Kind::FrameForForces),
+            _ => true,
+        };
         let time = |(packet, bytes)| (packet, sent(packet).then(|| kind.wire_ms(bytes, bit_rate)));
         Some(LinkTimes { kind, bit_rate, packets: payloads(model).into_iter().map(time).collect() })
     };

@@ -1,4 +1,4 @@
-//! A scene with several contacts, which the bit-true model has and the hardware has not.
+//! A scene with several contacts: in words, in hardware, and its program.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn run(folder: &Path, args: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn contacts_are_reconstructed_in_words_and_have_no_hardware() {
+fn contacts_are_reconstructed_in_words_and_in_hardware() {
     let work = tempfile::tempdir().unwrap();
     let folder = work.path();
     fs::write(folder.join("pad.toml"), PAD).unwrap();
@@ -41,13 +41,23 @@ fn contacts_are_reconstructed_in_words_and_have_no_hardware() {
     let normal = |region: &Value| region["load_N"][2].as_f64().unwrap();
     assert!(normal(&regions[0]) > normal(&regions[1]) && normal(&regions[1]) > 2.0, "{regions:?}");
 
-    let reason = "partition.case = contacts is not available in hardware yet";
     let (code, text, error) = run(folder, &["check", "pad.toml", "--draws", "2"]);
     assert_eq!(code, Some(0), "{error}");
-    assert!(text.contains(&format!("hardware    none: {reason}")), "{text}");
-    for command in [&["build", "pad.toml"][..], &["cosim", "pad.toml", "--frame", "f.json"]] {
-        let (code, _, error) = run(folder, command);
-        assert_eq!(code, Some(2), "{error}");
-        assert!(error.contains(reason), "{error}");
+    assert!(text.contains("within the budget of 1000 µs"), "{text}");
+    let (code, text, error) = run(folder, &["cosim", "pad.toml", "--frame", "f.json", "--device", "rust-hdl"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(text.contains("equal to the bit-true model to the bit"), "{text}");
+    let (code, text, error) = run(folder, &["build", "pad.toml", "--explain", "--out", "rtl"]);
+    assert_eq!(code, Some(0), "{error}");
+    for line in
+        ["contacts: a μ for each of 2 at most", "| each contact       | weights 1", "| each step of relax | −Ax"]
+    {
+        assert!(text.contains(line), "{line}: {text}");
     }
+    let manifest: Value = serde_json::from_str(&fs::read_to_string(folder.join("rtl/manifest.json")).unwrap()).unwrap();
+    let sections: Vec<&str> =
+        manifest["program"].as_array().unwrap().iter().map(|own| own["section"].as_str().unwrap()).collect();
+    let mut different = sections.clone();
+    different.dedup();
+    assert_eq!(different, ["first", "each contact", "each step of relax"]);
 }

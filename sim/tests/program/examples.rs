@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 47] = [
+const NOT_RUN: [(&str, &str); 48] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -42,6 +42,7 @@ const NOT_RUN: [(&str, &str); 47] = [
     ("dermis noise sensor-1 --shapes table --sensitivity", "minutes"),
     ("dermis train sensor-1", "a quarter of an hour; the short one is run"),
     ("dermis train my-scene.toml", "a quarter of an hour"),
+    ("dermis train my-scene.toml --limit-of my-scene.network", "needs a network of an older version"),
     ("dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network", "minutes"),
     ("dermis study input-bits", "a minute; accuracy.rs measures the same"),
     ("dermis study contacts ellipses", "a minute; guide.rs"),

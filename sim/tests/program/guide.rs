@@ -111,8 +111,8 @@ fn the_pictures_that_only_the_program_changes_are_drawn_anew() {
 
 #[test]
 fn pictures_have_titles_their_labels_and_colours_for_light_and_dark() {
-    let stages =
-        "prepare receive choose normalise fold pass estimate rescale relax unfold search forces send resultants";
+    let stages = "prepare receive choose normalise fold pass segment contacts window estimate shear rescale relax unfold search \
+                  forces send label_beats resultants";
     let timings: Vec<String> = stages.split(' ').map(|stage| format!("timing-{stage}.svg")).collect();
     let of_stages = timings.iter().map(|name| (name.as_str(), &["cycle", "input", "output"][..]));
     let pictures = [

@@ -67,11 +67,12 @@ impl Questions {
             status[0][2] |= FLAG_FRAMING as i32;
         }
         let bytes = |beats: &[[i32; 3]]| -> Vec<u8> { beats.iter().flatten().flat_map(|w| w.to_le_bytes()).collect() };
-        let sensor = &self.model.scene.sensor;
-        let (forces, labels) = trace.beats.split_at(sensor.taxels());
+        let (forces, labels) = trace.beats.split_at(trace.beats.len() - self.model.label_beats());
         let front = match kind {
-            Kind::FrameForForces => bytes(forces),
-            _ => Sums::of(forces, sensor.cols).to_bytes(),
+            Kind::FrameForResultants if !self.model.sends_resultants() => {
+                Sums::of(forces, self.model.scene.sensor.cols).to_bytes()
+            }
+            _ => bytes(forces),
         };
         Packet { kind: kind.answer(), sequence, payload: [front, bytes(labels), bytes(&status)].concat() }
     }
@@ -292,16 +293,45 @@ const TWO_SUBARRAYS: &str = "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2
 const SINGLE_BYTE: &str =
     "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n";
 
-/// Labels between forces and statuses, a status for each of two contacts; the host reads the contacts.
-#[test]
-fn contacts_are_answered_with_their_labels() {
-    let text =
-        "rows = 5\ncols = 6\n[partition]\ncase = \"contacts\"\nmax_contacts = 2\n[input]\nfull_scale_MPa = 0.5\n";
-    let (scene, _file) = with_network(&small_text(text), &[6]);
+const CONTACTS: &str =
+    "rows = 5\ncols = 6\n[partition]\ncase = \"contacts\"\nmax_contacts = 2\n[input]\nfull_scale_MPa = 0.5\n";
+
+/// A scene of contacts, its network, and a frame with two of them as the first.
+fn two_contacts(more: &str) -> (Questions, Frame, impl Sized) {
+    let (scene, file) = with_network(&small_text(&format!("{CONTACTS}{more}")), &[6]);
     let mut questions = extremes(Model::new(&scene).unwrap());
     let pressed = |taxel: usize| if [7, 8, 22, 28].contains(&taxel) { 0.3 } else { 0.001 };
     let frame = Frame::from_stress("two", &scene.sensor, (0..30).map(pressed).collect()).unwrap();
     questions.codes[0] = questions.model.codes(&frame).unwrap().codes;
+    (questions, frame, file)
+}
+
+/// What a board sends in the place of forces is the answer to a request for resultants; there is none for forces.
+#[test]
+fn records_of_contacts_are_the_resultants() {
+    let (questions, frame, _file) = two_contacts("[output]\nforces = \"resultants\"\n");
+    let mut board = Board::of(questions, &[Simulator::Verilator]);
+    board.send(&Packet::request(Kind::Identify, 3).to_wire());
+    let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
+    assert!(identity.supports(Kind::FrameForResultants) && !identity.supports(Kind::FrameForForces));
+    board.send(&board.frame(0, Kind::FrameForForces, 4).to_wire());
+    assert_eq!(board.receive(), []);
+    board.send(&board.frame(0, Kind::FrameForResultants, 5).to_wire());
+    let mut answers = board.receive();
+    assert!(answers == [board.answer(0, Kind::FrameForResultants, 5, false)]);
+    assert_eq!(board.counters(), Counters { taken: 3, unknown_type: 1, ..Counters::default() });
+    let answer = Answer::of_bytes(&board.model, &answers.remove(0).payload, false).unwrap();
+    assert_eq!(answer.compare_with_model(&board.model, &board.codes[0]), None);
+    let physical = PhysicalAnswer::new(&board.model, &frame, &answer).unwrap();
+    let of_model = board.model.reconstruct(&frame).unwrap();
+    assert_eq!((physical.contacts, physical.resultant_N), (of_model.contacts(), of_model.resultant_N));
+    assert_eq!(physical.flags, of_model.flags);
+}
+
+/// Labels between forces and statuses, a status for each of two contacts; the host reads the contacts.
+#[test]
+fn contacts_are_answered_with_their_labels() {
+    let (questions, frame, _file) = two_contacts("");
     let mut board = Board::of(questions, &[Simulator::Verilator, Simulator::RustHdl]);
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();

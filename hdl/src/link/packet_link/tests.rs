@@ -8,9 +8,10 @@ use dermis_golden::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet,
 use super::*;
 use crate::language::testbench::{block_subject, check_with_defects, Reference, Subject};
 use crate::language::Change;
+use crate::link::Answers;
 use crate::wire::Word;
 
-const SHAPE: Shape = Shape { rows: 3, cols: 4, input_bits: 12, other_beats: 3, resultants: true, frames: 4 };
+const SHAPE: Shape = Shape { rows: 3, cols: 4, input_bits: 12, other_beats: 3, answers: Answers::Both, frames: 4 };
 const TAXELS: usize = SHAPE.rows * SHAPE.cols;
 /// Packets between two resets.
 const PACKETS: usize = 12;
