@@ -40,8 +40,8 @@ pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (V
 }
 
 /// Lanes and memories of the parallel engine: the scene's number of lanes, else the most with which the memories fit, if
-/// need be without frames that overlap or with some memories in distributed RAM. With the same number of lanes, one
-/// coefficient memory is preferred to one of its own for the low limbs of Cz⁺.
+/// need be without frames that overlap or with some memories in distributed RAM. With the same number of lanes, the low limbs of
+/// Cz⁺ have a memory of their own where that takes fewer block RAMs.
 fn parallel(
     formats: &Formats,
     matrices: &[Matrix],
@@ -96,16 +96,15 @@ fn parallel(
     groups.dedup();
     // Where nothing fits, the design with the fewest block RAMs.
     let mut leanest: Option<(Vec<LaidOut>, Resources)> = None;
-    let memories =
-        |groups| [false, true].into_iter().take(1 + usize::from(narrow_may)).map(move |narrow| (groups, narrow));
-    for (groups, narrow) in groups.into_iter().flat_map(memories) {
-        let design = with(groups, narrow);
-        if design.1.fits(board) {
+    for groups in groups {
+        let memories = [false, true].into_iter().take(1 + usize::from(narrow_may));
+        let designs = memories.map(|narrow| with(groups, narrow));
+        let (fitting, others): (Vec<_>, Vec<_>) = designs.partition(|design| design.1.fits(board));
+        if let Some(design) = fitting.into_iter().min_by_key(|design| design.1.rom_block_rams()) {
             return design;
         }
-        if leanest.as_ref().is_none_or(|leanest| design.1.block_rams() < leanest.1.block_rams()) {
-            leanest = Some(design);
-        }
+        let lean = others.into_iter().min_by_key(|design| design.1.block_rams());
+        leanest = leanest.into_iter().chain(lean).min_by_key(|design| design.1.block_rams());
     }
     leanest.unwrap_or(all)
 }

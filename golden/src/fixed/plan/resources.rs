@@ -328,6 +328,11 @@ impl Resources {
         self
     }
 
+    /// Number of block RAMs of coefficients and lists of columns, which no distributed RAM relieves.
+    pub fn rom_block_rams(&self) -> usize {
+        self.memories.iter().filter(|memory| memory.holds.is_rom()).map(|memory| memory.block_rams).sum()
+    }
+
     /// Number of block RAMs of all memories.
     pub fn block_rams(&self) -> usize {
         self.memories.iter().map(|memory| memory.block_rams).sum()
