@@ -114,7 +114,7 @@ impl Answer {
         Some(x.hypot(y) / MU_STEPS as f64)
     }
 
-    /// The figures behind the flags that a board's answer allows.
+    /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
         Ok(Checks {
             full_scale_share: Input::new(&model.scene)?.full_scale_share(std::slice::from_ref(readings)),
@@ -124,7 +124,7 @@ impl Answer {
         })
     }
 
-    /// The result's flags, as in a reconstruction, but `mu-at-bound` only with one subarray.
+    /// The flags of an answer with sums, as in a reconstruction, but `mu-at-bound` only with one subarray.
     fn flags(&self, model: &Model, frame: &Frame, checks: &Checks) -> Result<Vec<Flag>> {
         let noise_MPa = Input::new(&model.scene)?.noise_MPa();
         let of_frame = frame_flags(&model.scene, frame, &model.codes(frame)?, noise_MPa);
@@ -188,17 +188,15 @@ impl PhysicalAnswer {
         let [x0, y0] = sensor.position_mm(0, 0);
         let centre = answer.sums.and_then(|sums| sums.centre());
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
-        let decoded = match model.by_contact.is_some() || answer.sums.is_none() {
-            true => answer.decode(model, readings)?,
-            false => None,
-        };
+        let decoded = answer.decode(model, readings)?;
         let resultant_N = match (&answer.sums, &decoded) {
             (Some(sums), _) => [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
             (None, decoded) => decoded.as_ref().map_or([0.0; 3], |result| result.resultant_N),
         };
-        let (checks, flags) = match (&answer.sums, &decoded) {
-            (None, Some(result)) => (result.checks, result.flags.clone()),
-            _ => {
+        // Forces or records tell all that a reconstruction checks.
+        let (checks, flags) = match &decoded {
+            Some(result) => (result.checks, result.flags.clone()),
+            None => {
                 let checks = answer.checks(model, readings, frame)?;
                 (checks, answer.flags(model, frame, &checks)?)
             }

@@ -121,15 +121,18 @@ impl<'k> Circuit<'k> {
             heading.set(self.is(BORDERS).mux(borders, climbs));
         });
         let ahead = k.wire("ahead", runs & (!last | ends | moves));
-        let steps = self.steps_out.low(DIRECTION) & (walks & !known).repeat(DIRECTION);
-        let direction = *heading | steps | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION);
-        let direction = k.wire("direction", direction);
-        let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
-        let from_window = k.wire("from_window", smooths & last & !ends | self.is(WALK) & known & !passes);
-        let from_point = k.wire("from_point", smooths & !from_window | self.is(WALK) & !known);
+        let direction = k.wire("direction", *heading | constant(DIRECTION, NEXT as usize) & ahead.repeat(DIRECTION));
+        let from_window = k.wire("from_window", smooths & last & !ends);
         let own = self.is(LABEL).mux(*self.target, *self.address);
-        let from = from_window.mux(*window, from_point.mux(*self.point, own));
-        let next = k.wire("next_point", (from + offset).low(self.address.bits()));
+        let from = from_window.mux(*window, smooths.mux(*self.point, own));
+        let next_to = |from: Expr<'k>, direction: Expr<'k>| {
+            let offset = direction.table(self.address.bits(), &offsets(shape.cols, self.address.bits()));
+            (from + offset).low(self.address.bits())
+        };
+        // The entry of a walk comes late from its memory: what it says is known is selected behind the sum.
+        let uphill = k.wire("uphill", next_to(*self.point, self.steps_out.low(DIRECTION)));
+        let walked = known.mux(passes.mux(*self.address, *window), uphill);
+        let next = k.wire("next_point", self.is(WALK).mux(walked, next_to(from, direction)));
         let reads = self.is(CLIMB) | self.is(BORDERS) & *self.moves | runs | walks | self.at(LABEL, 1);
         k.when(reads, || self.point.set(next));
         k.when(runs & last, || window.set(next));
