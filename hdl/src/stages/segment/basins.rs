@@ -170,7 +170,7 @@ impl<'k> Circuit<'k> {
         let middle = column.concat(!column & self.tick.any());
         let at = select(&[
             (self.at(BORDERS, 4), *self.own),
-            (self.is(LABEL), index(self.label.minus(1).low(contact), self.tick.minus(1).low(2))),
+            (self.is(LABEL), index(self.label.minus(1), self.tick.minus(1).low(2))),
             (self.is(MIDDLE), index(self.higher.low(contact), middle)),
             (self.among(&[CLEAR, SETTLE]), *self.higher),
             (self.among(&[LEAST, JOIN]), *self.cursor),

@@ -334,7 +334,7 @@ impl<'k> Circuit<'k> {
             kept: register("count", shape.label()),
             overflow: register("overflow", 1),
             done: k.state("done", Type::unsigned(1), rst, 0),
-            label: register("label", shape.label()),
+            label: register("label", count_bits(shape.most)),
             adds: register("adds", 1),
             own: register("own", BASIN),
             lower: register("lower", BASIN),

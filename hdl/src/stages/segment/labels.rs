@@ -22,7 +22,8 @@ impl<'k> Circuit<'k> {
         // The basin of a taxel is the cursor when the next taxel has been chosen.
         k.when(self.at(LABEL, 4), || self.begun.set(k.constant(1, 1)));
         k.when(self.at(LABEL, 0), || {
-            self.label.set(found);
+            // Its number, and 0 for none, which adds nothing.
+            self.label.set(found.low(self.label.bits()));
             self.adds.set(*self.counts & found.any() & *self.begun);
             before.set(quad.slice(bits, 3 * bits));
         });
