@@ -84,20 +84,26 @@ impl Misfit {
     fn mu_of_taxels(&self, result: &Reconstruction) -> Option<Vec<[f64; 2]>> {
         let n = self.sensor.taxels();
         let whole = result.subarrays.iter().find(|own| own.centroid_condition)?;
+        // Of records of contacts, whose taxels are only counted, and of contacts that share their taxels.
+        let nearest = |all: Vec<([f64; 2], [f64; 2])>| -> Option<Vec<[f64; 2]>> {
+            let of_taxel = |taxel: usize| {
+                let [x, y] = self.sensor.position_mm(taxel / self.sensor.cols, taxel % self.sensor.cols);
+                let off = |[u, v]: [f64; 2]| (x - u).hypot(y - v);
+                all.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).map(|own| own.1)
+            };
+            (0..n).map(of_taxel).collect()
+        };
         if let Some(regions) = &result.extra.regions {
+            if regions.iter().any(|region| region.taxel_count > region.taxels.len()) {
+                return nearest(regions.iter().filter_map(|region| Some((region.centre_mm?, region.mu))).collect());
+            }
             let mut mu = vec![[0.0; 2]; n];
             let own = regions.iter().flat_map(|region| region.taxels.iter().map(|&taxel| (taxel, region.mu)));
             own.for_each(|(taxel, own)| mu[taxel] = own);
             return Some(mu);
         }
         if let Some(contacts) = result.extra.contacts.as_ref().filter(|contacts| !contacts.is_empty()) {
-            let nearest = |taxel: usize| {
-                let [x, y] = self.sensor.position_mm(taxel / self.sensor.cols, taxel % self.sensor.cols);
-                let off = |[u, v]: [f64; 2]| (x - u).hypot(y - v);
-                let own = contacts.iter().min_by(|a, b| off(a.centre_mm).total_cmp(&off(b.centre_mm)));
-                own.map(|contact| contact.mu)
-            };
-            return (0..n).map(nearest).collect();
+            return nearest(contacts.iter().map(|contact| (contact.centre_mm, contact.mu)).collect());
         }
         // 0 where no forces press.
         Some(vec![whole.mu; n])

@@ -89,14 +89,19 @@ fn several() -> (Scene, tempfile::NamedTempFile) {
     (scene, file)
 }
 
-/// With several contacts each taxel has the μ of its contact.
+/// With several contacts each taxel has the μ of its contact; with records of contacts that of the nearest one.
 #[test]
 fn frames_of_several_contacts_are_checked() {
     let (scene, _file) = several();
+    let mut with_records = scene.clone();
+    with_records.output.forces = crate::scene::ForceOutput::Resultants;
+    let with_records = Model::new(&with_records).unwrap();
     for number in 0..3 {
         let frame = like(&scene, 2, number);
         let ([network, _, fixed], flagged) = misfits(&scene, &frame);
         assert!(!flagged && (fixed / network - 1.0).abs() < 0.05, "{number}: {network} {fixed}");
+        let of_records = with_records.reconstruct(&frame).unwrap().checks.network_misfit.unwrap();
+        assert!((of_records / fixed - 1.0).abs() < 0.1, "{number}: {of_records} {fixed}");
         let (figures, flagged) = misfits(&scene, &unlike(frame));
         assert!(flagged, "{number}: {figures:?}");
     }
