@@ -100,8 +100,11 @@ fn frames_of_several_contacts_are_checked() {
         let frame = like(&scene, 2, number);
         let ([network, _, fixed], flagged) = misfits(&scene, &frame);
         assert!(!flagged && (fixed / network - 1.0).abs() < 0.05, "{number}: {network} {fixed}");
-        let of_records = with_records.reconstruct(&frame).unwrap().checks.network_misfit.unwrap();
-        assert!((of_records / fixed - 1.0).abs() < 0.1, "{number}: {of_records} {fixed}");
+        let records = with_records.reconstruct(&frame).unwrap();
+        let of_taxels = Misfit::new(&scene, 1.0).mu_of_taxels(&records).unwrap();
+        let of_regions: Vec<[f64; 2]> = records.extra.regions.iter().flatten().map(|region| region.mu).collect();
+        assert!(of_regions.iter().all(|mu| *mu != [0.0; 2] && of_taxels.contains(mu)), "{number}: {of_regions:?}");
+        assert!(of_taxels.iter().all(|mu| of_regions.contains(mu)), "{number}: {of_regions:?}");
         let (figures, flagged) = misfits(&scene, &unlike(frame));
         assert!(flagged, "{number}: {figures:?}");
     }
