@@ -1,7 +1,6 @@
 //! Which features a scene's hardware has, which it omits, and what each omission saves: the model of the scene with
 //! that feature added, minus the model of the scene.
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::feature_costs::{features, Feature};
 use dermis_golden::fixed::plan::program::listing;
 use dermis_golden::fixed::{Cycles, Model};
@@ -49,8 +48,9 @@ impl Generated {
     /// Adds the list of features and the program of the passes of `model` to the manifest, and updates the checksums.
     pub fn add_explained(&mut self, model: &Model, explained: &[Explained]) {
         self.manifest["features"] = json!(explained);
-        if model.board.engine == EngineKind::Parallel {
-            self.manifest["program"] = json!(listing(model.cases()));
+        let program = listing(model);
+        if !program.is_empty() {
+            self.manifest["program"] = json!(program);
         }
         self.seal();
     }

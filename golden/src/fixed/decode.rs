@@ -150,18 +150,19 @@ impl Model {
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
-            let resultants = match &result.extra.regions {
-                Some(regions) => regions.iter().map(Region::resultant).collect(),
-                None => records.resultants(),
-            };
-            if result.extra.regions.is_some() {
-                result.extra.wrench = Some(records.wrench());
-            } else {
-                for (own, of) in result.subarrays.iter_mut().zip(&resultants) {
-                    own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+            result.extra.resultants = Some(match &result.extra.regions {
+                Some(regions) => {
+                    result.extra.wrench = Some(records.wrench());
+                    regions.iter().map(Region::resultant).collect()
                 }
-            }
-            result.extra.resultants = Some(resultants);
+                None => {
+                    let resultants = records.resultants();
+                    for (own, of) in result.subarrays.iter_mut().zip(&resultants) {
+                        own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+                    }
+                    resultants
+                }
+            });
         }
         if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.

@@ -46,7 +46,7 @@ impl Identity {
             bit_rate: scene.hardware.link.bit_rate(board)?,
             statuses: (plan.status_beats() / STATUS_BEATS) as u16,
             left_out: REQUESTS.into_iter().filter(|&kind| !supports(plan, kind)).map(bit).sum(),
-            label_bits: if plan.by_contact.is_some() { LABEL_BITS as u8 } else { 0 },
+            label_bits: if plan.label_beats() > 0 { LABEL_BITS as u8 } else { 0 },
         })
     }
 
@@ -75,15 +75,16 @@ fn bit(kind: Kind) -> u8 {
 pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
     let taxels = plan.scene.sensor.taxels();
     let others = (plan.label_beats() + plan.status_beats()) * BEAT_BYTES;
+    let resultants = if plan.sends_resultants() { BEAT_BYTES * plan.force_beats() } else { Sums::BYTES };
     [
         ("codes", code_bytes(plan.formats().code_bits) * taxels),
-        ("resultants", if plan.sends_resultants() { BEAT_BYTES * plan.force_beats() } else { Sums::BYTES } + others),
+        ("resultants", resultants + others),
         ("forces", BEAT_BYTES * taxels + others),
     ]
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
-/// condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, the quantised matrices with
+/// whether records take the place of forces, condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, the quantised matrices with
 /// the columns kept, the network, and what finds the contacts. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
     let sensor = &plan.scene.sensor;
@@ -92,6 +93,7 @@ pub fn scene_hash(plan: &Plan) -> u32 {
         "array": [sensor.rows, sensor.cols],
         "subarrays": plan.grid(),
         "formats": plan.formats(),
+        "records": plan.sends_resultants(),
         "both_signs": plan.scene.partition.condition == Condition::BothSigns,
         "noise_floor": plan.noise_floor,
         "threshold": plan.threshold,

@@ -164,6 +164,9 @@ fn records_are_the_resultants_of_a_board() {
     let identity = Identity::of(&plan).unwrap();
     assert!(identity.supports(Kind::FrameForResultants) && !identity.supports(Kind::FrameForForces));
     assert_eq!(payloads(&plan)[1], ("resultants", (4 + 3) * BEAT_BYTES));
+    // A host that expects forces is told that it is another board.
+    let forces = crate::fixed::plan::cases::planned(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    assert_ne!(identity.scene, scene_hash(&forces));
 }
 
 #[test]

@@ -147,9 +147,9 @@ impl Kind {
         let is_dark = |t: usize| (t / cols + t % cols) % 2 == 1;
         match self {
             Kind::Like(_) | Kind::Friction | Kind::Thickness(_) => (),
-            Kind::Signs => (0..n).for_each(|t| b[t] = if is_dark(t) { -1.0 } else { 1.0 } + NOISE[1] * random.normal()),
-            Kind::Checkerboard => {
-                (0..n).for_each(|t| b[t] = if is_dark(t) { 0.0 } else { 1.0 } + NOISE[1] * random.normal());
+            Kind::Signs | Kind::Checkerboard => {
+                let dark = if self == Kind::Signs { -1.0 } else { 0.0 };
+                (0..n).for_each(|t| b[t] = if is_dark(t) { dark } else { 1.0 } + NOISE[1] * random.normal());
             }
             Kind::Permuted => (1..n).rev().for_each(|t| b.swap(t, any(random, t + 1))),
             Kind::Shifted => {

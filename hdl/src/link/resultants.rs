@@ -8,10 +8,10 @@ use crate::language::{concat, Body, Builder, Expr, Type};
 use crate::primitives::count_bits;
 use crate::wire::Wire;
 
-/// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With `summarise`, the forces are
-/// added up, and four words of sums go out before the status beats. No multiplier is needed: for Σ column · fz, the sum
-/// of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times, once per cycle;
-/// likewise for rows.
+/// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With
+/// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is needed: for
+/// Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times,
+/// once per cycle; likewise for rows.
 #[derive(LogicBlock)]
 pub struct Resultants {
     /// Clock; registers change on its rising edge.

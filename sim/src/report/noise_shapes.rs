@@ -200,8 +200,7 @@ pub fn unlike(rows: &[UnlikeRow], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
         Format::Csv => {
-            let interval = |name: &str| format!("{name},{name}_low,{name}_high");
-            let shares_head = ["flagged", "flagged_if_stated", "any"].map(interval).join(",");
+            let shares_head = ["flagged", "flagged_if_stated", "any"].map(interval_head).join(",");
             let mut text = format!("frame,estimator,frames,misfit,{shares_head}\n");
             for row in rows {
                 let shares = shares(row).map(|own| format!("{},{},{}", own.value, own.low, own.high)).join(",");
@@ -227,9 +226,13 @@ pub fn unlike(rows: &[UnlikeRow], format: Format) -> Result<String> {
     })
 }
 
+/// Columns of a value with its interval.
+fn interval_head(name: &str) -> String {
+    format!("{name},{name}_low,{name}_high")
+}
+
 /// Columns of [`summary_csv`].
 fn summary_head() -> String {
-    let interval = |name: &str| format!("{name},{name}_low,{name}_high");
     let coverage = ["within_1", "within_2", "normal_within_1", "normal_within_2", "beyond_3"];
     let names = [
         "et_median",
@@ -242,7 +245,7 @@ fn summary_head() -> String {
         "contact_et_90",
         "flagged",
     ];
-    let all: Vec<String> = names.iter().chain(&coverage).map(|name| interval(name)).collect();
+    let all: Vec<String> = names.iter().chain(&coverage).map(|name| interval_head(name)).collect();
     format!("draws,{}", all.join(","))
 }
 

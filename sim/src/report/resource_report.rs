@@ -1,6 +1,5 @@
 //! Resources of a generated design and its optional features, as text.
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::cycles::lane_utilisation;
 use dermis_golden::fixed::plan::program::listing;
 use dermis_golden::fixed::{Cycles, Model};
@@ -32,11 +31,12 @@ pub fn resources(model: &Model, usage: &StageUsage) -> String {
 
 /// The program of the passes as a table; none for the serial engine, which has no lanes.
 pub fn program(model: &Model) -> String {
-    if model.board.engine == EngineKind::Serial {
+    let program = listing(model);
+    if program.is_empty() {
         return String::new();
     }
     let several = model.chooses();
-    let rows = listing(model.cases()).into_iter().map(|own| {
+    let rows = program.into_iter().map(|own| {
         let section = if several { format!("case {}, {}", own.case, own.section) } else { own.section.to_owned() };
         let [step, group, flip] = [own.step, own.group, own.flip].map(|number| number.to_string());
         let [coefficients, cycles] = [own.coefficients, own.cycles].map(|number| number.to_string());

@@ -314,6 +314,7 @@ fn records_of_contacts_are_the_resultants() {
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
     assert!(identity.supports(Kind::FrameForResultants) && !identity.supports(Kind::FrameForForces));
+    assert_eq!((identity.statuses, identity.label_bits), (2, 0));
     board.send(&board.frame(0, Kind::FrameForForces, 4).to_wire());
     assert_eq!(board.receive(), []);
     board.send(&board.frame(0, Kind::FrameForResultants, 5).to_wire());

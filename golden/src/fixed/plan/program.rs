@@ -6,7 +6,8 @@
 //! | in: accumulations of each [`Section`], layout of the coefficient memory | – | – |
 //! | out: [`Instruction`]s | one per product and group of rows | words of the memories |
 
-use super::contents::CasePlan;
+use super::contents::{CasePlan, Plan};
+use crate::board::EngineKind;
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::schedule::{
     operand_number, sections, Axis, Kind, Matrix, Operand, Product, Section, Target, EXPONENTS,
@@ -92,10 +93,11 @@ pub struct Listed {
     pub cycles: usize,
 }
 
-/// The program of all `cases`, in the order of the table in the hardware.
-pub fn listing(cases: &[CasePlan]) -> Vec<Listed> {
+/// The program of all cases, in the order of the table in the hardware; none for the serial engine, which has no lanes.
+pub fn listing(plan: &Plan) -> Vec<Listed> {
     let mut all = Vec::new();
-    for case in cases {
+    let parallel = plan.board.engine == EngineKind::Parallel;
+    for case in plan.cases().iter().filter(|_| parallel) {
         for (index, section) in sections(&case.formats).iter().enumerate() {
             let section_name = section_name(&case.formats, index);
             let listed = |(step, own): (usize, Instruction)| Listed {
@@ -186,7 +188,7 @@ mod tests {
     fn every_coefficient_is_read() {
         for name in ["eight-by-eight", "sensor-1-noisy", "eight-by-eight-contacts", "sensor-4"] {
             let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
-            let listed = listing(model.cases());
+            let listed = listing(&model);
             let words: usize = model.cases().iter().map(|case| case.storage.words()).sum();
             let mut read = vec![false; words];
             for own in &listed {
@@ -202,17 +204,17 @@ mod tests {
     fn an_instruction_is_named_as_the_equations_are() {
         let of = |scene: &str, result: &str| -> Vec<String> {
             let model = Model::new(&Scene::builtin(scene).unwrap()).unwrap();
-            let own = listing(model.cases()).into_iter().filter(|own| own.result == result && own.group == 0);
+            let own = listing(&model).into_iter().filter(|own| own.result == result && own.group == 0);
             own.map(|own| format!("{} · {}", own.matrix, own.operand)).collect()
         };
         assert_eq!(of("eight-by-eight", "v_11"), ["−Ay · v_10", "−Ax · v_01"]);
         // Square taxels in a square subarray: Ay is Ax transposed.
         let mut square = Scene::builtin("sensor-4").unwrap();
         square.partition.case = crate::partition::Case::numbered(1).unwrap();
-        let listed = listing(Model::new(&square).unwrap().cases());
+        let listed = listing(&Model::new(&square).unwrap());
         assert!(listed.iter().any(|own| own.result == "v_01" && own.operand == "v_00, x and y exchanged"));
         let model = Model::new(&Scene::builtin("eight-by-eight-contacts").unwrap()).unwrap();
-        let listed = listing(model.cases());
+        let listed = listing(&model);
         let step: Vec<&str> = listed.iter().filter(|own| own.result == "p").map(|own| own.operand.as_str()).collect();
         assert_eq!(step, ["μ1 ∘ p", "μ2 ∘ p"].repeat(step.len() / 2));
     }

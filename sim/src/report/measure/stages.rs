@@ -93,9 +93,13 @@ impl ComparedWords {
     }
 }
 
-/// All stages of a frame in pipeline order; empty without bit-true model.
+/// All stages of a frame in pipeline order; empty without bit-true model, and where each contact has a μ of its own: what
+/// those stages compute depends on the contacts found, which differ between the models in ties and rounding.
 pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     let Ok(bit_true) = &measured.bit_true else { return Vec::new() };
+    if bit_true.model.by_contact.is_some() {
+        return Vec::new();
+    }
     let reference = FloatReference::new(
         &bit_true.model,
         &measured.engine,
@@ -148,6 +152,9 @@ pub fn trace(scene: &Scene, frame: &Frame) -> Result<Vec<(&'static str, u32, Com
     let engine = Golden::new(&scene.for_hardware())?;
     let frames = std::slice::from_ref(frame);
     let model = Model::for_frames(scene, frames)?;
+    if model.by_contact.is_some() {
+        bail!("scene {}: partition.case = contacts: stages are compared with one μ", scene.name);
+    }
     if model.chooses() {
         bail!("scene {}: partition.case = {}: stages are compared in one case", scene.name, scene.partition.case);
     }

@@ -1,6 +1,7 @@
 //! The report's first page: error against noise beside error against run time, for the first scene; then scenes with a network.
 
 use anyhow::Result;
+use dermis_golden::noise::statistic::ErrorSpread;
 use dermis_golden::noise::ShapeRow;
 
 use super::super::document::{percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
@@ -29,8 +30,8 @@ pub fn noise(measured: &[Measured], studies: &[NoiseStudy]) -> Result<Option<Sec
     }
     if !others.is_empty() {
         let text = "Scenes with a network, which are one design whatever the noise: the golden model with what the scene names and \
-                    with the hardware's estimator, and the hardware, which is equal to its bit-true model. With contacts of their \
-                    own the error is over the sum of all tangential forces.";
+                    with the hardware's estimator, and the hardware, which is equal to its bit-true model. With several contacts the \
+                    error is over the sum of all tangential forces, and the bound, which is that of the resultant, is left out.";
         items.push(Item::Text(text.into()));
         items.push(Item::Pictures(others.iter().map(|study| picture(study)).collect::<Result<_>>()?));
         items.extend(others.iter().map(|study| Item::Table(table(study))));
@@ -64,8 +65,18 @@ fn table(study: &NoiseStudy) -> Table {
     Table::new(id, caption, &head, rows.iter().map(row).collect())
 }
 
+/// The shear error: of several contacts over the sum of their tangential forces.
+fn shear(row: &ShapeRow) -> &ErrorSpread {
+    row.summary.over_all.as_ref().unwrap_or(&row.summary.tangential)
+}
+
+/// The bound of that error; of several contacts there is none, because it is that of the resultant.
+fn bound(row: &ShapeRow) -> Option<f64> {
+    row.summary.over_all.is_none().then_some(row.bound.tangential[0])
+}
+
 fn row(row: &ShapeRow) -> Vec<Cell> {
-    let spread = &row.summary.tangential;
+    let spread = shear(row);
     vec![
         percent(Some(row.noise)),
         text_cell(row.estimator.clone()),
@@ -75,7 +86,7 @@ fn row(row: &ShapeRow) -> Vec<Cell> {
         percent(Some(spread.ninety.value)),
         percent(Some(row.summary.normal.median.value)),
         percent(Some(row.summary.flagged.value)),
-        percent(Some(row.bound.tangential[0])),
+        percent(bound(row)),
     ]
 }
 
@@ -88,8 +99,9 @@ fn picture(NoiseStudy { scene, rows, .. }: &NoiseStudy) -> Result<Picture> {
             names.push(&row.estimator);
         }
     });
-    let own = |name: &str, error: fn(&ShapeRow) -> f64| {
-        let points = noisy.iter().filter(|row| row.estimator == name).map(|row| (row.noise, error(row), String::new()));
+    let own = |name: &str, error: fn(&ShapeRow) -> Option<f64>| -> Vec<_> {
+        let of_name = noisy.iter().filter(|row| row.estimator == name);
+        let points = of_name.filter_map(|row| Some((row.noise, error(row)?, String::new())));
         points.filter(|(_, error, _)| *error > 0.0).collect()
     };
     let series = |(index, name): (usize, &&str)| Series {
@@ -97,18 +109,18 @@ fn picture(NoiseStudy { scene, rows, .. }: &NoiseStudy) -> Result<Picture> {
         colour: SERIES[index % SERIES.len()],
         shape: index % 4,
         hollow: false,
-        points: own(name, |row| row.summary.tangential.median.value),
+        points: own(name, |row| Some(shear(row).median.value)),
         joined: true,
     };
     let mut all: Vec<Series> = names.iter().enumerate().map(series).collect();
-    if let Some(first) = names.first() {
+    if let Some(first) = names.first().filter(|first| !own(first, bound).is_empty()) {
         let index = names.len();
         all.push(Series {
             name: "Cramér–Rao bound".into(),
             colour: SERIES[index % SERIES.len()],
             shape: index % 4,
             hollow: false,
-            points: own(first, |row| row.bound.tangential[0]),
+            points: own(first, bound),
             joined: true,
         });
     }

@@ -22,7 +22,10 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
         let kept = m.frames.iter().filter(|frame| ContactCount::of(frame) == choice.contact_count);
         let kept: Vec<&str> = kept.map(|frame| frame.id.as_str()).collect();
         let own = rows.iter().filter(|row| row.scene == *scene && row.case == case && kept.contains(&&*row.frame));
-        pictures.push(picture(scene, &case, choice.contact_count, kept.len(), &own.collect::<Vec<_>>())?);
+        let own: Vec<&StageRow> = own.collect();
+        if !own.is_empty() {
+            pictures.push(picture(scene, &case, choice.contact_count, kept.len(), &own)?);
+        }
     }
     let head = [
         "sensor",
