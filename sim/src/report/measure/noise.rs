@@ -1,6 +1,7 @@
 //! Measurement of error against noise for the report.
 
 use anyhow::Result;
+use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::draws::DrawOptions;
 use dermis_golden::noise::{shape_study, Candidate, ShapeRow, ShapeStudy};
 use dermis_golden::partition::Case;
@@ -53,7 +54,8 @@ pub fn noise(measured: &[Measured], options: &Options) -> Result<Vec<NoiseStudy>
     let study = |(m, told): (&Measured, bool)| {
         let scene = &m.scene;
         let contacts = if scene.partition.case == Case::Contacts { CONTACTS } else { 1 };
-        let drawn = DrawOptions { contacts, ..Default::default() };
+        let converter = Converter { unipolar: scene.input.unipolar, ..Default::default() };
+        let drawn = DrawOptions { contacts, converter, ..Default::default() };
         let wanted =
             ShapeStudy { draws, candidates: candidates(scene, told), told, options: drawn, ..Default::default() };
         let bar = Progress::steps(&format!("{}: noise", scene.name), 0);

@@ -144,7 +144,8 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
 /// The words of every stage of one frame beside their references: name, width in bits, words; in pipeline order.
 ///
 /// # Errors
-/// A scene without hardware, one whose frames are averaged or whose case is chosen per frame, a frame of another sensor.
+/// A scene without hardware, one whose frames are averaged, whose case is chosen per frame or whose contacts have a μ each, a
+/// frame of another sensor.
 pub fn trace(scene: &Scene, frame: &Frame) -> Result<Vec<(&'static str, u32, ComparedWords)>> {
     if scene.input.average > 0 {
         bail!("scene {}: input.average = {}: stages are compared without averaging", scene.name, scene.input.average);
@@ -395,6 +396,9 @@ mod tests {
         let scenes = |names: &[&str]| names.iter().map(|name| Scene::builtin(name).unwrap()).collect::<Vec<_>>();
         let mut measured =
             measure(&scenes(&["sensor-1", "sensor-1-noisy", "eight-by-eight"]), &cases(&[0, 1, 3]), &options).unwrap();
+        // Of contacts nothing is compared.
+        let contacts = measure(&scenes(&["eight-by-eight-contacts"]), &[], &options).unwrap();
+        assert!(contacts.len() == 1 && contacts[0].bit_true.is_ok() && stages(&contacts[0], 0).is_empty());
         measured.extend(measure(&scenes(&["sensor-4"]), &cases(&[1]), &options).unwrap());
         // sensor-4 fits the board in case 1, where Ay is Ax transposed.
         let rows: Vec<StageRow> = measured.iter().flat_map(|measured| stages(measured, 0)).collect();

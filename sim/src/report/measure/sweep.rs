@@ -85,7 +85,8 @@ fn tasks(scene: &Scene) -> Vec<Task> {
     for degree in 1..=dermis_golden::matrices::MAX_DEGREE {
         all.push(("degree", degree.to_string(), Box::new(|_| {}), Some(degree)));
     }
-    for case in (0..4).filter_map(Case::numbered) {
+    let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
+    for case in scene.cases_of(&numbered) {
         let change = move |scene: &mut Scene| scene.partition.case = case;
         if dermis_golden::partition::subarrays(case, &scene.sensor).is_ok() {
             all.push(("case", case.to_string(), Box::new(change), None));
