@@ -75,6 +75,7 @@ pub mod board;
 pub mod bonded;
 pub mod checks;
 pub mod degree;
+pub mod deviations;
 pub mod errors;
 pub mod evidence;
 pub mod fixed;

@@ -12,7 +12,8 @@
 //!
 //! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
 //! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
-//! [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training.
+//! [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
+//! [`measure_deviations`] the standard deviations of a search.
 //!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
 //! below the bound where it is wide.
@@ -20,6 +21,7 @@
 pub mod bound;
 pub mod contact;
 pub mod coverage;
+mod deviations;
 pub mod expected;
 pub mod matching;
 pub mod outcome;
@@ -32,6 +34,7 @@ pub mod support_bound;
 mod tests;
 mod unlike;
 
+pub use deviations::{deviations_coverage, measure_deviations};
 pub use sensitivity::{sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};

@@ -59,6 +59,9 @@ pub struct SubarrayResult {
     /// Standard deviation of the shear in N, [x, y]; absent where the estimator gives none, see [`shear_sigma_N`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear_sigma_N: Option<[f64; 2]>,
+    /// Standard deviation of the normal force in N; absent where the estimator gives none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_sigma_N: Option<f64>,
     /// The objective at μ; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
 }
@@ -175,6 +178,7 @@ impl SubarrayResult {
             mu,
             mu_sigma: None,
             shear_sigma_N: None,
+            normal_sigma_N: None,
             objective_value,
         }
     }

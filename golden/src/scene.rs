@@ -193,6 +193,8 @@ pub struct SearchSpec {
     pub degree: Option<usize>,
     /// Path of a trained network, relative to the working folder, or ending in `dermis:NAME`: one of the program's own.
     pub network: Option<PathBuf>,
+    /// Path of a table of standard deviations, relative to the working folder, see [`crate::deviations`].
+    pub deviations: Option<PathBuf>,
 }
 
 /// Table `[threshold]`.
@@ -391,6 +393,7 @@ impl Default for SearchSpec {
             form: Form::default(),
             degree: None,
             network: None,
+            deviations: None,
         }
     }
 }
@@ -462,11 +465,13 @@ impl Scene {
         }
     }
 
-    /// The scene as the hardware and its bit-true model take it: `learned` becomes `network`, all others `search`.
+    /// The scene as the hardware and its bit-true model take it: `learned` becomes `network`, `auto` as
+    /// [`Scene::chosen_for_hardware`] says, all others `search`.
     pub fn for_hardware(&self) -> Scene {
         let estimator = match self.search.estimator {
             EstimatorKind::Learned | EstimatorKind::Network => EstimatorKind::Network,
-            EstimatorKind::Auto | EstimatorKind::Evidence | EstimatorKind::Search => EstimatorKind::Search,
+            EstimatorKind::Auto => self.chosen_for_hardware().0,
+            EstimatorKind::Evidence | EstimatorKind::Search => EstimatorKind::Search,
         };
         let search = SearchSpec { estimator, ..self.search.clone() };
         Scene { search, ..self.clone() }

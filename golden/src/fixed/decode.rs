@@ -176,6 +176,9 @@ impl Model {
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
         let checks = Checks { full_scale_share, network_misfit, shear_spread, ..result.figures(&self.scene, frame) };
         result.add_checks(&self.scene, checks);
+        if let Some(deviations) = &self.deviations {
+            deviations.add(&mut result, &self.scene, frame, noise_MPa);
+        }
         Ok(result)
     }
 

@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::board::BoardError;
 use crate::frame::FrameError;
 use crate::input::InputError;
+use crate::deviations::DeviationsError;
 use crate::learned::LearnedError;
 use crate::matrices::MatricesError;
 use crate::partition::{Case, PartitionError};
@@ -67,6 +68,9 @@ pub enum FixedError {
     /// The network that the scene names cannot be used.
     #[error(transparent)]
     Learned(#[from] LearnedError),
+    /// The table of standard deviations that the scene names cannot be used.
+    #[error(transparent)]
+    Deviations(#[from] DeviationsError),
     /// A device sent a wrong number of beats for the scene.
     #[error("{what}: got {got} beats, expected {expected}")]
     Beats {

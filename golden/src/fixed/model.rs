@@ -7,6 +7,7 @@ use super::plan::cases::{planned, planned_with};
 use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
+use crate::deviations::Deviations;
 use crate::frame::Frame;
 use crate::input::Input;
 use crate::matrices::MAX_DEGREE;
@@ -18,6 +19,8 @@ use crate::scene::Scene;
 #[derive(Clone, Debug)]
 pub struct Model {
     plan: Plan,
+    /// Standard deviations of a search, where there is a table.
+    pub(super) deviations: Option<Deviations>,
 }
 
 impl Deref for Model {
@@ -34,9 +37,10 @@ impl DerefMut for Model {
     }
 }
 
+/// Without standard deviations.
 impl From<Plan> for Model {
     fn from(plan: Plan) -> Model {
-        Model { plan }
+        Model { plan, deviations: None }
     }
 }
 
@@ -65,7 +69,9 @@ impl Model {
     /// lacks the full scale. [`FixedError::DoesNotFit`] lists the resources the board lacks and changes that make the
     /// scene fit.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
-        Ok(Model { plan: fitting(planned(scene)?)? })
+        let plan = fitting(planned(scene)?)?;
+        let deviations = Deviations::of_scene(&plan.scene)?;
+        Ok(Model { plan, deviations })
     }
 
     /// The model with a polynomial of the given degree, 1 to 3, in place of the one the series needs.
@@ -73,12 +79,12 @@ impl Model {
     /// # Errors
     /// As [`Model::new`], but a board that is too small is no error.
     pub fn of_degree(scene: &Scene, degree: usize) -> Result<Self, FixedError> {
-        Ok(Model { plan: planned_with(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))? })
+        Ok(planned_with(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))?.into())
     }
 
     /// The model of a scene, whether it fits its board or not.
     pub(crate) fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
-        Ok(Model { plan: planned(scene)? })
+        Ok(planned(scene)?.into())
     }
 
     /// The model for `frames`: if the scene needs a full scale and has none, it takes the frames' largest |b|, one

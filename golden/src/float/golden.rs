@@ -18,6 +18,7 @@ use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
+use crate::deviations::{Deviations, DeviationsError};
 use crate::misfit::Misfit;
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::quantise;
@@ -41,6 +42,8 @@ pub struct Golden {
     pub(super) network: Option<Learned>,
     /// The check of frames for which a network gives μ.
     pub(super) misfit: Option<Misfit>,
+    /// Standard deviations of a search, where there is a table.
+    pub(super) deviations: Option<Deviations>,
 }
 
 /// A partition into equal rectangles with its matrices.
@@ -119,6 +122,9 @@ pub enum GoldenError {
     /// The network that the scene names cannot be used.
     #[error(transparent)]
     Learned(#[from] LearnedError),
+    /// The table of standard deviations that the scene names cannot be used.
+    #[error(transparent)]
+    Deviations(#[from] DeviationsError),
     /// The stress is so large that its forces are not finite.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
@@ -185,8 +191,8 @@ impl Golden {
             None => evidence,
             Some(shares) => evidence.with_noise_shares(shares),
         });
-        let misfit = Misfit::of_scene(scene)?;
-        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network, misfit })
+        let (misfit, deviations) = (Misfit::of_scene(scene)?, Deviations::of_scene(scene)?);
+        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network, misfit, deviations })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.

@@ -218,6 +218,7 @@ fn the_case_is_counted_from_the_subarrays() {
         mu: [0.0; 2],
         mu_sigma: None,
         shear_sigma_N: None,
+        normal_sigma_N: None,
         objective_value: None,
     };
     let results = parts.iter().map(result).collect();

@@ -75,6 +75,9 @@ impl Golden {
             ..result.figures(&self.scene, &frame)
         };
         result.add_checks(&self.scene, checks);
+        if let Some(deviations) = &self.deviations {
+            deviations.add(&mut result, &self.scene, &frame, noise_MPa);
+        }
         Ok(match self.scene.output.forces {
             ForceOutput::Taxels => result,
             ForceOutput::Resultants => result.with_resultants(&self.scene.sensor),

@@ -17,12 +17,12 @@ pub fn found(result: &Reconstruction) -> Vec<FoundContact> {
         return contacts.into_iter().filter(|contact| contact.centre_mm.is_some()).collect();
     }
     // Of several subarrays each has a μ of its own.
-    let shear_sigma_N = match result.subarrays.as_slice() {
-        [one] => one.shear_sigma_N,
-        _ => None,
+    let (shear_sigma_N, normal_sigma_N) = match result.subarrays.as_slice() {
+        [one] => (one.shear_sigma_N, one.normal_sigma_N),
+        _ => (None, None),
     };
     let (centre_mm, force_N) = (Some([0.0; 2]), result.resultant_N);
-    vec![FoundContact { centre_mm, force_N, shear_sigma_N, ..FoundContact::default() }]
+    vec![FoundContact { centre_mm, force_N, shear_sigma_N, normal_sigma_N, ..FoundContact::default() }]
 }
 
 /// The partner of each true contact.

@@ -14,7 +14,8 @@ use super::outcome::{Outcome, Summary};
 use super::statistic::quantile;
 use super::support_bound::{Reading, SupportBound};
 use super::StudyError;
-use crate::fixed::Model;
+use crate::deviations::Deviations;
+use crate::fixed::{FixedError, Model};
 use crate::float::Golden;
 use crate::frame::Frame;
 use crate::generator::converter::Converter;
@@ -204,18 +205,25 @@ pub(super) fn outcomes(
 }
 
 /// Reconstructs every reading by the bit-true model, which reads each frame as codes of its own full scale unless the scene
-/// states one.
+/// states one. Stated noise is told for the standard deviations alone: the noise floor is a word of the hardware, which
+/// needs a full scale.
 fn outcomes_of_hardware(
     scene: &Scene,
     drawn: &[DrawnFrame],
     readings: &[Frame],
     step: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, StudyError> {
-    // The noise floor is a word of the hardware, which needs a full scale; none is told per frame.
     let mut scene = scene.clone();
+    let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
     scene.search.noise_floor_MPa = 0.0;
     let engine = Model::new(&scene)?;
-    outcomes_of(&|frame| Ok(engine.reconstruct(frame)?), drawn, readings, step)
+    let deviations = Deviations::of_scene(&engine.scene).map_err(FixedError::from)?;
+    let run = |frame: &Frame| {
+        let mut result = engine.reconstruct(frame)?;
+        deviations.iter().for_each(|table| table.add(&mut result, &scene, frame, noise_MPa));
+        Ok(result)
+    };
+    outcomes_of(&run, drawn, readings, step)
 }
 
 fn outcomes_of(

@@ -21,7 +21,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols", "max_contacts"]),
-    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree", "network"]),
+    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree", "network", "deviations"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
@@ -252,6 +252,7 @@ fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
         degree: degree(reader)?,
         network: file(reader, origin, "search.network")?,
+        deviations: file(reader, origin, "search.deviations")?,
     })
 }
 

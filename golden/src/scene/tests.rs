@@ -326,3 +326,34 @@ fn files_are_read_and_bounded() {
     let folder = folder.path().to_str().unwrap();
     assert!(matches!(Scene::load(folder), Err(SceneError::Unreadable { .. })));
 }
+
+#[test]
+fn auto_takes_the_network_in_hardware_where_noise_can_be() {
+    let chosen = |change: fn(&mut Scene)| {
+        let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
+        scene.search.estimator = EstimatorKind::Auto;
+        (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (1e-4, Some(0.1));
+        change(&mut scene);
+        assert_eq!(scene.for_hardware().search.estimator, scene.chosen_for_hardware().0);
+        scene.chosen_for_hardware()
+    };
+    assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network"));
+    type Change = fn(&mut Scene);
+    let searched: [(Change, &str); 7] = [
+        (|s| s.search.network = None, "names no network"),
+        (|s| s.search.noise_floor_MPa = 0.0, "states no noise"),
+        (|s| s.search.noise_floor_MPa = 9e-7, "below 1e-5 of full scale"),
+        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition"),
+        (|s| s.search.mu_max = 0.0, "mu_max"),
+        (|s| s.hardware.search_width = Some(2), "search width"),
+        (|s| s.hardware.board = "icebreaker".into(), "serial engine"),
+    ];
+    for (change, why) in searched {
+        let (taken, reason) = chosen(change);
+        assert!(taken == EstimatorKind::Search && reason.contains(why), "{why}: {reason}");
+    }
+    // Of a mean of 64 frames more noise is allowed in each.
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (7e-6, 6)).0, EstimatorKind::Search);
+    assert_eq!(chosen(|s| s.search.noise_floor_MPa = 1.1e-6).0, EstimatorKind::Network);
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.tare) = (0.0, Some("t.json".into()))).0, EstimatorKind::Network);
+}

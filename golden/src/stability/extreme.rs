@@ -33,7 +33,7 @@ use crate::frame::{Contact, Frame};
 use crate::generator::{generate, GeneratorError};
 use crate::partition::{subarrays, Case};
 use crate::reconstruct::Reconstruction;
-use crate::scene::Scene;
+use crate::scene::{EstimatorKind, Scene};
 use serde::Serialize;
 
 /// Normal load of the contacts in N.
@@ -146,7 +146,11 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     let mut unipolar =
         plain(bare("all clipped, unipolar", &|row, col| -press.stress_MPa[row * sensor.cols + col].abs()));
     unipolar.scene.input.unipolar = true;
-    all.push(unipolar);
+    // A network serves the readings and the partition that it was trained for.
+    let network = scene.for_hardware().search.estimator == EstimatorKind::Network;
+    if scene.input.unipolar || !network {
+        all.push(unipolar);
+    }
     let decade = |k: &i32| with_scale(scaled(format!("load 1e{k} of full scale"), 10f64.powi(*k)), peak);
     all.extend(DECADES.iter().map(decade));
     all.extend(OCTAVES.iter().map(|k| plain(scaled(format!("load 2^{k}, own full scale"), 2f64.powi(*k)))));
@@ -154,7 +158,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     all.push(plain(circle("in the corner", "hertz-circle", radius, [-half_x, half_y], mu)?));
     // The first of the paper's cases 2 and 3 that divides the array through its middle.
     let cuts = [2, 3].into_iter().filter_map(Case::numbered).find(|case| subarrays(*case, sensor).is_ok());
-    if let Some(case) = cuts {
+    if let Some(case) = cuts.filter(|_| !network) {
         let mut cut = plain(circle("on a subarray boundary", "hertz-circle", radius, [0.0; 2], mu)?);
         cut.scene.partition.case = case;
         all.push(cut);

@@ -53,6 +53,7 @@ const EXAMPLES: &str = "Examples:
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
   dermis train sensor-1                              a network for search.estimator = \"learned\"
+  dermis deviations my-scene.toml                    how far shear and normal force of a search may be off
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
   dermis import walk.asf                             scene and frames of a recording of a real array
@@ -115,6 +116,8 @@ enum Command {
     Table(super::table::Arguments),
     /// Train a network for search.estimator = "learned" on frames drawn from the scene's own physics.
     Train(super::train::Arguments),
+    /// Measure the standard deviations of a search on frames drawn from the scene's own physics.
+    Deviations(super::deviations::Arguments),
     /// Measure the errors under noise, next to the Cramér–Rao bound; any shape, several contacts, wrong scenes.
     Noise(super::noise::Arguments),
 }
@@ -203,6 +206,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Guide(arguments) => super::guide_pages::run(arguments, build_dir),
         Command::Table(arguments) => super::table::run(arguments, build_dir),
         Command::Train(arguments) => super::train::run(arguments),
+        Command::Deviations(arguments) => super::deviations::run(arguments),
         Command::Noise(arguments) => Ok((super::noise::run(arguments)?, true)),
     }
 }

@@ -44,7 +44,10 @@ pub(super) fn estimator_instead(scene: &Scene) -> Option<&'static str> {
 /// One line on standard error where the hardware takes another estimator than the scene.
 pub(super) fn note_estimator(scene: &Scene) {
     if let Some(taken) = estimator_instead(scene) {
-        eprintln!("{}: the hardware has no estimator {} and takes {taken}", scene.name, scene.estimator().name());
+        // A choice only where there is a network.
+        let chosen = scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some();
+        let why = if chosen { format!(": {}", scene.chosen_for_hardware().1) } else { String::new() };
+        eprintln!("{}: the hardware has no estimator {} and takes {taken}{why}", scene.name, scene.estimator().name());
     }
 }
 

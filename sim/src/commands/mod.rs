@@ -10,6 +10,7 @@
 //! | [`calibrate`] | `dermis calibrate`: a calibration table from recordings under known stresses |
 //! | [`check`] | `dermis check`: what to expect of a scene; whether a generated folder is intact |
 //! | [`cosim`] | `dermis cosim`: compares simulated hardware with the bit-true model |
+//! | [`deviations`] | `dermis deviations`: standard deviations of a search |
 //! | [`mod@faults`] | `dermis faults`: flips single bits and counts the outcomes |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, made by the commands named there |
@@ -37,6 +38,7 @@ pub mod calibrate;
 pub mod check;
 mod cli;
 pub mod cosim;
+pub mod deviations;
 pub mod faults;
 pub mod generate;
 pub mod guide_pages;

@@ -17,6 +17,7 @@ mod csv;
 #[cfg(test)]
 mod csv_reader;
 mod data;
+mod deviations;
 pub(crate) mod document;
 mod errors;
 mod extremes;
@@ -45,6 +46,7 @@ pub use board_list::{boards, BoardList, NamedBoard};
 pub use calibration::calibration;
 pub use cases::cases;
 pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, SceneCheck};
+pub use deviations::deviations;
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;

@@ -47,9 +47,12 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     }
     for s in &result.subarrays {
         let centroid = |c: Option<[f64; 2]>| c.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+        let spread = |x: f64| significant_digits(x, largest);
+        let shear = s.shear_sigma_N.map(|[x, y]| format!(", shear ± ({}, {}) N", spread(x), spread(y)));
+        let normal = s.normal_sigma_N.map(|sigma| format!(", normal ± {} N", spread(sigma)));
         writeln!(
             text,
-            "subarray {}x{} at row {}, column {}: condition {}, mu ({:+.4}, {:+.4}), compression at {}, tension at {}",
+            "subarray {}x{} at row {}, column {}: condition {}, mu ({:+.4}, {:+.4}), compression at {}, tension at {}{}{}",
             s.rows,
             s.cols,
             s.row0,
@@ -59,6 +62,8 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
             s.mu[1],
             centroid(s.compression_centroid_mm),
             centroid(s.tension_centroid_mm),
+            shear.unwrap_or_default(),
+            normal.unwrap_or_default(),
         )?;
     }
     let mut contact = |centre_mm: Option<[f64; 2]>, force_N: [f64; 3], sigma_N: [Option<f64>; 3]| {

@@ -1,0 +1,307 @@
+//! Deviations: the standard deviations of forces that a search found, from a table of the errors on drawn frames.
+//!
+//! A search gives the best μ, not how far it may be off. The physics is linear, so that the relative error of a frame depends
+//! on its noise over its peak and on the size of its contact, not on its load. The table has the error that 68 % of drawn
+//! frames do not exceed, per level of noise and class of sizes; [`crate::noise::measure_deviations`] makes it. Frames are
+//! looked up by
+//!
+//! ```text
+//! noise = √(σ² + LSB² / 12) / peak          peak = max |b| of the subarray, LSB that of the converter's codes
+//! size  = F / (peak · area of a taxel)      F the normal force
+//! ```
+//!
+//! Between two levels the logarithm of the deviation is linear in that of the noise; outside of them it is that of the last.
+//! Where neither scene nor tare frames state the noise there are no deviations: that of a real array is far above its LSB.
+//!
+//! The tables of the built-in scenes are part of the program and serve every scene of the same [`Subject`]. For others
+//! `dermis deviations` writes a file that `search.deviations` names.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: result of a search, calibrated stress, noise | –, taxels, scalar | –, MPa, MPa |
+//! | out: standard deviation of μ, shear and normal force | 2, 2, 1 per searched subarray | –, N, N |
+
+#[cfg(test)]
+mod tests;
+
+use crate::checks::{largest_spread, relative_spread, Checks};
+use crate::frame::Frame;
+use crate::partition::Case;
+use crate::quantise::largest_code;
+use crate::reconstruct::{shear_sigma_N, Reconstruction};
+use crate::scene::{EstimatorKind, Form, Medium, ObjectiveKind, Scene};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use thiserror::Error;
+
+/// Version of the file.
+const VERSION: u32 = 1;
+/// Largest file in bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+/// Tables that are part of the program, in JSON.
+const SHIPPED: [(&str, &str); 5] = [
+    ("sensor-1", include_str!("../scenes/sensor-1.deviations")),
+    ("sensor-2", include_str!("../scenes/sensor-2.deviations")),
+    ("sensor-3", include_str!("../scenes/sensor-3.deviations")),
+    ("sensor-4", include_str!("../scenes/sensor-4.deviations")),
+    ("eight-by-eight", include_str!("../scenes/eight-by-eight.deviations")),
+];
+
+/// What a table was measured for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subject {
+    /// Rows of the array.
+    pub rows: usize,
+    /// Columns of the array.
+    pub cols: usize,
+    /// Pitch along columns in mm.
+    pub pitch_x_mm: f64,
+    /// Pitch along rows in mm.
+    pub pitch_y_mm: f64,
+    /// Thickness of the cover in mm.
+    pub thickness_mm: f64,
+    /// The elastic body.
+    pub medium: Medium,
+    /// Largest ratio of shear to normal force.
+    pub mu_max: f64,
+    /// The partition, as a scene file names it.
+    pub case: String,
+    /// Dead taxels, row and column.
+    pub dead: Vec<[usize; 2]>,
+}
+
+/// The table of one subject.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deviations {
+    /// Version of the file.
+    pub(crate) version: u32,
+    /// What it was measured for.
+    pub subject: Subject,
+    /// Number of frames per level.
+    pub draws: usize,
+    /// Seed of the frames.
+    pub seed: u64,
+    /// Noise over peak of each level, rising.
+    pub levels: Vec<f64>,
+    /// Sizes, in taxels, that separate the classes, rising: one less than there are classes.
+    pub sizes: Vec<f64>,
+    /// Per level and class: standard deviation of μ, [x, y], and that of the normal force over the force.
+    pub sigma: Vec<Vec<[f64; 3]>>,
+}
+
+/// A table cannot be read or used.
+#[derive(Debug, Error)]
+pub enum DeviationsError {
+    /// The file cannot be read.
+    #[error("{file}: search.deviations cannot be read: {source}; dermis deviations makes it")]
+    Unreadable {
+        /// Its path.
+        file: String,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file is no table, or damaged.
+    #[error("{file}: not a table of standard deviations of this version: {reason}")]
+    Damaged {
+        /// Its path.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The table was measured for something else.
+    #[error("{file}: measured for {field} = {measured}, the scene has {scene}; measure it anew with dermis deviations")]
+    Mismatch {
+        /// Its path.
+        file: String,
+        /// The scene's field.
+        field: &'static str,
+        /// The value it was measured for.
+        measured: String,
+        /// The scene's value.
+        scene: String,
+    },
+}
+
+impl Subject {
+    /// The subject of a scene; `None` unless the scene is searched with the objective `sparse`, shear and one μ per subarray.
+    pub fn of(scene: &Scene) -> Option<Subject> {
+        let Scene { sensor, search, input, partition, .. } = scene;
+        let searched = search.objective == ObjectiveKind::Sparse && search.form == Form::Oblique && search.mu_max > 0.0;
+        let by_search = scene.estimator() == EstimatorKind::Search && partition.case != Case::Contacts;
+        (searched && by_search && !input.unipolar).then(|| Subject {
+            rows: sensor.rows,
+            cols: sensor.cols,
+            pitch_x_mm: sensor.pitch_x_mm,
+            pitch_y_mm: sensor.pitch_y_mm,
+            thickness_mm: sensor.thickness_mm,
+            medium: scene.medium,
+            mu_max: search.mu_max,
+            case: partition.case.to_string(),
+            dead: input.dead.clone(),
+        })
+    }
+
+    /// The first field in which another subject differs: its name, this value, the other.
+    fn differs(&self, other: &Subject) -> Option<(&'static str, String, String)> {
+        let pair = |of: fn(&Subject) -> String| (of(self), of(other));
+        let pairs = [
+            ("sensor.rows", pair(|s| s.rows.to_string())),
+            ("sensor.cols", pair(|s| s.cols.to_string())),
+            ("sensor.pitch_x_mm", pair(|s| s.pitch_x_mm.to_string())),
+            ("sensor.pitch_y_mm", pair(|s| s.pitch_y_mm.to_string())),
+            ("sensor.thickness_mm", pair(|s| s.thickness_mm.to_string())),
+            ("medium.kind", pair(|s| s.medium.to_string())),
+            ("search.mu_max", pair(|s| s.mu_max.to_string())),
+            ("partition.case", pair(|s| s.case.clone())),
+            ("input.dead", pair(|s| format!("{:?}", s.dead))),
+        ];
+        pairs.into_iter().find(|(_, (own, other))| own != other).map(|(field, (own, other))| (field, own, other))
+    }
+}
+
+impl Deviations {
+    /// The table of a scene: of the file that `search.deviations` names, else the program's own of the same subject. `None`
+    /// for a scene without a [`Subject`], or where neither is there.
+    ///
+    /// # Errors
+    /// [`DeviationsError`] of the named file.
+    pub fn of_scene(scene: &Scene) -> Result<Option<Deviations>, DeviationsError> {
+        let Some(subject) = Subject::of(scene) else { return Ok(None) };
+        let Some(path) = &scene.search.deviations else {
+            let shipped = SHIPPED.iter().map(|(name, text)| Deviations::parse(text, name));
+            return Ok(shipped.filter_map(Result::ok).find(|table| table.subject == subject));
+        };
+        let file = path.display().to_string();
+        let table = Deviations::parse(&read(path, &file)?, &file)?;
+        match table.subject.differs(&subject) {
+            None => Ok(Some(table)),
+            Some((field, measured, scene)) => Err(DeviationsError::Mismatch { file, field, measured, scene }),
+        }
+    }
+
+    /// Reads a table; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`DeviationsError::Damaged`].
+    pub fn parse(text: &str, file: &str) -> Result<Deviations, DeviationsError> {
+        let damaged = |reason: String| DeviationsError::Damaged { file: file.to_owned(), reason };
+        let table: Deviations = serde_json::from_str(text).map_err(|error| damaged(error.to_string()))?;
+        let rising = |all: &[f64]| all.windows(2).all(|pair| pair[0] < pair[1]) && all.iter().all(|x| *x > 0.0);
+        let positive = |sigma: &[f64; 3]| sigma.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite());
+        let whole = |row: &Vec<[f64; 3]>| row.len() == table.sizes.len() + 1 && row.iter().all(positive);
+        let faults = [
+            (table.version != VERSION, "its version is another"),
+            (table.levels.is_empty() || !rising(&table.levels), "its levels do not rise from above 0"),
+            (!rising(&table.sizes), "its sizes do not rise from above 0"),
+            (table.sigma.len() != table.levels.len(), "it has not a row per level"),
+            (!table.sigma.iter().all(whole), "a row has not a deviation above 0 per class"),
+        ];
+        match faults.into_iter().find(|(fault, _)| *fault) {
+            None => Ok(table),
+            Some((_, reason)) => Err(damaged(reason.to_owned())),
+        }
+    }
+
+    /// A table of these levels, sizes and deviations, to four digits: more are not known.
+    pub(crate) fn new(
+        subject: Subject,
+        [draws, seed]: [u64; 2],
+        levels: Vec<f64>,
+        sizes: Vec<f64>,
+        sigma: Vec<Vec<[f64; 3]>>,
+    ) -> Deviations {
+        let digits = |value: f64| format!("{value:.3e}").parse().unwrap_or(value);
+        let all = |values: Vec<f64>| values.into_iter().map(digits).collect();
+        let sigma = sigma.into_iter().map(|row| row.into_iter().map(|own| own.map(digits)).collect()).collect();
+        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels: all(levels), sizes: all(sizes), sigma }
+    }
+
+    /// The file, JSON with a line per level.
+    pub fn to_text(&self) -> String {
+        let line = |row: &Vec<[f64; 3]>| serde_json::json!(row).to_string();
+        let rows: Vec<String> = self.sigma.iter().map(line).collect();
+        format!(
+            "{{\"version\": {}, \"subject\": {},\n\"draws\": {}, \"seed\": {},\n\"levels\": {},\n\"sizes\": {},\n\"sigma\": [\n{}\n]}}\n",
+            self.version,
+            serde_json::json!(self.subject),
+            self.draws,
+            self.seed,
+            serde_json::json!(self.levels),
+            serde_json::json!(self.sizes),
+            rows.join(",\n")
+        )
+    }
+
+    /// Standard deviation of μ, [x, y], and that of the normal force over the force, at a noise over peak and a size in taxels.
+    pub fn at(&self, noise: f64, size: f64) -> [f64; 3] {
+        let class = self.sizes.partition_point(|edge| *edge <= size);
+        let above = self.levels.partition_point(|level| *level <= noise);
+        let row = |level: usize| self.sigma[level][class];
+        if above == 0 || above == self.levels.len() {
+            return row(above.saturating_sub(1));
+        }
+        let [low, high] = [self.levels[above - 1], self.levels[above]];
+        let share = (noise / low).ln() / (high / low).ln();
+        let (a, b) = (row(above - 1), row(above));
+        [0, 1, 2].map(|k| a[k].powf(1.0 - share) * b[k].powf(share))
+    }
+
+    /// Adds standard deviations to the searched subarrays of a result, and the figure and flag of the shear's spread;
+    /// `noise_MPa` is the standard deviation of a taxel of the calibrated `stress`. Nothing if it is 0.
+    pub fn add(&self, result: &mut Reconstruction, scene: &Scene, stress: &Frame, noise_MPa: f64) {
+        if noise_MPa <= 0.0 {
+            return;
+        }
+        let lsb_MPa = scene.input.full_scale_MPa.unwrap_or_else(|| stress.peak_MPa())
+            / f64::from(largest_code(scene.fixed.input_bits));
+        let noise_MPa = noise_MPa.hypot(lsb_MPa / 12f64.sqrt());
+        let mut spreads = Vec::new();
+        for index in 0..result.subarrays.len() {
+            let Some(load) = load_of(result, scene, stress, index) else { continue };
+            let own = &mut result.subarrays[index];
+            let [x, y, normal] = self.at(noise_MPa / load.peak_MPa, load.size);
+            own.mu_sigma = Some([x, y]);
+            own.shear_sigma_N = shear_sigma_N(own.mu_sigma, load.normal_N);
+            own.normal_sigma_N = Some(normal * load.normal_N);
+            spreads.push((load.normal_N, Some(relative_spread(own.mu, [x, y], 1.0))));
+        }
+        let checks = Checks { shear_spread: largest_spread(&spreads), ..result.checks };
+        result.add_checks(scene, checks);
+    }
+}
+
+/// What is looked up of a subarray.
+pub(crate) struct Load {
+    /// Normal force in N, above 0.
+    pub normal_N: f64,
+    /// max |b| in MPa.
+    pub peak_MPa: f64,
+    /// Normal force over that of the peak on one taxel.
+    pub size: f64,
+}
+
+/// The load of a subarray; `None` unless it was searched and presses.
+pub(crate) fn load_of(result: &Reconstruction, scene: &Scene, stress: &Frame, index: usize) -> Option<Load> {
+    let own = result.subarrays.get(index).filter(|own| own.objective_value.is_some())?;
+    let part = own.part();
+    let normal_N: f64 = match &result.extra.resultants {
+        Some(resultants) => resultants.get(index)?.force_N[2],
+        None => part.indices(&scene.sensor).map(|k| result.forces_N.fz[k]).sum(),
+    };
+    let peak_MPa = part.indices(&scene.sensor).map(|k| stress.stress_MPa[k].abs()).fold(0.0, f64::max);
+    let size = normal_N / (peak_MPa * scene.sensor.pitch_x_mm * scene.sensor.pitch_y_mm);
+    (normal_N > 0.0 && size > 0.0 && size.is_finite()).then_some(Load { normal_N, peak_MPa, size })
+}
+
+/// The text of a file of bounded size.
+fn read(path: &Path, file: &str) -> Result<String, DeviationsError> {
+    let unreadable = |source| DeviationsError::Unreadable { file: file.to_owned(), source };
+    if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_FILE {
+        let reason = format!("it is larger than {LARGEST_FILE} bytes");
+        return Err(DeviationsError::Damaged { file: file.to_owned(), reason });
+    }
+    std::fs::read_to_string(path).map_err(unreadable)
+}
