@@ -11,6 +11,9 @@ use crate::{engine, serial};
 /// Field width of the tap of `search`, in bits: at least that of each of its signals.
 const SEARCH_FIELD: u32 = 32;
 
+/// Field width of the tap of `instruction`, in bits: an index below 2¹⁵, and a sign bit.
+const INSTRUCTION_FIELD: u32 = 16;
+
 /// Field width of the tap of `choose`, in bits: the index of a case, and a sign bit.
 const CHOICE_FIELD: u32 = 3;
 
@@ -180,6 +183,7 @@ streams!(engine::Engine {
     choose if receive.chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
     normalise: fold.normalised_valid => [signed normalise.shifted; TAXELS],
     fold: fold.folded_valid => [signed fold.folded; PARITIES],
+    instruction: pass.issued => [unsigned pass.which, unsigned pass.step] as INSTRUCTION_FIELD,
     pass: pass.quad_valid => [signed pass.quad; PARITIES],
     segment if contacts.are_wanted: segment.labelled => [signed segment.labelled_quad; TAXELS],
     window if contacts.are_wanted: operand_source.of_window => [signed operand_source.quad; PARITIES],
@@ -248,16 +252,18 @@ mod tests {
 
     #[test]
     fn signals_are_in_the_top_module() {
-        const STAGES: [&str; 8] = ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces"];
+        const STAGES: [&str; 9] =
+            ["receive", "normalise", "fold", "instruction", "pass", "rescale", "unfold", "search", "forces"];
         let parallel = checked(&model(|_| {}));
         assert_eq!(names(&parallel), STAGES);
         assert_eq!(parallel[0].valid, ["receive__accept"]);
         assert_eq!((&parallel[0].fields[..], &parallel[2].fields[..]), (&["taken_word"][..], &PARITIES[..]));
-        assert_eq!(parallel[6].fields, ["best_x", "best_y", "score", "taken"]);
+        assert_eq!(parallel[3].word[1].name, "pass__step");
+        assert_eq!(parallel[7].fields, ["best_x", "best_y", "score", "taken"]);
         let serial = model(|scene| scene.hardware.board = "icebreaker".into());
         assert_eq!(serial.board.engine, EngineKind::Serial);
         let serial = checked(&serial);
-        assert_eq!(names(&serial), STAGES);
+        assert_eq!(names(&serial), STAGES.into_iter().filter(|name| *name != "instruction").collect::<Vec<_>>());
         assert_eq!(serial[2].valid, ["butterfly__quad_valid", "pass_sequencer__folding"]);
         let choosing = checked(&model(|scene| scene.partition.case = Case::Adaptive));
         assert_eq!(names(&choosing)[1], "choose");

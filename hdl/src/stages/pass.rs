@@ -50,6 +50,10 @@ pub struct Pass {
     pub quad_soon: Signal<Out, Bit>,
     /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
     pub damaged: Wire<Out>,
+    /// A product's column is issued in this cycle.
+    pub issued: Signal<Out, Bit>,
+    /// Index in its section of the instruction that issues; valid with `issued`.
+    pub step: Wire<Out>,
     column: Counter,
     running: Dff,
     /// Schedule of the products.
@@ -99,6 +103,8 @@ impl Pass {
             quad_valid: Default::default(),
             quad_soon: Default::default(),
             damaged: Wire::new(1),
+            issued: Default::default(),
+            step: Wire::new(pass_program.step.width()),
             column: Counter::new(longest(model)),
             running: Default::default(),
             low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
@@ -186,6 +192,8 @@ impl Logic for Pass {
         self.quad_soon.next = self.lanes.quad_soon.val();
         self.layer_valid.next = self.lanes.layer_valid.val();
         self.damaged.next = self.lanes.damaged.val();
+        self.issued.next = self.issue.val();
+        self.step.next = self.pass_program.step.val();
     }
 }
 
@@ -217,11 +225,13 @@ mod tests {
         quad: usize,
         /// Last of its accumulation.
         last: bool,
+        /// Index of its instruction in the section.
+        step: usize,
     }
 
     /// The columns of a section in order.
     fn columns((case, section): &(&CasePlan, Section)) -> Vec<Column> {
-        let mut all: Vec<Column> = Vec::new();
+        let (mut all, mut step): (Vec<Column>, usize) = (Vec::new(), 0);
         // μ comes between the images of hidden layers and the other vectors.
         let layers = case.formats.layers.len();
         for (accumulation, (target, products)) in section.accumulations.iter().enumerate() {
@@ -237,8 +247,9 @@ mod tests {
                         (Operand::One, _) => 0,
                     };
                     let input = matches!(product.operand, Operand::InputHigh | Operand::InputLow);
-                    let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false };
+                    let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false, step };
                     all.extend(case.storage.columns_of(product.matrix, group).iter().map(column));
+                    step += 1;
                 }
                 all.last_mut().unwrap().last = true;
             }
@@ -376,6 +387,8 @@ mod tests {
                 leaves(self.cycle + 2, false),
                 leaves(self.cycle, true),
                 Some(Word::default()),
+                self.rows.as_ref().map(|_| self.issue().is_some().into()),
+                self.issue().map(|column| Word::from(column.step as u64)),
             ]
         }
 
@@ -491,7 +504,7 @@ mod tests {
                     Pass::new(&model),
                     changes,
                     inputs [rst, which, start, input_quad, vector_quad, vector_valid, position_x, position_y],
-                    outputs [input_address, quad, quad_valid, quad_soon, layer_valid, damaged],
+                    outputs [input_address, quad, quad_valid, quad_soon, layer_valid, damaged, issued, step],
                 )
             };
             let defects = [

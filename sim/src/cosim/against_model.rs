@@ -8,7 +8,9 @@
 //! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first [`Mismatch`]es of each frame and their total number |
 //! | a [`Device`] with its tap names | [`Times`] of every frame |
 
-use dermis_golden::fixed::{Cycles, Trace};
+use dermis_golden::board::EngineKind;
+use dermis_golden::fixed::plan::program::issued;
+use dermis_golden::fixed::{Cycles, Model, Stage, Trace};
 use dermis_hdl::device::Device;
 
 use super::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};
@@ -33,6 +35,20 @@ pub struct Vector {
 }
 
 impl Vector {
+    /// The vector of `codes`, which the device is sent, and the model's results; the instructions that the passes issue are
+    /// added to its stages.
+    pub fn new(model: &Model, frame: String, codes: Vec<i32>, mut expected: Trace) -> Vector {
+        let sensor = &model.scene.sensor;
+        if model.board.engine == EngineKind::Parallel {
+            let chosen = expected.stages.iter().find(|stage| stage.name == "choose");
+            let case = chosen.and_then(|stage| stage.words.first()).map_or(0, |word| word[0] as usize);
+            let contacts = expected.course.map_or(0, |course| course.contacts);
+            let words = issued(model, case, contacts).into_iter().map(|word| word.map(|index| index as i64).to_vec());
+            expected.stages.push(Stage { name: "instruction", words: words.collect() });
+        }
+        Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected }
+    }
+
     /// What is sent, and how many beats answer it.
     pub fn input(&self) -> InputFrame<'_> {
         let beats = self.expected.beats.len() + self.expected.status.len();

@@ -183,11 +183,10 @@ impl Hardware {
     pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
         let codes = self.model.readings(frames)?;
         let expected = self.model.run(&codes);
-        let sensor = &self.model.scene.sensor;
         let before = frames.len() - self.model.scene.input.frames_per_result();
         let frame = frames.get(before).map_or_else(String::new, |frame| frame.id.clone());
-        let codes = codes[before * sensor.taxels()..].to_vec();
-        Ok(Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected })
+        let codes = codes[before * self.model.scene.sensor.taxels()..].to_vec();
+        Ok(Vector::new(&self.model, frame, codes, expected))
     }
 
     /// The test vectors of frames that follow one another after a reset.

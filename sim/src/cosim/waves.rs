@@ -6,7 +6,9 @@
 //! dermis.clk
 //! dermis.input.{valid, ready, last, code}        dermis.output.{valid, ready, last, fx, fy, fz}
 //! dermis.fold.{valid, even_even, …}              dermis.search.{valid, best_x, best_y, score, taken}
+//! dermis.instruction.{valid, which, step, name}
 //! ```
+//! `name` is the running instruction as the program's listing has it (`dermis build --explain`), while it issues products.
 //! A netlist has no taps, so that only its pins are recorded. A stage's fields keep their last word while its `valid`
 //! is low. Values are sampled before the rising edge that ends a cycle and drawn over that whole cycle, one period of
 //! the board's clock.
@@ -17,11 +19,12 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, Result};
+use dermis_golden::fixed::plan::program::listing;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
-use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, Writer};
+use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, VarType, Writer};
 
 use super::against_model::{run, DeviceUnderTest};
 use super::drive::Stimulus;
@@ -44,10 +47,58 @@ struct Waves<W: Write> {
     pins: Vec<Signal>,
     /// Signals of each tap: valid, then the fields.
     taps: Vec<Vec<Signal>>,
+    /// The instructions' names, where there is a program.
+    instructions: Option<Instructions>,
     cycle: u64,
     period_ps: u64,
     /// The first write error; nothing is written after it.
     failed: Option<std::io::Error>,
+}
+
+/// The signal with the name of the running instruction.
+struct Instructions {
+    id: IdCode,
+    /// Index of the tap that says which it is.
+    tap: usize,
+    /// By section and step.
+    names: Vec<Vec<String>>,
+    last: Option<[usize; 2]>,
+}
+
+/// The tap of the instructions, and the signal with their names.
+const INSTRUCTION: &str = "instruction";
+const NAME: &str = "name";
+
+/// What a VCD file writes for a text without any.
+const NO_TEXT: &str = "-";
+
+impl Instructions {
+    /// Writes the name if it differs from the last one; `word` is the tap's.
+    fn change<W: Write>(&mut self, writer: &mut Writer<W>, word: Option<&[i64]>, first: bool) -> std::io::Result<()> {
+        let running = match word {
+            Some(&[section, step]) => Some([section as usize, step as usize]),
+            _ => None,
+        };
+        if !first && running == self.last {
+            return Ok(());
+        }
+        self.last = running;
+        let name = running.and_then(|[section, step]| self.names.get(section)?.get(step));
+        writer.change_string(self.id, name.map_or(NO_TEXT, String::as_str))
+    }
+}
+
+/// The instructions of each section as texts without spaces, at which a value in a VCD file ends.
+fn names(model: &Model) -> Vec<Vec<String>> {
+    let mut all: Vec<Vec<String>> = Vec::new();
+    for own in listing(model) {
+        if own.step == 0 {
+            all.push(Vec::new());
+        }
+        let name = format!("{}:group_{}:{}·{}", own.result, own.group, own.matrix, own.operand).replace(' ', "_");
+        all.last_mut().into_iter().for_each(|section| section.push(name.clone()));
+    }
+    all
 }
 
 /// The pins in the order of [`Waves::pins`].
@@ -59,7 +110,7 @@ const PINS: [(&str, &[(&str, u32)]); 3] = [
 
 impl<W: Write> Waves<W> {
     /// Writes the VCD header.
-    fn new(device: Box<dyn Device>, taps: &[Tap], clock_MHz: f64, out: W) -> std::io::Result<Self> {
+    fn new(device: Box<dyn Device>, taps: &[Tap], model: &Model, out: W) -> std::io::Result<Self> {
         let mut writer = Writer::new(out);
         writer.timescale(1, TimescaleUnit::PS)?;
         writer.add_module("dermis")?;
@@ -75,12 +126,16 @@ impl<W: Write> Waves<W> {
             }
             writer.upscope()?;
         }
-        let mut streams = Vec::new();
-        for tap in taps {
+        let (mut streams, mut instructions) = (Vec::new(), None);
+        for (index, tap) in taps.iter().enumerate() {
             writer.add_module(tap.name)?;
             let mut stream = vec![signal(&mut writer, "valid", 1)?];
             for name in &tap.fields {
                 stream.push(signal(&mut writer, name, tap.field_bits)?);
+            }
+            if tap.name == INSTRUCTION {
+                let id = writer.add_var(VarType::String, 1, NAME, None)?;
+                instructions = Some(Instructions { id, tap: index, names: names(model), last: None });
             }
             writer.upscope()?;
             streams.push(stream);
@@ -90,8 +145,8 @@ impl<W: Write> Waves<W> {
         writer.begin(SimulationCommand::Dumpvars)?;
         writer.end()?;
         // Even, so that half a period is an integer.
-        let period_ps = 2 * (5e5 / clock_MHz).round() as u64;
-        Ok(Waves { device, writer, clock, pins, taps: streams, cycle: 0, period_ps, failed: None })
+        let period_ps = 2 * (5e5 / model.board.clock_MHz).round() as u64;
+        Ok(Waves { device, writer, clock, pins, taps: streams, instructions, cycle: 0, period_ps, failed: None })
     }
 
     fn write(&mut self, inputs: &Inputs, outputs: &Outputs) -> std::io::Result<()> {
@@ -122,6 +177,10 @@ impl<W: Write> Waves<W> {
             for (signal, value) in fields.iter_mut().zip(word.iter().flatten()) {
                 change(&mut self.writer, signal, *value)?;
             }
+        }
+        if let Some(instructions) = &mut self.instructions {
+            let word = outputs.taps[instructions.tap].as_deref();
+            instructions.change(&mut self.writer, word, self.cycle == 0)?;
         }
         self.writer.timestamp(start + self.period_ps / 2)?;
         self.writer.change_scalar(self.clock, Value::V0)
@@ -172,8 +231,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let part = part.tempfile_in(folder).map_err(|e| at(folder, e))?;
     let mut out = BufWriter::new(part.reopen().map_err(|e| at(part.path(), e))?);
     let device = hardware.device(simulator)?;
-    let clock_MHz = hardware.model.board.clock_MHz;
-    let mut device = Waves::new(device, taps, clock_MHz, &mut out).map_err(|e| at(part.path(), e))?;
+    let mut device = Waves::new(device, taps, &hardware.model, &mut out).map_err(|e| at(part.path(), e))?;
     let dut = DeviceUnderTest { name: simulator.name(), device: &mut device, taps: &names };
     run(dut, &vectors, Stimulus::FullSpeed);
     let failed = device.failed.take();
@@ -208,7 +266,8 @@ fn signal_list(vcd: &Path, taps: &[Tap]) -> String {
     }
     for tap in taps {
         let words = tap.fields.iter().map(|field| (*field, tap.field_bits));
-        group(tap.name, &mut [("valid", 1)].into_iter().chain(words));
+        let text = (tap.name == INSTRUCTION).then_some((NAME, 1));
+        group(tap.name, &mut [("valid", 1)].into_iter().chain(words).chain(text));
     }
     text
 }
@@ -220,8 +279,9 @@ mod tests {
     use std::fs::File;
     use vcd::{Command, Parser, ScopeItem};
 
-    /// Width of every signal, and the values of every vector, one per change; both by name.
-    fn read(path: &Path) -> (BTreeMap<String, u32>, BTreeMap<String, Vec<i64>>) {
+    /// Width of every signal, the values of every vector, one per change, both by name, and the texts of the one signal that has
+    /// texts.
+    fn read(path: &Path) -> (BTreeMap<String, u32>, BTreeMap<String, Vec<i64>>, Vec<String>) {
         let mut parser = Parser::new(std::io::BufReader::new(File::open(path).unwrap()));
         let header = parser.parse_header().unwrap();
         let (mut names, mut widths) = (BTreeMap::new(), BTreeMap::new());
@@ -238,14 +298,22 @@ mod tests {
             }
         }
         let mut values: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+        let mut texts = Vec::new();
         for command in parser {
-            if let Command::ChangeVector(id, bits) = command.unwrap() {
-                let sign = if bits.first() == Some(&Value::V1) { -1 } else { 0 };
-                let value = bits.iter().fold(sign, |value: i64, bit| value << 1 | i64::from(*bit == Value::V1));
-                values.entry(names[&id].clone()).or_default().push(value);
+            match command.unwrap() {
+                Command::ChangeVector(id, bits) => {
+                    let sign = if bits.first() == Some(&Value::V1) { -1 } else { 0 };
+                    let value = bits.iter().fold(sign, |value: i64, bit| value << 1 | i64::from(*bit == Value::V1));
+                    values.entry(names[&id].clone()).or_default().push(value);
+                }
+                Command::ChangeString(id, text) => {
+                    assert_eq!(names[&id], "dermis.instruction.name");
+                    texts.push(text);
+                }
+                _ => {}
             }
         }
-        (widths, values)
+        (widths, values, texts)
     }
 
     #[test]
@@ -260,7 +328,7 @@ mod tests {
         assert_eq!(std::fs::metadata(&vcd).unwrap().permissions().mode() & 0o777, 0o644);
         // No temporary file remains.
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
-        let (widths, values) = read(&vcd);
+        let (widths, values, texts) = read(&vcd);
         // Every listed signal is in the file, with its width.
         let list = std::fs::read_to_string(list).unwrap();
         let listed = list.lines().filter_map(|line| line.strip_prefix("dermis."));
@@ -273,8 +341,15 @@ mod tests {
             count += 1;
         }
         assert_eq!(count, widths.len());
-        // The words are the model's: the search's last word is its result.
+        // Every instruction of the program has run once, in order.
         let model = Model::new(&scene).unwrap();
+        let running: Vec<&String> = texts.iter().filter(|text| *text != NO_TEXT).collect();
+        let mut once = running.clone();
+        once.dedup();
+        assert_eq!(once, names(&model)[0].iter().collect::<Vec<_>>());
+        assert_eq!(texts[0], NO_TEXT);
+        assert!(running.iter().any(|name| *name == "v_11:group_0:−Ax·v_01"), "{running:?}");
+        // The words are the model's: the search's last word is its result.
         let trace = model.run(&model.readings(frames).unwrap());
         let stage = |name: &str| &trace.stages.iter().find(|stage| stage.name == name).unwrap().words;
         assert_eq!(values["dermis.search.best_x"].last(), Some(&stage("search").last().unwrap()[0]));

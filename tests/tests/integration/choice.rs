@@ -61,7 +61,7 @@ fn vectors(hardware: &Hardware, seed: u64) -> Vec<Vector> {
             _ => bump(scene, &mut random),
         };
         let expected = hardware.model.run(&codes);
-        Vector { frame: format!("bump {k}"), cols: scene.sensor.cols, taxels: codes.len(), codes, expected }
+        Vector::new(&hardware.model, format!("bump {k}"), codes, expected)
     };
     (0..FRAMES).map(vector).collect()
 }

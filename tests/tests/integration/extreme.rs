@@ -17,13 +17,8 @@ fn vectors(scene: &Scene, hardware: &Hardware) -> Vec<Vector> {
     own.map(|extreme| {
         let frame = std::slice::from_ref(&extreme.frame);
         let codes = Model::for_frames(&extreme.scene, frame).unwrap().readings(frame).unwrap();
-        Vector {
-            frame: extreme.frame.id.clone(),
-            cols: scene.sensor.cols,
-            taxels: codes.len(),
-            expected: hardware.model.run(&codes),
-            codes,
-        }
+        let expected = hardware.model.run(&codes);
+        Vector::new(&hardware.model, extreme.frame.id.clone(), codes, expected)
     })
     .collect()
 }

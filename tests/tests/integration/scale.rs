@@ -55,13 +55,7 @@ fn random_frames(scene: &Scene, frames: u64) {
             .map(|k| {
                 let codes = codes(&mut random, scene);
                 let expected = hardware.model.run(&codes);
-                Vector {
-                    frame: format!("random {}", CHUNK * seed + k),
-                    cols: scene.sensor.cols,
-                    taxels: codes.len(),
-                    codes,
-                    expected,
-                }
+                Vector::new(&hardware.model, format!("random {}", CHUNK * seed + k), codes, expected)
             })
             .collect();
         let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };

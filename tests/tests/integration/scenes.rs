@@ -161,7 +161,7 @@ proptest! {
             })
             .collect();
         let expected = hardware.model.run(&codes);
-        let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, taxels: codes.len(), codes, expected }];
+        let vectors = [dermis_sim::cosim::Vector::new(&hardware.model, "random".into(), codes, expected)];
         let findings = compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
     }

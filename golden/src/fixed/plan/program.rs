@@ -93,6 +93,26 @@ pub struct Listed {
     pub cycles: usize,
 }
 
+/// The issues of a frame, one per cycle of a product: index of the section in the hardware's table, and of the instruction in it.
+/// `case` is the index of the case taken, `contacts` the number of those with a μ of their own.
+pub fn issued(plan: &Plan, case: usize, contacts: usize) -> Vec<[usize; 2]> {
+    let before: usize = plan.cases()[..case].iter().map(|case| sections(&case.formats).len()).sum();
+    let case = &plan.cases()[case];
+    // The first section once; with contacts the second for each, the third for each step of `relax`.
+    let times = match case.formats.by_contact() {
+        true => vec![1, contacts, case.formats.degree],
+        false => vec![case.parts.len()],
+    };
+    let mut all = Vec::new();
+    for (index, (section, times)) in sections(&case.formats).iter().zip(times).enumerate() {
+        let own = instructions(case, section);
+        let steps = own.iter().enumerate().flat_map(|(step, own)| std::iter::repeat_n([before + index, step], own.columns));
+        let once: Vec<[usize; 2]> = steps.collect();
+        all.extend(once.repeat(times));
+    }
+    all
+}
+
 /// The program of all cases, in the order of the table in the hardware; none for the serial engine, which has no lanes.
 pub fn listing(plan: &Plan) -> Vec<Listed> {
     let mut all = Vec::new();

@@ -121,6 +121,8 @@ pub struct PassProgram {
     pub factor: Wire<Out>,
     /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes), see [`Control`]; with the addresses.
     pub control: Wire<Out>,
+    /// Index of the step in its section; from `start` on.
+    pub step: Wire<Out>,
     kernel: Body,
 }
 
@@ -162,7 +164,7 @@ kernel_block!(
     PassProgram,
     clock clk,
     inputs [which, start, advance, column, finished],
-    outputs [ready, last, ends, coefficient_address, operand_address, source, factor, control]
+    outputs [ready, last, ends, coefficient_address, operand_address, source, factor, control, step]
 );
 
 /// File of the column list, one line per word of the coefficient memory.
@@ -224,6 +226,7 @@ impl PassProgram {
             source: Wire::new(SOURCE_BITS),
             factor: Wire::new(FACTOR_BITS),
             control: Wire::new(shape.control.bits()),
+            step: Wire::new(count_bits(largest_of(&shape.steps))),
             kernel: Body::default(),
         };
         block.bind(shape.kernel())
@@ -451,6 +454,7 @@ mod tests {
             let of = |of: &dyn Fn(&Step) -> bool| self.now.map(|(step, _)| Word::from(of(&step)));
             let pauses = self.ended.contains(&Some(true));
             let flags = [
+                self.now.map(|(_, index)| Word::from(index as u64)),
                 of(&|step| step.ends),
                 of(&|step| finished >= step.needs && !pauses),
                 of(&|step| column + 1 == step.columns),
