@@ -12,7 +12,7 @@
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
-//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
+//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where the noise is stated ([`Deviations`](crate::deviations::Deviations)) |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
@@ -92,7 +92,8 @@ pub struct Checks {
     /// training, see [`Misfit`](crate::misfit::Misfit); `None` where no network gave a μ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network_misfit: Option<f64>,
-    /// Standard deviation of the shear over its size, the largest of all contacts; `None` with `search`.
+    /// Standard deviation of the shear over its size, the largest of all contacts or searched subarrays; `None` with `search`
+    /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
 }

@@ -112,7 +112,9 @@ pub enum DeviationsError {
         reason: String,
     },
     /// The table was measured for something else.
-    #[error("{file}: measured for {field} = {measured}, the scene has {scene}; measure it anew with dermis deviations")]
+    #[error(
+        "{file}: measured for {field} = {measured}, the scene has {scene}; measure it anew with dermis deviations"
+    )]
     Mismatch {
         /// Its path.
         file: String,
@@ -216,7 +218,15 @@ impl Deviations {
         let digits = |value: f64| format!("{value:.3e}").parse().unwrap_or(value);
         let all = |values: Vec<f64>| values.into_iter().map(digits).collect();
         let sigma = sigma.into_iter().map(|row| row.into_iter().map(|own| own.map(digits)).collect()).collect();
-        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels: all(levels), sizes: all(sizes), sigma }
+        Deviations {
+            version: VERSION,
+            subject,
+            draws: draws as usize,
+            seed,
+            levels: all(levels),
+            sizes: all(sizes),
+            sigma,
+        }
     }
 
     /// The file, JSON with a line per level.

@@ -12,8 +12,8 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "search"), `degree` (none; 1 … 8) |
-//! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …) |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "network", "search"), `degree` (none; 1 … 8) |
+//! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …), `deviations` (none; a file) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |

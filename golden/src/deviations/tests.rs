@@ -60,9 +60,12 @@ fn between_levels_the_logarithm_is_linear() {
     let table = Deviations::new(subject, [9, 1], vec![1e-4, 1e-2], vec![4.0], vec![row(0.01), row(0.16)]);
     for (noise, wanted) in [(1e-9, 0.01), (1e-4, 0.01), (1e-3, 0.04), (1e-2, 0.16), (1.0, 0.16)] {
         let [x, y, normal] = table.at(noise, 3.9);
-        assert!((x / wanted - 1.0).abs() < 1e-9 && (y / x - 2.0).abs() < 1e-9 && (normal - 0.1).abs() < 1e-9, "{noise}");
+        assert!(
+            (x / wanted - 1.0).abs() < 1e-9 && (y / x - 2.0).abs() < 1e-9 && (normal - 0.1).abs() < 1e-9,
+            "{noise}"
+        );
     }
-    assert_eq!(table.at(1e-3, 4.0), [0.5; 3]);
+    assert!(table.at(1e-3, 4.0).iter().all(|sigma| (sigma - 0.5).abs() < 1e-12));
     assert_eq!(Deviations::parse(&table.to_text(), "t").unwrap(), table);
 }
 
@@ -106,7 +109,7 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
         (|s| s.sensor.rows = 12, "sensor.rows = 10, the scene has 12"),
         (|s| s.sensor.pitch_y_mm = 3.0, "sensor.pitch_y_mm = 4, the scene has 3"),
         (|s| s.sensor.thickness_mm = 2.5, "sensor.thickness_mm = 3, the scene has 2.5"),
-        (|s| s.search.mu_max = 0.8, "search.mu_max = 0.6, the scene has 0.8"),
+        (|s| s.search.mu_max = 0.5, "search.mu_max = 0.6, the scene has 0.5"),
         (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = 0, the scene has 1"),
         (|s| s.input.dead = vec![[1, 2]], "input.dead = [], the scene has [[1, 2]]"),
     ];
@@ -145,7 +148,9 @@ fn results_have_the_deviations_of_their_noise() {
     }
     let scene = searched("sensor-1");
     let own = frame(&scene, 1e-3, 3);
-    for result in [Golden::new(&scene).unwrap().run(&own).unwrap(), Model::new(&scene).unwrap().reconstruct(&own).unwrap()] {
+    for result in
+        [Golden::new(&scene).unwrap().run(&own).unwrap(), Model::new(&scene).unwrap().reconstruct(&own).unwrap()]
+    {
         let one = &result.subarrays[0];
         assert!(one.mu_sigma.is_none() && one.normal_sigma_N.is_none() && result.checks.shear_spread.is_none());
     }

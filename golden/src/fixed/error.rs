@@ -5,9 +5,9 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::board::BoardError;
+use crate::deviations::DeviationsError;
 use crate::frame::FrameError;
 use crate::input::InputError;
-use crate::deviations::DeviationsError;
 use crate::learned::LearnedError;
 use crate::matrices::MatricesError;
 use crate::partition::{Case, PartitionError};

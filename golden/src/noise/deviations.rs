@@ -179,8 +179,9 @@ fn errors_of(scene: &Scene, drawn: &DrawnFrame, reading: &Frame, result: &Recons
     let of = |index: usize| {
         let load = load_of(result, scene, reading, index).filter(|load| load.normal_N >= counts)?;
         let part = result.subarrays[index].part();
-        let off = [(&truth.fx, &result.forces_N.fx), (&truth.fy, &result.forces_N.fy), (&truth.fz, &result.forces_N.fz)]
-            .map(|(truth, own)| part.indices(&scene.sensor).map(|k| own[k] - truth[k]).sum::<f64>().abs());
+        let off =
+            [(&truth.fx, &result.forces_N.fx), (&truth.fy, &result.forces_N.fy), (&truth.fz, &result.forces_N.fz)]
+                .map(|(truth, own)| part.indices(&scene.sensor).map(|k| own[k] - truth[k]).sum::<f64>().abs());
         Some(Error { size: load.size, off: off.map(|off| off / load.normal_N) })
     };
     (0..result.subarrays.len()).filter_map(of).collect()

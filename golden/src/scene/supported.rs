@@ -127,16 +127,15 @@ impl Scene {
     }
 
     /// What `auto` takes in hardware, `network` or `search`, and why. The network is taken where the scene names one and
-    /// states noise, by `noise_floor_MPa` or a tare file, that a real array has. A search that starts at the network's μ is no
-    /// better than the better of both, at any noise.
+    /// states, by `noise_floor_MPa`, noise that a real array has. A search that starts at the network's μ is no better than the
+    /// better of both, at any noise.
     pub fn chosen_for_hardware(&self) -> (EstimatorKind, &'static str) {
         let noise_MPa = self.search.noise_floor_MPa * self.input.noise_share();
-        let quiet = self.input.full_scale_MPa.is_some_and(|full| noise_MPa > 0.0 && noise_MPa < QUIET * full);
-        let stated = noise_MPa > 0.0 || self.input.tare.is_some();
+        let quiet = self.input.full_scale_MPa.is_some_and(|full| noise_MPa < QUIET * full);
         let parallel = || Board::load(&self.hardware.board).is_ok_and(|board| board.engine == EngineKind::Parallel);
         match () {
             () if self.search.network.is_none() => (EstimatorKind::Search, "the scene names no network"),
-            () if !stated => (EstimatorKind::Search, "the scene states no noise"),
+            () if noise_MPa == 0.0 => (EstimatorKind::Search, "the scene states no noise"),
             () if quiet => (EstimatorKind::Search, "the stated noise is below 1e-5 of full scale"),
             () if self.require_network().is_err() => {
                 (EstimatorKind::Search, "a network takes neither the scene's partition, array, mu_max nor search width")

@@ -355,5 +355,4 @@ fn auto_takes_the_network_in_hardware_where_noise_can_be() {
     // Of a mean of 64 frames more noise is allowed in each.
     assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (7e-6, 6)).0, EstimatorKind::Search);
     assert_eq!(chosen(|s| s.search.noise_floor_MPa = 1.1e-6).0, EstimatorKind::Network);
-    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.tare) = (0.0, Some("t.json".into()))).0, EstimatorKind::Network);
 }

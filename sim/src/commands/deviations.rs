@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{bail, Result};
 use clap::Args;
+use dermis_golden::deviations::Deviations;
 use dermis_golden::noise::{deviations_coverage, measure_deviations};
 use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_golden::write::write;
@@ -23,6 +24,7 @@ const COVERED: [f64; 2] = [0.55, 0.8];
 #[command(after_help = "Examples:
   dermis deviations eight-by-eight --draws 200 --out small.deviations     seconds: to see it work
   dermis deviations my-scene.toml                    my-scene.deviations beside it
+  dermis deviations sensor-1 --check                 how often the table of a scene holds on other frames
 
 Then, in the scene: [search] with deviations = \"my-scene.deviations\"; a result whose noise the scene states has the
 standard deviations of shear and normal force. The tables of the built-in scenes are part of the program.
@@ -39,12 +41,15 @@ pub struct Arguments {
     /// The file; default: the scene's name with .deviations, beside the scene's file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Measure and write nothing; try the table that the scene has.
+    #[arg(long, conflicts_with = "out")]
+    check: bool,
 }
 
-/// Measures, writes the file, and returns text for stdout and whether the deviations cover the errors of fresh frames.
+/// Measures and writes the file, or takes the table there is, and returns text for stdout and whether the deviations cover the errors of fresh frames.
 ///
 /// # Errors
-/// An unknown scene, one that is not searched, too few frames, a file that cannot be written.
+/// An unknown scene, one that is not searched or has no table, too few frames, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let scene = Scene::load(&arguments.scene)?;
     let beside = || PathBuf::from(&arguments.scene).with_file_name(format!("{}.deviations", scene.name));
@@ -52,16 +57,26 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     if scene.for_hardware().search.estimator == EstimatorKind::Network {
         bail!("scene {}: search.estimator: a network gives standard deviations of its own", scene.name);
     }
-    let bar = Progress::steps(&format!("{}: errors of the search", scene.name), 0);
-    let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
-    let table = measure_deviations(&scene, arguments.draws, arguments.seed, &progress)?;
-    drop(bar);
-    write(&out, table.to_text().as_bytes())?;
+    let (written, table) = match arguments.check {
+        true => {
+            let Some(table) = Deviations::of_scene(&scene.for_hardware())? else {
+                bail!("scene {}: it has no table of standard deviations; leave out --check to make one", scene.name);
+            };
+            (String::new(), table)
+        }
+        false => {
+            let bar = Progress::steps(&format!("{}: errors of the search", scene.name), 0);
+            let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
+            let table = measure_deviations(&scene, arguments.draws, arguments.seed, &progress)?;
+            write(&out, table.to_text().as_bytes())?;
+            (format!("{}\n\n", out.display()), table)
+        }
+    };
     let bar = Progress::steps(&format!("{}: other frames", scene.name), 0);
     let frames = [arguments.draws.div_ceil(2) as u64, arguments.seed.wrapping_add(FRESH)];
     let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
     let covered = deviations_coverage(&scene, &table, &LEVELS, frames, &progress)?;
     drop(bar);
     let good = covered.iter().flatten().all(|share| (COVERED[0]..=COVERED[1]).contains(share));
-    Ok((format!("{}\n\n{}", out.display(), report::deviations(&table, &LEVELS, &covered)), good))
+    Ok((written + &report::deviations(&table, &LEVELS, &covered), good))
 }

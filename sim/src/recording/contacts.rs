@@ -1,7 +1,7 @@
 //! The contacts of a result: what the live page draws and a recording holds as wrenches.
 
 use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::reconstruct::{FoundContact, Reconstruction, SubarrayResult};
 
 /// The contacts that the estimator tells apart, else the resultants; the whole array as one contact where it is one subarray
 /// with a contact.
@@ -16,7 +16,8 @@ pub fn contacts(result: &Reconstruction) -> Vec<FoundContact> {
     match result.subarrays.as_slice() {
         [whole] if !result.flags.contains(&Flag::NoContact) => {
             let own = plain(whole.compression_centroid_mm, result.resultant_N);
-            vec![FoundContact { mu: whole.mu, mu_sigma: whole.mu_sigma, shear_sigma_N: whole.shear_sigma_N, ..own }]
+            let SubarrayResult { mu, mu_sigma, shear_sigma_N, normal_sigma_N, .. } = *whole;
+            vec![FoundContact { mu, mu_sigma, shear_sigma_N, normal_sigma_N, ..own }]
         }
         _ => Vec::new(),
     }

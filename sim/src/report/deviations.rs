@@ -20,7 +20,9 @@ pub fn deviations(table: &Deviations, levels: &[f64], covered: &[[f64; 3]]) -> S
         std::iter::once(format!("{level:.1e}")).chain(sigma.iter().map(cell)).collect::<Vec<_>>()
     };
     let mut text = markdown(&head, table.levels.iter().zip(&table.sigma).map(row).collect());
-    text.push_str("Standard deviations of μ along x and y, of the normal force over the force; by noise over peak, and by\n");
+    text.push_str(
+        "Standard deviations of μ along x and y, of the normal force over the force; by noise over peak, and by\n",
+    );
     text.push_str("normal force over that of the peak on one taxel.\n\n");
     let share = |share: f64| format!("{:.0} %", 1e2 * share);
     let row = |(level, own): (&f64, &[f64; 3])| {

@@ -106,7 +106,8 @@ pub fn issued(plan: &Plan, case: usize, contacts: usize) -> Vec<[usize; 2]> {
     let mut all = Vec::new();
     for (index, (section, times)) in sections(&case.formats).iter().zip(times).enumerate() {
         let own = instructions(case, section);
-        let steps = own.iter().enumerate().flat_map(|(step, own)| std::iter::repeat_n([before + index, step], own.columns));
+        let steps =
+            own.iter().enumerate().flat_map(|(step, own)| std::iter::repeat_n([before + index, step], own.columns));
         let once: Vec<[usize; 2]> = steps.collect();
         all.extend(once.repeat(times));
     }
