@@ -4,8 +4,8 @@ use dermis_golden::deviations::Deviations;
 
 use super::table::markdown;
 
-/// The table, a line per level of noise, and how often the errors of other frames at `levels` are within it.
-pub fn deviations(table: &Deviations, levels: &[f64], covered: &[[f64; 3]]) -> String {
+/// The table, a line per level of noise.
+pub fn deviations(table: &Deviations) -> String {
     let edges: Vec<String> = table.sizes.iter().map(|size| format!("{size:.1}")).collect();
     let class = |class: usize| match (class.checked_sub(1).map(|low| &edges[low]), edges.get(class)) {
         (None, Some(high)) => format!("up to {high} taxels"),
@@ -23,12 +23,16 @@ pub fn deviations(table: &Deviations, levels: &[f64], covered: &[[f64; 3]]) -> S
     text.push_str(
         "Standard deviations of μ along x and y, of the normal force over the force; by noise over peak, and by\n",
     );
-    text.push_str("normal force over that of the peak on one taxel.\n\n");
+    text.push_str("normal force over that of the peak on one taxel.\n");
+    text
+}
+
+/// How often the errors of frames at `levels` of noise are within a table's deviations.
+pub fn deviations_covered(levels: &[f64], covered: &[[f64; 3]]) -> String {
     let share = |share: f64| format!("{:.0} %", 1e2 * share);
     let row = |(level, own): (&f64, &[f64; 3])| {
         std::iter::once(format!("{level:.1e}")).chain(own.map(share)).collect::<Vec<_>>()
     };
     let rows = levels.iter().zip(covered).map(row).collect();
-    text.push_str(&markdown(&["noise", "shear x within one", "shear y within one", "normal force within one"], rows));
-    text
+    markdown(&["noise", "shear x within one", "shear y within one", "normal force within one"], rows)
 }

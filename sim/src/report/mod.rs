@@ -46,7 +46,7 @@ pub use board_list::{boards, BoardList, NamedBoard};
 pub use calibration::calibration;
 pub use cases::cases;
 pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, SceneCheck};
-pub use deviations::deviations;
+pub use deviations::{deviations, deviations_covered};
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;
