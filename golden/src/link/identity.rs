@@ -66,9 +66,9 @@ pub fn supports(plan: &Plan, kind: Kind) -> bool {
     }
 }
 
-/// Bit of a request in [`Identity::left_out`].
+/// Bit of a request in [`Identity::left_out`]; 0 of an answer.
 fn bit(kind: Kind) -> u8 {
-    1 << (kind as u8 - 1)
+    1u8.checked_shl(u32::from(kind as u8).wrapping_sub(1)).unwrap_or(0)
 }
 
 /// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.

@@ -59,7 +59,7 @@ pub use uart_transmitter::UartTransmitter;
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{supports, Counters, Identity, Kind, Sums, BEAT_BYTES};
+use dermis_golden::link::{payloads, supports, Counters, Identity, Kind};
 
 /// Properties of a scene on which its packets depend.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,8 +70,8 @@ pub struct Shape {
     pub cols: usize,
     /// Width of a code, in bits.
     pub input_bits: u32,
-    /// Beats of labels and statuses of a frame, after the forces.
-    pub other_beats: usize,
+    /// Bytes of the payload of an answer with resultants, and of one with forces.
+    pub answer_bytes: [usize; 2],
     /// What the board answers a frame with.
     pub answers: Answers,
     /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
@@ -85,11 +85,8 @@ pub enum Answers {
     Forces,
     /// Forces, or their sums.
     Both,
-    /// Records of subarrays or contacts, which the engine sends in so many beats in the place of forces.
-    Records {
-        /// Beats of all records of a frame.
-        beats: usize,
-    },
+    /// Records of subarrays or contacts, which the engine sends in the place of forces.
+    Records,
 }
 
 impl Answers {
@@ -103,7 +100,7 @@ impl Answers {
         match self {
             Answers::Forces => &[Kind::FrameForForces],
             Answers::Both => &[Kind::FrameForResultants, Kind::FrameForForces],
-            Answers::Records { .. } => &[Kind::FrameForResultants],
+            Answers::Records => &[Kind::FrameForResultants],
         }
     }
 }
@@ -113,31 +110,25 @@ impl Shape {
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
         let input_bits = model.formats().code_bits;
-        let other_beats = model.label_beats() + model.status_beats();
+        let [_, resultants, forces] = payloads(model).map(|(_, bytes)| bytes);
         let answers = match [Kind::FrameForResultants, Kind::FrameForForces].map(|kind| supports(model, kind)) {
             [true, true] => Answers::Both,
-            [true, false] => Answers::Records { beats: model.force_beats() },
+            [true, false] => Answers::Records,
             [false, _] => Answers::Forces,
         };
         let frames = match model.board.engine {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,
         };
-        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, other_beats, answers, frames }
+        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, answer_bytes: [resultants, forces], answers, frames }
     }
 
     /// Bytes of the payload of an answer, by source.
     fn payloads(&self) -> [usize; 4] {
-        let others = self.other_beats * BEAT_BYTES;
         let mut bytes = [0; 4];
         bytes[IDENTITY] = Identity::BYTES;
         bytes[COUNTERS] = Counters::BYTES;
-        bytes[RESULTANTS] = others
-            + match self.answers {
-                Answers::Records { beats } => beats * BEAT_BYTES,
-                Answers::Forces | Answers::Both => Sums::BYTES,
-            };
-        bytes[FORCES] = self.rows * self.cols * BEAT_BYTES + others;
+        [bytes[RESULTANTS], bytes[FORCES]] = self.answer_bytes;
         bytes
     }
 }

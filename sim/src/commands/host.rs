@@ -112,7 +112,7 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
     let (mut text, mut equal) = (String::new(), true);
     for (index, frame) in frames.iter().enumerate() {
         let (readings, answer) = session.request(frame)?;
-        if let Some(result) = session.decode(&readings, &answer)? {
+        if let Some(result) = answer.decode(&session.model, &readings)? {
             let sensor = &session.model.scene.sensor;
             let stress = session.model.stress(std::slice::from_ref(&readings))?;
             let full_scale_MPa = full_scale(&session.model.scene, &stress);

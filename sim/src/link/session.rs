@@ -4,11 +4,10 @@ use std::cell::RefCell;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
-use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::input::Input;
 use dermis_golden::link::{Identity, Kind};
-use dermis_golden::reconstruct::Reconstruction;
 use serialport::SerialPort;
 
 use super::answer::Answer;
@@ -70,14 +69,6 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         answer.forces = answer.forces.filter(|_| self.forces || !forces);
         Ok((frame, answer))
     }
-
-    /// The result of an answer to these readings; `None` if it has no forces.
-    ///
-    /// # Errors
-    /// An answer that the model cannot decode.
-    pub fn decode(&self, readings: &Frame, answer: &Answer) -> Result<Option<Reconstruction>, FixedError> {
-        answer.decode(&self.model, readings)
-    }
 }
 
 impl<P: std::io::Read + std::io::Write + 'static> From<Session<P>> for Engine {
@@ -88,7 +79,7 @@ impl<P: std::io::Read + std::io::Write + 'static> From<Session<P>> for Engine {
             let mut session = session.borrow_mut();
             let [frame] = frames else { bail!("{} frames: a board takes one for each result", frames.len()) };
             let (readings, answer) = session.request(frame)?;
-            session.decode(&readings, &answer)?.ok_or_else(|| anyhow!("the answer has no forces"))
+            answer.decode(&session.model, &readings)?.ok_or_else(|| anyhow!("the answer has no forces"))
         }))
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums};
+use dermis_golden::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
 
 use super::*;
 use crate::language::testbench::{block_subject, check_with_defects, Reference, Subject};
@@ -11,8 +11,17 @@ use crate::language::Change;
 use crate::link::Answers;
 use crate::wire::Word;
 
-const SHAPE: Shape = Shape { rows: 3, cols: 4, input_bits: 12, other_beats: 3, answers: Answers::Both, frames: 4 };
-const TAXELS: usize = SHAPE.rows * SHAPE.cols;
+/// Beats of labels and statuses of a frame, after the forces.
+const OTHER_BEATS: usize = 3;
+const SHAPE: Shape = Shape {
+    rows: TAXELS / 4,
+    cols: 4,
+    input_bits: 12,
+    answer_bytes: [Sums::BYTES + OTHER_BEATS * BEAT_BYTES, (TAXELS + OTHER_BEATS) * BEAT_BYTES],
+    answers: Answers::Both,
+    frames: 4,
+};
+const TAXELS: usize = 12;
 /// Packets between two resets.
 const PACKETS: usize = 12;
 
@@ -175,7 +184,7 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
             continue;
         }
         around.counters.taken += 1;
-        let count = if is_frame { TAXELS + SHAPE.other_beats } else { 0 };
+        let count = if is_frame { TAXELS + OTHER_BEATS } else { 0 };
         let mut value = || random.i32(..) >> random.u32(..32);
         let beats: Vec<[i32; 3]> = (0..count).map(|_| [(); 3].map(|()| value())).collect();
         let of_beats = |beats: &[[i32; 3]]| -> Vec<u8> {
