@@ -11,8 +11,10 @@ use dermis_golden::board::Family;
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
-use dermis_hdl::usage::total;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::usage::{total, Usage};
 use dermis_hdl::{generate, Generated};
+use dermis_sim::flow::baseline::{Baseline, Baselines};
 use dermis_sim::flow::synthesis::{cells, commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
 use dermis_tests::with_network;
@@ -20,6 +22,9 @@ use serde_json::Value;
 
 /// Largest relative error of the estimated flip-flops and LUTs; here it is 10 and 11 %.
 const NEAR: f64 = 0.15;
+
+/// Largest relative error of the estimated LUTs of a whole board against place and route; it is −4 to +7 %.
+const NEAR_ROUTED: f64 = 0.1;
 
 /// Runs Yosys to the end of a `synth_ecp5` stage and returns the counts of cells by type.
 fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
@@ -99,6 +104,40 @@ fn flip_flops_and_luts_are_near_those_of_yosys() {
     for (counted, estimated) in counted.into_iter().zip([usage.flip_flops, usage.luts]) {
         let share = estimated as f64 / counted as f64;
         assert!((share - 1.0).abs() < NEAR, "estimated {estimated}, counted {counted}");
+    }
+}
+
+/// Every committed baseline, as place and route counted it, against the plan of the same board: block RAMs and multipliers are
+/// equal, LUTs close. Prints each, with its sign.
+#[test]
+fn every_baseline_is_near_its_plan() {
+    let baselines = Baselines::committed();
+    let all = baselines.built_in();
+    assert!(all.len() >= 12, "{}", all.len());
+    let compare = |usage: &Usage, baseline: &Baseline| {
+        let off = usage.luts as f64 / baseline.luts as f64 - 1.0;
+        let exact = [usage.block_rams, usage.multipliers].map(|count| count as u64);
+        let text = format!(
+            "{exact:?} block RAMs and multipliers, {} LUTs planned, {} routed, {:+.1} %",
+            usage.luts,
+            baseline.luts,
+            1e2 * off
+        );
+        match exact == [baseline.block_rams, baseline.multipliers] && off.abs() <= NEAR_ROUTED {
+            true => Ok(text),
+            false => Err(text),
+        }
+    };
+    for (scene, baseline) in all {
+        let usage = total(&generate_board(&Model::new(&scene).unwrap()).unwrap().usage);
+        println!("{} on {}: {}", scene.name, scene.hardware.board, compare(&usage, baseline).unwrap());
+        for wrong in [
+            Baseline { luts: baseline.luts * 5 / 4, ..baseline.clone() },
+            Baseline { block_rams: baseline.block_rams + 1, ..baseline.clone() },
+            Baseline { multipliers: baseline.multipliers - 1, ..baseline.clone() },
+        ] {
+            compare(&usage, &wrong).unwrap_err();
+        }
     }
 }
 

@@ -16,8 +16,8 @@
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
-//! send     begins with the first subarray's values: 13 to the first beat, then one beat a cycle; a beat waits for the
-//!          first value of its subarray
+//! send     begins with the first subarray's values: 13 to the first beat, 14 where each contact has a μ, then one beat a
+//!          cycle; a beat waits for the first value of its subarray
 //! ```
 
 use serde::Serialize;
@@ -58,7 +58,9 @@ pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 5;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
 /// Cycles from the beginning of a subarray's values to the output of a force of it.
-pub(super) const SEND: u64 = 13;
+const SEND: u64 = 13;
+/// Cycles more where each contact has a μ of its own: the label of the taxel.
+const LABEL: u64 = 1;
 /// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
 pub(super) const FOLDED: u64 = 2;
 
@@ -88,6 +90,11 @@ pub fn split_latency(formats: &Formats) -> u64 {
 pub fn coarse_period(formats: &Formats, quads: usize) -> u64 {
     let steps = (formats.sweep_steps(quads) as u64).max(SHORTEST_SWEEP);
     steps.max((steps + SELECTION_LATENCY + split_latency(formats)).div_ceil(2))
+}
+
+/// Cycles from the beginning of a subarray's values to the output of a force of it.
+pub(super) fn send(formats: &Formats) -> u64 {
+    SEND + if formats.by_contact() { LABEL } else { 0 }
 }
 
 /// Cycles from a subarray's first value to the beginning of the values for those that read them row-major: no taxel is
@@ -158,13 +165,14 @@ impl BeatCycles {
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
         let forces = forces(plan, case, &values(plan, case, searched, course));
-        let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + ACCEPT + SEND);
+        let sent = ACCEPT + send(&case.formats);
+        let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + sent);
         let before = plan.prepare.latency();
         let beats = match plan.sends_resultants() {
             // They are sent once the last force has been added.
             true => (before + last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
             false => {
-                let forces = forces.iter().map(|force| before + force + ACCEPT + SEND);
+                let forces = forces.iter().map(|force| before + force + sent);
                 let labels = (1..=plan.label_beats() as u64).map(|beat| before + last + beat * LABELS);
                 let sent: Vec<u64> = forces.chain(labels).collect();
                 let next = sent.last().map_or(0, |beat| beat + 1);

@@ -22,11 +22,11 @@ use crate::primitives::search::sweep::position_bits;
 use crate::primitives::stream::queue::LATENCY as LEAVING;
 use crate::wire::Wire;
 
-/// A pipeline without stalls: memory (3 cycles), lane selection, products (2), shift, rounding and saturation,
-/// threshold, output.
+/// A pipeline without stalls: memory (3 cycles), lane selection, with contacts the μ of the label, products (2), shift, rounding
+/// and saturation, threshold, output.
 ///
-/// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, [`STEPS`]
-/// cycles after `offer`. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
+/// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, ten cycles after
+/// `offer`, with contacts eleven. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
 /// `begin_frame` clears the counts of the frame.
 ///
 /// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for each from 1 on,
@@ -104,14 +104,12 @@ kernel_block!(
     outputs [valid, last, beat_data]
 );
 
-/// Cycles from `offer` to `valid`.
+/// Cycles from `offer` to `valid`, without contacts.
 pub const STEPS: usize = 10;
 /// Cycles from `offer` to `quad`.
 const READ_STEPS: usize = 3;
 /// Cycles from a value to its products.
 const PRODUCT_STEPS: usize = 2;
-/// Cycles for which a request travels along the pipeline.
-const ASKED: usize = STEPS - 1;
 /// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
 /// Cycles of a frame outside its counter: before it counts, one cycle and its delay after the frame starts, and from its
@@ -271,6 +269,16 @@ impl Shape {
         largest(&self.counts)
     }
 
+    /// Cycles from the lane selection to the μ of the label.
+    fn label_steps(&self) -> usize {
+        usize::from(self.contacts)
+    }
+
+    /// Cycles for which a request travels along the pipeline.
+    fn asked(&self) -> usize {
+        STEPS - 1 + self.label_steps()
+    }
+
     /// Width of a label.
     fn label_bits(&self) -> usize {
         if self.contacts {
@@ -287,6 +295,7 @@ impl Shape {
 
     fn kernel(&self) -> Kernel {
         let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
+        let asked = self.asked();
         let k = Builder::new("force_unit");
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.counts.len())));
         let (begin_frame, start) = (k.input("begin_frame", 1), k.input("start", 1));
@@ -304,16 +313,16 @@ impl Shape {
         let (labels, overflow) = (k.input("labels", Quads::LANES * self.label_bits()), k.input("overflow", 1));
 
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
-        let offers = k.state("offers", Type::unsigned(ASKED), rst, 0);
-        offers.set(offers.low(ASKED - 1).concat(offer));
+        let offers = k.state("offers", Type::unsigned(asked), rst, 0);
+        offers.set(offers.low(asked - 1).concat(offer));
         let leaves = k.wire("leaves", offers.top());
-        let beats = travel(&k, "beats", beat, ASKED);
+        let beats = travel(&k, "beats", beat, asked);
         let lanes = travel(&k, "lanes", lane, READ_STEPS);
-        let parts = travel(&k, "parts", beat_part, ASKED);
+        let parts = travel(&k, "parts", beat_part, asked);
         let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
-        let beat_out = k.wire("beat_out", beats.slice(2 * (ASKED - 1), 2));
+        let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
         let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
-        let at_out = k.wire("at_out", part_after(ASKED));
+        let at_out = k.wire("at_out", part_after(asked));
         let kept = Kept { k: &k, start, part, parts: self.parts(), at_out };
 
         k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
@@ -327,17 +336,19 @@ impl Shape {
         let shift = k.delay("shift_now", raw_shift.top().mux(k.constant(SHIFT_BITS, 0), limited));
         let shifts = kept.memory("shifts", SHIFT_BITS);
         shifts.write(start_2, part_2, shift);
-        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
+        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + self.label_steps() + PRODUCT_STEPS)));
 
         let label = lane_of(labels, Quads::LANES, lane_value);
         let value = k.delay("value", lane_of(quad, self.lanes, lane_value).signed());
+        // Selection and μ in one cycle would be the longest path.
+        let value = if self.contacts { k.delay("value_told", value) } else { value };
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let z = k.delay("moved_z", doubled.shift_right_by(shift));
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
-                let at_value = if self.contacts { label } else { part_after(READ_STEPS) };
+                let at_value = if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS) };
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);
@@ -407,7 +418,7 @@ impl Shape {
         let words = match self.tells_labels {
             false => words,
             true => {
-                let steps = ASKED - READ_STEPS;
+                let steps = asked - READ_STEPS;
                 travel(&k, "labels_sent", label, steps)
                     .slice(self.label_bits() * (steps - 1), self.label_bits())
                     .concat(words)
