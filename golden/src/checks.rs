@@ -12,7 +12,7 @@
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
-//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where the noise is stated ([`Deviations`](crate::deviations::Deviations)) |
+//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::deviations::Deviations)) |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 

@@ -1,17 +1,20 @@
 //! Deviations: the standard deviations of forces that a search found, from a table of the errors on drawn frames.
 //!
 //! A search gives the best μ, not how far it may be off. The physics is linear, so that the relative error of a frame depends
-//! on its noise over its peak and on the size of its contact, not on its load. The table has the error that 68 % of drawn
-//! frames do not exceed, per level of noise and class of sizes; [`crate::noise::measure_deviations`] makes it. Frames are
-//! looked up by
+//! on its noise over its peak and on the shape of its contact, not on the size of its load. The table has the error that 68 %
+//! of drawn frames do not exceed, per level of noise and class of sizes; [`crate::noise::measure_deviations`] makes it. A
+//! subarray is looked up by
 //!
 //! ```text
 //! noise = √(σ² + LSB² / 12) / peak          peak = max |b| of the subarray, LSB that of the converter's codes
 //! size  = F / (peak · area of a taxel)      F the normal force
 //! ```
 //!
-//! Between two levels the logarithm of the deviation is linear in that of the noise; outside of them it is that of the last.
-//! Where neither scene nor tare frames state the noise there are no deviations: that of a real array is far above its LSB.
+//! Between two levels the logarithm of the deviation is linear in that of the noise. Below the first it is that of the first;
+//! above the last that of μ is that of the last, since |μ| is bounded, and that of the normal force grows with the noise. Where
+//! neither scene nor tare frames state the noise there are no deviations: that of a real array is far above its LSB.
+//! [`Subject`] has the fields of a scene that must be those of the table. A threshold takes forces away: with one there is no
+//! deviation of the normal force.
 //!
 //! The tables of the built-in scenes are part of the program and serve every scene of the same [`Subject`]. For others
 //! `dermis deviations` writes a file that `search.deviations` names.
@@ -29,8 +32,10 @@ use crate::frame::Frame;
 use crate::partition::Case;
 use crate::quantise::largest_code;
 use crate::reconstruct::{shear_sigma_N, Reconstruction};
-use crate::scene::{EstimatorKind, Form, Medium, ObjectiveKind, Scene};
+use crate::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Debug;
 use std::path::Path;
 use thiserror::Error;
 
@@ -48,29 +53,9 @@ const SHIPPED: [(&str, &str); 5] = [
     ("eight-by-eight", include_str!("../scenes/eight-by-eight.deviations")),
 ];
 
-/// What a table was measured for.
+/// What a table was measured for: fields of a scene, with their values as texts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Subject {
-    /// Rows of the array.
-    pub rows: usize,
-    /// Columns of the array.
-    pub cols: usize,
-    /// Pitch along columns in mm.
-    pub pitch_x_mm: f64,
-    /// Pitch along rows in mm.
-    pub pitch_y_mm: f64,
-    /// Thickness of the cover in mm.
-    pub thickness_mm: f64,
-    /// The elastic body.
-    pub medium: Medium,
-    /// Largest ratio of shear to normal force.
-    pub mu_max: f64,
-    /// The partition, as a scene file names it.
-    pub case: String,
-    /// Dead taxels, row and column.
-    pub dead: Vec<[usize; 2]>,
-}
+pub struct Subject(BTreeMap<String, String>);
 
 /// The table of one subject.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -119,7 +104,7 @@ pub enum DeviationsError {
         /// Its path.
         file: String,
         /// The scene's field.
-        field: &'static str,
+        field: String,
         /// The value it was measured for.
         measured: String,
         /// The scene's value.
@@ -130,37 +115,40 @@ pub enum DeviationsError {
 impl Subject {
     /// The subject of a scene; `None` unless the scene is searched with the objective `sparse`, shear and one μ per subarray.
     pub fn of(scene: &Scene) -> Option<Subject> {
-        let Scene { sensor, search, input, partition, .. } = scene;
+        let Scene { sensor, search, inverse, fixed, input, partition, .. } = scene;
         let searched = search.objective == ObjectiveKind::Sparse && search.form == Form::Oblique && search.mu_max > 0.0;
         let by_search = scene.estimator() == EstimatorKind::Search && partition.case != Case::Contacts;
-        (searched && by_search && !input.unipolar).then(|| Subject {
-            rows: sensor.rows,
-            cols: sensor.cols,
-            pitch_x_mm: sensor.pitch_x_mm,
-            pitch_y_mm: sensor.pitch_y_mm,
-            thickness_mm: sensor.thickness_mm,
-            medium: scene.medium,
-            mu_max: search.mu_max,
-            case: partition.case.to_string(),
-            dead: input.dead.clone(),
-        })
+        let fields: [(&str, &dyn Debug); 19] = [
+            ("sensor.rows", &sensor.rows),
+            ("sensor.cols", &sensor.cols),
+            ("sensor.pitch_x_mm", &sensor.pitch_x_mm),
+            ("sensor.pitch_y_mm", &sensor.pitch_y_mm),
+            ("sensor.thickness_mm", &sensor.thickness_mm),
+            ("medium", &scene.medium),
+            ("search.mu_max", &search.mu_max),
+            ("search.degree", &search.degree),
+            ("inverse.kind", &inverse.kind.name()),
+            ("inverse.level", &inverse.level),
+            ("fixed.input_bits", &fixed.input_bits),
+            ("fixed.data_bits", &fixed.data_bits),
+            ("fixed.coef_bits", &fixed.coef_bits),
+            ("fixed.inverse_bits", &fixed.inverse_bits),
+            ("fixed.prune_bits", &fixed.prune_bits),
+            ("partition.case", &partition.case.to_string()),
+            ("partition.cases", &partition.listed),
+            ("partition.condition", &partition.condition),
+            ("input.dead", &input.dead),
+        ];
+        let texts = || fields.map(|(field, value)| (field.to_owned(), format!("{value:?}"))).into();
+        (searched && by_search && !input.unipolar).then(|| Subject(texts()))
     }
 
     /// The first field in which another subject differs: its name, this value, the other.
-    fn differs(&self, other: &Subject) -> Option<(&'static str, String, String)> {
-        let pair = |of: fn(&Subject) -> String| (of(self), of(other));
-        let pairs = [
-            ("sensor.rows", pair(|s| s.rows.to_string())),
-            ("sensor.cols", pair(|s| s.cols.to_string())),
-            ("sensor.pitch_x_mm", pair(|s| s.pitch_x_mm.to_string())),
-            ("sensor.pitch_y_mm", pair(|s| s.pitch_y_mm.to_string())),
-            ("sensor.thickness_mm", pair(|s| s.thickness_mm.to_string())),
-            ("medium.kind", pair(|s| s.medium.to_string())),
-            ("search.mu_max", pair(|s| s.mu_max.to_string())),
-            ("partition.case", pair(|s| s.case.clone())),
-            ("input.dead", pair(|s| format!("{:?}", s.dead))),
-        ];
-        pairs.into_iter().find(|(_, (own, other))| own != other).map(|(field, (own, other))| (field, own, other))
+    fn differs(&self, other: &Subject) -> Option<(String, String, String)> {
+        let names: BTreeSet<&String> = self.0.keys().chain(other.0.keys()).collect();
+        let value = |subject: &Subject, name: &String| subject.0.get(name).cloned().unwrap_or_default();
+        let pairs = names.into_iter().map(|name| (name.clone(), value(self, name), value(other, name)));
+        pairs.into_iter().find(|(_, own, other)| own != other)
     }
 }
 
@@ -250,32 +238,33 @@ impl Deviations {
         let class = self.sizes.partition_point(|edge| *edge <= size);
         let above = self.levels.partition_point(|level| *level <= noise);
         let row = |level: usize| self.sigma[level][class];
-        if above == 0 || above == self.levels.len() {
-            return row(above.saturating_sub(1));
+        if above == 0 {
+            return row(0);
         }
-        let [low, high] = [self.levels[above - 1], self.levels[above]];
-        let share = (noise / low).ln() / (high / low).ln();
-        let (a, b) = (row(above - 1), row(above));
-        [0, 1, 2].map(|k| a[k].powf(1.0 - share) * b[k].powf(share))
+        let low = self.levels[above - 1];
+        let [x, y, normal] = row(above - 1);
+        let Some(high) = self.levels.get(above) else {
+            return [x, y, normal * noise / low];
+        };
+        let (share, next) = ((noise / low).ln() / (high / low).ln(), row(above));
+        let between = |a: f64, b: f64| a.powf(1.0 - share) * b.powf(share);
+        [between(x, next[0]), between(y, next[1]), between(normal, next[2])]
     }
 
     /// Adds standard deviations to the searched subarrays of a result, and the figure and flag of the shear's spread;
-    /// `noise_MPa` is the standard deviation of a taxel of the calibrated `stress`. Nothing if it is 0.
+    /// `noise_MPa` is the standard deviation of a taxel of the calibrated `stress`. Nothing unless it is finite and above 0.
     pub fn add(&self, result: &mut Reconstruction, scene: &Scene, stress: &Frame, noise_MPa: f64) {
-        if noise_MPa <= 0.0 {
+        if !(noise_MPa > 0.0 && noise_MPa.is_finite()) {
             return;
         }
-        let lsb_MPa = scene.input.full_scale_MPa.unwrap_or_else(|| stress.peak_MPa())
-            / f64::from(largest_code(scene.fixed.input_bits));
-        let noise_MPa = noise_MPa.hypot(lsb_MPa / 12f64.sqrt());
         let mut spreads = Vec::new();
         for index in 0..result.subarrays.len() {
-            let Some(load) = load_of(result, scene, stress, index) else { continue };
+            let Some(load) = Load::of(result, scene, stress, index, noise_MPa) else { continue };
             let own = &mut result.subarrays[index];
-            let [x, y, normal] = self.at(noise_MPa / load.peak_MPa, load.size);
+            let [x, y, normal] = self.at(load.noise, load.size);
             own.mu_sigma = Some([x, y]);
             own.shear_sigma_N = shear_sigma_N(own.mu_sigma, load.normal_N);
-            own.normal_sigma_N = Some(normal * load.normal_N);
+            own.normal_sigma_N = (scene.threshold.min_force_N == 0.0).then_some(normal * load.normal_N);
             spreads.push((load.normal_N, Some(relative_spread(own.mu, [x, y], 1.0))));
         }
         let checks = Checks { shear_spread: largest_spread(&spreads), ..result.checks };
@@ -287,23 +276,30 @@ impl Deviations {
 pub(crate) struct Load {
     /// Normal force in N, above 0.
     pub normal_N: f64,
-    /// max |b| in MPa.
-    pub peak_MPa: f64,
+    /// Standard deviation of noise and rounding over max |b|.
+    pub noise: f64,
     /// Normal force over that of the peak on one taxel.
     pub size: f64,
 }
 
-/// The load of a subarray; `None` unless it was searched and presses.
-pub(crate) fn load_of(result: &Reconstruction, scene: &Scene, stress: &Frame, index: usize) -> Option<Load> {
-    let own = result.subarrays.get(index).filter(|own| own.objective_value.is_some())?;
-    let part = own.part();
-    let normal_N: f64 = match &result.extra.resultants {
-        Some(resultants) => resultants.get(index)?.force_N[2],
-        None => part.indices(&scene.sensor).map(|k| result.forces_N.fz[k]).sum(),
-    };
-    let peak_MPa = part.indices(&scene.sensor).map(|k| stress.stress_MPa[k].abs()).fold(0.0, f64::max);
-    let size = normal_N / (peak_MPa * scene.sensor.pitch_x_mm * scene.sensor.pitch_y_mm);
-    (normal_N > 0.0 && size > 0.0 && size.is_finite()).then_some(Load { normal_N, peak_MPa, size })
+impl Load {
+    /// Of a subarray of a result of this calibrated `stress`; `None` unless it was searched and presses.
+    pub fn of(result: &Reconstruction, scene: &Scene, stress: &Frame, index: usize, noise_MPa: f64) -> Option<Load> {
+        let Scene { sensor, input, fixed, .. } = scene;
+        let own = result.subarrays.get(index).filter(|own| own.objective_value.is_some())?;
+        let part = own.part();
+        let normal_N: f64 = match &result.extra.resultants {
+            Some(resultants) => resultants.get(index)?.force_N[2],
+            None => part.indices(sensor).map(|k| result.forces_N.fz[k]).sum(),
+        };
+        let peak_MPa = part.indices(sensor).map(|k| stress.stress_MPa[k].abs()).fold(0.0, f64::max);
+        let full_scale_MPa = input.full_scale_MPa.unwrap_or_else(|| stress.peak_MPa());
+        let rounding_MPa = full_scale_MPa / f64::from(largest_code(fixed.input_bits)) / 12f64.sqrt();
+        let noise = noise_MPa.hypot(rounding_MPa) / peak_MPa;
+        let size = normal_N / (peak_MPa * sensor.pitch_x_mm * sensor.pitch_y_mm);
+        let finite = noise.is_finite() && size.is_finite();
+        (normal_N > 0.0 && peak_MPa > 0.0 && finite).then_some(Load { normal_N, noise, size })
+    }
 }
 
 /// The text of a file of bounded size.

@@ -13,7 +13,7 @@
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
-//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimators but `search` |
+//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, with `search` where the noise is stated |
 //! | `misfit` | the stated noise does not explain what the estimate leaves, or noise found from the frame is above a tenth of its peak; with a network also a frame unlike those of its training | `Checks::flags`, estimators but `search` |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |

@@ -84,7 +84,7 @@ impl Board {
                     frame.id
                 )));
             }
-            let result = session.decode(&readings, &answer).map_err(fixed)?;
+            let result = answer.decode(&session.model, &readings).map_err(fixed)?;
             let result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
             Ok(Reconstruction::new(Arc::new(result), scene.lengths()))
         })

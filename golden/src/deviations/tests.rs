@@ -7,7 +7,7 @@ use crate::float::Golden;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, Draws};
 use crate::noise::{deviations_coverage, measure_deviations};
-use crate::scene::ForceOutput;
+use crate::scene::{Condition, ForceOutput, Medium};
 
 /// max |b| of the frames in MPa.
 const PEAK: f64 = 0.1;
@@ -51,6 +51,9 @@ fn the_built_in_scenes_have_a_table_each() {
     without(|s| s.partition.case = Case::Contacts);
     without(|s| s.input.unipolar = true);
     without(|s| s.sensor.thickness_mm = 3.5);
+    without(|s| s.inverse.level = Some(0.3));
+    without(|s| s.search.degree = Some(1));
+    without(|s| s.fixed.data_bits = 12);
 }
 
 #[test]
@@ -58,7 +61,10 @@ fn between_levels_the_logarithm_is_linear() {
     let row = |sigma: f64| vec![[sigma, 2.0 * sigma, 0.1], [0.5, 0.5, 0.5]];
     let subject = Subject::of(&searched("sensor-1")).unwrap();
     let table = Deviations::new(subject, [9, 1], vec![1e-4, 1e-2], vec![4.0], vec![row(0.01), row(0.16)]);
-    for (noise, wanted) in [(1e-9, 0.01), (1e-4, 0.01), (1e-3, 0.04), (1e-2, 0.16), (1.0, 0.16)] {
+    // Beyond the last level that of the normal force grows with the noise.
+    let [x, _, normal] = table.at(1.0, 3.9);
+    assert!((x - 0.16).abs() < 1e-9 && (normal - 10.0).abs() < 1e-9);
+    for (noise, wanted) in [(1e-9, 0.01), (1e-4, 0.01), (1e-3, 0.04), (1e-2, 0.16)] {
         let [x, y, normal] = table.at(noise, 3.9);
         assert!(
             (x / wanted - 1.0).abs() < 1e-9 && (y / x - 2.0).abs() < 1e-9 && (normal - 0.1).abs() < 1e-9,
@@ -105,12 +111,16 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
     }
     std::fs::write(&path, good.to_text()).unwrap();
     assert_eq!(Deviations::of_scene(&scene).unwrap(), Some(good));
-    let changes: [(fn(&mut Scene), &str); 6] = [
+    let changes: [(fn(&mut Scene), &str); 10] = [
+        (|s| s.inverse.level = Some(0.3), "inverse.level = None, the scene has Some(0.3)"),
+        (|s| s.search.degree = Some(1), "search.degree = None, the scene has Some(1)"),
+        (|s| s.fixed.coef_bits = 12, "fixed.coef_bits = 18, the scene has 12"),
+        (|s| s.partition.condition = Condition::BothSigns, "partition.condition = Loaded, the scene has BothSigns"),
         (|s| s.sensor.rows = 12, "sensor.rows = 10, the scene has 12"),
-        (|s| s.sensor.pitch_y_mm = 3.0, "sensor.pitch_y_mm = 4, the scene has 3"),
-        (|s| s.sensor.thickness_mm = 2.5, "sensor.thickness_mm = 3, the scene has 2.5"),
+        (|s| s.sensor.pitch_y_mm = 3.0, "sensor.pitch_y_mm = 4.0, the scene has 3.0"),
+        (|s| s.sensor.thickness_mm = 2.5, "sensor.thickness_mm = 3.0, the scene has 2.5"),
         (|s| s.search.mu_max = 0.5, "search.mu_max = 0.6, the scene has 0.5"),
-        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = 0, the scene has 1"),
+        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = \"0\", the scene has \"1\""),
         (|s| s.input.dead = vec![[1, 2]], "input.dead = [], the scene has [[1, 2]]"),
     ];
     for (change, wanted) in changes {
@@ -156,6 +166,63 @@ fn results_have_the_deviations_of_their_noise() {
     }
 }
 
+/// With a mean the noise is that of the mean, with tare frames theirs; a threshold leaves no deviation of the normal force; noise that
+/// is no number adds nothing.
+#[test]
+fn the_noise_is_that_of_the_reading() {
+    let mut scene = stated("sensor-1", 1e-3);
+    let own = frame(&scene, 1e-4, 2);
+    let sigma = |scene: &Scene, frames: usize| {
+        let frames = vec![own.clone(); frames];
+        let [golden, fixed] = [
+            Golden::new(scene).unwrap().run_averaged(&frames).unwrap(),
+            Model::new(scene).unwrap().reconstruct_averaged(&frames).unwrap(),
+        ];
+        let [a, b] = [golden, fixed].map(|result| result.subarrays[0].clone());
+        assert!((a.mu_sigma.unwrap()[0] / b.mu_sigma.unwrap()[0] - 1.0).abs() < 0.02);
+        a
+    };
+    let single = sigma(&scene, 1);
+    scene.input.average = 4;
+    let mean = sigma(&scene, 16);
+    assert!(single.mu_sigma.unwrap()[0] > 1.5 * mean.mu_sigma.unwrap()[0]);
+    scene.input.average = 0;
+    scene.threshold.min_force_N = 1e-3;
+    let one = sigma(&scene, 1);
+    assert!(one.shear_sigma_N.is_some() && one.normal_sigma_N.is_none());
+    let mut result = Golden::new(&searched("sensor-1")).unwrap().run(&own).unwrap();
+    let plain = result.clone();
+    let table = Deviations::of_scene(&searched("sensor-1")).unwrap().unwrap();
+    for noise in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
+        table.add(&mut result, &scene, &own, noise);
+        assert_eq!(result, plain, "{noise}");
+    }
+}
+
+/// A scene whose case is chosen per frame has a table of its own, and so has one of several subarrays that sends records.
+#[test]
+fn chosen_cases_and_records_have_their_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    for (case, forces) in [(Case::Adaptive, ForceOutput::Taxels), (Case::numbered(1).unwrap(), ForceOutput::Resultants)]
+    {
+        let mut scene = stated("eight-by-eight", 1e-4);
+        scene.partition.case = case;
+        let path = folder.path().join("t.deviations");
+        std::fs::write(&path, measure_deviations(&scene, 60, 1, &|_, _| ()).unwrap().to_text()).unwrap();
+        scene.search.deviations = Some(path);
+        scene.output.forces = forces;
+        let own = frame(&scene, 1e-4, 4);
+        let result = Model::new(&scene).unwrap().reconstruct(&own).unwrap();
+        let searched = |own: &&crate::reconstruct::SubarrayResult| own.objective_value.is_some();
+        assert!(result
+            .subarrays
+            .iter()
+            .filter(searched)
+            .any(|own| own.normal_sigma_N.is_some_and(|sigma| sigma > 0.0)));
+        assert!(result.checks.shear_spread.is_some(), "{case}");
+    }
+}
+
 /// Each searched subarray has its own; one without a contact has none.
 #[test]
 fn each_searched_subarray_has_its_own() {
@@ -172,10 +239,11 @@ fn each_searched_subarray_has_its_own() {
 #[test]
 fn one_standard_deviation_covers_two_thirds_of_the_errors() {
     let levels = [2e-6, 5e-5, 6e-4, 2e-2];
-    for name in ["eight-by-eight", "sensor-1", "sensor-2"] {
+    for (name, draws) in [("eight-by-eight", 300), ("sensor-1", 300), ("sensor-2", 300), ("sensor-3", 100)] {
         let scene = searched(name);
         let mut table = Deviations::of_scene(&scene).unwrap().unwrap();
-        let covered = |table: &Deviations| deviations_coverage(&scene, table, &levels, [300, 77], &|_, _| ()).unwrap();
+        let covered =
+            |table: &Deviations| deviations_coverage(&scene, table, &levels, [draws, 77], &|_, _| ()).unwrap();
         for (level, shares) in levels.iter().zip(covered(&table)) {
             assert!(shares.iter().all(|share| (0.55..=0.8).contains(share)), "{name} {level}: {shares:?}");
         }
@@ -194,8 +262,14 @@ fn a_table_is_measured_again_from_its_seed() {
     contacts.partition.case = Case::Contacts;
     let error = measure_deviations(&contacts, 100, 1, &|_, _| ()).unwrap_err().to_string();
     assert!(error.contains("one that is searched"), "{error}");
-    assert!(measure_deviations(&scene, 1, 1, &|_, _| ()).unwrap_err().to_string().contains("draws = 1"), "few");
     // A medium without hardware is measured by the golden model.
-    let bonded = Scene { medium: Medium::BondedLayer { poisson: 0.48 }, ..scene };
+    let bonded = Scene { medium: Medium::BondedLayer { poisson: 0.48 }, ..scene.clone() };
     assert!(measure_deviations(&bonded, 40, 1, &|_, _| ()).is_ok());
+    // The same for one that no board holds; few frames leave classes without errors.
+    let mut large = scene;
+    large.hardware.board = "icebreaker".into();
+    (large.sensor.rows, large.sensor.cols) = (12, 12);
+    assert!(Model::new(&large).is_err() && measure_deviations(&large, 40, 1, &|_, _| ()).is_ok());
+    let error = measure_deviations(&large, 2, 1, &|_, _| ()).unwrap_err().to_string();
+    assert!(error.contains("at a noise of"), "{error}");
 }

@@ -66,9 +66,12 @@ pub fn supports(plan: &Plan, kind: Kind) -> bool {
     }
 }
 
-/// Bit of a request in [`Identity::left_out`]; 0 of an answer.
+/// Bit of a request in [`Identity::left_out`]; an answer has none.
 fn bit(kind: Kind) -> u8 {
-    1u8.checked_shl(u32::from(kind as u8).wrapping_sub(1)).unwrap_or(0)
+    match REQUESTS.contains(&kind) {
+        true => 1 << (kind as u8 - 1),
+        false => 0,
+    }
 }
 
 /// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.

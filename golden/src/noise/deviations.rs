@@ -1,19 +1,19 @@
 //! Deviations: measures the table of [`crate::deviations`] on drawn frames.
 //!
 //! Frames of every shape, one contact each, its shear up to 0.83 mu_max in any direction, are read at each level of noise and
-//! reconstructed by the bit-true model, or by the golden one where the hardware does not implement the scene. The classes
-//! of sizes have equal numbers of frames.
+//! reconstructed by the bit-true model, whether a board holds it or not, or by the golden one where the hardware does not
+//! implement the scene. The classes of sizes have equal numbers of frames.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: scene, number of frames, seed | – | – |
 //! | out: 68.3 % quantiles of the errors of μ and normal force | levels × classes × 3 | –, fraction |
 
-use super::shapes::{readings, ShapeStudy};
+use super::shapes::{readings, ShapeStudy, PEAK};
 use super::statistic::quantile;
 use super::StudyError;
 use crate::checks::COUNTS_FROM;
-use crate::deviations::{load_of, Deviations, Subject};
+use crate::deviations::{Deviations, Load, Subject};
 use crate::fixed::Model;
 use crate::float::Golden;
 use crate::frame::Frame;
@@ -34,8 +34,10 @@ const DECADES: [i32; 2] = [-6, -1];
 /// Shear over normal force of the frames, in units of mu_max.
 const RATIO: [f64; 2] = [0.25, 0.83];
 
-/// A searched subarray of a frame: its size in taxels, and the errors of μ, [x, y], and of the normal force over the force.
+/// A searched subarray of a frame: what it is looked up by, and the errors of μ, [x, y], and of the normal force over the
+/// force.
 struct Error {
+    noise: f64,
     size: f64,
     off: [f64; 3],
 }
@@ -66,14 +68,14 @@ pub fn measure_deviations(
     let levels: Vec<f64> = steps.map(|step| 10f64.powf(f64::from(step) / per_decade)).collect();
     let scene = bare(scene);
     let subject = subject(&scene)?;
-    let errors = errors(&scene, &levels, draws, seed, progress)?;
+    let levels: Vec<f64> = levels.into_iter().map(digits).collect();
+    let errors = by_level(errors(&scene, &levels, draws, seed, progress)?, &levels);
     let sizes = edges(&errors);
-    let row = |own: &Vec<Error>| (0..=sizes.len()).map(|class| within(own, &sizes, class)).collect::<Option<Vec<_>>>();
-    let sigma = errors.iter().map(row).collect::<Option<Vec<_>>>().ok_or_else(|| StudyError::Parameter {
-        field: "draws",
-        value: draws.to_string(),
-        allowed: "so many that each class of sizes has frames, at least 100",
-    })?;
+    let mut sigma = Vec::with_capacity(levels.len());
+    for (level, own) in levels.iter().zip(&errors) {
+        let class = |class: usize| within(own, &sizes, class).ok_or(StudyError::Unmeasured { noise: *level, draws });
+        sigma.push((0..=sizes.len()).map(class).collect::<Result<Vec<_>, _>>()?);
+    }
     Ok(Deviations::new(subject, [draws as u64, seed], levels, sizes, sigma))
 }
 
@@ -90,13 +92,13 @@ pub fn deviations_coverage(
 ) -> Result<Vec<[f64; 3]>, StudyError> {
     let scene = bare(scene);
     let errors = errors(&scene, levels, draws as usize, seed, progress)?;
-    let share = |(level, own): (&f64, &Vec<Error>)| {
+    let share = |own: &Vec<Error>| {
         [0, 1, 2].map(|axis| {
-            let within = own.iter().filter(|error| error.off[axis] <= table.at(*level, error.size)[axis]).count();
+            let within = own.iter().filter(|error| error.off[axis] <= table.at(error.noise, error.size)[axis]).count();
             within as f64 / own.len().max(1) as f64
         })
     };
-    Ok(levels.iter().zip(&errors).map(share).collect())
+    Ok(errors.iter().map(share).collect())
 }
 
 fn subject(scene: &Scene) -> Result<Subject, StudyError> {
@@ -105,6 +107,23 @@ fn subject(scene: &Scene) -> Result<Subject, StudyError> {
         value: scene.name.clone(),
         allowed: "one that is searched: objective sparse, form oblique, mu_max above 0, no contacts, not unipolar",
     })
+}
+
+/// To four digits: more are not known.
+fn digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+/// The errors by the level that is nearest to the noise of their subarray: one that a contact only touches has a smaller peak
+/// than the frame.
+fn by_level(errors: Vec<Vec<Error>>, levels: &[f64]) -> Vec<Vec<Error>> {
+    let mut all: Vec<Vec<Error>> = levels.iter().map(|_| Vec::new()).collect();
+    for error in errors.into_iter().flatten() {
+        let off = |level: &f64| (error.noise / level).ln().abs();
+        let nearest = (0..levels.len()).min_by(|a, b| off(&levels[*a]).total_cmp(&off(&levels[*b])));
+        nearest.into_iter().for_each(|level| all[level].push(Error { ..error }));
+    }
+    all
 }
 
 /// The errors of frames at each level.
@@ -126,7 +145,8 @@ fn errors(
     let at = |level: usize| {
         let readings = readings(&drawn, &study.converter(level), scene)?;
         let of = |(drawn, reading): (&DrawnFrame, &Frame)| {
-            let own = errors_of(scene, drawn, reading, &engine.run(reading)?);
+            let reading = reading.clone().mask_dead(&scene.input.dead);
+            let own = errors_of(scene, drawn, &reading, &engine.run(&reading)?, levels[level] * PEAK);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, levels.len() * draws);
             Ok(own)
         };
@@ -136,7 +156,7 @@ fn errors(
     (0..levels.len()).map(at).collect()
 }
 
-/// The scene as hardware takes it, without what changes readings or forces and needs a full scale.
+/// The scene with its search, without what changes readings or forces and needs a full scale.
 fn bare(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.input = InputSpec { dead: scene.input.dead.clone(), unipolar: scene.input.unipolar, ..InputSpec::default() };
@@ -144,8 +164,6 @@ fn bare(scene: &Scene) -> Scene {
     scene.output.forces = ForceOutput::Taxels;
     scene.search.noise_floor_MPa = 0.0;
     scene.search.deviations = None;
-    scene = scene.for_hardware();
-    // A scene that no hardware implements has the search of the golden model.
     scene.search.estimator = EstimatorKind::Search;
     scene
 }
@@ -159,7 +177,7 @@ enum Engine {
 impl Engine {
     fn new(scene: &Scene) -> Result<Engine, StudyError> {
         Ok(match scene.require_supported() {
-            Ok(()) => Engine::Fixed(Box::new(Model::new(scene)?)),
+            Ok(()) => Engine::Fixed(Box::new(Model::without_fit_check(scene)?)),
             Err(_) => Engine::Golden(Box::new(Golden::new(scene)?)),
         })
     }
@@ -172,17 +190,26 @@ impl Engine {
     }
 }
 
-/// The errors of the searched subarrays of one result that carry a part of the load worth a μ.
-fn errors_of(scene: &Scene, drawn: &DrawnFrame, reading: &Frame, result: &Reconstruction) -> Vec<Error> {
+/// The errors of the searched subarrays of one result that carry a part of the true load worth a μ.
+fn errors_of(
+    scene: &Scene,
+    drawn: &DrawnFrame,
+    reading: &Frame,
+    result: &Reconstruction,
+    noise_MPa: f64,
+) -> Vec<Error> {
     let Some(truth) = &drawn.frame.cell_forces_N else { return Vec::new() };
-    let counts = COUNTS_FROM * result.resultant_N[2];
+    let counts = COUNTS_FROM * drawn.total_N[2];
     let of = |index: usize| {
-        let load = load_of(result, scene, reading, index).filter(|load| load.normal_N >= counts)?;
+        let load = Load::of(result, scene, reading, index, noise_MPa)?;
         let part = result.subarrays[index].part();
-        let off =
-            [(&truth.fx, &result.forces_N.fx), (&truth.fy, &result.forces_N.fy), (&truth.fz, &result.forces_N.fz)]
-                .map(|(truth, own)| part.indices(&scene.sensor).map(|k| own[k] - truth[k]).sum::<f64>().abs());
-        Some(Error { size: load.size, off: off.map(|off| off / load.normal_N) })
+        let sum = |forces: &[f64]| part.indices(&scene.sensor).map(|k| forces[k]).sum::<f64>();
+        let own = &result.forces_N;
+        // Where nothing presses there is no relative error.
+        let pressed = sum(&truth.fz) >= counts;
+        let axes = [(&truth.fx, &own.fx), (&truth.fy, &own.fy), (&truth.fz, &own.fz)];
+        let off = Some(axes).filter(|_| pressed)?.map(|(truth, own)| (sum(own) - sum(truth)).abs());
+        Some(Error { noise: load.noise, size: load.size, off: off.map(|off| off / load.normal_N) })
     };
     (0..result.subarrays.len()).filter_map(of).collect()
 }
@@ -191,19 +218,19 @@ fn errors_of(scene: &Scene, drawn: &DrawnFrame, reading: &Frame, result: &Recons
 fn edges(errors: &[Vec<Error>]) -> Vec<f64> {
     let mut sizes: Vec<f64> = errors.iter().flatten().map(|error| error.size).collect();
     sizes.sort_by(f64::total_cmp);
-    let mut edges: Vec<f64> = (1..CLASSES).map(|class| quantile(&sizes, class as f64 / CLASSES as f64)).collect();
+    let edge = |class: usize| digits(quantile(&sizes, class as f64 / CLASSES as f64));
+    let mut edges: Vec<f64> = (1..CLASSES).map(edge).collect();
     edges.dedup();
     edges
 }
 
-/// What 68.3 % of the errors of a class do not exceed; `None` for a class without errors.
+/// What 68.3 % of the errors of a class do not exceed; `None` for a class without errors, or where they are 0.
 fn within(errors: &[Error], sizes: &[f64], class: usize) -> Option<[f64; 3]> {
     let own: Vec<&Error> = errors.iter().filter(|e| sizes.partition_point(|edge| *edge <= e.size) == class).collect();
     let most = |axis: usize| {
         let mut off: Vec<f64> = own.iter().map(|error| error.off[axis]).collect();
         off.sort_by(f64::total_cmp);
-        // A deviation of 0 would claim to know.
-        quantile(&off, WITHIN_ONE).max(f64::MIN_POSITIVE)
+        digits(quantile(&off, WITHIN_ONE))
     };
-    (!own.is_empty()).then(|| [0, 1, 2].map(most))
+    Some([0, 1, 2].map(most)).filter(|sigma| sigma.iter().all(|sigma| *sigma > 0.0))
 }

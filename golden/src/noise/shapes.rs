@@ -29,7 +29,7 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// max |b| of every frame in MPa.
-const PEAK: f64 = 0.1;
+pub(super) const PEAK: f64 = 0.1;
 /// Errors drawn from the bound's covariance for each frame.
 const BOUND_DRAWS: usize = 8;
 /// Multiplier of the seed of a level's noise.
@@ -213,7 +213,7 @@ fn outcomes_of_hardware(
     readings: &[Frame],
     step: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, StudyError> {
-    let mut scene = scene.clone();
+    let mut scene = scene.for_hardware();
     let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
     scene.search.noise_floor_MPa = 0.0;
     let engine = Model::new(&scene)?;

@@ -95,6 +95,14 @@ pub enum StudyError {
         /// The allowed values, in words.
         allowed: &'static str,
     },
+    /// Of the frames of a table of standard deviations none has a contact of some size at some noise.
+    #[error("at a noise of {noise} of the peak, {draws} frames have no errors of a class of sizes; draw more of them")]
+    Unmeasured {
+        /// The level.
+        noise: f64,
+        /// Number of frames.
+        draws: usize,
+    },
 }
 
 impl Spread {

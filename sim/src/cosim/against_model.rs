@@ -44,7 +44,9 @@ impl Vector {
             let case = chosen.and_then(|stage| stage.words.first()).map_or(0, |word| word[0] as usize);
             let contacts = expected.course.map_or(0, |course| course.contacts);
             let words = issued(model, case, contacts).into_iter().map(|word| word.map(|index| index as i64).to_vec());
-            expected.stages.push(Stage { name: "instruction", words: words.collect() });
+            // Before its rows, so that a wrong program is the first mismatch.
+            let rows = expected.stages.iter().position(|stage| stage.name == "pass").unwrap_or_default();
+            expected.stages.insert(rows, Stage { name: "instruction", words: words.collect() });
         }
         Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected }
     }

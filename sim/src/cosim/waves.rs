@@ -8,7 +8,8 @@
 //! dermis.fold.{valid, even_even, …}              dermis.search.{valid, best_x, best_y, score, taken}
 //! dermis.instruction.{valid, which, step, name}
 //! ```
-//! `name` is the running instruction as the program's listing has it (`dermis build --explain`), while it issues products.
+//! `name` is the instruction that issues products, of the listing of `dermis build --explain`, in ASCII: result, group of rows,
+//! matrix and operand.
 //! A netlist has no taps, so that only its pins are recorded. A stage's fields keep their last word while its `valid`
 //! is low. Values are sampled before the rising edge that ends a cycle and drawn over that whole cycle, one period of
 //! the board's clock.
@@ -69,7 +70,7 @@ struct Instructions {
 const INSTRUCTION: &str = "instruction";
 const NAME: &str = "name";
 
-/// What a VCD file writes for a text without any.
+/// Written while no instruction issues products.
 const NO_TEXT: &str = "-";
 
 impl Instructions {
@@ -88,14 +89,16 @@ impl Instructions {
     }
 }
 
-/// The instructions of each section as texts without spaces, at which a value in a VCD file ends.
+/// The instructions of each section as texts of ASCII without spaces, at which a value in a VCD file ends.
 fn names(model: &Model) -> Vec<Vec<String>> {
     let mut all: Vec<Vec<String>> = Vec::new();
     for own in listing(model) {
         if own.step == 0 {
             all.push(Vec::new());
         }
-        let name = format!("{}:group_{}:{}·{}", own.result, own.group, own.matrix, own.operand).replace(' ', "_");
+        let name = format!("{}:group_{}:{}*{}", own.result, own.group, own.matrix, own.operand);
+        let ascii = [(" ", "_"), ("−", "-"), ("⁺", "+"), ("∘", "."), ("μ", "mu")];
+        let name = ascii.iter().fold(name, |name, (from, to)| name.replace(from, to));
         all.last_mut().into_iter().for_each(|section| section.push(name.clone()));
     }
     all
@@ -344,11 +347,12 @@ mod tests {
         // Every instruction of the program has run once, in order.
         let model = Model::new(&scene).unwrap();
         let running: Vec<&String> = texts.iter().filter(|text| *text != NO_TEXT).collect();
+        assert!(running.iter().all(|name| name.is_ascii()));
         let mut once = running.clone();
         once.dedup();
         assert_eq!(once, names(&model)[0].iter().collect::<Vec<_>>());
         assert_eq!(texts[0], NO_TEXT);
-        assert!(running.iter().any(|name| *name == "v_11:group_0:−Ax·v_01"), "{running:?}");
+        assert!(running.iter().any(|name| *name == "v_11:group_0:-Ax*v_01"), "{running:?}");
         // The words are the model's: the search's last word is its result.
         let trace = model.run(&model.readings(frames).unwrap());
         let stage = |name: &str| &trace.stages.iter().find(|stage| stage.name == name).unwrap().words;

@@ -1,7 +1,7 @@
 //! The contacts of a result: what the live page draws and a recording holds as wrenches.
 
 use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction, SubarrayResult};
+use dermis_golden::reconstruct::{FoundContact, Reconstruction, Resultant, SubarrayResult};
 
 /// The contacts that the estimator tells apart, else the resultants; the whole array as one contact where it is one subarray
 /// with a contact.
@@ -11,16 +11,22 @@ pub fn contacts(result: &Reconstruction) -> Vec<FoundContact> {
         return found;
     }
     if let Some(resultants) = &result.extra.resultants {
-        return resultants.iter().map(|own| plain(own.centre_mm, own.force_N)).collect();
+        let told = |(own, of): (&Resultant, &SubarrayResult)| deviating(of, plain(own.centre_mm, own.force_N));
+        return resultants.iter().zip(&result.subarrays).map(told).collect();
     }
     match result.subarrays.as_slice() {
         [whole] if !result.flags.contains(&Flag::NoContact) => {
             let own = plain(whole.compression_centroid_mm, result.resultant_N);
-            let SubarrayResult { mu, mu_sigma, shear_sigma_N, normal_sigma_N, .. } = *whole;
-            vec![FoundContact { mu, mu_sigma, shear_sigma_N, normal_sigma_N, ..own }]
+            vec![deviating(whole, own)]
         }
         _ => Vec::new(),
     }
+}
+
+/// The contact with the μ of its subarray and the standard deviations.
+fn deviating(own: &SubarrayResult, contact: FoundContact) -> FoundContact {
+    let SubarrayResult { mu, mu_sigma, shear_sigma_N, normal_sigma_N, .. } = *own;
+    FoundContact { mu, mu_sigma, shear_sigma_N, normal_sigma_N, ..contact }
 }
 
 #[cfg(test)]

@@ -55,7 +55,7 @@ fn reconstruct() {
             "flags",
             "checks",
         ];
-        // Standard deviations are the golden model's.
+        // The search tells no contacts apart.
         top.extend((engine == "golden").then_some("contacts"));
         top.push("wrench");
         assert_eq!(fields(&text, 1), top);

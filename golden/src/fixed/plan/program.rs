@@ -98,13 +98,8 @@ pub struct Listed {
 pub fn issued(plan: &Plan, case: usize, contacts: usize) -> Vec<[usize; 2]> {
     let before: usize = plan.cases()[..case].iter().map(|case| sections(&case.formats).len()).sum();
     let case = &plan.cases()[case];
-    // The first section once; with contacts the second for each, the third for each step of `relax`.
-    let times = match case.formats.by_contact() {
-        true => vec![1, contacts, case.formats.degree],
-        false => vec![case.parts.len()],
-    };
     let mut all = Vec::new();
-    for (index, (section, times)) in sections(&case.formats).iter().zip(times).enumerate() {
+    for (index, (section, (_, times))) in sections(&case.formats).iter().zip(runs(case, contacts)).enumerate() {
         let own = instructions(case, section);
         let steps =
             own.iter().enumerate().flat_map(|(step, own)| std::iter::repeat_n([before + index, step], own.columns));
@@ -119,8 +114,7 @@ pub fn listing(plan: &Plan) -> Vec<Listed> {
     let mut all = Vec::new();
     let parallel = plan.board.engine == EngineKind::Parallel;
     for case in plan.cases().iter().filter(|_| parallel) {
-        for (index, section) in sections(&case.formats).iter().enumerate() {
-            let section_name = section_name(&case.formats, index);
+        for (section, (section_name, _)) in sections(&case.formats).iter().zip(runs(case, 0)) {
             let listed = |(step, own): (usize, Instruction)| Listed {
                 case: case.case.to_string(),
                 section: section_name,
@@ -139,12 +133,11 @@ pub fn listing(plan: &Plan) -> Vec<Listed> {
     all
 }
 
-fn section_name(formats: &Formats, index: usize) -> &'static str {
-    match (formats.by_contact(), index) {
-        (false, _) => "each subarray",
-        (true, 0) => "first",
-        (true, 1) => "each contact",
-        (true, _) => "each step of relax",
+/// When each section runs, and how often in a frame with so many contacts.
+fn runs(case: &CasePlan, contacts: usize) -> Vec<(&'static str, usize)> {
+    match case.formats.by_contact() {
+        false => vec![("each subarray", case.parts.len())],
+        true => vec![("first", 1), ("each contact", contacts), ("each step of relax", case.formats.degree)],
     }
 }
 

@@ -51,6 +51,8 @@ pub fn sweep(scene: &Scene, frames: &[Frame], options: &Options) -> Result<Vec<S
     let own = Model::new(scene)?;
     let one = |(field, value, change, degree): Task| -> Result<Option<SweepPoint>> {
         let mut changed = scene.clone();
+        // A table of standard deviations is that of the scene as it stands.
+        changed.search.deviations = None;
         change(&mut changed);
         let model = match degree {
             Some(degree) => Model::of_degree(&changed, degree),
