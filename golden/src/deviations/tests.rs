@@ -90,7 +90,8 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
     };
     assert!(message(&scene).contains("search.deviations cannot be read"));
     let good = Deviations::of_scene(&searched("sensor-1")).unwrap().unwrap();
-    let faults: [(fn(&mut Deviations), &str); 7] = [
+    type Fault = (fn(&mut Deviations), &'static str);
+    let faults: [Fault; 7] = [
         (|t| t.version = 2, "version"),
         (|t| t.levels.clear(), "levels"),
         (|t| t.levels[1] = t.levels[0], "levels"),
@@ -111,7 +112,8 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
     }
     std::fs::write(&path, good.to_text()).unwrap();
     assert_eq!(Deviations::of_scene(&scene).unwrap(), Some(good));
-    let changes: [(fn(&mut Scene), &str); 10] = [
+    type Change = (fn(&mut Scene), &'static str);
+    let changes: [Change; 10] = [
         (|s| s.inverse.level = Some(0.3), "inverse.level = None, the scene has Some(0.3)"),
         (|s| s.search.degree = Some(1), "search.degree = None, the scene has Some(1)"),
         (|s| s.fixed.coef_bits = 12, "fixed.coef_bits = 18, the scene has 12"),

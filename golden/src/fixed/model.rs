@@ -93,7 +93,8 @@ impl Model {
     /// # Errors
     /// As [`Model::new`].
     pub fn for_frames(scene: &Scene, frames: &[Frame]) -> Result<Self, FixedError> {
-        let mut scene = scene.clone();
+        // What `auto` takes is chosen for the scene as it stands, before a full scale is filled in.
+        let mut scene = scene.for_hardware();
         let needs = scene.search.noise_floor_MPa > 0.0
             || scene.threshold.min_force_N > 0.0
             || scene.input.average > 0

@@ -207,3 +207,30 @@ fn resultants_have_the_standard_deviation_of_the_shear() {
     assert_eq!((taxels, none), (100, 0));
     assert!((0..2).all(|axis| wanted[axis] > 0.0 && (found[axis] / wanted[axis] - 1.0).abs() < 1e-9), "{found:?}");
 }
+
+/// With "auto" the hardware is that of the scene as it states its noise, although the study leaves out the noise floor.
+#[test]
+fn the_hardware_of_a_study_has_the_scene_s_estimator() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    let study =
+        ShapeStudy { levels: vec![1e-3], draws: 20, candidates: vec![Candidate::Hardware], ..Default::default() };
+    let error = |told: bool| {
+        let rows = shape_study(&scene, &ShapeStudy { told, ..study.clone() }, &|_, _| ()).unwrap();
+        rows[1].summary.tangential.median.value
+    };
+    // The network where noise is stated, else the search, which cannot find shear in it.
+    assert!(error(true) < 0.2 && error(false) > 0.4, "{} {}", error(true), error(false));
+}
+
+/// The deviations of a search are those of the array: of frames with several contacts there is no coverage.
+#[test]
+fn the_deviations_of_a_search_are_not_those_of_one_of_several_contacts() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    for contacts in [1, 2] {
+        let options = DrawOptions { contacts, ..Default::default() };
+        let candidates = vec![Candidate::Estimator(EstimatorKind::Search)];
+        let study = ShapeStudy { levels: vec![1e-3], draws: 10, candidates, options, ..Default::default() };
+        let rows = shape_study(&scene, &study, &|_, _| ()).unwrap();
+        assert_eq!(rows[1].summary.coverage.is_some(), contacts == 1);
+    }
+}

@@ -337,16 +337,17 @@ fn auto_takes_the_network_in_hardware_where_noise_can_be() {
         assert_eq!(scene.for_hardware().search.estimator, scene.chosen_for_hardware().0);
         scene.chosen_for_hardware()
     };
-    assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network"));
+    assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network".to_owned()));
+    // Without a full scale nothing says that the noise is small.
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.full_scale_MPa) = (1e-8, None)).0, EstimatorKind::Network);
     type Change = fn(&mut Scene);
-    let searched: [(Change, &str); 7] = [
+    let searched: [(Change, &str); 6] = [
         (|s| s.search.network = None, "names no network"),
         (|s| s.search.noise_floor_MPa = 0.0, "states no noise"),
         (|s| s.search.noise_floor_MPa = 9e-7, "below 1e-5 of full scale"),
-        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition"),
+        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = 1"),
         (|s| s.search.mu_max = 0.0, "mu_max"),
-        (|s| s.hardware.search_width = Some(2), "search width"),
-        (|s| s.hardware.board = "icebreaker".into(), "serial engine"),
+        (|s| s.hardware.search_width = Some(2), "search_width"),
     ];
     for (change, why) in searched {
         let (taken, reason) = chosen(change);

@@ -18,7 +18,7 @@ pub(super) const WORD: usize = WORD_BITS as usize;
 /// Fraction bits of a weight.
 pub(super) const FRACTION: usize = WEIGHT_BITS as usize;
 /// Width of a factor of the multiplier: a weight, a slope, an odd number for a line.
-const FACTOR: usize = TAP_BITS - 3;
+const FACTOR: usize = TAP_BITS;
 /// Factor by which a maximum becomes its bar, as a weight.
 const BAR: u64 = (SADDLE[0] << WEIGHT_BITS) as u64 / SADDLE[1] as u64;
 /// What rounds a bar up.
@@ -171,9 +171,9 @@ pub(super) struct Circuit<'k> {
     pub(super) word: Expr<'k>,
     pub(super) words_out: Expr<'k>,
     pub(super) steps_out: Expr<'k>,
-    /// Weight of a tap, and that two cycles later.
+    /// The tap that is read, and its flags two cycles later.
     pub(super) tap: Net<'k>,
-    pub(super) tap_out: Expr<'k>,
+    pub(super) tap_flags: Expr<'k>,
 
     /// What is subtracted from a word before the multiplication; the difference, the product, rounded sum of products.
     pub(super) base: Net<'k>,
@@ -257,10 +257,15 @@ impl<'k> Circuit<'k> {
         };
         let words_out = read("words", &words, shape.smoothed);
         let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
-        let taps: Vec<(usize, u64)> = shape.taps.concat().into_iter().enumerate().collect();
+        let taps = shape.taps.concat();
         let tap = register("tap", count_bits(taps.len()));
-        let windows = k.memory("windows", taps.len(), TAP_BITS, Contents::Words(taps)).style("block");
+        let weights = taps.iter().map(|tap| tap & ((1 << FACTOR) - 1)).enumerate().collect();
+        let windows = k.memory("windows", taps.len(), TAP_BITS, Contents::Words(weights)).style("block");
         let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
+        // In logic: a block RAM may be far from what the flags decide in the same cycle.
+        let mut flags: Vec<u64> = taps.iter().map(|tap| tap >> FACTOR).collect();
+        flags.resize(1 << tap.bits(), 0);
+        let tap_flags = later("tap_flags", tap.table(3, &flags));
 
         k.comment("Multiplier and the sum of its products");
         let (row, col) = (register("row", row), register("col", col));
@@ -271,12 +276,12 @@ impl<'k> Circuit<'k> {
         let difference = k.wire("difference", (data - *base).unsigned());
         let operand = register("operand", shape.smoothed + 1);
         k.when(!is(BORDERS) | tick.is(3), || operand.set(difference));
-        let weight = k.delay("weight2", k.delay("weight1", tap_out.low(FACTOR)));
+        let weight = k.delay("weight2", k.delay("weight1", tap_out));
         let factor = k.delay("factor", factor(k, shape, &is, [*tick, weight, *row, *col, *lane]));
         let product = register("product", shape.smoothed + 1 + FACTOR);
         product.set((operand.signed() * factor.extend(FACTOR + 1).signed()).low(product.bits()));
         // A tap's flags, when its product is there.
-        let flags = k.delay("flags1", tap_out.slice(FACTOR, 3));
+        let flags = k.delay("flags1", tap_flags);
         let flags = (2..=4).fold(flags, |flags, stage| k.delay(&format!("flags{stage}"), flags));
         let sum = shape.smoothed + FRACTION;
         let partial = register("partial", sum);
@@ -322,7 +327,7 @@ impl<'k> Circuit<'k> {
             words_out,
             steps_out,
             tap,
-            tap_out,
+            tap_flags,
             base,
             difference,
             operand,

@@ -104,7 +104,7 @@ impl<'k> Circuit<'k> {
 
         k.comment("Taps of the smoothing");
         let smooths = self.among(&[ALONG_ROWS, ALONG_COLUMNS]);
-        let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_out.at(FRACTION + 1 + flag));
+        let [last, moves, ends] = [0, 1, 2].map(|flag| self.tap_flags.at(flag));
         tap_there.set(smooths & self.tick.any());
         let [along_row, along_column] = shape.tap_counts();
         let tap = |number: usize| constant(self.tap.bits(), number);

@@ -23,8 +23,8 @@ use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_B
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 
-/// Width of a tap in the memory of the hardware: a weight up to one, and three flags.
-pub const TAP_BITS: usize = WEIGHT_BITS as usize + 4;
+/// Width of a tap in the memory of the hardware: a weight up to one.
+pub const TAP_BITS: usize = WEIGHT_BITS as usize + 1;
 /// Largest number of contacts of the hardware.
 pub const MOST: usize = 8;
 /// Cycles from the start to the first step, and from the last to the end.
