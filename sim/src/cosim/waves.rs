@@ -282,9 +282,15 @@ mod tests {
     use std::fs::File;
     use vcd::{Command, Parser, ScopeItem};
 
-    /// Width of every signal, the values of every vector, one per change, both by name, and the texts of the one signal that has
-    /// texts.
-    fn read(path: &Path) -> (BTreeMap<String, u32>, BTreeMap<String, Vec<i64>>, Vec<String>) {
+    /// What a file holds: width of every signal and values of every vector, one per change, by name; the texts of the one signal
+    /// that has texts.
+    struct Recorded {
+        widths: BTreeMap<String, u32>,
+        values: BTreeMap<String, Vec<i64>>,
+        texts: Vec<String>,
+    }
+
+    fn read(path: &Path) -> Recorded {
         let mut parser = Parser::new(std::io::BufReader::new(File::open(path).unwrap()));
         let header = parser.parse_header().unwrap();
         let (mut names, mut widths) = (BTreeMap::new(), BTreeMap::new());
@@ -316,7 +322,7 @@ mod tests {
                 _ => {}
             }
         }
-        (widths, values, texts)
+        Recorded { widths, values, texts }
     }
 
     #[test]
@@ -331,7 +337,7 @@ mod tests {
         assert_eq!(std::fs::metadata(&vcd).unwrap().permissions().mode() & 0o777, 0o644);
         // No temporary file remains.
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
-        let (widths, values, texts) = read(&vcd);
+        let Recorded { widths, values, texts } = read(&vcd);
         // Every listed signal is in the file, with its width.
         let list = std::fs::read_to_string(list).unwrap();
         let listed = list.lines().filter_map(|line| line.strip_prefix("dermis."));
