@@ -31,12 +31,13 @@ use crate::checks::{largest_spread, relative_spread, Checks};
 use crate::frame::Frame;
 use crate::partition::Case;
 use crate::quantise::largest_code;
+use crate::read::text_up_to;
 use crate::reconstruct::{shear_sigma_N, Reconstruction};
 use crate::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Debug;
-use std::path::Path;
+use std::sync::LazyLock;
 use thiserror::Error;
 
 /// Version of the file.
@@ -52,6 +53,10 @@ const SHIPPED: [(&str, &str); 5] = [
     ("sensor-4", include_str!("../scenes/sensor-4.deviations")),
     ("eight-by-eight", include_str!("../scenes/eight-by-eight.deviations")),
 ];
+
+/// The same, read once: models are built by the thousand.
+static TABLES: LazyLock<Vec<Deviations>> =
+    LazyLock::new(|| SHIPPED.iter().filter_map(|(name, text)| Deviations::parse(text, name).ok()).collect());
 
 /// What a table was measured for: fields of a scene, with their values as texts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -161,11 +166,15 @@ impl Deviations {
     pub fn of_scene(scene: &Scene) -> Result<Option<Deviations>, DeviationsError> {
         let Some(subject) = Subject::of(scene) else { return Ok(None) };
         let Some(path) = &scene.search.deviations else {
-            let shipped = SHIPPED.iter().map(|(name, text)| Deviations::parse(text, name));
-            return Ok(shipped.filter_map(Result::ok).find(|table| table.subject == subject));
+            return Ok(TABLES.iter().find(|table| table.subject == subject).cloned());
         };
         let file = path.display().to_string();
-        let table = Deviations::parse(&read(path, &file)?, &file)?;
+        let text = match text_up_to(LARGEST_FILE, path) {
+            Err(source) => return Err(DeviationsError::Unreadable { file, source }),
+            Ok(None) => return Err(DeviationsError::Damaged { file, reason: "it is too large".to_owned() }),
+            Ok(Some(text)) => text,
+        };
+        let table = Deviations::parse(&text, &file)?;
         match table.subject.differs(&subject) {
             None => Ok(Some(table)),
             Some((field, measured, scene)) => Err(DeviationsError::Mismatch { file, field, measured, scene }),
@@ -195,7 +204,7 @@ impl Deviations {
         }
     }
 
-    /// A table of these levels, sizes and deviations, to four digits: more are not known.
+    /// A table of these levels, sizes and deviations.
     pub(crate) fn new(
         subject: Subject,
         [draws, seed]: [u64; 2],
@@ -203,18 +212,7 @@ impl Deviations {
         sizes: Vec<f64>,
         sigma: Vec<Vec<[f64; 3]>>,
     ) -> Deviations {
-        let digits = |value: f64| format!("{value:.3e}").parse().unwrap_or(value);
-        let all = |values: Vec<f64>| values.into_iter().map(digits).collect();
-        let sigma = sigma.into_iter().map(|row| row.into_iter().map(|own| own.map(digits)).collect()).collect();
-        Deviations {
-            version: VERSION,
-            subject,
-            draws: draws as usize,
-            seed,
-            levels: all(levels),
-            sizes: all(sizes),
-            sigma,
-        }
+        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels, sizes, sigma }
     }
 
     /// The file, JSON with a line per level.
@@ -300,14 +298,4 @@ impl Load {
         let finite = noise.is_finite() && size.is_finite();
         (normal_N > 0.0 && peak_MPa > 0.0 && finite).then_some(Load { normal_N, noise, size })
     }
-}
-
-/// The text of a file of bounded size.
-fn read(path: &Path, file: &str) -> Result<String, DeviationsError> {
-    let unreadable = |source| DeviationsError::Unreadable { file: file.to_owned(), source };
-    if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_FILE {
-        let reason = format!("it is larger than {LARGEST_FILE} bytes");
-        return Err(DeviationsError::Damaged { file: file.to_owned(), reason });
-    }
-    std::fs::read_to_string(path).map_err(unreadable)
 }

@@ -48,6 +48,7 @@ pub use training::{Stage, Training};
 pub use trial::with_network;
 pub use window::{Place, Window};
 
+use crate::read::bytes_up_to;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
@@ -210,14 +211,7 @@ fn bytes_of(scene: &Scene) -> Result<(Cow<'static, [u8]>, String), LearnedError>
 
 /// The bytes of a file.
 fn read(path: &Path, file: &str) -> Result<Vec<u8>, LearnedError> {
-    use std::io::Read;
     let unreadable = |source| LearnedError::Unreadable { file: file.to_owned(), source };
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|open| open.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(unreadable)?;
-    match bytes.len() as u64 > LARGEST_FILE {
-        true => Err(LearnedError::Damaged { file: file.to_owned(), reason: "it is too large".to_owned() }),
-        false => Ok(bytes),
-    }
+    let too_large = || LearnedError::Damaged { file: file.to_owned(), reason: "it is too large".to_owned() };
+    bytes_up_to(LARGEST_FILE, path).map_err(unreadable)?.ok_or_else(too_large)
 }

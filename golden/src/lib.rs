@@ -95,6 +95,7 @@ pub mod noise;
 pub mod paper;
 pub mod partition;
 pub mod quantise;
+mod read;
 pub mod reception;
 pub mod reconstruct;
 pub mod scene;

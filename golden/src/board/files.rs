@@ -1,7 +1,7 @@
 //! Where the files of a board are: built into the program, or in a folder.
 
-use std::fs::File;
-use std::io::{Error, ErrorKind, Read};
+use crate::read::text_up_to;
+use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use include_dir::{include_dir, Dir};
@@ -39,12 +39,8 @@ impl Folder {
                 Ok(file.contents_utf8().ok_or(ErrorKind::InvalidData)?.to_owned())
             }
             Folder::At(path) => {
-                let mut bytes = Vec::new();
-                File::open(path.join(name))?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-                if bytes.len() as u64 > LARGEST_FILE {
-                    return Err(Error::other(format!("over {LARGEST_FILE} bytes, too large for a file of a board")));
-                }
-                String::from_utf8(bytes).map_err(|error| Error::new(ErrorKind::InvalidData, error))
+                let too_large = || Error::other(format!("over {LARGEST_FILE} bytes, too large for a file of a board"));
+                text_up_to(LARGEST_FILE, &path.join(name))?.ok_or_else(too_large)
             }
         }
     }

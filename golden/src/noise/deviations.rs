@@ -65,10 +65,9 @@ pub fn measure_deviations(
 ) -> Result<Deviations, StudyError> {
     let per_decade = f64::from(PER_DECADE);
     let steps = PER_DECADE * DECADES[0]..=PER_DECADE * DECADES[1];
-    let levels: Vec<f64> = steps.map(|step| 10f64.powf(f64::from(step) / per_decade)).collect();
+    let levels: Vec<f64> = steps.map(|step| digits(10f64.powf(f64::from(step) / per_decade))).collect();
     let scene = bare(scene);
     let subject = subject(&scene)?;
-    let levels: Vec<f64> = levels.into_iter().map(digits).collect();
     let errors = by_level(errors(&scene, &levels, draws, seed, progress)?, &levels);
     let sizes = edges(&errors);
     let mut sigma = Vec::with_capacity(levels.len());
@@ -119,9 +118,11 @@ fn digits(value: f64) -> f64 {
 fn by_level(errors: Vec<Vec<Error>>, levels: &[f64]) -> Vec<Vec<Error>> {
     let mut all: Vec<Vec<Error>> = levels.iter().map(|_| Vec::new()).collect();
     for error in errors.into_iter().flatten() {
-        let off = |level: &f64| (error.noise / level).ln().abs();
-        let nearest = (0..levels.len()).min_by(|a, b| off(&levels[*a]).total_cmp(&off(&levels[*b])));
-        nearest.into_iter().for_each(|level| all[level].push(Error { ..error }));
+        let off = |(level, _): &(&f64, _)| (error.noise / **level).ln().abs();
+        let nearest = levels.iter().zip(&mut all).min_by(|a, b| off(a).total_cmp(&off(b)));
+        if let Some((_, own)) = nearest {
+            own.push(error);
+        }
     }
     all
 }

@@ -9,6 +9,7 @@ use dermis_golden::noise::{deviations_coverage, measure_deviations};
 use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_golden::write::write;
 
+use super::inputs::beside;
 use crate::progress::Progress;
 use crate::report;
 
@@ -46,14 +47,14 @@ pub struct Arguments {
     check: bool,
 }
 
-/// Measures and writes the file, or takes the table there is, and returns text for stdout and whether the deviations cover the errors of fresh frames.
+/// Measures and writes the file, or takes the table there is; returns text for stdout and whether the deviations cover the errors
+/// of other frames.
 ///
 /// # Errors
 /// An unknown scene, one that is not searched or has no table, too few frames, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let scene = Scene::load(&arguments.scene)?;
-    let beside = || PathBuf::from(&arguments.scene).with_file_name(format!("{}.deviations", scene.name));
-    let out = arguments.out.clone().unwrap_or_else(beside);
+    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.scene, &scene, "deviations"));
     if scene.for_hardware().search.estimator == EstimatorKind::Network {
         bail!("scene {}: search.estimator: a network gives standard deviations of its own", scene.name);
     }

@@ -8,6 +8,8 @@
 //!
 //! One reconstruction takes 2^k frames, where k is the scene's `input.average`; with a sliding mean any number.
 
+use std::path::{Path, PathBuf};
+
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::frame::Frame;
@@ -30,6 +32,11 @@ impl BoardOverride {
         scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
         scene
     }
+}
+
+/// The file of `extension` beside that of a scene, whose argument is `named`, or in the working folder for a built-in one.
+pub(super) fn beside(named: &str, scene: &Scene, extension: &str) -> PathBuf {
+    Path::new(named).with_file_name(format!("{}.{extension}", scene.name))
 }
 
 /// What the hardware takes in place of the scene's estimator; `None` where it has that.

@@ -10,6 +10,7 @@ use dermis_golden::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_golden::write::write;
 
+use super::inputs::beside;
 use crate::progress::Progress;
 use crate::report;
 
@@ -87,10 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     if let Some(file) = &arguments.limit_of {
         return Ok((measured(&mut scene, file, frames, training.seed)?, true));
     }
-    let out = arguments.out.clone().unwrap_or_else(|| {
-        let beside = PathBuf::from(&arguments.scene);
-        beside.with_file_name(format!("{}.network", scene.name))
-    });
+    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.scene, &scene, "network"));
     let bar = Progress::steps(&format!("{}: contacts, then training", scene.name), 0);
     let loss = std::sync::Mutex::new(Vec::new());
     let (contacts, every) = (AtomicUsize::new(0), (training.steps / 10).max(1));

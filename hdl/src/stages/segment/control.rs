@@ -79,8 +79,8 @@ pub(super) struct Shape {
     pub(super) sum: usize,
     /// Inverse distances of neighbours along x, along y, of diagonal ones.
     slopes: [u64; 3],
-    /// For each axis the taps of a line in their order: `{end of the line, window moves on, last of the place, weight}`.
-    taps: [Vec<u64>; 2],
+    /// For each axis the taps of a line in their order: weight; `{end of the line, window moves on, last of the place}`.
+    taps: [Vec<(u64, u64)>; 2],
 }
 
 impl Shape {
@@ -92,13 +92,13 @@ impl Shape {
             let moves = |place: usize| places.get(place + 1).is_some_and(|next| next.0 > places[place].0);
             let of_place = |(place, (_, weights)): (usize, &(usize, &[i64]))| {
                 let (last, ends, moves) = (weights.len() - 1, place + 1 == places.len(), moves(place));
-                let flag = |flag: bool, at: usize| u64::from(flag) << (FACTOR + at);
+                let flag = |flag: bool, at: usize| u64::from(flag) << at;
                 let tap = |(k, weight): (usize, &i64)| {
-                    *weight as u64 | flag(k == last, 0) | flag(moves, 1) | flag(k == last && ends, 2)
+                    (*weight as u64, flag(k == last, 0) | flag(moves, 1) | flag(k == last && ends, 2))
                 };
                 weights.iter().enumerate().map(tap).collect::<Vec<_>>()
             };
-            places.iter().enumerate().flat_map(of_place).collect::<Vec<u64>>()
+            places.iter().enumerate().flat_map(of_place).collect::<Vec<_>>()
         };
         Shape {
             rows: sensor.rows,
@@ -257,13 +257,12 @@ impl<'k> Circuit<'k> {
         };
         let words_out = read("words", &words, shape.smoothed);
         let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
-        let taps = shape.taps.concat();
-        let tap = register("tap", count_bits(taps.len()));
-        let weights = taps.iter().map(|tap| tap & ((1 << FACTOR) - 1)).enumerate().collect();
-        let windows = k.memory("windows", taps.len(), TAP_BITS, Contents::Words(weights)).style("block");
+        let (weights, mut flags): (Vec<u64>, Vec<u64>) = shape.taps.concat().into_iter().unzip();
+        let tap = register("tap", count_bits(weights.len()));
+        let contents = Contents::Words(weights.iter().copied().enumerate().collect());
+        let windows = k.memory("windows", weights.len(), TAP_BITS, contents).style("block");
         let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
         // In logic: a block RAM may be far from what the flags decide in the same cycle.
-        let mut flags: Vec<u64> = taps.iter().map(|tap| tap >> FACTOR).collect();
         flags.resize(1 << tap.bits(), 0);
         let tap_flags = later("tap_flags", tap.table(3, &flags));
 
