@@ -54,6 +54,7 @@
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`reconstruct`] | the result format of all engines |
+//! | [`deviations`] | standard deviations of forces that a search found |
 //! | [`misfit`] | how far a frame is from those of a network's training |
 //! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
