@@ -27,6 +27,7 @@
 mod error;
 mod family;
 mod files;
+mod power;
 mod reader;
 #[cfg(test)]
 mod tests;
@@ -39,6 +40,7 @@ use toml::Value;
 pub use error::BoardError;
 pub use family::{Device, Family};
 use files::Folder;
+pub use power::Power;
 use reader::Reader;
 
 use crate::symmetry::quads::Quads;
@@ -232,6 +234,14 @@ impl Board {
                 Err(self.invalid(field, reason))
             }
         }
+    }
+
+    /// Energies of the device's resources; `None` for a family without them.
+    ///
+    /// # Errors
+    /// [`BoardError::Unreadable`] if a built-in file is damaged.
+    pub fn power(&self) -> Result<Option<Power>, BoardError> {
+        family::power_of(self.family)
     }
 
     /// The board as a file that states every field.

@@ -34,6 +34,33 @@ pub fn run_times() -> Vec<RunTime> {
     RUN_TIMES.lines().skip(1).filter_map(time).collect()
 }
 
+/// A published power.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(non_snake_case)]
+pub struct PublishedPower {
+    /// The system.
+    pub system: String,
+    /// The sensor as printed.
+    pub sensor: String,
+    /// Power, W.
+    pub power_W: f64,
+    /// Source of the figure.
+    pub source: String,
+}
+
+const POWER: &str = include_str!("../data/paper/power.csv");
+
+/// All published figures of power, in the file's order.
+#[allow(non_snake_case)]
+pub fn powers() -> Vec<PublishedPower> {
+    let power = |line: &str| {
+        let mut fields = line.splitn(4, ',').map(str::to_owned);
+        let (system, sensor, power_W) = (fields.next()?, fields.next()?, fields.next()?.parse().ok()?);
+        Some(PublishedPower { system, sensor, power_W, source: fields.next()? })
+    };
+    POWER.lines().skip(1).filter_map(power).collect()
+}
+
 /// A conclusion of the paper about a sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conclusion {
@@ -85,6 +112,13 @@ mod tests {
         assert_eq!((times[0].seconds, times[0].case), (2705.33, Some(Case::WHOLE)));
         assert_eq!((&*times[4].sensor, times[4].seconds), ("8x8", 16.43));
         assert!(times[6].source.ends_with("maximum 14.7 %") && times[7].case.is_none());
+    }
+
+    #[test]
+    fn powers_of_the_file() {
+        let powers = powers();
+        assert_eq!(powers.len(), POWER.lines().count() - 1);
+        assert_eq!((&*powers[0].sensor, powers[0].power_W), ("10x10", 0.871));
     }
 
     #[test]

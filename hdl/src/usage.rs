@@ -1,6 +1,6 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
-use dermis_golden::board::Board;
+use dermis_golden::board::{Board, EngineKind};
 use dermis_golden::fixed::plan::resources::Memory as Planned;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
@@ -51,6 +51,11 @@ pub struct PlacedMemory {
 impl PlacedMemory {
     pub(crate) fn new(block: &str, array: &str, planned: &Planned) -> Self {
         PlacedMemory { block: block.to_owned(), array: array.to_owned(), planned: planned.clone() }
+    }
+
+    /// Pipeline stage of the block in an engine of this kind; `engine` if it belongs to none.
+    pub fn stage(&self, engine: EngineKind) -> &'static str {
+        stage(simulate::stages(engine), &self.block)
     }
 }
 

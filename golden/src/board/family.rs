@@ -6,6 +6,7 @@
 //! | `multiplier`, `block_ram` | names of the cells that are counted |
 //! | `figures` | fields of a board that all devices have |
 //! | `devices.NAME` | fields of a board that this device has |
+//! | `power` | energies for an estimate of the power, [`Power`]; absent where none are known |
 
 use std::collections::BTreeMap;
 
@@ -14,6 +15,7 @@ use toml::{Table, Value};
 
 use super::error::BoardError;
 use super::files::Folder;
+use super::power::Power;
 
 /// A device family, whose members share their tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +59,7 @@ struct FamilyFile {
     block_ram: String,
     figures: Table,
     devices: BTreeMap<String, Table>,
+    power: Option<Power>,
 }
 
 impl FamilyFile {
@@ -96,7 +99,8 @@ impl Device {
     pub fn all() -> Result<Vec<Device>, BoardError> {
         let mut all = Vec::new();
         for (_, family) in Family::NAMES {
-            let FamilyFile { description, source, multiplier, block_ram, figures, devices } = FamilyFile::load(family)?;
+            let FamilyFile { description, source, multiplier, block_ram, figures, devices, .. } =
+                FamilyFile::load(family)?;
             all.extend(devices.into_iter().map(|(name, own)| Device {
                 name: name.clone(),
                 family,
@@ -122,6 +126,14 @@ impl Device {
 /// [`BoardError::Unreadable`] if a built-in file is damaged.
 pub(super) fn of_all_devices(family: Family) -> Result<Table, BoardError> {
     Ok(figures_of(family, FamilyFile::load(family)?.figures.into_iter()))
+}
+
+/// The energies of a family's resources.
+///
+/// # Errors
+/// [`BoardError::Unreadable`] if a built-in file is damaged.
+pub(super) fn power_of(family: Family) -> Result<Option<Power>, BoardError> {
+    Ok(FamilyFile::load(family)?.power)
 }
 
 fn figures_of(family: Family, figures: impl Iterator<Item = (String, Value)>) -> Table {

@@ -207,3 +207,23 @@ fn a_wrong_field_is_told_with_its_line_value_and_what_is_right() {
         assert!(!allowed.is_empty());
     }
 }
+
+#[test]
+fn energies_are_ranges_of_a_factor_of_two_at_least() {
+    for (_, family) in Family::NAMES {
+        let devices: Vec<Device> =
+            Device::all().unwrap().into_iter().filter(|device| device.family == family).collect();
+        let Some(power) = family::power_of(family).unwrap() else { continue };
+        let ranges = [power.toggle_pJ, power.clock_pJ, power.product_pJ, power.block_ram_pJ, power.static_range];
+        assert!(ranges.iter().all(|[lower, upper]| *lower > 0.0 && *upper >= 2.0 * lower), "{power:?}");
+        assert!(!power.source.is_empty() && power.static_mW("another").is_none());
+        for device in devices {
+            let [lower, upper] = power.static_mW(&device.name).unwrap();
+            assert!(lower > 0.0 && upper >= 2.0 * lower, "{}", device.name);
+        }
+    }
+    assert_eq!(family::power_of(Family::Artix7).unwrap(), None);
+    let own = Board::load("ulx3s-85f").unwrap();
+    let [lower, upper] = own.power().unwrap().unwrap().static_mW(own.device.as_deref().unwrap()).unwrap();
+    assert!(lower < 298.0 && upper > 298.0);
+}

@@ -4,16 +4,16 @@ use dermis_golden::link::{Counters, Identity};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Kernel, Type};
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
 use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
 /// counters, in the order of [`Counters`], from 16.
 ///
-/// An event of a packet is counted in the three cycles after it (read, add, write); while `hold` is high it waits,
-/// because the two bytes of a counter are being read. `entry` is not valid meanwhile. Counters wrap. Reset clears one
-/// counter per cycle and has to last at least eight cycles.
+/// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory and adder
+/// in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is not valid
+/// meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
 #[derive(LogicBlock)]
 pub struct CounterRam {
     /// Clock; registers change on its rising edge.
@@ -53,8 +53,8 @@ const KINDS: usize = 8;
 const EVENTS: usize = Counters::BYTES / 2;
 
 impl CounterRam {
-    /// Answers requests for the identity with `identity`.
-    pub fn new(identity: &Identity) -> Self {
+    /// Answers requests for the identity with `identity`; with the register between memory and adder if `registered`.
+    pub fn new(identity: &Identity, registered: bool) -> Self {
         let block = CounterRam {
             clk: Default::default(),
             rst: Default::default(),
@@ -67,7 +67,7 @@ impl CounterRam {
             entry_valid: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(kernel(&words(identity)))
+        block.bind(kernel(&words(identity), registered))
     }
 }
 
@@ -77,24 +77,40 @@ fn words(identity: &Identity) -> Vec<(usize, u64)> {
     identity.to_bytes().chunks(2).enumerate().map(word).collect()
 }
 
-fn kernel(words: &[(usize, u64)]) -> Kernel {
+/// Cycles in which a count keeps `entry` from being valid: read, if `registered` the register, add, write.
+fn cycles(registered: bool) -> usize {
+    3 + usize::from(registered)
+}
+
+fn kernel(words: &[(usize, u64)], registered: bool) -> Kernel {
     let k = Builder::new("counter_ram");
     let (rst, taken, fault) = (k.input("rst", 1), k.input("taken", 1), k.input("fault", EVENTS - 2));
     let (overrun, hold, address) = (k.input("overrun", 1), k.input("hold", 1), k.input("address", 5));
     let memory = k.memory("memory", ENTRIES, 16, Contents::Words(words.to_vec())).style("block").unchecked();
     let which = k.register("which", Type::unsigned(count_bits(KINDS)));
     let due = k.state("due", Type::unsigned(1), rst, 0);
-    let counted = k.register("counted", Type::unsigned(3));
-    let counted = counted.comment("Pipeline of a count: adding, writing, just written.");
+    let counted = k.register("counted", Type::unsigned(cycles(registered)));
+    let counted = counted.comment("Pipeline of a count: a bit for each cycle, of which the second last one writes.");
     let [entry, raised] = ["entry", "raised"].map(|name| k.register(name, Type::unsigned(16)));
 
     let events = k.wire("events", concat(&[overrun, fault, taken]));
     let counts = k.wire("counts", *due & !hold);
     let counter = k.constant(2, (COUNTS / KINDS) as u64).concat(*which);
     entry.set(memory.read(counts.mux(counter, address)));
-    raised.set(entry.plus(1));
-    memory.write(rst | counted.at(1), counter, rst.mux(k.constant(16, 0), *raised));
-    counted.set(concat(&[counted.at(1), counted.at(0) & !rst, counts & !rst]));
+    // A block RAM's output is slow.
+    let count = match registered {
+        false => *entry,
+        true => {
+            let count = k.register("count", Type::unsigned(16));
+            count.set(*entry);
+            *count
+        }
+    };
+    raised.set(count.plus(1));
+    let writes = cycles(registered) - 2;
+    memory.write(rst | counted.at(writes), counter, rst.mux(k.constant(16, 0), *raised));
+    let goes_on: Vec<Expr> = (0..writes).rev().map(|cycle| counted.at(cycle) & !rst).collect();
+    counted.set(concat(&[&[counted.at(writes)], &goes_on[..], &[counts & !rst]].concat()));
     due.set(events.any() | (*due & !counts));
     // The number of the event, as each has its own bit.
     let bit = |bit: usize| {
@@ -124,6 +140,7 @@ mod tests {
         waiting: Option<usize>,
         left: u64,
         entry: Option<u64>,
+        registered: bool,
     }
 
     impl Table {
@@ -143,7 +160,7 @@ mod tests {
             let [rst, taken, fault, overrun, hold, address] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number());
             if rst == 1 {
                 let before = if self.runs { 0 } else { self.resets };
-                *self = Table { resets: before + 1, ..Table::default() };
+                *self = Table { resets: before + 1, registered: self.registered, ..Table::default() };
                 return;
             }
             self.runs = true;
@@ -156,7 +173,7 @@ mod tests {
             };
             if let Some(event) = self.waiting.filter(|_| hold == 0) {
                 self.counters[event] = self.counters[event].wrapping_add(1);
-                (self.waiting, self.left) = (None, 3);
+                (self.waiting, self.left) = (None, cycles(self.registered) as u64);
             }
             if events != 0 {
                 self.waiting = Some(events.trailing_zeros() as usize);
@@ -196,8 +213,10 @@ mod tests {
 
     #[test]
     fn events_are_counted_and_the_identity_is_read() {
-        let kernel = kernel(&IDENTITY);
-        let block = Body::new(kernel, &[], &[("entry", 16), ("entry_valid", 1)]);
-        check(block.kernel(), &stimulus(30_000), &mut Table::default());
+        for registered in [false, true] {
+            let kernel = kernel(&IDENTITY, registered);
+            let block = Body::new(kernel, &[], &[("entry", 16), ("entry_valid", 1)]);
+            check(block.kernel(), &stimulus(30_000), &mut Table { registered, ..Table::default() });
+        }
     }
 }

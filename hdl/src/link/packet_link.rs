@@ -103,7 +103,7 @@ impl PacketLink {
             sources: Sources::new(shape.answers.are_fast()),
             packer: Packer::new(shape.payloads()),
             encoder: SlipEncoder::new(shape.answers.are_fast()),
-            counters: CounterRam::new(identity),
+            counters: CounterRam::new(identity, shape.answers.are_fast()),
             arriving: Crc::default(),
             leaving: Crc::default(),
             unused: Default::default(),

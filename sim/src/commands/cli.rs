@@ -59,6 +59,7 @@ const EXAMPLES: &str = "Examples:
   dermis import walk.asf                             scene and frames of a recording of a real array
   dermis stability --plot stability.svg              error against the condition number
   dermis stress                                      gaps, wrong tlast and resets on sensor-1
+  dermis power sensor-1                              the engine's power, estimated from simulated register bits
   dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";
 
 #[derive(Subcommand, Debug)]
@@ -106,6 +107,8 @@ enum Command {
     Stability(super::stability::Arguments),
     /// Test the simulated hardware's AXI streams with gaps, back-pressure, wrong tlast and resets.
     Stress(super::stress::Arguments),
+    /// Estimate the engine's power from the register bits that change in the simulated hardware.
+    Power(super::power::Arguments),
     /// Flip single bits of the simulated hardware and count harmless, detected, hanging and silent faults.
     Faults(super::faults::Arguments),
     /// Print a comparison of the guide: input bits, dead taxels, several contacts, links.
@@ -200,6 +203,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Generate(arguments) => Ok((super::generate::run(arguments)?, true)),
         Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
+        Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),
         Command::Stress(arguments) => super::stress::run(arguments, build_dir),
         Command::Study(arguments) => Ok((super::study::run(arguments)?, true)),

@@ -20,6 +20,7 @@
 //! | [`live`] | `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger |
 //! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
+//! | [`mod@power`] | `dermis power`: the engine's power, estimated |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
@@ -48,6 +49,7 @@ pub mod inputs;
 pub mod live;
 pub mod new;
 pub mod noise;
+pub mod power;
 pub mod reconstruct;
 mod reconstruct_stream;
 pub mod replay;

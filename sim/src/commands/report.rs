@@ -16,8 +16,8 @@ use crate::report::measure::{
 };
 use crate::report::save::save;
 use crate::report::sections::{
-    choice, choose, extremes, fields, frames, noise, paper, published, ratios, recordings, resources, run_logs, search,
-    stability, stages, sweeps, time, Choice,
+    choice, choose, extremes, fields, frames, noise, paper, power, published, ratios, recordings, resources, run_logs,
+    search, stability, stages, sweeps, time, Choice,
 };
 use crate::run_log::RunLog;
 
@@ -148,6 +148,7 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         extremes(&measure::extremes(measured, options)?),
         shipped_recordings(options)?,
         resources(measured, &choices, options)?,
+        power(measured, &choices, options)?,
         run_logs(&RunLog::load_all(&options.build)?),
     ];
     Ok(first.into_iter().chain(others).collect())

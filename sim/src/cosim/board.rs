@@ -34,8 +34,7 @@ impl VerilatedBoard {
              .alive(out[1]), .busy(out[2]), .error(out[3]));\nendmodule\n"
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design =
-            Design { top, files, taps: &[], input_bits: 1, writable_state: false, optimisation: Optimisation::On };
+        let design = Design { top, files, taps: &[], input_bits: 1, open_state: false, optimisation: Optimisation::On };
         VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }

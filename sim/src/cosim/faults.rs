@@ -30,6 +30,7 @@ use serde::Serialize;
 use super::drive::{record, InputFrame, Stimulus};
 use super::hardware::Hardware;
 use super::stress::{shipped_samples, synthetic_samples, Sample};
+use super::verilator::Optimisation;
 use crate::progress::Progress;
 use bit_flip::{FaultInjector, StateBit};
 use classify::{classify, Outcome};
@@ -82,21 +83,18 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         pool = synthetic_samples(&hardware.model, &mut random);
     }
     pool.retain(Sample::has_force);
-    let mut device = hardware.device_with_writable_state()?;
+    let mut device = hardware.device_with_open_state(Optimisation::On)?;
     let elements = &hardware.generated.state;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
     let mut rows: BTreeMap<(StorageClass, &str), Row> = BTreeMap::new();
+    let mut found = Vec::new();
     for element in elements {
+        let StateElement { scope, signal, words, bits, .. } = element;
         // Flips a bit twice, which leaves it unchanged: shows that it can be flipped.
-        if ![(); 2].iter().all(|()| device.flip(&element.scope, &element.signal, element.words - 1, element.bits - 1)) {
-            bail!(
-                "{}.{}, word {}, bit {} cannot be flipped",
-                element.scope,
-                element.signal,
-                element.words - 1,
-                element.bits - 1
-            );
-        }
+        let [word, bit] = [words - 1, bits - 1];
+        let own = device.find(scope, signal).filter(|own| [(); 2].iter().all(|()| device.flip(*own, word, bit)));
+        let Some(own) = own else { bail!("{scope}.{signal}, word {word}, bit {bit} cannot be flipped") };
+        found.push(own);
         let row = rows.entry((element.class, element.stage)).or_insert_with(|| Row::new(element));
         (row.signals, row.bits) = (row.signals + 1, row.bits + element.words * element.bits);
     }
@@ -106,10 +104,11 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         bar.set(run as u64);
         let Some((index, word, bit)) = draw(elements, run, &mut random) else { continue };
         let element = &elements[index];
+        let bit = StateBit { element: found[index], word, bit };
         let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
         let second = &second.behind(&hardware.model, first);
         let flip_cycle = random.u64(..first.cycles.total);
-        let mut injector = FaultInjector::new(&mut device, StateBit { element, word, bit }, flip_cycle);
+        let mut injector = FaultInjector::new(&mut device, bit, flip_cycle);
         let frames = [first, second].map(input_frame);
         let recording = record(&mut injector, 0, &frames, Stimulus::FullSpeed, 4 * longest);
         let outcome = classify(&recording, &[first, second]);
@@ -119,7 +118,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         let again = record(&mut device, 0, &[input_frame(after)], Stimulus::FullSpeed, 4 * longest);
         let recovered = classify(&again, &[after]) == Outcome::Harmless;
         if let Some(row) = rows.get_mut(&(element.class, element.stage)) {
-            row.add(outcome, recovered, flipped.insert((index, word, bit)));
+            row.add(outcome, recovered, flipped.insert((index, word, bit.bit)));
         }
     }
     Ok(rows.into_values().collect())

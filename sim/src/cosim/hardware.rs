@@ -108,18 +108,18 @@ impl Hardware {
         })
     }
 
-    /// Starts a Verilator simulation in which every bit of a register or memory can be flipped.
+    /// Starts a Verilator simulation whose registers and memories can be read and changed.
     ///
     /// # Errors
     /// As [`Hardware::device`].
-    pub fn device_with_writable_state(&self) -> Result<Verilated, VerilatorError> {
-        self.verilated(&self.generated, true, Optimisation::On)
+    pub fn device_with_open_state(&self, optimisation: Optimisation) -> Result<Verilated, VerilatorError> {
+        self.verilated(&self.generated, true, optimisation)
     }
 
     fn verilated(
         &self,
         generated: &Generated,
-        writable_state: bool,
+        open_state: bool,
         optimisation: Optimisation,
     ) -> Result<Verilated, VerilatorError> {
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
@@ -128,7 +128,7 @@ impl Hardware {
             files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.formats().code_bits,
-            writable_state,
+            open_state,
             optimisation,
         };
         Verilated::new(&design, &self.cache)

@@ -19,6 +19,8 @@
 //! | [`faults`] | flips single bits and classifies the effect |
 //! | [`stress`] | both streams under gaps, wrong `tlast` and resets |
 //! | [`block_timing`] | the cycles of a frame in which a block's handshakes change |
+//! | [`power`] | the engine's power, estimated from the register bits that change |
+//! | [`toggles`] | counts the register bits that change |
 //! | [`waves`] | a run as a waveform file |
 
 mod against_model;
@@ -29,7 +31,9 @@ pub mod drive;
 pub mod faults;
 mod findings;
 pub mod hardware;
+pub mod power;
 pub mod stress;
+pub mod toggles;
 pub mod verify;
 pub mod verilator;
 pub mod waves;

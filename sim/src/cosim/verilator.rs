@@ -31,8 +31,8 @@ const LIBRARY: &str = "libbench.so";
 const SHIM: &str = include_str!("../../shim/shim.cpp");
 /// Its file name.
 const SHIM_FILE: &str = "shim.cpp";
-/// Addition to [`SHIM`] for libraries in which bits can be flipped.
-const FAULTS: &str = include_str!("../../shim/faults.cpp");
+/// Addition to [`SHIM`] for libraries whose registers and memories are read or changed.
+const STATE: &str = include_str!("../../shim/state.cpp");
 /// Seed of the random start values of registers without an initial value; these show a missing reset.
 const RESET_SEED: i32 = 20_240_501;
 /// Argument of the compiler for a shared library.
@@ -85,8 +85,8 @@ pub struct Design<'a> {
     pub taps: &'a [Tap],
     /// Width of `s_axis_tdata`, 1..=32.
     pub input_bits: u32,
-    /// Whether bits of registers and memories can be flipped; the simulation is slower then.
-    pub writable_state: bool,
+    /// Whether registers and memories can be read and changed; the simulation is slower then.
+    pub open_state: bool,
     /// How much the compiler optimises.
     pub optimisation: Optimisation,
 }
@@ -123,15 +123,28 @@ impl Optimisation {
     }
 }
 
-/// `dermis_flip` of the shim: model, scope, signal, word, bit; returns 0 if there is no such bit.
-type Flip = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, u64, u64) -> i32;
+/// `dermis_words` of the shim: model, scope, signal, bytes of a word, bytes of all words; null if there is no such signal.
+type FindWords = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, *mut u64, *mut u64) -> *mut u8;
+
+/// Where the words of a register or memory lie in a running model.
+#[derive(Clone, Copy)]
+struct Words {
+    first: *mut u8,
+    word_bytes: usize,
+    bytes: usize,
+}
+
+/// A register or memory that [`Verilated::find`] found.
+#[derive(Clone, Copy, Debug)]
+pub struct Found(usize);
 
 /// A running verilated design, with its pins packed into two vectors.
 pub(crate) struct VerilatedBench {
     handle: *mut c_void,
     cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
     free: unsafe extern "C" fn(*mut c_void),
-    flip: Option<Flip>,
+    find_words: Option<FindWords>,
+    found: Vec<Words>,
     words: Vec<u32>,
     /// Keeps the code of the function pointers loaded; dropped after `drop` has freed the model.
     _library: Library,
@@ -156,14 +169,23 @@ impl VerilatedBench {
                 *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
-            let flip = if design.writable_state { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
+            let find_words =
+                if design.open_state { Some(*library.get(b"dermis_words").map_err(symbol)?) } else { None };
             if bytes() as usize != 4 * words {
                 return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
             }
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(VerilatedBench { handle, cycle, free, flip, words: vec![0; words], _library: library })
+            Ok(VerilatedBench {
+                handle,
+                cycle,
+                free,
+                find_words,
+                found: Vec::new(),
+                words: vec![0; words],
+                _library: library,
+            })
         }
     }
 
@@ -176,12 +198,26 @@ impl VerilatedBench {
 }
 
 impl VerilatedBench {
-    /// Flips a bit; false if there is no such bit.
-    fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
-        let names = [scope, signal].map(|name| CString::new(name).ok());
-        let (Some(flip), [Some(scope), Some(signal)]) = (self.flip, &names) else { return false };
-        // SAFETY: `handle` lives until drop; the library checks the names, the word and the bit.
-        unsafe { flip(self.handle, scope.as_ptr(), signal.as_ptr(), word as u64, bit as u64) != 0 }
+    /// Finds a register or memory; `None` if there is no such signal.
+    fn find(&mut self, scope: &str, signal: &str) -> Option<Found> {
+        let [scope, signal] = [CString::new(scope).ok()?, CString::new(signal).ok()?];
+        let (mut word_bytes, mut bytes) = (0, 0);
+        // SAFETY: `handle` lives until drop; the library checks the names.
+        let first = unsafe {
+            (self.find_words?)(self.handle, scope.as_ptr(), signal.as_ptr(), &raw mut word_bytes, &raw mut bytes)
+        };
+        if first.is_null() {
+            return None;
+        }
+        self.found.push(Words { first, word_bytes: word_bytes as usize, bytes: bytes as usize });
+        Some(Found(self.found.len() - 1))
+    }
+
+    /// The bytes of what was found, and those of a word.
+    fn words(&mut self, Found(index): Found) -> (&mut [u8], usize) {
+        let Words { first, word_bytes, bytes } = self.found[index];
+        // SAFETY: memory of the model, which lives until drop, and which nothing else uses while `self` is borrowed.
+        (unsafe { std::slice::from_raw_parts_mut(first, bytes) }, word_bytes)
     }
 }
 
@@ -209,12 +245,30 @@ impl Verilated {
         Ok(Verilated { layout, bench })
     }
 
-    /// Flips a bit of a word of a register or memory before the next cycle; false if there is no such bit or the design
-    /// has no `writable_state`. `scope` is the instance path from the design's top, separated by dots.
-    pub fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
+    /// Finds a register or memory; `None` if there is no such signal or the design has no `open_state`. `scope` is the
+    /// instance path from the design's top, separated by dots.
+    pub fn find(&mut self, scope: &str, signal: &str) -> Option<Found> {
         // The shim also names its model "bench".
         let path = format!("bench.{INSTANCE}{}{scope}", if scope.is_empty() { "" } else { "." });
-        self.bench.flip(&path, signal, word, bit)
+        self.bench.find(&path, signal)
+    }
+
+    /// The words that this device found as bytes, each word with its least significant byte first.
+    ///
+    /// # Panics
+    /// If another device found it.
+    pub fn bytes(&mut self, found: Found) -> &[u8] {
+        self.bench.words(found).0
+    }
+
+    /// Flips a bit of a word before the next cycle; false if there is no such bit.
+    ///
+    /// # Panics
+    /// If another device found it.
+    pub fn flip(&mut self, found: Found, word: usize, bit: usize) -> bool {
+        let (bytes, word_bytes) = self.bench.words(found);
+        let byte = bytes.chunks_mut(word_bytes).nth(word).and_then(|word| word.get_mut(bit / 8));
+        byte.map(|byte| *byte ^= 1 << (bit % 8)).is_some()
     }
 }
 
@@ -257,7 +311,7 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
     // Waivers come first: Verilator applies them only to files read afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
-    let shim = if design.writable_state { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
+    let shim = if design.open_state { [SHIM, STATE].concat() } else { SHIM.to_owned() };
     sources.extend([("bench.v", bench), (SHIM_FILE, &shim)]);
     let version = version()?;
     let folder = |level: Optimisation| cache.join(fingerprint(&sources, &format!("{version} {}", level.argument())));
@@ -300,7 +354,7 @@ fn compile(design: &Design, sources: &[(&str, &str)], work: &Path, cache: &Path)
     let mut verilator = Command::new("verilator");
     verilator.current_dir(work).args(["--top-module", "bench", "--cc", "--prefix", "Vbench", "-O3"]);
     verilator.args(["--x-initial", "unique", "--x-assign", "unique"]);
-    if design.writable_state {
+    if design.open_state {
         verilator.arg("--public-flat-rw");
     }
     succeed(verilator.args(verilog))?;

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap, TapSignal};
+use dermis_hdl::state::{StateElement, StorageClass};
 use dermis_sim::cosim::drive::{record, InputFrame, Stimulus, Times};
+use dermis_sim::cosim::toggles::ToggleCounter;
 use dermis_sim::cosim::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 
@@ -32,11 +34,15 @@ fn cache() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("verilator")
 }
 
-fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
+fn toy_of(verilog: &str, gain: &str, open_state: bool) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
     let optimisation = Optimisation::Off;
-    let design = Design { top: "toy", files, taps: &taps(), input_bits: 12, writable_state: false, optimisation };
+    let design = Design { top: "toy", files, taps: &taps(), input_bits: 12, open_state, optimisation };
     Verilated::new(&design, &cache())
+}
+
+fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
+    toy_of(verilog, gain, false)
 }
 
 fn toy() -> Verilated {
@@ -249,4 +255,31 @@ fn a_missing_reset_is_found() {
     device.cycle(&Inputs { rst: true, ..Inputs::default() });
     let (findings, _) = check(&mut WithoutReset(device), &vectors(), STALLS);
     assert!(!findings.is_equal());
+}
+
+#[test]
+fn changes_of_registers_are_counted_to_the_bit() {
+    let register = |signal: &str, words, bits| StateElement {
+        class: StorageClass::Register,
+        stage: "toy",
+        scope: String::new(),
+        signal: signal.into(),
+        words,
+        bits,
+    };
+    let registers = [register("head", 1, 3), register("sending", 1, 1), register("memory", 8, 12)];
+    let mut device = toy_of(TOY, "03\n", true).unwrap();
+    let ramp = &vectors()[..1];
+    // What the words are before the first frame is random.
+    check(&mut device, ramp, Stimulus::FullSpeed);
+    let mut counter = ToggleCounter::new(&mut device, registers.iter()).unwrap();
+    let (findings, _) = check(&mut counter, ramp, Stimulus::FullSpeed);
+    assert_eq!(findings, Findings::default());
+    // head: 0 to 5 and back to 0 (8 + 2 bits), 0 to 6 and back (10 + 2); sending: on and off; the memory has the frame.
+    assert_eq!(counter.toggles().collect::<Vec<_>>(), [8 + 2 + 10 + 2, 2, 0]);
+    // Each of the six words changes from the ramp's to the extremes': 0, 1, 2, 3, 4, 5 to -2048, 2047, -1, 0, 1, -2047.
+    check(&mut counter, &vectors()[1..], Stimulus::FullSpeed);
+    assert_eq!(counter.toggles().last(), Some(1 + 10 + 11 + 2 + 2 + 2));
+    assert!(ToggleCounter::new(&mut device, [register("absent", 1, 1)].iter()).is_err());
+    assert!(ToggleCounter::new(&mut toy(), registers.iter()).is_err(), "closed state");
 }

@@ -23,6 +23,7 @@ mod framing;
 mod link;
 mod lint;
 mod netlist;
+mod power;
 mod proofs;
 mod resources;
 mod scale;

@@ -1,14 +1,13 @@
 //! A device that flips one of its bits at a given cycle.
 
 use dermis_hdl::device::{Device, Inputs, Outputs};
-use dermis_hdl::state::StateElement;
 
-use super::super::verilator::Verilated;
+use super::super::verilator::{Found, Verilated};
 
 /// One bit of one word of a register or memory.
 #[derive(Clone, Copy)]
-pub(super) struct StateBit<'a> {
-    pub(super) element: &'a StateElement,
+pub(super) struct StateBit {
+    pub(super) element: Found,
     pub(super) word: usize,
     pub(super) bit: usize,
 }
@@ -16,21 +15,21 @@ pub(super) struct StateBit<'a> {
 /// Wraps a device and flips `bit` once, in cycle `flip_cycle` counted from the first cycle without reset.
 pub(super) struct FaultInjector<'a> {
     device: &'a mut Verilated,
-    bit: StateBit<'a>,
+    bit: StateBit,
     flip_cycle: u64,
     cycle: u64,
 }
 
 impl<'a> FaultInjector<'a> {
     /// A device whose `bit` flips in cycle `flip_cycle`.
-    pub(super) fn new(device: &'a mut Verilated, bit: StateBit<'a>, flip_cycle: u64) -> Self {
+    pub(super) fn new(device: &'a mut Verilated, bit: StateBit, flip_cycle: u64) -> Self {
         FaultInjector { device, bit, flip_cycle, cycle: 0 }
     }
 
     /// Flips the bit now.
     pub(super) fn flip(&mut self) {
         let StateBit { element, word, bit } = self.bit;
-        self.device.flip(&element.scope, &element.signal, word, bit);
+        self.device.flip(element, word, bit);
     }
 }
 
