@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 48] = [
+const NOT_RUN: [(&str, &str); 50] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -31,6 +31,8 @@ const NOT_RUN: [(&str, &str); 48] = [
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
+    ("dermis power sensor-1", "the same for eight-by-eight is run"),
+    ("dermis power sensor-1 --frame a.json --frame b.csv", "no such files"),
     ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
     ("dermis cosim sensor-1", "equality.rs"),
     ("dermis cosim eight-by-eight --target-board icebreaker", "serial.rs"),
