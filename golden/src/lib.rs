@@ -59,6 +59,7 @@
 //! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
 //! | [`link`] | packets between a host and a board |
+//! | [`registers`] | the register map of an engine on a bus |
 //! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
 //! | [`noise`], [`stability`] | studies: errors with noise against the Cramér–Rao bound; errors against conditioning |
 //! | [`gauss`], [`mod@write`] | Gauss–Legendre quadrature; atomic file writing |
@@ -99,6 +100,7 @@ pub mod quantise;
 mod read;
 pub mod reception;
 pub mod reconstruct;
+pub mod registers;
 pub mod scene;
 pub mod segment;
 pub mod sensor;

@@ -27,6 +27,7 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
+pub mod bus;
 pub mod describe;
 pub mod device;
 pub mod engine;

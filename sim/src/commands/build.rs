@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
+use dermis_hdl::bus::{generate_core, Bus, CoreShape, WIDTHS};
 use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
@@ -20,6 +21,7 @@ use crate::report;
 #[command(after_help = "Examples:
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
+  dermis build sensor-1 --bus axi --stream-bits 64   a core for a SoC: registers on AXI4-Lite, streams of whole words
   dermis build sensor-1 --board                      engine, link and packets, ready for place and route
   dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices
   dermis build eight-by-eight --target-board ./my-board.toml      a board of your own")]
@@ -33,10 +35,38 @@ pub struct Arguments {
     #[arg(long)]
     explain: bool,
     /// Generate the board top (engine, link and packets) instead of the engine alone.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "bus")]
     board: bool,
+    /// Generate the engine as a core for a SoC, with its registers on this bus and streams of whole words.
+    #[arg(long, value_enum)]
+    bus: Option<BusChoice>,
+    /// Width of the core's output stream.
+    #[arg(long, value_name = "BITS", default_value_t = 32, requires = "bus", value_parser = stream_bits)]
+    stream_bits: usize,
     #[command(flatten)]
     target: BoardOverride,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum BusChoice {
+    /// AXI4-Lite.
+    Axi,
+    /// Wishbone B4, classic, with addresses of words.
+    Wishbone,
+}
+
+/// A width of the output stream that there is.
+fn stream_bits(text: &str) -> Result<usize, String> {
+    let words = text.parse().ok().filter(|bits| WIDTHS.iter().any(|words| 32 * words == *bits));
+    words.ok_or_else(|| format!("there are {}", WIDTHS.map(|words| (32 * words).to_string()).join(", ")))
+}
+
+/// What is generated.
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Engine,
+    Board,
+    Core(CoreShape),
 }
 
 /// Runs the command: the list of the files and the resource tables.
@@ -44,21 +74,35 @@ pub struct Arguments {
 /// # Errors
 /// A scene that cannot be loaded or has no hardware, files that cannot be written.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
-    let Arguments { scene, out, explain, board, target } = arguments;
+    let Arguments { scene, out, explain, board, bus, stream_bits, target } = arguments;
     let scene = target.apply(Scene::load(scene)?);
-    let folder = if *board { "board" } else { "rtl" };
+    let (what, folder) = match bus {
+        None if *board => (What::Board, "board"),
+        None => (What::Engine, "rtl"),
+        Some(bus) => {
+            let bus = match bus {
+                BusChoice::Axi => Bus::AxiLite,
+                BusChoice::Wishbone => Bus::Wishbone,
+            };
+            (What::Core(CoreShape { bus, words: stream_bits / 32 }), "core")
+        }
+    };
     let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
-    build(&scene, &out, *board, *explain)
+    build(&scene, &out, what, *explain)
 }
 
 /// Writes the generated files, each completely or not at all; returns their list and the resource tables.
-fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
+fn build(scene: &Scene, out: &Path, what: What, with_features: bool) -> Result<String> {
     // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
     note_estimator(scene);
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
-    let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
-    if !board {
+    let mut generated = match what {
+        What::Engine => generate(&model)?,
+        What::Board => generate_board(&model)?,
+        What::Core(shape) => generate_core(&model, shape)?,
+    };
+    if let What::Engine = what {
         generated.add_integration(&model);
     }
     let explained = explain(&model)?;
@@ -73,7 +117,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     }
     text.push_str(&report::resources(&model, &generated.usage));
     text.push_str(&report::cases(&model, &generated.dropped));
-    if board {
+    if let What::Board = what {
         text.push_str(&report::wire_times(&model));
     }
     if with_features {

@@ -1,0 +1,46 @@
+//! The engine on a bus, as a core of a SoC: registers behind AXI4-Lite or Wishbone, streams of whole words.
+//!
+//! ```text
+//!  s_axis, 32 bits -> stream_in -> engine -> stream_out -> m_axis, 32, 64 or 128 bits
+//!                         |  labels: a queue  ^   |
+//!                         '-------------------'   |
+//!  s_axil or wb <-> axi_lite or wishbone <-> registers <- events of both
+//! ```
+//! The map of the registers is [`dermis_golden::registers`]. `labels` has the identifier of each frame that is under way.
+
+mod axi_lite;
+mod core;
+mod generate;
+mod registers;
+mod stream_in;
+mod stream_out;
+mod wishbone;
+
+pub use axi_lite::AxiLite;
+pub use core::{AxiCore, SerialAxiCore, SerialWishboneCore, WishboneCore};
+pub use generate::{generate_core, generate_core_changed};
+pub use registers::{Registers, RESET_CYCLES};
+pub use stream_in::StreamIn;
+pub use stream_out::{StreamOut, WIDTHS};
+pub use wishbone::Wishbone;
+
+/// Bits of a frame's identifier, `tid`.
+pub const ID_BITS: usize = 4;
+
+/// The bus of the registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bus {
+    /// AXI4-Lite.
+    AxiLite,
+    /// Wishbone B4, classic.
+    Wishbone,
+}
+
+/// What a core has around its engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CoreShape {
+    /// The bus of the registers.
+    pub bus: Bus,
+    /// Words of 32 bits in a beat of the output, one of [`WIDTHS`].
+    pub words: usize,
+}

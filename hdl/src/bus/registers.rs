@@ -1,0 +1,257 @@
+//! The registers of the map, and what they control.
+
+use dermis_golden::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS};
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
+
+/// Cycles for which register `control` resets engine and streams.
+pub const RESET_CYCLES: u64 = 16;
+/// Bytes of a register.
+const BYTES: usize = REGISTER_BITS / 8;
+
+/// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
+#[derive(LogicBlock)]
+pub struct Registers {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// An access in this cycle.
+    pub select: Signal<In, Bit>,
+    /// The access is a write; valid with `select`.
+    pub write: Signal<In, Bit>,
+    /// Address in bytes; valid with `select`.
+    pub address: Wire<In>,
+    /// Data of a write; valid with `select` and `write`.
+    pub data: Wire<In>,
+    /// Bytes of a write that count; valid with `select` and `write`.
+    pub strobe: Wire<In>,
+    /// The last taxel of a frame is received in this cycle.
+    pub complete: Signal<In, Bit>,
+    /// The last beat of a frame is sent in this cycle.
+    pub sent: Signal<In, Bit>,
+    /// A code is clipped in this cycle.
+    pub clipped: Signal<In, Bit>,
+    /// An incomplete beat is received in this cycle.
+    pub partial: Signal<In, Bit>,
+    /// A wrong `tlast` is received in this cycle.
+    pub misframed: Signal<In, Bit>,
+    /// Content of the register; valid in the cycle after `select`.
+    pub content: Wire<Out>,
+    /// The access is an error; valid in the cycle after `select`.
+    pub refused: Signal<Out, Bit>,
+    /// Engine and streams are to be reset.
+    pub restart: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Registers,
+    clock clk,
+    inputs [rst, select, write, address, data, strobe, complete, sent, clipped, partial, misframed],
+    outputs [content, refused, restart]
+);
+
+impl Registers {
+    /// With the content of the constant registers, by name.
+    pub fn new(constants: &[(&'static str, u32)]) -> Self {
+        let block = Registers {
+            clk: Default::default(),
+            rst: Default::default(),
+            select: Default::default(),
+            write: Default::default(),
+            address: Wire::new(ADDRESS_BITS),
+            data: Wire::new(REGISTER_BITS),
+            strobe: Wire::new(BYTES),
+            complete: Default::default(),
+            sent: Default::default(),
+            clipped: Default::default(),
+            partial: Default::default(),
+            misframed: Default::default(),
+            content: Wire::new(REGISTER_BITS),
+            refused: Default::default(),
+            restart: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(constants))
+    }
+}
+
+fn kernel(constants: &[(&'static str, u32)]) -> Kernel {
+    let k = Builder::new("registers");
+    let (rst, select, write) = (k.input("rst", 1), k.input("select", 1), k.input("write", 1));
+    let address = k.input("address", ADDRESS_BITS);
+    let (data, strobe) = (k.input("data", REGISTER_BITS), k.input("strobe", BYTES));
+    let [complete, sent, clipped, partial, misframed] =
+        ["complete", "sent", "clipped", "partial", "misframed"].map(|name| k.input(name, 1));
+    let number = Type::unsigned(REGISTER_BITS);
+    let content = k.register("content", number);
+    let refused = k.register("refused", Type::unsigned(1));
+
+    let is = |register: &Register| address.is(register.address as u64);
+    let any = |which: &dyn Fn(&Register) -> bool| {
+        REGISTERS.iter().filter(|own| which(own)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+    };
+    let known = k.wire("known", any(&|_| true));
+    let writable = k.wire("writable", any(&|own| own.access.is_written()));
+    let wrong = k.wire("wrong", select & !write.mux(writable, known));
+    // All fields that a write reaches are in the low byte.
+    let written = k.wire("written", select & write & strobe.at(0));
+    let bits = |name: &str| {
+        let own = REGISTERS.iter().find(|own| own.name == name);
+        let reaches = own.map_or(k.constant(1, 0), |own| written & is(own));
+        move |field: registers::Field| reaches & data.at(field.low)
+    };
+    let control = bits("control");
+    let clear = k.wire("clear", control(registers::CLEAR));
+    let left = k.state("left", Type::unsigned(5), rst, 0).comment("Cycles of reset left.");
+    left.set(left.any().mux(left.minus(1), *left));
+    k.when(control(registers::RESET), || left.set(k.constant(5, RESET_CYCLES)));
+    k.wire("restart", left.any());
+
+    let cleared = bits("errors");
+    let events = [
+        (registers::CLIPPED, clipped),
+        (registers::PARTIAL, partial),
+        (registers::FRAMING, misframed),
+        (registers::ACCESS, wrong),
+    ];
+    let errors: Vec<Expr> = events
+        .iter()
+        .rev()
+        .map(|&(field, event)| {
+            let own = k.state(&format!("error_{}", field.name), Type::unsigned(1), rst, 0);
+            own.set(event | (*own & !cleared(field)));
+            *own
+        })
+        .collect();
+    let counts = [
+        ("frames_in", complete),
+        ("frames_out", sent),
+        ("codes_clipped", clipped),
+        ("beats_partial", partial),
+        ("frames_misframed", misframed),
+        ("accesses_refused", wrong),
+        ("cycles", k.constant(1, 1)),
+    ];
+    let counters: Vec<(&str, Expr)> = counts
+        .iter()
+        .map(|&(name, event)| {
+            let own = k.state(name, number, rst, 0);
+            own.set(clear.mux(k.constant(REGISTER_BITS, 0), (*own + event).low(REGISTER_BITS)));
+            (name, *own)
+        })
+        .collect();
+
+    let value = |register: &Register| match register.access {
+        Access::Constant => {
+            let own = constants.iter().find(|(name, _)| *name == register.name);
+            own.map(|(_, content)| k.constant(REGISTER_BITS, u64::from(*content)))
+        }
+        Access::ReadOnly => counters.iter().find(|(name, _)| *name == register.name).map(|(_, own)| *own),
+        Access::ClearedByOne => Some(concat(&errors).extend(REGISTER_BITS)),
+        Access::Pulse => None,
+    };
+    let arms: Vec<(u64, Expr)> = REGISTERS.iter().filter_map(|own| Some((own.address as u64, value(own)?))).collect();
+    k.when(select, || {
+        content.set(address.case(&arms, k.constant(REGISTER_BITS, 0)));
+        refused.set(wrong);
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const CONSTANTS: [(&str, u32); 7] = [
+        ("id", 1),
+        ("map_version", 0xffff_ffff),
+        ("scene", 0x1234_5678),
+        ("array", 4),
+        ("clock_Hz", 5),
+        ("force_triples", 6),
+        ("status_triples", 7),
+    ];
+
+    /// The map as a driver sees it.
+    #[derive(Default)]
+    struct Map {
+        errors: u32,
+        counters: [u32; 7],
+        left: u64,
+        answer: Option<(u32, bool)>,
+        reset: bool,
+    }
+
+    impl Reference for Map {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![
+                self.answer.map(|(content, _)| Word::from(u64::from(content))),
+                self.answer.map(|(_, refused)| Word::from(refused)),
+                self.reset.then(|| Word::from(self.left > 0)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, select, write, address, data, strobe] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number());
+            let events: Vec<bool> = (6..11).map(|k| inputs[k].number() == 1).collect();
+            let index = address as usize / 4;
+            let known = address % 4 == 0 && index < 16;
+            let refused = select == 1 && if write == 1 { !(known && [7, 8].contains(&index)) } else { !known };
+            if select == 1 {
+                let content = match index {
+                    _ if !known => 0,
+                    0..=6 => CONSTANTS[index].1,
+                    7 => 0,
+                    8 => self.errors,
+                    _ => self.counters[index - 9],
+                };
+                self.answer = self.reset.then_some((content, refused));
+            }
+            let written = select == 1 && write == 1 && strobe & 1 == 1 && known;
+            let (commands, cleared) = match index {
+                7 if written => (data & 3, 0),
+                8 if written => (0, data as u32 & 15),
+                _ => (0, 0),
+            };
+            let [complete, sent, clipped, partial, misframed] = [0, 1, 2, 3, 4].map(|k| events[k]);
+            let now = [clipped, partial, misframed, refused];
+            let set: u32 = now.iter().enumerate().map(|(bit, event)| u32::from(*event) << bit).sum();
+            self.errors = self.errors & !cleared | set;
+            let counted = [complete, sent, clipped, partial, misframed, refused, true];
+            for (counter, event) in self.counters.iter_mut().zip(counted) {
+                *counter = if commands & 2 == 2 { 0 } else { counter.wrapping_add(u32::from(event)) };
+            }
+            self.left = if commands & 1 == 1 { RESET_CYCLES } else { self.left.saturating_sub(1) };
+            if rst == 1 {
+                *self = Map { reset: true, answer: self.answer, ..Map::default() };
+            }
+        }
+    }
+
+    #[test]
+    fn every_register_answers_as_the_map_says() {
+        let mut random = fastrand::Rng::with_seed(8);
+        let stimulus = (0..30_000).map(|cycle| {
+            let address = if random.u8(..6) == 0 { random.u64(..256) } else { 4 * random.u64(..17) };
+            let mut inputs = vec![
+                Word::from(cycle < 2 || random.u16(..900) == 0),
+                Word::from(random.bool()),
+                Word::from(random.bool()),
+                Word::from(address),
+                Word::from(u64::from(random.u32(..))),
+                Word::from(random.u64(..16)),
+            ];
+            inputs.extend((0..5).map(|_| Word::from(random.u8(..4) == 0)));
+            inputs
+        });
+        let stimulus: Vec<_> = stimulus.collect();
+        check(Registers::new(&CONSTANTS).kernel.kernel(), &stimulus, &mut Map::default());
+    }
+}
