@@ -17,7 +17,7 @@ VENV       = $(BUILD)/python
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick python c docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick python buses c docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -38,7 +38,7 @@ program: setup
 run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit quick python docs ## run all checks, as .ci/run does
+test: setup fmt clippy unit quick python buses docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
@@ -68,6 +68,13 @@ python: setup ## build the Python package, install it into a new environment, bu
 	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
+
+buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus
+	@echo '== buses'
+	$(CARGO) build --quiet --bin dermis
+	python3 -m venv --clear $(BUILD)/cocotb-tools
+	$(BUILD)/cocotb-tools/bin/pip install -q --disable-pip-version-check -r tests/cocotb/requirements.txt
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/cocotb $(BUILD)/cocotb-tools/bin/python -m pytest -q tests/cocotb
 
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
 	$(CARGO) build --release --package dermis-c

@@ -95,6 +95,8 @@ enum Command {
     Boards(super::boards::Arguments),
     /// Print the ports of a block, its Verilog, or draw its timing.
     Block(super::block::Arguments),
+    /// Print the register map of a core, as `dermis build --bus` generates one.
+    Registers(super::registers::Arguments),
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     Cosim(super::cosim::Arguments),
     /// Measure errors and times of all engines and write an HTML page with tables and pictures.
@@ -203,6 +205,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Generate(arguments) => Ok((super::generate::run(arguments)?, true)),
         Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
+        Command::Registers(arguments) => Ok((super::registers::run(arguments)?, true)),
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),
         Command::Stress(arguments) => super::stress::run(arguments, build_dir),

@@ -23,6 +23,7 @@
 //! | [`mod@power`] | `dermis power`: the engine's power, estimated |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
+//! | [`mod@registers`] | `dermis registers`: the register map of a core |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
@@ -52,6 +53,7 @@ pub mod noise;
 pub mod power;
 pub mod reconstruct;
 mod reconstruct_stream;
+pub mod registers;
 pub mod replay;
 pub mod report;
 pub mod stability;

@@ -20,6 +20,9 @@
 //! | `packer.v`: header, words, CRC between two ENDs; an offered byte stays | the link's packer |
 //! | `roundtrip.v`: decoding restores the encoded bytes, with or without IDLE bytes in between | the link's encoder and decoder |
 //! | `label_beats.v`: labels leave between forces and statuses, those of every taxel in its place | `label_beats` |
+//! | `axi_lite.v`: every access is answered once, an answer stays, reads and writes take turns | a core's `axi_lite` |
+//! | `stream_in.v`: every code leaves once, clipped; frames are counted, labels are theirs | a core's `stream_in` |
+//! | `stream_out.v`: words leave in order without gaps, an offered beat stays | a core's `stream_out` |
 //! | `sums.v`: forces are accepted, four words sent, the status passed on | the link's resultants |
 //!
 //! Not proved, but verified by co-simulation: the UART's shift registers, the SPI slave's two clocks, the link's
@@ -36,6 +39,7 @@ use dermis_golden::symmetry::quads::Quads;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::FORCE_STEPS;
 
+mod buses;
 mod prover;
 mod queues;
 

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
+use dermis_hdl::bus::{generate_core_changed, CoreShape};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::generate_board_changed;
 use dermis_hdl::{generate_changed, Generated};
@@ -16,6 +17,8 @@ pub enum Hardware<'a> {
     Engine(&'a Model),
     /// The same behind its board's link.
     Board(&'a Model),
+    /// The same as a core on a bus.
+    Core(&'a Model, CoreShape),
 }
 
 impl Hardware<'_> {
@@ -23,6 +26,7 @@ impl Hardware<'_> {
         let generated = match self {
             Hardware::Engine(model) => generate_changed(model, changes),
             Hardware::Board(model) => generate_board_changed(model, changes),
+            Hardware::Core(model, shape) => generate_core_changed(model, shape, changes),
         };
         generated.unwrap_or_else(|error| panic!("{error}"))
     }
