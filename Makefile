@@ -119,6 +119,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 
 nightly: fuzz ## run all variants of the tests, those too that `make test` leaves out
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
+	$(CARGO) test --release -p dermis-sim --test program -- --include-ignored bitstream::
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
 	mkdir -p $(BUILD)

@@ -8,14 +8,14 @@ use crate::language::KernelError;
 /// Why no hardware can be generated from a model.
 #[derive(Debug, Error)]
 pub enum HdlError {
-    /// The scene omits a feature that a board's top module always has.
-    #[error("{field} = {value}: a board without {what} is not available yet")]
+    /// There is no hardware of this kind for the scene.
+    #[error("{field} = {value}: {what} is not available yet")]
     Unsupported {
         /// Field of the scene.
         field: &'static str,
         /// Its value.
         value: String,
-        /// The feature that would be omitted.
+        /// The hardware that would be needed.
         what: &'static str,
     },
     /// The scene's link cannot be built.

@@ -15,7 +15,7 @@ use dermis_golden::partition::Case;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::describe::port_comments;
+use crate::describe::{comments, port_comments};
 use crate::device::Tap;
 use crate::error::HdlError;
 use crate::language::{self, Attributes, Change, Hierarchy};
@@ -24,7 +24,7 @@ use crate::primitives::MEMORY_FILE;
 use crate::simulate::{design, stages};
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
-use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Usage};
+use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Surrounding, Usage};
 use crate::waivers::waivers;
 
 /// The generated hardware of one scene.
@@ -125,11 +125,58 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     Ok(generated)
 }
 
+/// The instance of the engine in a module around it.
+const ENGINE: &str = "engine";
+
+/// A module around the engine: a board's top, or a core for a SoC.
+pub(crate) struct Around<'a> {
+    /// Its name.
+    pub top: String,
+    /// All its modules.
+    pub hierarchy: Hierarchy,
+    /// Rust sources with the comments of its ports.
+    pub sources: &'a [&'a str],
+    /// Comment at the head of the file.
+    pub header: String,
+    /// Row of its own blocks in the table of resources.
+    pub row: &'static str,
+}
+
+impl Around<'_> {
+    /// The files of `engine` with this module's Verilog in the place of the engine's, without taps; not sealed.
+    ///
+    /// # Errors
+    /// [`HdlError::Check`] if a planned memory is missing.
+    pub(crate) fn generated(self, model: &Model, engine: Generated) -> Result<Generated, HdlError> {
+        let Around { top, hierarchy, sources, header, row } = self;
+        let memories = placed(&hierarchy, model)?;
+        let of_engine = port_comments(model.board.engine);
+        let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
+            ("", _) => sources.iter().find_map(|source| comments(source).remove(port)),
+            (ENGINE, _) => of_engine("", port),
+            (_, own) => of_engine(own?, port),
+        };
+        let text = header + &hierarchy.verilog(&top, &attributes(&memories), &comment);
+        let (engine_file, waivers) = (format!("{}.v", engine.top), format!("{}.vlt", engine.top));
+        let files = engine.files.iter().cloned().map(|file| match file {
+            file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
+            file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
+            file => file,
+        });
+        let files = files.collect();
+        let usage = by_stage(model, &hierarchy, &memories, Some(Surrounding { engine: ENGINE, row }));
+        let mut manifest = engine.manifest.clone();
+        manifest["top"] = json!(top);
+        manifest["resources"] = resources(&usage, &memories);
+        Ok(Generated { files, top, memories, taps: Vec::new(), manifest, usage, ..engine })
+    }
+}
+
 /// Finds every memory that the model plans in the hardware, by its label.
 ///
 /// # Errors
 /// [`HdlError::Check`] if one is missing, or not of its size.
-pub(crate) fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, HdlError> {
+fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, HdlError> {
     let all: Vec<(&str, &language::Memory)> =
         hierarchy.kernels().flat_map(|(block, kernel)| kernel.memories().iter().map(move |own| (block, own))).collect();
     let place = |planned: &Memory| {
@@ -145,7 +192,7 @@ pub(crate) fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedM
 }
 
 /// The `ram_style` attribute of every memory.
-pub(crate) fn attributes(memories: &[PlacedMemory]) -> Attributes {
+fn attributes(memories: &[PlacedMemory]) -> Attributes {
     let attribute = |memory: &PlacedMemory| {
         let style = match (memory.planned.large_rams, memory.planned.block_rams) {
             (0, 0) => "distributed",
@@ -213,7 +260,7 @@ fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
 }
 
 /// The manifest's resources.
-pub(crate) fn resources(usage: &StageUsage, memories: &[PlacedMemory]) -> serde_json::Value {
+fn resources(usage: &StageUsage, memories: &[PlacedMemory]) -> serde_json::Value {
     json!({
         "total": total(usage),
         "stages": usage.iter().copied().collect::<BTreeMap<_, _>>(),

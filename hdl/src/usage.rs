@@ -68,8 +68,8 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
-/// Usage by stage in the order of the data flow; then that of the engine's blocks outside any stage, as `engine`, and of a
-/// board that of the blocks around the engine, as `link`.
+/// Usage by stage in the order of the data flow; then that of the engine's blocks outside any stage, as `engine`, and that of
+/// the blocks around the engine, as `link` of a board and as `bus` of a core.
 pub type StageUsage = Vec<(&'static str, Usage)>;
 
 /// The stage of the block with instance path `block`; `engine` if it belongs to none.
@@ -78,24 +78,27 @@ pub(crate) fn stage(stages: &[Stage], block: &str) -> &'static str {
     stages.iter().find(|stage| Some(stage.name) == instance).map_or(CONTROL, |stage| stage.name)
 }
 
-/// The row of the blocks around the engine.
-const LINK: &str = "link";
+/// A module around an engine: the instance of the engine in it, and the row of all other blocks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surrounding {
+    pub engine: &'static str,
+    pub row: &'static str,
+}
 
-/// Usage of each stage of the engine of `model`, and in the hierarchy of a board, where the engine is the instance
-/// `engine`, of the link.
+/// Usage of each stage of the engine of `model`, and, where there is a module around it, of that.
 pub(crate) fn by_stage(
     model: &Model,
     hierarchy: &Hierarchy,
     memories: &[PlacedMemory],
-    engine: Option<&str>,
+    around: Option<Surrounding>,
 ) -> StageUsage {
     let list = simulate::stages(model.board.engine);
-    let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(engine.map(|_| LINK));
+    let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(around.map(|around| around.row));
     let mut all: StageUsage = names.map(|name| (name, Usage::default())).collect();
-    let row_of = |block: &str| match engine.map(|engine| block.strip_prefix(engine)) {
+    let row_of = |block: &str| match around.map(|around| (block.strip_prefix(around.engine), around.row)) {
         None => stage(list, block),
-        Some(Some(inside)) => stage(list, inside.strip_prefix(SEPARATOR).unwrap_or_default()),
-        Some(None) => LINK,
+        Some((Some(inside), _)) => stage(list, inside.strip_prefix(SEPARATOR).unwrap_or_default()),
+        Some((None, row)) => row,
     };
     let mut add = |row: &str, usage: Usage| {
         all.iter_mut().filter(|(name, _)| *name == row).for_each(|(_, sum)| *sum += usage);

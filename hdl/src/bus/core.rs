@@ -225,7 +225,11 @@ cores!(SerialAxiCore, SerialWishboneCore, serial::Engine);
 pub(super) fn hierarchy(model: &Model, shape: CoreShape) -> Result<Hierarchy, HdlError> {
     if model.scene.input.average > 0 {
         let value = model.scene.input.average.to_string();
-        return Err(HdlError::Unsupported { field: "input.average", value, what: "one result per frame" });
+        return Err(HdlError::Unsupported {
+            field: "input.average",
+            value,
+            what: "a core with several frames per result",
+        });
     }
     let words = shape.words;
     match (model.board.engine, shape.bus) {

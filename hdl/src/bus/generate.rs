@@ -8,15 +8,10 @@ use serde_json::json;
 
 use super::core::hierarchy;
 use super::{Bus, CoreShape};
-use crate::describe::{comments, port_comments};
 use crate::error::HdlError;
-use crate::generate::{attributes, placed, resources, top_name, Generated};
+use crate::generate::{top_name, Around, Generated};
 use crate::language::Change;
 use crate::manifest::GeneratedFile;
-use crate::usage::by_stage;
-
-/// The instance of the engine in a core.
-const ENGINE: &str = "engine";
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
 /// place of the engine's, without taps; `dermis_registers.h`, `registers.json` and `registers.rdl` beside them.
@@ -39,16 +34,8 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
         Bus::Wishbone => ("wishbone", include_str!("wishbone.rs")),
     };
     let top = format!("{}_{suffix}", top_name(&model.scene.name));
-    let memories = placed(&hierarchy, model)?;
-    let of_engine = port_comments(model.board.engine);
-    let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
-        ("", _) => comments(bus_source).remove(port).or_else(|| comments(include_str!("core.rs")).remove(port)),
-        (ENGINE, _) => of_engine("", port),
-        (_, own) => of_engine(own?, port),
-    };
-    let verilog = hierarchy.verilog(&top, &attributes(&memories), &comment);
     let (scene, bytes) = (&model.scene, 4 * shape.words);
-    let text = format!(
+    let header = format!(
         "\
 // {top}: {engine_top} as a core, {sensor}.
 //
@@ -59,7 +46,7 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
 //   m_axis           {{fx, fy, fz}} of 32 bits signed each without gaps, {forces} triples, then {others} of labels and status
 //   {pins:<16} registers: dermis_registers.h
 //
-{verilog}",
+",
         engine_top = engine.top,
         sensor = scene.sensor,
         name = scene.name,
@@ -72,24 +59,15 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
             Bus::Wishbone => "wb",
         },
     );
-    let (engine_file, waivers) = (format!("{}.v", engine.top), format!("{}.vlt", engine.top));
-    let files = engine.files.iter().cloned().map(|file| match file {
-        file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
-        file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
-        file => file,
-    });
     let contents: BTreeMap<&str, u32> = constants(model, bytes).into_iter().collect();
     let map = json!({ "registers": REGISTERS, "constants": contents });
     let own =
         [("dermis_registers.h", c_header()), ("registers.json", format!("{map:#}\n")), ("registers.rdl", system_rdl())];
     let own = own.map(|(name, text)| GeneratedFile { name: name.into(), text });
-    let mut manifest = engine.manifest.clone();
-    manifest["top"] = json!(top);
-    manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
-    let usage = by_stage(model, &hierarchy, &memories, Some(ENGINE));
-    manifest["resources"] = resources(&usage, &memories);
-    let files = files.chain(own).collect();
-    let mut core = Generated { files, top, memories, taps: Vec::new(), manifest, usage, ..engine };
+    let around = Around { top, hierarchy, sources: &[bus_source, include_str!("core.rs")], header, row: "bus" };
+    let mut core = around.generated(model, engine)?;
+    core.files.extend(own);
+    core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
     core.seal();
     Ok(core)
 }

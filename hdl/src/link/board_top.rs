@@ -164,7 +164,7 @@ pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
         return Err(HdlError::Unsupported {
             field: "search.mu_max",
             value: model.scene.search.mu_max.to_string(),
-            what: "a μ search",
+            what: "a board without a μ search",
         });
     }
     match (model.board.engine, model.scene.hardware.link) {

@@ -2,18 +2,11 @@
 
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{slip::IDLE, LinkKind};
-use serde_json::json;
 
 use super::board_top::board_top;
-use crate::describe::{comments, port_comments};
 use crate::error::HdlError;
-use crate::generate::{attributes, placed, resources, top_name, Generated};
+use crate::generate::{top_name, Around, Generated};
 use crate::language::{Change, Hierarchy};
-use crate::manifest::GeneratedFile;
-use crate::usage::by_stage;
-
-/// The instance of the engine in a board's top.
-const ENGINE: &str = "engine";
 
 /// The link in the header comment of the top module: its name, and its pins.
 fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
@@ -57,17 +50,9 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
     let hierarchy = Hierarchy::of(&*board).changed(changes)?;
-    let memories = placed(&hierarchy, model)?;
-    let of_engine = port_comments(model.board.engine);
-    let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
-        ("", _) => comments(include_str!("board_top.rs")).remove(port),
-        (ENGINE, _) => of_engine("", port),
-        (_, own) => of_engine(own?, port),
-    };
-    let verilog = hierarchy.verilog(&top, &attributes(&memories), &comment);
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
-    let text = format!(
+    let header = format!(
         "\
 // {top}: {engine_top} behind {behind}, {sensor}.
 //
@@ -78,24 +63,14 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
 {pins}
 //   alive, busy, error  status LEDs, high when lit
 //
-{verilog}",
+",
         engine_top = engine.top,
         sensor = model.scene.sensor,
         name = model.scene.name,
         clock = model.board.clock_MHz,
     );
-    let engine_file = format!("{}.v", engine.top);
-    let waivers = format!("{}.vlt", engine.top);
-    let files = engine.files.iter().cloned().map(|file| match file {
-        file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
-        file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
-        file => file,
-    });
-    let mut manifest = engine.manifest.clone();
-    manifest["top"] = json!(top);
-    let usage = by_stage(model, &hierarchy, &memories, Some(ENGINE));
-    manifest["resources"] = resources(&usage, &memories);
-    let mut board = Generated { files: files.collect(), top, memories, taps: Vec::new(), manifest, usage, ..engine };
+    let around = Around { top, hierarchy, sources: &[include_str!("board_top.rs")], header, row: "link" };
+    let mut board = around.generated(model, engine)?;
     board.seal();
     Ok(board)
 }

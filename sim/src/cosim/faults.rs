@@ -83,9 +83,11 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         pool = synthetic_samples(&hardware.model, &mut random);
     }
     pool.retain(Sample::has_force);
-    let mut device = hardware.device_with_open_state(Optimisation::On)?;
     let elements = &hardware.generated.state;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
+    // Two frames and one after the reset.
+    let optimisation = Optimisation::of_cycles(3 * longest * count as u64);
+    let mut device = hardware.device_with_open_state(optimisation)?;
     let mut rows: BTreeMap<(StorageClass, &str), Row> = BTreeMap::new();
     let mut found = Vec::new();
     for element in elements {

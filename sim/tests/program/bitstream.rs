@@ -77,6 +77,7 @@ fn a_small_scene_behind_a_uart() {
 }
 
 #[test]
+#[ignore = "half a minute more: make nightly"]
 fn a_small_scene_behind_an_spi() {
     makes_a_bitstream_without_regression("tiny-spi");
 }

@@ -6,13 +6,14 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::Instant;
 
 use rayon::prelude::*;
 
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 50] = [
+const NOT_RUN: [(&str, &str); 51] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -31,6 +32,7 @@ const NOT_RUN: [(&str, &str); 50] = [
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
+    ("dermis stability", "half a minute; the same with a picture is run"),
     ("dermis power sensor-1", "the same for eight-by-eight is run"),
     ("dermis power sensor-1 --frame a.json --frame b.csv", "no such files"),
     ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
@@ -165,7 +167,9 @@ fn every_example_works() {
     let run: Vec<&String> = all.difference(&not_run).collect();
     assert!(run.len() >= 15, "{run:?}");
     let failure = |line: &&String| {
+        let begun = Instant::now();
         let output = in_shell(work.path(), line);
+        println!("{:5.1} s  {line}", begun.elapsed().as_secs_f64());
         (!output.status.success()).then(|| format!("{line}\n{}\n", String::from_utf8_lossy(&output.stderr)))
     };
     // Several build into the same folder: those run one after the other, beside all others.

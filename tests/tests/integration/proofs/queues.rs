@@ -8,7 +8,7 @@ use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
 use dermis_golden::symmetry::quads::Quads;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::QUEUE_PLACES;
-use dermis_tests::with_network;
+use dermis_tests::{variants, with_network};
 
 use super::prover::{number, Hardware, Proof};
 use super::{model, text, with_inverse, COLS, ROWS};
@@ -51,8 +51,8 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
 
 #[test]
 fn rows_that_wait_for_their_shift_come_out_in_order() {
-    // Without and with low limbs.
-    for (inverse_bits, limbs) in [(8, 1), (20, 2)] {
+    // With and without low limbs.
+    for &(inverse_bits, limbs) in variants(&[(20, 2), (8, 1)], 1) {
         let model = with_inverse(inverse_bits, "");
         let given = [widths(&model), vec![("LIMBS", number(limbs))]].concat();
         let mut defects = vec![
@@ -76,7 +76,7 @@ fn rows_that_wait_for_their_shift_come_out_in_order() {
 #[test]
 fn forces_that_wait_leave_in_order() {
     let model = model("");
-    for bit in [0, 95] {
+    for &bit in variants(&[0, 95], 1) {
         let queue = "forces__leaving";
         let defects = vec![
             // One place too many is promised; an offered word changes; words leave in the wrong order.
