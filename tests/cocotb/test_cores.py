@@ -1,5 +1,6 @@
 """Generates a core for each bus and width of the output stream, and runs core.py on it under Icarus."""
 
+import json
 import os
 import subprocess
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import pytest
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
+from systemrdl import RDLCompiler
+from systemrdl.node import FieldNode
 
 HERE = Path(__file__).resolve().parent
 DERMIS = os.environ.get("DERMIS", "dermis")
@@ -80,3 +83,21 @@ def test_a_defect_is_found(vectors, name, right, wrong):
 
     tests, failed = simulate(BUILD / f"defect-{name}", "axi", 64, vectors, change)
     assert tests == 8 and failed > 0
+
+
+def test_the_map_in_systemrdl_is_that_in_json():
+    folder = BUILD / "map"
+    generate(folder, "--bus", "axi")
+    compiler = RDLCompiler()
+    compiler.compile_file(folder / "registers.rdl")
+    top = compiler.elaborate().top
+    read = {
+        register.inst_name: (
+            register.absolute_address,
+            {own.inst_name: (own.lsb, own.width) for own in register.children() if isinstance(own, FieldNode)},
+        )
+        for register in top.registers()
+    }
+    registers = json.loads((folder / "registers.json").read_text(encoding="utf-8"))["registers"]
+    fields = lambda own: {field["name"]: (field["low"], field["bits"]) for field in own["fields"]} or {"value": (0, 32)}
+    assert read == {own["name"]: (own["address"], fields(own)) for own in registers}
