@@ -129,11 +129,18 @@ fn moved<'k>(from: Expr<'k>, go: Expr<'k>) -> Expr<'k> {
     (from + go.signed().resize(from.bits())).resize(from.bits())
 }
 
-/// (c + u)² − c² for the move `go` of −1, 0 or 1 from `from`, modulo the width of a square.
-fn grows<'k>(k: &'k Builder, from: Expr<'k>, go: Expr<'k>) -> Expr<'k> {
+/// 1 − 2 c: (c + u)² − c² for the move u = −1 from c, modulo the width of a square.
+fn grows_down<'k>(k: &'k Builder, from: Expr<'k>) -> Expr<'k> {
     let bits = square_bits();
-    let (one, twice) = (k.constant(bits, 1), from.shift_left(1).resize(bits).unsigned());
-    go.at(1).mux((one - twice).low(bits), go.at(0).mux((one + twice).low(bits), k.constant(bits, 0)))
+    (k.constant(bits, 1) - from.shift_left(1).resize(bits).unsigned()).low(bits)
+}
+
+/// (c + u)² − c² for the move `go` of −1, 0 or 1 from `from`, modulo the width of a square; `down` is that for −1.
+fn grows<'k>(k: &'k Builder, from: Expr<'k>, go: Expr<'k>, down: Expr<'k>) -> Expr<'k> {
+    let bits = square_bits();
+    // 1 + 2 c: the lowest bit of 2 c is 0.
+    let up = from.resize(bits - 1).unsigned().concat(k.constant(1, 1));
+    go.at(1).mux(down, go.at(0).mux(up, k.constant(bits, 0)))
 }
 
 /// A number times 2^`by` with its own width.
@@ -184,14 +191,15 @@ fn kernel(quads: usize) -> Kernel {
         let table: Vec<u64> = (0..1 << COUNT_BITS).map(|n| moves.get(n).map_or(0, |by| by[axis] as u64 & 3)).collect();
         let to_best = (best[axis].low(2) - from.centre[axis].low(2)).low(2);
         let go = k.delay(&format!("go_{name}"), is_coarse.mux(count.table(2, &table), to_best));
-        (go, k.delay(&format!("base_{name}"), from.centre[axis]))
+        let down = k.delay(&format!("down_{name}"), grows_down(&k, from.centre[axis]));
+        (go, k.delay(&format!("base_{name}"), from.centre[axis]), down)
     };
-    let [(go_x, base_x), (go_y, base_y)] = [axis(0, "x"), axis(1, "y")];
+    let [(go_x, base_x, down_x), (go_y, base_y, down_y)] = [axis(0, "x"), axis(1, "y")];
     let base_square = k.delay("base_square", from.square);
     let base_buffer = k.delay("base_buffer", from.buffer);
     let bases: Vec<u64> = (0..1 << BUFFER_BITS).map(|b| base(b, quads) as u64).collect();
     k.delay("next_base", from.buffer.table(base_bits(quads), &bases));
-    let to_square = base_square + grows(&k, base_x, go_x) + grows(&k, base_y, go_y);
+    let to_square = base_square + grows(&k, base_x, go_x, down_x) + grows(&k, base_y, go_y, down_y);
     let at_square = k.delay("at_square", to_square.low(q));
     let at_x = k.delay("at_x", moved(base_x, go_x));
     let at_y = k.delay("at_y", moved(base_y, go_y));
