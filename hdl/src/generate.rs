@@ -147,7 +147,7 @@ impl Around<'_> {
     ///
     /// # Errors
     /// [`HdlError::Check`] if a planned memory is missing.
-    pub(crate) fn generated(self, model: &Model, engine: Generated) -> Result<Generated, HdlError> {
+    pub(crate) fn generated(self, model: &Model, mut engine: Generated) -> Result<Generated, HdlError> {
         let Around { top, hierarchy, sources, header, row } = self;
         let memories = placed(&hierarchy, model)?;
         let of_engine = port_comments(model.board.engine);
@@ -158,17 +158,18 @@ impl Around<'_> {
         };
         let text = header + &hierarchy.verilog(&top, &attributes(&memories), &comment);
         let (engine_file, waivers) = (format!("{}.v", engine.top), format!("{}.vlt", engine.top));
-        let files = engine.files.iter().cloned().map(|file| match file {
-            file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
-            file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
-            file => file,
-        });
-        let files = files.collect();
+        for file in &mut engine.files {
+            if file.name == waivers {
+                file.name = format!("{top}.vlt");
+            } else if file.name == engine_file {
+                file.name = format!("{top}.v");
+                file.text.clone_from(&text);
+            }
+        }
         let usage = by_stage(model, &hierarchy, &memories, Some(Surrounding { engine: ENGINE, row }));
-        let mut manifest = engine.manifest.clone();
-        manifest["top"] = json!(top);
-        manifest["resources"] = resources(&usage, &memories);
-        Ok(Generated { files, top, memories, taps: Vec::new(), manifest, usage, ..engine })
+        engine.manifest["top"] = json!(top);
+        engine.manifest["resources"] = resources(&usage, &memories);
+        Ok(Generated { top, memories, taps: Vec::new(), usage, ..engine })
     }
 }
 

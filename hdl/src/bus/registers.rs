@@ -1,14 +1,13 @@
 //! The registers of the map, and what they control.
 
-use dermis_golden::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS};
+use dermis_golden::fixed::plan::resources::count_bits;
+use dermis_golden::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS, RESET_CYCLES};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
 use crate::wire::Wire;
 
-/// Cycles for which register `control` resets engine and streams.
-pub const RESET_CYCLES: u64 = 16;
 /// Bytes of a register.
 const BYTES: usize = REGISTER_BITS / 8;
 
@@ -107,9 +106,10 @@ fn kernel(constants: &[(&'static str, u32)]) -> Kernel {
     };
     let control = bits("control");
     let clear = k.wire("clear", control(registers::CLEAR));
-    let left = k.state("left", Type::unsigned(5), rst, 0).comment("Cycles of reset left.");
+    let left_bits = count_bits(RESET_CYCLES as usize + 1);
+    let left = k.state("left", Type::unsigned(left_bits), rst, 0).comment("Cycles of reset left.");
     left.set(left.any().mux(left.minus(1), *left));
-    k.when(control(registers::RESET), || left.set(k.constant(5, RESET_CYCLES)));
+    k.when(control(registers::RESET), || left.set(k.constant(left_bits, RESET_CYCLES)));
     k.wire("restart", left.any());
 
     let cleared = bits("errors");

@@ -98,14 +98,7 @@ fn kernel(words: &[(usize, u64)], registered: bool) -> Kernel {
     let counter = k.constant(2, (COUNTS / KINDS) as u64).concat(*which);
     entry.set(memory.read(counts.mux(counter, address)));
     // A block RAM's output is slow.
-    let count = match registered {
-        false => *entry,
-        true => {
-            let count = k.register("count", Type::unsigned(16));
-            count.set(*entry);
-            *count
-        }
-    };
+    let count = if registered { k.delay("count", *entry) } else { *entry };
     raised.set(count.plus(1));
     let writes = cycles(registered) - 2;
     memory.write(rst | counted.at(writes), counter, rst.mux(k.constant(16, 0), *raised));

@@ -23,8 +23,8 @@ use super::drive::{record, InputFrame, Stimulus};
 use super::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use crate::flow::netlist::netlist;
 
-/// Cycles without a transfer after which a reconstruction is aborted; far above any scene's latency.
-const WATCHDOG: u64 = 1_000_000;
+/// Cycles without a transfer after which a run is aborted; far above any scene's latency.
+pub(super) const WATCHDOG: u64 = 1_000_000;
 
 /// The simulated hardware stopped transferring beats: a defect of this program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -21,14 +21,12 @@ use serde::Serialize;
 
 use super::against_model::Vector;
 use super::drive::{record, InputFrame, Stimulus};
-use super::hardware::Hardware;
+use super::hardware::{Hardware, WATCHDOG};
 use super::toggles::ToggleCounter;
 use super::verilator::Optimisation;
 
 /// Frames simulated at least; fewer are repeated.
 const FEWEST: usize = 4;
-/// Cycles without a transfer after which a run is aborted.
-const WATCHDOG: u64 = 1_000_000;
 /// Rate that touch control needs, frames per second.
 const TOUCH_RATE: f64 = 1000.0;
 /// Share of the bits of a random word that change from one to the next.

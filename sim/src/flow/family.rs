@@ -54,7 +54,7 @@ pub fn flow(family: Family) -> Flow {
                 pins: "--lpf",
                 speed_grade: Some("--speed"),
                 configuration: "--textcfg",
-                // Three times the default: 121.9 MHz in the place of 115.4 for eight-by-eight on the ULX3S, seed 1.
+                // Three times the default: half of the longest paths and more is wire.
                 place_options: &["--placer-heap-timingweight", "30"],
                 pack_options: &["--compress"],
                 bitstream: "bit",

@@ -9,12 +9,11 @@ use dermis_sim::cosim::power::{count_toggles, energies, estimate_power, Toggles}
 use dermis_tests::build_dir;
 
 /// Few taxels and no search, so that the library with access to every signal is built quickly; the same as that of the faults.
-fn hardware(board: &str) -> Hardware {
-    let text = format!(
+fn hardware() -> Hardware {
+    let text =
         "name = \"faults\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-         [search]\nmu_max = 0.0\n[input]\nfull_scale_MPa = 0.1\n[hardware]\nboard = \"{board}\"\n"
-    );
-    Hardware::new(Model::new(&Scene::parse(&text, "faults").unwrap()).unwrap(), &build_dir()).unwrap()
+         [search]\nmu_max = 0.0\n[input]\nfull_scale_MPa = 0.1\n";
+    Hardware::new(Model::new(&Scene::parse(text, "faults").unwrap()).unwrap(), &build_dir()).unwrap()
 }
 
 fn frame(hardware: &Hardware, stress: impl Fn(usize) -> f64) -> Frame {
@@ -24,7 +23,7 @@ fn frame(hardware: &Hardware, stress: impl Fn(usize) -> f64) -> Frame {
 
 #[test]
 fn a_pressed_frame_changes_more_bits_than_an_empty_one() {
-    let hardware = hardware("ulx3s-85f");
+    let hardware = hardware();
     let toggles = |stress: fn(usize) -> f64| count_toggles(&hardware, &[frame(&hardware, stress)]).unwrap();
     let (empty, pressed) = (toggles(|_| 0.0), toggles(|taxel| [0.02, 0.05, 0.03][taxel % 3]));
     assert_eq!(empty.interval, pressed.interval);
@@ -41,7 +40,7 @@ fn a_pressed_frame_changes_more_bits_than_an_empty_one() {
 
 #[test]
 fn the_estimate_adds_up() {
-    let hardware = hardware("ulx3s-85f");
+    let hardware = hardware();
     let estimate = estimate_power(&hardware, &[frame(&hardware, |_| 0.04)]).unwrap();
     let power = hardware.model.board.power().unwrap().unwrap();
     let bits: usize = estimate.toggles.stages.iter().map(|own| own.register_bits).sum();
@@ -65,7 +64,7 @@ fn the_estimate_adds_up() {
 
 #[test]
 fn a_board_without_a_device_has_no_estimate() {
-    let mut board = hardware("ulx3s-85f").model.board.clone();
+    let mut board = hardware().model.board.clone();
     board.device = None;
     let told = energies(&board).unwrap_err().to_string();
     assert_eq!(

@@ -15,7 +15,9 @@ use dermis_hdl::usage::{total, Usage};
 use super::super::document::{
     count, decimal, empty_cell, percent, percent_text, seconds, text_cell, Cell, Item, Section, Table,
 };
-use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options, Point};
+use super::super::measure::{
+    clock, formats, BitTrue, Clock, ContactCount, Engine, FormatRow, Measured, Options, Point,
+};
 use super::super::BUDGET_US;
 use super::lookup::{case_text, scenes};
 use crate::drawn_frames::{DrawnFrames, Shapes};
@@ -45,6 +47,17 @@ pub struct Choice {
     pub clock: Clock,
     /// Whether this design was co-simulated, with cycles equal to the model's.
     pub simulated: bool,
+}
+
+/// The recommended designs, with their hardware; a scene can have one for each contact count.
+pub(super) fn designs<'a>(
+    measured: &'a [Measured],
+    choices: &'a [Choice],
+) -> impl Iterator<Item = (&'a Measured, &'a BitTrue)> {
+    choices.iter().filter_map(|choice| {
+        let m = &measured[choice.index];
+        Some((m, m.bit_true.as_ref().ok()?))
+    })
 }
 
 /// Chooses case and format for every scene and contact count for which hardware fits.

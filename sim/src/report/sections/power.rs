@@ -6,7 +6,7 @@ use dermis_golden::paper::powers;
 use super::super::document::{count, decimal, empty_cell, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{BitTrue, Measured, Options};
 use super::super::power::WHAT;
-use super::choice::Choice;
+use super::choice::{designs, Choice};
 use super::lookup::case_text;
 use crate::cosim::hardware::Hardware;
 use crate::cosim::power::{energies, estimate_power, PowerEstimate};
@@ -17,22 +17,16 @@ use crate::jobs::parallel;
 /// # Errors
 /// A design that cannot be simulated; an interruption.
 pub fn power(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Section> {
-    let own = choices.iter().filter_map(|choice| {
-        let m = &measured[choice.index];
-        Some((m, m.bit_true.as_ref().ok()?))
-    });
-    let own = own.filter(|(_, bit_true)| options.simulate && energies(&bit_true.model.board).is_ok());
-    let kept = if options.quick { 1 } else { usize::MAX };
-    let estimates = parallel(
-        "power",
-        own.take(kept).collect(),
-        options.jobs,
-        &options.interrupt,
-        |(m, bit_true): (&Measured, &BitTrue)| {
+    let known = |(_, own): &(&Measured, &BitTrue)| options.simulate && energies(&own.model.board).is_ok();
+    let mut own: Vec<_> = designs(measured, choices).filter(known).collect();
+    // The same design can be recommended for one contact and for several.
+    own.dedup_by(|(a, _), (b, _)| std::ptr::eq(*a, *b));
+    own.truncate(if options.quick { 1 } else { usize::MAX });
+    let estimates =
+        parallel("power", own, options.jobs, &options.interrupt, |(m, bit_true): (&Measured, &BitTrue)| {
             let hardware = Hardware::new(bit_true.model.clone(), &options.build)?;
             Ok((m, estimate_power(&hardware, &m.frames)?))
-        },
-    )?;
+        })?;
     let source = estimates.first().map_or("", |(_, estimate)| estimate.source.as_str());
     Ok(Section {
         id: "power",

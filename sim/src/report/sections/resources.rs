@@ -8,7 +8,7 @@ use super::super::document::{count, text_cell, Cell, Item, Picture, Section, Tab
 use super::super::measure::{BitTrue, Measured, Options};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
-use super::choice::Choice;
+use super::choice::{designs, Choice};
 use super::lookup::case_text;
 use crate::jobs::parallel;
 
@@ -17,12 +17,7 @@ use crate::jobs::parallel;
 /// # Errors
 /// A picture that cannot be written; a feature whose hardware cannot be generated; an interruption.
 pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Section> {
-    let chosen = || {
-        choices.iter().filter_map(|choice| {
-            let m = &measured[choice.index];
-            Some((m, m.bit_true.as_ref().ok()?))
-        })
-    };
+    let chosen = || designs(measured, choices);
     let groups = chosen().map(|(m, bit_true)| {
         let shares = total(&bit_true.usage).shares(&bit_true.model.board);
         (format!("{}, {}", m.scene.name, m.scene.partition.case), shares.map(Some).to_vec())
