@@ -8,7 +8,8 @@ use crate::wire::Wire;
 
 /// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
 ///
-/// With many lanes it has two register stages: the packer uses a byte no sooner than five cycles after it asked for it.
+/// With many lanes it has three register stages, that of the index first: the packer uses a byte no sooner than five cycles
+/// after it asked for it.
 /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
 #[derive(LogicBlock)]
 pub struct Sources {
@@ -57,7 +58,7 @@ kernel_block!(
 );
 
 impl Sources {
-    /// With the two register stages if `registered`.
+    /// With the three register stages if `registered`.
     pub fn new(registered: bool) -> Self {
         let block = Sources {
             clk: Default::default(),
@@ -106,15 +107,17 @@ fn kernel(registered: bool) -> Kernel {
     second.set(!begun & (*second | was_taken));
     k.wire("address", concat(&[source.at(0), *second, index.slice(1, 3)]));
     let is_answer = source.at(1);
+    // The packer, which holds the index, is a long way from the engine's answer.
+    let chosen = stage("chosen", index);
     k.wire("answer_wanted", wanted & is_answer);
     let [high, middle, low] = [2, 1, 0].map(|word| answer.slice(32 * word, 32));
-    let word = k.wire("answer_word", index.at(3).mux(high, index.at(2).mux(middle, low)));
-    let half = index.at(1).mux(word.slice(16, 16), word.low(16));
+    let word = k.wire("answer_word", chosen.at(3).mux(high, chosen.at(2).mux(middle, low)));
+    let half = chosen.at(1).mux(word.slice(16, 16), word.low(16));
     // The block RAM of the counters is slow and far away: nothing stands between it and its register.
     let both = k.wire("both", is_answer.mux(stage("answer_half", half), stage("kept_entry", entry)));
     let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
     let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
-    stage("octet", index.at(0).mux(both.slice(8, 8), both.low(8)));
+    stage("octet", chosen.at(0).mux(both.slice(8, 8), both.low(8)));
     stage("word_valid", valid);
     stage("word_last", last);
     stage("summarise", !source.at(0));
@@ -131,12 +134,13 @@ mod tests {
     /// Data, whether its word is valid, whether it is the last.
     type Selected<T> = (T, bool, bool);
 
-    /// Selects from whole words; with registers, the index selects one byte of two in the second cycle.
+    /// Selects from whole words; with registers, the index of the cycle before selects two bytes, and one of them in the next.
     #[derive(Default)]
     struct Selection {
         registered: bool,
         second: Option<bool>,
         was_taken: Option<bool>,
+        index: Option<usize>,
         /// Two bytes of the answer and those of the entry.
         halves: Option<Selected<[u64; 2]>>,
         byte: Option<(Selected<u64>, bool)>,
@@ -144,8 +148,8 @@ mod tests {
 
     impl Selection {
         fn halves(&self, inputs: &[Word]) -> Option<Selected<[u64; 2]>> {
-            let (source, index) = (inputs[0].number() as usize, inputs[3].number() as usize);
-            let halves = [inputs[7].field(16 * (index / 2), 16), inputs[5].number()];
+            let source = inputs[0].number() as usize;
+            let halves = [inputs[7].field(16 * (self.index(inputs)? / 2), 16), inputs[5].number()];
             let entry_valid = inputs[6].number() == 1;
             match source {
                 IDENTITY => Some((halves, entry_valid, self.second?)),
@@ -154,10 +158,22 @@ mod tests {
             }
         }
 
-        fn byte(inputs: &[Word], ([answer, entry], valid, last): Selected<[u64; 2]>) -> (Selected<u64>, bool) {
+        fn byte(
+            &self,
+            inputs: &[Word],
+            ([answer, entry], valid, last): Selected<[u64; 2]>,
+        ) -> Option<(Selected<u64>, bool)> {
             let half = if inputs[0].number() >= 2 { answer } else { entry };
-            let byte = half >> (8 * (inputs[3].number() & 1)) & 0xff;
-            ((byte, valid, last), inputs[0].number() & 1 == 0)
+            let byte = half >> (8 * (self.index(inputs)? & 1)) & 0xff;
+            Some(((byte, valid, last), inputs[0].number() & 1 == 0))
+        }
+
+        /// The index that selects in this cycle.
+        fn index(&self, inputs: &[Word]) -> Option<usize> {
+            if self.registered {
+                return self.index;
+            }
+            Some(inputs[3].number() as usize)
         }
     }
 
@@ -167,7 +183,7 @@ mod tests {
             let address = self.second.map(|second| Word::from((source & 1) << 4 | u64::from(second) << 3 | index >> 1));
             let byte = match self.registered {
                 true => self.byte,
-                false => self.halves(inputs).map(|halves| Selection::byte(inputs, halves)),
+                false => self.halves(inputs).and_then(|halves| self.byte(inputs, halves)),
             };
             vec![
                 address,
@@ -180,8 +196,9 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            self.byte = self.halves.map(|halves| Selection::byte(inputs, halves));
+            self.byte = self.halves.and_then(|halves| self.byte(inputs, halves));
             self.halves = self.halves(inputs);
+            self.index = Some(inputs[3].number() as usize);
             let taken = inputs[4].number() == 1;
             let counts = if self.registered { self.was_taken } else { Some(taken) };
             self.was_taken = Some(taken);
