@@ -58,9 +58,7 @@ pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 5;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
 /// Cycles from the beginning of a subarray's values to the output of a force of it.
-const SEND: u64 = 13;
-/// Cycles more where each contact has a μ of its own: the label of the taxel.
-const LABEL: u64 = 1;
+pub(super) const SEND: u64 = 14;
 /// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
 pub(super) const FOLDED: u64 = 2;
 
@@ -90,11 +88,6 @@ pub fn split_latency(formats: &Formats) -> u64 {
 pub fn coarse_period(formats: &Formats, quads: usize) -> u64 {
     let steps = (formats.sweep_steps(quads) as u64).max(SHORTEST_SWEEP);
     steps.max((steps + SELECTION_LATENCY + split_latency(formats)).div_ceil(2))
-}
-
-/// Cycles from the beginning of a subarray's values to the output of a force of it.
-pub(super) fn send(formats: &Formats) -> u64 {
-    SEND + if formats.by_contact() { LABEL } else { 0 }
 }
 
 /// Cycles from a subarray's first value to the beginning of the values for those that read them row-major: no taxel is
@@ -165,7 +158,7 @@ impl BeatCycles {
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
         let forces = forces(plan, case, &values(plan, case, searched, course));
-        let sent = ACCEPT + send(&case.formats);
+        let sent = ACCEPT + SEND;
         let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + sent);
         let before = plan.prepare.latency();
         let beats = match plan.sends_resultants() {

@@ -14,7 +14,7 @@
 
 use super::contact_cycles::{ContactCycles, Course};
 use super::contents::{CasePlan, Plan};
-use super::cycles::{early_values, forces, passes, search, send, split_latency, ACCEPT, FOLDED, LABELS, NEXT};
+use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
 use crate::board::EngineKind;
 use crate::fixed::stages::{choose, resultants};
@@ -84,7 +84,7 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
         }
         let before = sent;
         let forces = forces(plan, case, &values).last().map_or(0, |last| last + 1);
-        sent = forces + send(&case.formats) + sums + labels + plan.status_beats_of(case) as u64;
+        sent = forces + SEND + sums + labels + plan.status_beats_of(case) as u64;
         intervals.push(sent - before);
         // Codes that are averaged are taken while the frame buffer is full, the sums are not.
         // Windows are read from the frame buffer until the μ of the last contact is known.

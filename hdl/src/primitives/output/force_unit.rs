@@ -104,10 +104,12 @@ kernel_block!(
     outputs [valid, last, beat_data]
 );
 
-/// Cycles from `offer` to `valid`, without contacts.
-pub const STEPS: usize = 10;
+/// Cycles from `offer` to `valid`.
+pub const STEPS: usize = 11;
 /// Cycles from `offer` to `quad`.
 const READ_STEPS: usize = 3;
+/// Cycles from `quad` to the lane selected, before its μ is read.
+const SELECT_STEPS: usize = 1;
 /// Cycles from a value to its products.
 const PRODUCT_STEPS: usize = 2;
 /// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
@@ -269,16 +271,6 @@ impl Shape {
         largest(&self.counts)
     }
 
-    /// Cycles from the lane selection to the μ of the label.
-    fn label_steps(&self) -> usize {
-        usize::from(self.contacts)
-    }
-
-    /// Cycles for which a request travels along the pipeline.
-    fn asked(&self) -> usize {
-        STEPS - 1 + self.label_steps()
-    }
-
     /// Width of a label.
     fn label_bits(&self) -> usize {
         if self.contacts {
@@ -295,7 +287,7 @@ impl Shape {
 
     fn kernel(&self) -> Kernel {
         let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
-        let asked = self.asked();
+        let asked = STEPS - 1;
         let k = Builder::new("force_unit");
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.counts.len())));
         let (begin_frame, start) = (k.input("begin_frame", 1), k.input("start", 1));
@@ -336,19 +328,19 @@ impl Shape {
         let shift = k.delay("shift_now", raw_shift.top().mux(k.constant(SHIFT_BITS, 0), limited));
         let shifts = kept.memory("shifts", SHIFT_BITS);
         shifts.write(start_2, part_2, shift);
-        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + self.label_steps() + PRODUCT_STEPS)));
+        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS)));
 
         let label = lane_of(labels, Quads::LANES, lane_value);
-        let value = k.delay("value", lane_of(quad, self.lanes, lane_value).signed());
-        // Selection and μ in one cycle would be the longest path.
-        let value = if self.contacts { k.delay("value_told", value) } else { value };
+        // Two registers: block RAM and multiplier are far apart, and so are the selection of a label and its μ.
+        let value = k.delay("selected", lane_of(quad, self.lanes, lane_value).signed());
+        let value = k.delay("value", value);
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let z = k.delay("moved_z", doubled.shift_right_by(shift));
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
-                let at_value = if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS) };
+                let at_value = if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);

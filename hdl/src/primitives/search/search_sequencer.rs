@@ -207,6 +207,9 @@ fn kernel(quads: usize) -> Kernel {
     let next = next.map(|(value, by)| is_halving.mux(shifted(value, by), value.unsigned()));
     let next = k.wire("next", concat(&next));
 
+    k.comment("The first sweep of a search, halvings and the last one; registered before the sweep is set up.");
+    let in_place = k.delay("in_place", !*is_coarse | count.is(0));
+
     k.comment(
         "A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after",
     );
@@ -235,7 +238,7 @@ fn kernel(quads: usize) -> Kernel {
         source.set(base_buffer);
     });
     k.when(keeps, || kept.set(compared_sweep));
-    k.when(set_up & (!*is_coarse | count.is(0)), || {
+    k.when(set_up & in_place, || {
         kept.set(concat(&[closing, *is_coarse, is_coarse.mux(number(1), kept_buffer), next]));
     });
     k.when(begin_frame, || {

@@ -74,8 +74,7 @@ pub(crate) struct Requests {
 impl Requests {
     pub(crate) fn new(model: Model) -> Self {
         let parts = most_parts(&model);
-        let asked = STEPS - 1 + usize::from(model.formats().by_contact());
-        let (pipe, parts) = (vec![None; asked].into(), vec![Part::default(); parts]);
+        let (pipe, parts) = (vec![None; STEPS - 1].into(), vec![Part::default(); parts]);
         Requests { model, pipe, frame: Frame::default(), parts, output: None, reset: false }
     }
 
