@@ -8,7 +8,7 @@ use crate::wire::Wire;
 
 /// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
 ///
-/// With many lanes it has three register stages, that of the index first: the packer uses a byte no sooner than five cycles
+/// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five cycles
 /// after it asked for it.
 /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
 #[derive(LogicBlock)]
@@ -58,7 +58,7 @@ kernel_block!(
 );
 
 impl Sources {
-    /// With the three register stages if `registered`.
+    /// With the four register stages if `registered`.
     pub fn new(registered: bool) -> Self {
         let block = Sources {
             clk: Default::default(),
@@ -111,15 +111,15 @@ fn kernel(registered: bool) -> Kernel {
     let chosen = stage("chosen", index);
     k.wire("answer_wanted", wanted & is_answer);
     let [high, middle, low] = [2, 1, 0].map(|word| answer.slice(32 * word, 32));
-    let word = k.wire("answer_word", chosen.at(3).mux(high, chosen.at(2).mux(middle, low)));
+    let word = stage("answer_word", chosen.at(3).mux(high, chosen.at(2).mux(middle, low)));
     let half = chosen.at(1).mux(word.slice(16, 16), word.low(16));
     // The block RAM of the counters is slow and far away: nothing stands between it and its register.
     let both = k.wire("both", is_answer.mux(stage("answer_half", half), stage("kept_entry", entry)));
     let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
     let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
     stage("octet", chosen.at(0).mux(both.slice(8, 8), both.low(8)));
-    stage("word_valid", valid);
-    stage("word_last", last);
+    stage("word_valid", stage("half_valid", valid));
+    stage("word_last", stage("half_last", last));
     stage("summarise", !source.at(0));
     k.finish()
 }
@@ -131,49 +131,40 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    /// Data, whether its word is valid, whether it is the last.
-    type Selected<T> = (T, bool, bool);
-
-    /// Selects from whole words; with registers, the index of the cycle before selects two bytes, and one of them in the next.
+    /// Selects from whole words; with registers, the index of the cycle before selects a word, then two bytes, then one.
     #[derive(Default)]
     struct Selection {
         registered: bool,
         second: Option<bool>,
         was_taken: Option<bool>,
         index: Option<usize>,
-        /// Two bytes of the answer and those of the entry.
-        halves: Option<Selected<[u64; 2]>>,
-        byte: Option<(Selected<u64>, bool)>,
+        /// Four bytes of the answer, two of them; two of the entry.
+        word: Option<u64>,
+        half: Option<u64>,
+        entry: Option<u64>,
+        /// Whether the words of the last cycles are valid, whether they are the last; the latest first.
+        flags: [Option<(bool, bool)>; 3],
+        byte: Option<u64>,
+        sums: Option<bool>,
     }
 
     impl Selection {
-        fn halves(&self, inputs: &[Word]) -> Option<Selected<[u64; 2]>> {
-            let source = inputs[0].number() as usize;
-            let halves = [inputs[7].field(16 * (self.index(inputs)? / 2), 16), inputs[5].number()];
+        fn flags(&self, inputs: &[Word]) -> Option<(bool, bool)> {
             let entry_valid = inputs[6].number() == 1;
-            match source {
-                IDENTITY => Some((halves, entry_valid, self.second?)),
-                COUNTERS => Some((halves, entry_valid, true)),
-                _ => Some((halves, inputs[8].number() == 1, inputs[9].number() == 1)),
+            match inputs[0].number() as usize {
+                IDENTITY => Some((entry_valid, self.second?)),
+                COUNTERS => Some((entry_valid, true)),
+                _ => Some((inputs[8].number() == 1, inputs[9].number() == 1)),
             }
         }
 
-        fn byte(
-            &self,
-            inputs: &[Word],
-            ([answer, entry], valid, last): Selected<[u64; 2]>,
-        ) -> Option<(Selected<u64>, bool)> {
-            let half = if inputs[0].number() >= 2 { answer } else { entry };
-            let byte = half >> (8 * (self.index(inputs)? & 1)) & 0xff;
-            Some(((byte, valid, last), inputs[0].number() & 1 == 0))
+        /// Byte `index` of a word of so many bytes, at most four of them.
+        fn bytes(word: u64, index: usize, of: usize) -> u64 {
+            word >> (8 * (index % of))
         }
 
-        /// The index that selects in this cycle.
-        fn index(&self, inputs: &[Word]) -> Option<usize> {
-            if self.registered {
-                return self.index;
-            }
-            Some(inputs[3].number() as usize)
+        fn byte(inputs: &[Word], half: u64, entry: u64, index: usize) -> u64 {
+            Selection::bytes(if inputs[0].number() >= 2 { half } else { entry }, index, 2) & 0xff
         }
     }
 
@@ -181,24 +172,34 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let (source, index) = (inputs[0].number(), inputs[3].number());
             let address = self.second.map(|second| Word::from((source & 1) << 4 | u64::from(second) << 3 | index >> 1));
-            let byte = match self.registered {
-                true => self.byte,
-                false => self.halves(inputs).and_then(|halves| self.byte(inputs, halves)),
+            let at = index as usize;
+            let (byte, flags, sums) = match self.registered {
+                true => (self.byte, self.flags[2], self.sums),
+                false => {
+                    let half = inputs[7].field(16 * (at / 2), 16);
+                    let byte = Selection::byte(inputs, half, inputs[5].number(), at);
+                    (Some(byte), self.flags(inputs), Some(source & 1 == 0))
+                }
             };
             vec![
                 address,
                 Some(Word::from(inputs[2].number() == 1 && source >= 2)),
-                byte.map(|((byte, ..), _)| Word::from(byte)),
-                byte.map(|((_, valid, _), _)| Word::from(valid)),
-                byte.map(|((.., last), _)| Word::from(last)),
-                byte.map(|(_, sums)| Word::from(sums)),
+                byte.map(Word::from),
+                flags.map(|(valid, _)| Word::from(valid)),
+                flags.map(|(_, last)| Word::from(last)),
+                sums.map(Word::from),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            self.byte = self.halves.and_then(|halves| self.byte(inputs, halves));
-            self.halves = self.halves(inputs);
+            let both = self.half.zip(self.entry).zip(self.index);
+            self.byte = both.map(|((half, entry), index)| Selection::byte(inputs, half, entry, index));
+            self.half = self.word.zip(self.index).map(|(word, index)| Selection::bytes(word, index & 2, 4) & 0xffff);
+            self.word = self.index.map(|index| inputs[7].field(32 * (index / 4), 32));
             self.index = Some(inputs[3].number() as usize);
+            self.entry = Some(inputs[5].number());
+            self.flags = [self.flags(inputs), self.flags[0], self.flags[1]];
+            self.sums = Some(inputs[0].number() & 1 == 0);
             let taken = inputs[4].number() == 1;
             let counts = if self.registered { self.was_taken } else { Some(taken) };
             self.was_taken = Some(taken);
