@@ -38,8 +38,8 @@ pub const ACCEPT: u64 = 3;
 /// Cycles for the choice of a step's taxels, where a quad takes several.
 const SPLIT: u64 = 1;
 /// Cycles from the start of a sweep to its best candidate, beyond its steps: memory 3, Taylor shift 4, candidates 2,
-/// score 6, comparison 6.
-const SELECTION_LATENCY: u64 = 21;
+/// score 7, comparison 6.
+const SELECTION_LATENCY: u64 = 22;
 /// Cycles from the completion of a subarray's passes to the start of its search.
 const HAND_OVER: u64 = 2;
 /// Cycles from the start of the search, or from a best candidate that the next sweep depends on, to the next sweep.
@@ -58,7 +58,7 @@ pub(super) const LABELS: u64 = LABELS_PER_BEAT as u64 + 5;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
 /// Cycles from the beginning of a subarray's values to the output of a force of it.
-pub(super) const SEND: u64 = 14;
+pub(super) const SEND: u64 = 15;
 /// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
 pub(super) const FOLDED: u64 = 2;
 

@@ -1,10 +1,10 @@
-//! The table logarithm in two halves, shared by the two blocks that need one.
+//! The table logarithm in three steps, shared by the two blocks that need one.
 //!
 //! A binary search finds the leading one: if the upper half of the word is zero, the lower half is moved up. Each
 //! decision is a bit of the leading one's position, and the remaining bits start with the leading one. The search is
-//! split into two functions with a register between them, because up to 64 bits need too many steps for one cycle. The
-//! first function computes which nibbles are non-zero before it moves any, so that a decision does not wait for the
-//! previous move.
+//! split into two functions with a register between them, and another inside the first, because up to 64 bits need too many
+//! steps for one cycle. The first function computes which nibbles are non-zero before it moves any, so that a decision does
+//! not wait for the previous move.
 
 use dermis_golden::fixed::stages::search::log_table;
 use dermis_golden::fixed::words::formats::{LOG_FRACTION, LOG_TABLE_BITS};
@@ -33,8 +33,8 @@ fn move_up<'k>(stays: Expr<'k>, word: Expr<'k>, by: usize) -> Expr<'k> {
     stays.mux(word, word.low(word.bits() - by).shift_left(by))
 }
 
-/// From an argument to the word in between: the upper bits of the leading one's position, then the bits from the nibble
-/// of the leading one on. Names of wires start with `name`.
+/// From an argument to the word in between, a cycle later: the upper bits of the leading one's position, then the bits from
+/// the nibble of the leading one on. Names of wires start with `name`.
 pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     let halves = first_halves(argument.bits());
     let width = 2 * halves[0];
@@ -42,7 +42,13 @@ pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     let nibbles: Vec<Expr> = (0..width / NIBBLE).rev().map(|n| word.slice(n * NIBBLE, NIBBLE).any()).collect();
     let mut used = k.wire(&format!("{name}_used"), concat(&nibbles));
     let mut parts = Vec::new();
-    for half in halves {
+    let before = halves.len() / 2;
+    for (index, half) in halves.into_iter().enumerate() {
+        if index == before {
+            (used, word) = (k.delay(&format!("{name}_nibbles"), used), k.delay(&format!("{name}_word"), word));
+            let part = |(index, part): (usize, &mut Expr<'k>)| *part = k.delay(&format!("{name}_part_{index}"), *part);
+            parts.iter_mut().enumerate().for_each(part);
+        }
         let upper = half / NIBBLE;
         let high = k.wire(&format!("{name}_high_{half}"), used.slice(used.bits() - upper, upper).any());
         used = move_up(high, used, upper);
@@ -80,7 +86,7 @@ mod tests {
 
     #[test]
     fn logarithms_are_those_of_the_model() {
-        let k = Builder::combinational("logarithms");
+        let k = Builder::new("logarithms");
         for bits in WIDTHS {
             let x = k.input(&format!("x{bits}"), bits);
             let located = k.wire(&format!("located{bits}"), locate(&k, &format!("locate{bits}"), x));
@@ -95,6 +101,6 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..4000).map(inputs).chain([vec![Word::default(); 4]]).collect();
         let log = |word: &Word| Some(Word::from(log2(word.number() as i64) as u64));
         let logs = |inputs: &[Word]| inputs.iter().map(log).collect();
-        check(body.kernel(), &stimulus, &mut Pipeline::new(0, WIDTHS.len(), logs));
+        check(body.kernel(), &stimulus, &mut Pipeline::new(1, WIDTHS.len(), logs));
     }
 }

@@ -105,7 +105,7 @@ kernel_block!(
 );
 
 /// Cycles from `offer` to `valid`.
-pub const STEPS: usize = 11;
+pub const STEPS: usize = 12;
 /// Cycles from `offer` to `quad`.
 const READ_STEPS: usize = 3;
 /// Cycles from `quad` to the lane selected, before its μ is read.
@@ -336,7 +336,8 @@ impl Shape {
         let value = k.delay("value", value);
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
-        let z = k.delay("moved_z", doubled.shift_right_by(shift));
+        let shift = Shift { by: shift, rest: k.delay("shift_rest", shift.low(FINE)) };
+        let z = shift.moved(&k, "moved_z", doubled);
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
@@ -346,7 +347,7 @@ impl Shape {
                         let words = kept.memory("mu", MU_BITS);
                         words.write(start_2, part_2, self.mu_word(&k, position));
                         let mu = k.delay("mu_value", words.read(at_value).signed());
-                        k.delay("moved", product(&k, value, mu).shift_left(1).shift_right_by(shift))
+                        shift.moved(&k, "moved", product(&k, value, mu).shift_left(1))
                     })
                 };
                 (Some(shear("x", position_x)), Some(shear("y", position_y)))
@@ -456,6 +457,25 @@ fn product<'k>(k: &'k Builder, value: Expr<'k>, mu: Expr<'k>) -> Expr<'k> {
     let low = k.delay("low", value.low(LOW).extend(LOW + 1).signed() * mu);
     let high = k.delay("high", value.slice(LOW, more).signed() * mu);
     k.delay("product", (high.shift_left(LOW) + low).resize(bits))
+}
+
+/// Low bits of a shift, by which its second step moves.
+const FINE: usize = 3;
+
+/// A right shift of `SHIFT_BITS` bits in two steps, a cycle each: over all its bits it would be a longest path.
+#[derive(Clone, Copy)]
+struct Shift<'k> {
+    /// The shift, and its low bits a cycle later.
+    by: Expr<'k>,
+    rest: Expr<'k>,
+}
+
+impl<'k> Shift<'k> {
+    /// `value` moved, two cycles later.
+    fn moved(self, k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let coarse = self.by.slice(FINE, SHIFT_BITS - FINE).concat(k.constant(FINE, 0));
+        k.delay(name, k.delay(&format!("{name}_coarse"), value.shift_right_by(coarse)).shift_right_by(self.rest))
+    }
 }
 
 /// One component of a force: rounded and saturated, and a cycle later beside the result of the threshold.

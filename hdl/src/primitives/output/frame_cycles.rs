@@ -35,7 +35,7 @@ kernel_block!(FrameCycles, clock clk, inputs [rst, begin_frame, waits, hand_over
 /// Width of the cycle counts, in bits.
 pub const CYCLE_BITS: usize = 24;
 /// Cycles from an event to its effect on the counts.
-pub const COUNT_DELAY: usize = 10;
+pub const COUNT_DELAY: usize = 12;
 
 impl Default for FrameCycles {
     /// Counts modulo 2^[`CYCLE_BITS`].

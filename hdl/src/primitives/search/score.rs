@@ -32,7 +32,7 @@ pub struct Score {
 }
 
 /// Cycles from a step to the totals that contain it.
-pub const LATENCY: usize = 6;
+pub const LATENCY: usize = 7;
 
 kernel_block!(Score, clock clk, inputs [valid, first, mask, values, sums], outputs [totals]);
 

@@ -11,11 +11,11 @@ use crate::primitives::arithmetic::logarithm::{locate, logarithm, LOG_BITS};
 use crate::primitives::search::sweep::{square_bits, sweep_bits, Fields};
 use crate::wire::Wire;
 
-/// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, first half of the logarithm, second
-/// half and table, times n.
+/// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, the logarithm in three steps, the
+/// last with its table, times n.
 ///
 /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
-/// eight cycles after `start`, until those of the next sweep.
+/// nine cycles after `start`, until those of the next sweep.
 #[derive(LogicBlock)]
 pub struct ScoreBias {
     /// Clock; registers change on its rising edge.
@@ -32,7 +32,7 @@ pub struct ScoreBias {
     pub radius: Wire<In>,
     /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
     pub sums: Wire<In>,
-    /// Nine n·log2 Σp, unsigned, 2^−6; valid eight cycles after `start`, until those of the next sweep.
+    /// Nine n·log2 Σp, unsigned, 2^−6; valid nine cycles after `start`, until those of the next sweep.
     pub weights: Wire<Out>,
     /// Nine bits, each Σp > 0 and inside the disc; valid with `weights`.
     pub eligible: Wire<Out>,
@@ -102,7 +102,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
     let (radius, sums) = (k.input("radius", q), k.input("sums", 9 * s));
     let (bit, zero) = (Type::unsigned(1), k.constant(1, 0));
     let running = k.state("running", bit, rst, 0);
-    let valid = k.state("valid", Type::unsigned(4), rst, 0);
+    let valid = k.state("valid", Type::unsigned(5), rst, 0);
     let (own_sweep, own_radius) = (k.register("own_sweep", sweep.ty()), k.register("own_radius", radius.ty()));
     k.when(start, || {
         own_sweep.set(sweep);
@@ -110,15 +110,15 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
     });
     let row = k.register("row", Type::unsigned(2));
     row.set(start.mux(k.constant(2, 0), row.plus(1)));
-    let rows = ["row2", "row3", "row4", "row5"].iter().scan(*row, |row, name| {
+    let rows = ["row2", "row3", "row4", "row5", "row6"].iter().scan(*row, |row, name| {
         *row = k.delay(name, *row);
         Some(*row)
     });
-    let row5 = rows.last().unwrap_or(*row);
+    let row6 = rows.last().unwrap_or(*row);
     k.when(row.is(2), || running.set(zero));
     k.when(start, || running.set(k.constant(1, 1)));
-    valid.set(valid.low(3).concat(*running));
-    let writes = valid.at(3);
+    valid.set(valid.low(4).concat(*running));
+    let writes = valid.top();
 
     k.comment(
         "|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry chain per",
@@ -143,7 +143,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
             let sum = k.delay("sum", row.is(0).mux(sum_of(0), row.is(1).mux(sum_of(1), sum_of(2))));
             let presses = k.delay("presses", !sum.top() & sum.any());
             let fits = k.delay("fits", presses & !own_radius.less(distance));
-            let fits = k.delay("fits_later", fits);
+            let fits = k.delay("fits_2", k.delay("fits_1", fits));
             let located = k.delay("located", locate(&k, "locate", sum));
             let log = k.delay("log", logarithm(&k, "log", located));
             let all: Vec<[Expr; 2]> = taxels.iter().map(|&taxels| halves(&k, taxels, log, w)).collect();
@@ -157,7 +157,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
                     k.register(&format!("weight_{row}"), Type::unsigned(w)),
                     k.register(&format!("eligible_{row}"), bit),
                 );
-                k.when(writes & row5.is(row), || {
+                k.when(writes & row6.is(row), || {
                     own.0.set(weight);
                     own.1.set(fits);
                 });
@@ -169,7 +169,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
     k.wire("weights", concat(&results.iter().map(|(_, (weight, _))| weight.get()).collect::<Vec<_>>()));
     k.wire("eligible", concat(&results.iter().map(|(_, (_, eligible))| eligible.get()).collect::<Vec<_>>()));
     let weighted_sweep = k.register("weighted_sweep", sweep.ty());
-    k.when(writes & row5.is(2), || weighted_sweep.set(*own_sweep));
+    k.when(writes & row6.is(2), || weighted_sweep.set(*own_sweep));
     k.finish()
 }
 
@@ -183,7 +183,7 @@ mod tests {
     use crate::wire::Word;
 
     /// Cycles from `start` to the results.
-    const LATENCY: usize = 8;
+    const LATENCY: usize = 9;
     const SUM_BITS: usize = 30;
     const TAXELS: [usize; 3] = [64, 25, 9];
 

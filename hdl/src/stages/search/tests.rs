@@ -13,8 +13,8 @@ use crate::scenes::model;
 use crate::wire::Word;
 
 /// Cycles from the set-up of a sweep to its comparison, beyond its steps: memory 3, Taylor shift 4, candidates 2, score
-/// 6, comparison 6.
-const COMPARED: usize = 21;
+/// 7, comparison 6.
+const COMPARED: usize = 22;
 /// Cycles from the set-up of the last sweep to its first values.
 const VALUES: usize = 8;
 
