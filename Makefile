@@ -69,7 +69,7 @@ python: setup ## build the Python package, install it into a new environment, bu
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
 
-buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus
+buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, and with FuseSoC
 	@echo '== buses'
 	$(CARGO) build --quiet --bin dermis
 	python3 -m venv --clear $(BUILD)/cocotb-tools

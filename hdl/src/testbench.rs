@@ -17,18 +17,34 @@ const LEAST_CYCLES: u64 = 10_000;
 /// Ending of the testbench's module and files, behind the top module's name.
 pub(crate) const SUFFIX: &str = "_tb";
 
-/// The testbench and its two memory files.
-pub(crate) fn testbench(model: &Model, top: &str) -> Vec<GeneratedFile> {
+/// What a testbench sends and expects.
+pub(crate) struct Reconstruction {
+    /// Codes of one reconstruction, frame after frame, row-major.
+    pub codes: Vec<i32>,
+    /// Beats of the engine: forces, then status.
+    pub beats: Vec<[i32; 3]>,
+    /// Cycles after which the testbench gives up.
+    pub patience: u64,
+}
+
+/// The reconstruction of the testbenches of `model`.
+pub(crate) fn reconstruction(model: &Model) -> Reconstruction {
     let codes = codes(model);
     let trace = model.run(&codes);
-    let beats: Vec<[i32; 3]> = trace.beats.iter().chain(&trace.status).copied().collect();
+    let beats = trace.beats.iter().chain(&trace.status).copied().collect();
+    let patience = LEAST_CYCLES + PATIENCE * (codes.len() as u64 + trace.cycles.total);
+    Reconstruction { codes, beats, patience }
+}
+
+/// The testbench and its two memory files.
+pub(crate) fn testbench(model: &Model, top: &str) -> Vec<GeneratedFile> {
+    let Reconstruction { codes, beats, patience } = reconstruction(model);
     let bits = model.formats().code_bits;
     let mask = (1i64 << bits) - 1;
     let digits = bits.div_ceil(4) as usize;
     let code_lines: String = codes.iter().map(|&code| format!("{:0digits$x}\n", i64::from(code) & mask)).collect();
     let beat_lines: String = beats.iter().map(|[fx, fy, fz]| format!("{fz:08x}{fy:08x}{fx:08x}\n")).collect();
     let file = |ending: &str, text: String| GeneratedFile { name: format!("{top}{SUFFIX}{ending}"), text };
-    let patience = LEAST_CYCLES + PATIENCE * (codes.len() as u64 + trace.cycles.total);
     let text = text(model, top, [codes.len(), beats.len()], patience);
     vec![file(".sv", text), file("_codes.hex", code_lines), file("_beats.hex", beat_lines)]
 }

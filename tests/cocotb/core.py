@@ -6,6 +6,7 @@ import json
 import os
 import random
 import struct
+from pathlib import Path
 
 import cocotb
 from cocotb.clock import Clock
@@ -15,9 +16,9 @@ from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp, AxiStreamBus, AxiS
 FOLDER = os.environ["DERMIS_CORE"]
 BUS = os.environ["DERMIS_BUS"]
 WORDS = int(os.environ["DERMIS_WORDS"])
-MAP = json.load(open(f"{FOLDER}/registers.json", encoding="utf-8"))
+MAP = json.loads(Path(FOLDER, "registers.json").read_text(encoding="utf-8"))
 REGISTERS = {register["name"]: register for register in MAP["registers"]}
-MANIFEST = json.load(open(f"{FOLDER}/manifest.json", encoding="utf-8"))
+MANIFEST = json.loads(Path(FOLDER, "manifest.json").read_text(encoding="utf-8"))
 CODE_BITS = MANIFEST["input"]["bits"]
 FORCES = MANIFEST["output"]["force_beats"]
 # Cycles after which something hangs, far more than two frames take.

@@ -17,8 +17,8 @@ BUILD = Path(os.environ.get("DERMIS_BUILD", HERE.parent.parent / "build/cocotb")
 SCENE = HERE / "press.toml"
 
 
-def generate(folder, *arguments):
-    command = [DERMIS, "build", str(SCENE), "--out", str(folder), *arguments]
+def generate(folder, *arguments, scene=SCENE):
+    command = [DERMIS, "build", str(scene), "--out", str(folder), *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 

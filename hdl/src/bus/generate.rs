@@ -7,6 +7,7 @@ use dermis_golden::registers::{c_header, constants, system_rdl, REGISTERS};
 use serde_json::json;
 
 use super::core::hierarchy;
+use super::testbench::testbench;
 use super::{Bus, CoreShape};
 use crate::error::HdlError;
 use crate::generate::{top_name, Around, Generated};
@@ -14,7 +15,8 @@ use crate::language::Change;
 use crate::manifest::GeneratedFile;
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
-/// place of the engine's, without taps; `dermis_registers.h`, `registers.json` and `registers.rdl` beside them.
+/// place of the engine's, without taps; beside them `dermis_registers.h`, `registers.json` and `registers.rdl`, testbench and
+/// FuseSoC core file.
 ///
 /// # Errors
 /// As [`crate::generate()`]; [`HdlError::Unsupported`] for a scene that averages frames.
@@ -67,6 +69,7 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     let around = Around { top, hierarchy, sources: &[bus_source, include_str!("core.rs")], header, row: "bus" };
     let mut core = around.generated(model, engine)?;
     core.files.extend(own);
+    core.add_core_file(model, testbench(model, &core.top, shape));
     core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
     core.seal();
     Ok(core)

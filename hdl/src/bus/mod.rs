@@ -14,6 +14,7 @@ mod generate;
 mod registers;
 mod stream_in;
 mod stream_out;
+mod testbench;
 mod wishbone;
 
 pub use axi_lite::AxiLite;

@@ -1,0 +1,75 @@
+"""Builds the examples of hdl/examples around a generated core: linted by Verilator, run under Icarus."""
+
+import json
+import subprocess
+
+import pytest
+from cocotb_tools.check_results import get_results
+from cocotb_tools.runner import get_runner
+
+from test_cores import BUILD, HERE, generate
+
+EXAMPLES = HERE.parent.parent / "hdl/examples"
+TOP = "dermis_press_axi"
+
+
+def run(name, bits, change=lambda text: text):
+    """Runs NAME.py on example NAME, changed by `change`; the number of its tests, and of those that failed."""
+    folder = BUILD / "examples" / name
+    generate(folder, "--bus", "axi", "--stream-bits", str(bits))
+    generate(folder / "engine")
+    example = folder / f"{name}.v"
+    example.write_text(change((EXAMPLES / f"{name}.v").read_text(encoding="utf-8")), encoding="utf-8")
+    lint = ["verilator", "--lint-only", "-Wall", "-Wno-DECLFILENAME", "-Wno-PINCONNECTEMPTY", "-Wno-UNUSED", "--top-module", name]
+    subprocess.run([*lint, f"{TOP}.vlt", example.name, f"{TOP}.v"], check=True, cwd=folder)
+    work = folder / "sim"
+    runner = get_runner("icarus")
+    runner.build(
+        sources=[example, folder / f"{TOP}.v"], hdl_toplevel=name, build_dir=work, always=True, timescale=("1ns", "1ps")
+    )
+    for memory in folder.glob("*.hex"):
+        (work / memory.name).write_bytes(memory.read_bytes())
+    sizes = [len((folder / f"{TOP}_tb_{kind}.hex").read_text().splitlines()) for kind in ["codes", "words"]]
+    environment = {
+        "DERMIS_CORE": str(folder),
+        "DERMIS_BUS": "axi",
+        "DERMIS_WORDS": str(bits // 32),
+        "DERMIS_VECTORS": str(folder / "engine/dermis_press_tb"),
+        "DERMIS_SIZES": json.dumps(sizes),
+        "PYTHONPATH": str(HERE),
+    }
+    results = work / "results.xml"
+    try:
+        runner.test(
+            hdl_toplevel=name,
+            test_module=name,
+            build_dir=work,
+            test_dir=work,
+            extra_env=environment,
+            results_xml=str(results),
+        )
+    except SystemExit:
+        # A test failed; an absent file of results is an error below.
+        pass
+    return get_results(results)
+
+
+@pytest.mark.parametrize("name, bits, tests", [("bare", 128, 1), ("dma", 32, 2)])
+def test_example(name, bits, tests):
+    assert run(name, bits) == (tests, 0)
+
+
+@pytest.mark.parametrize(
+    "name, bits, right, wrong",
+    [
+        ("bare", 128, "(first + lane) % 3 == 2", "(first + lane) % 3 == 1"),
+        ("dma", 32, "read_at    <= read_at + 4 * MOST", "read_at    <= read_at + 4 * MOST + 4"),
+        ("dma", 32, "write_at    <= write_at + 4 * MOST", "write_at    <= write_at + 3 * MOST"),
+    ],
+)
+def test_a_wrong_example_is_found(name, bits, right, wrong):
+    def change(text):
+        assert right in text
+        return text.replace(right, wrong)
+
+    assert run(name, bits, change)[1] > 0
