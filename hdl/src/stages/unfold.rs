@@ -22,7 +22,7 @@ pub struct Unfold {
     pub words: Wire<In>,
     /// `words` holds a quad.
     pub words_valid: Signal<In, Bit>,
-    /// One coefficient of four taxels, two bits wider, signed; valid with `taxels_valid`, two cycles after `words`.
+    /// One coefficient of four taxels, two bits wider, signed; valid with `taxels_valid`, three cycles after `words`.
     pub taxels: Wire<Out>,
     /// `taxels` holds a quad.
     pub taxels_valid: Signal<Out, Bit>,
@@ -72,11 +72,11 @@ impl Unfold {
             vectors: Counter::new(count),
             unfolder: Unfolder::new(bits, &degrees),
             transposed: TransposedPlace::new(model.layout(), bits + 2, count, across),
-            index_first: Delay::new(index, 1),
+            index_first: Delay::new(index, 2),
             index_later: Delay::new(index, 1),
-            address_later: Delay::new(address, 2),
-            valid_later: BitDelay::new(2),
-            finish: BitDelay::new(3),
+            address_later: Delay::new(address, 3),
+            valid_later: BitDelay::new(3),
+            finish: BitDelay::new(4),
             quad_end: Default::default(),
         }
     }
@@ -174,7 +174,7 @@ mod tests {
     impl Reference for Unfolding<'_> {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             let bits = self.model.formats().vector_bits as usize + 2;
-            let [now, before] = [1, 2].map(|cycles| self.quads.get(cycles).copied());
+            let [now, before] = [2, 3].map(|cycles| self.quads.get(cycles).copied());
             let quad = now.flatten();
             vec![
                 quad.map(|quad| Word::of_fields(&quad.taxels, bits)),
@@ -190,11 +190,11 @@ mod tests {
             let formats = &self.model.cases()[which].formats;
             let words = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.vector_bits as usize));
             self.quads.push_front((valid == 1).then(|| self.quad(which, words)));
-            self.quads.truncate(3);
+            self.quads.truncate(4);
             let all = formats.vectors() * formats.quads;
             self.next = if start == 1 { 0 } else { (self.next + valid) % all };
             if rst == 1 {
-                self.quads = vec![None; 3].into();
+                self.quads = vec![None; 4].into();
             }
         }
     }

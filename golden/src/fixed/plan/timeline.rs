@@ -25,7 +25,7 @@ const ESTIMATE: u64 = 3;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
-pub(super) const UNFOLD: u64 = 6;
+pub(super) const UNFOLD: u64 = 7;
 
 /// Timing of a section's products, in cycles from its start; of the first section from that of the subarray.
 pub(super) struct Timeline {

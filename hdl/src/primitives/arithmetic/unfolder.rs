@@ -7,16 +7,16 @@ use crate::language::{concat, Body, Builder, Expr, Kernel};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
-/// Butterfly, then v_ij / 4^(i+j), rounded half up: taxels two cycles after their parities.
+/// Butterfly in two steps, then v_ij / 4^(i+j), rounded half up: taxels three cycles after their parities.
 #[derive(LogicBlock)]
 pub struct Unfolder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Four parities of a v_ij, signed; taken in every cycle.
     pub quad: Wire<In>,
-    /// Index of the v_ij; one cycle after its `quad`.
+    /// Index of the v_ij; two cycles after its `quad`.
     pub index: Wire<In>,
-    /// Four taxels, two bits wider, signed; two cycles after `quad`.
+    /// Four taxels, two bits wider, signed; three cycles after `quad`.
     pub taxels: Wire<Out>,
     kernel: Body,
 }
@@ -56,7 +56,11 @@ fn kernel(bits: usize, degrees: &[u32]) -> Kernel {
     let (quad, index) = (k.input("quad", 4 * bits), k.input("index", count_bits(degrees.len())));
     let shifts: Vec<u64> = (0..1 << index.bits()).map(|index| shift(index, degrees).into()).collect();
     let amount = k.wire("amount", index.table(3, &shifts));
-    let sums = hadamard(quad);
+    let [a, b, c, d] = [0, 1, 2, 3].map(|parity| quad.slice(parity * bits, bits).signed());
+    let halves = [("even_low", a + b), ("even_high", c + d), ("odd_low", a - b), ("odd_high", c - d)];
+    let [even_low, even_high, odd_low, odd_high] = halves.map(|(name, sum)| k.delay(name, sum));
+    let sums = [even_low + even_high, odd_low + odd_high, even_low - even_high, odd_low - odd_high];
+    let sums = sums.map(|sum| sum.resize(wide));
     let taxel = |lane: usize| {
         let sum = k.delay(&format!("sum_{lane}"), sums[lane]);
         let moved = k.wire(&format!("moved_{lane}"), sum.shift_left(1).shift_right_by(amount));
@@ -86,16 +90,16 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(9);
         let quads: Vec<(Word, usize)> =
             (0..2000).map(|_| (random_word(&mut random, 4 * BITS), random.usize(..degrees.len()))).collect();
-        // The index follows its quad by a cycle.
+        // The index follows its quad by two cycles.
         let stimulus: Vec<Vec<Word>> =
-            (1..quads.len()).map(|n| vec![quads[n].0, Word::from(quads[n - 1].1 as u64)]).collect();
-        let mut at = 0;
+            (2..quads.len()).map(|n| vec![quads[n].0, Word::from(quads[n - 2].1 as u64)]).collect();
+        let mut at = 1;
         let taxels = |inputs: &[Word]| {
             at += 1;
             let quad = std::array::from_fn(|lane| inputs[0].signed(lane, BITS));
             let all = hadamard(quad).map(|sum| round_shift(sum, shift(quads[at].1, &degrees)));
             vec![Some(Word::of_fields(&all, BITS + 2))]
         };
-        check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(2, 1, taxels));
+        check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(3, 1, taxels));
     }
 }
