@@ -29,38 +29,41 @@ def vectors():
     return BUILD / "engine/dermis_press_tb"
 
 
+def icarus(folder, top, sources, module, environment):
+    """Runs the tests of `module` on `top` with the memory files of `folder`; how many there are, and how many failed."""
+    work = folder / "sim"
+    runner = get_runner("icarus")
+    runner.build(sources=sources, hdl_toplevel=top, build_dir=work, always=True, timescale=("1ns", "1ps"))
+    for memory in folder.glob("*.hex"):
+        (work / memory.name).write_bytes(memory.read_bytes())
+    results = work / "results.xml"
+    try:
+        runner.test(
+            hdl_toplevel=top,
+            test_module=module,
+            build_dir=work,
+            test_dir=work,
+            extra_env={"DERMIS_CORE": str(folder), "PYTHONPATH": str(HERE), **environment},
+            results_xml=str(results),
+        )
+    except SystemExit:
+        # A test failed; an absent file of results is an error below.
+        pass
+    return get_results(results)
+
+
+def environment(bus, bits, vectors):
+    """What core.py reads."""
+    return {"DERMIS_BUS": bus, "DERMIS_WORDS": str(bits // 32), "DERMIS_VECTORS": str(vectors)}
+
+
 def simulate(folder, bus, bits, vectors, change=lambda text: text):
     """Runs core.py on a core whose Verilog `change` has changed; the number of its tests, and of those that failed."""
     generate(folder, "--bus", bus, "--stream-bits", str(bits))
     top = f"dermis_press_{bus}"
     verilog = folder / f"{top}.v"
     verilog.write_text(change(verilog.read_text(encoding="utf-8")), encoding="utf-8")
-    simulation = folder / "sim"
-    runner = get_runner("icarus")
-    runner.build(sources=[verilog], hdl_toplevel=top, build_dir=simulation, always=True, timescale=("1ns", "1ps"))
-    for memory in folder.glob("*.hex"):
-        (simulation / memory.name).write_bytes(memory.read_bytes())
-    environment = {
-        "DERMIS_CORE": str(folder),
-        "DERMIS_BUS": bus,
-        "DERMIS_WORDS": str(bits // 32),
-        "DERMIS_VECTORS": str(vectors),
-        "PYTHONPATH": str(HERE),
-    }
-    results = simulation / "results.xml"
-    try:
-        runner.test(
-            hdl_toplevel=top,
-            test_module="core",
-            build_dir=simulation,
-            test_dir=simulation,
-            extra_env=environment,
-            results_xml=str(results),
-        )
-    except SystemExit:
-        # A test of core.py failed; an absent file of results is an error below.
-        pass
-    return get_results(results)
+    return icarus(folder, top, [verilog], "core", environment(bus, bits, vectors))
 
 
 @pytest.mark.parametrize("bus, bits", [("axi", 32), ("axi", 64), ("axi", 128), ("wishbone", 32)])

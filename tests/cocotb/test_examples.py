@@ -4,10 +4,7 @@ import json
 import subprocess
 
 import pytest
-from cocotb_tools.check_results import get_results
-from cocotb_tools.runner import get_runner
-
-from test_cores import BUILD, HERE, generate
+from test_cores import BUILD, HERE, environment, generate, icarus
 
 EXAMPLES = HERE.parent.parent / "hdl/examples"
 TOP = "dermis_press_axi"
@@ -22,36 +19,9 @@ def run(name, bits, change=lambda text: text):
     example.write_text(change((EXAMPLES / f"{name}.v").read_text(encoding="utf-8")), encoding="utf-8")
     lint = ["verilator", "--lint-only", "-Wall", "-Wno-DECLFILENAME", "-Wno-PINCONNECTEMPTY", "-Wno-UNUSED", "--top-module", name]
     subprocess.run([*lint, f"{TOP}.vlt", example.name, f"{TOP}.v"], check=True, cwd=folder)
-    work = folder / "sim"
-    runner = get_runner("icarus")
-    runner.build(
-        sources=[example, folder / f"{TOP}.v"], hdl_toplevel=name, build_dir=work, always=True, timescale=("1ns", "1ps")
-    )
-    for memory in folder.glob("*.hex"):
-        (work / memory.name).write_bytes(memory.read_bytes())
     sizes = [len((folder / f"{TOP}_tb_{kind}.hex").read_text().splitlines()) for kind in ["codes", "words"]]
-    environment = {
-        "DERMIS_CORE": str(folder),
-        "DERMIS_BUS": "axi",
-        "DERMIS_WORDS": str(bits // 32),
-        "DERMIS_VECTORS": str(folder / "engine/dermis_press_tb"),
-        "DERMIS_SIZES": json.dumps(sizes),
-        "PYTHONPATH": str(HERE),
-    }
-    results = work / "results.xml"
-    try:
-        runner.test(
-            hdl_toplevel=name,
-            test_module=name,
-            build_dir=work,
-            test_dir=work,
-            extra_env=environment,
-            results_xml=str(results),
-        )
-    except SystemExit:
-        # A test failed; an absent file of results is an error below.
-        pass
-    return get_results(results)
+    own = {"DERMIS_SIZES": json.dumps(sizes), **environment("axi", bits, folder / "engine/dermis_press_tb")}
+    return icarus(folder, name, [example, folder / f"{TOP}.v"], name, own)
 
 
 @pytest.mark.parametrize("name, bits, tests", [("bare", 128, 1), ("dma", 32, 2)])

@@ -119,9 +119,7 @@ endmodule
 /// The wires of the bus.
 fn declarations(bus: Bus) -> &'static str {
     match bus {
-        Bus::AxiLite => {
-            "  reg asked = 1'b0;\n  wire arready, rvalid;\n  wire [1:0] rresp;\n  wire [31:0] rdata;\n"
-        }
+        Bus::AxiLite => "  reg asked = 1'b0;\n  wire arready, rvalid;\n  wire [1:0] rresp;\n  wire [31:0] rdata;\n",
         Bus::Wishbone => "  wire ack, err;\n  wire [31:0] rdata;\n",
     }
 }

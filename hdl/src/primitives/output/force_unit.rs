@@ -341,7 +341,8 @@ impl Shape {
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
-                let at_value = if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
+                let at_value =
+                    if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);
