@@ -86,12 +86,11 @@ impl Sources {
 
 /// A register of `value`, or a wire.
 fn stage<'k>(k: &'k Builder, registered: bool, name: &str, value: Expr<'k>) -> Expr<'k> {
-    if !registered {
-        return k.wire(name, value);
+    if registered {
+        k.delay(name, value)
+    } else {
+        k.wire(name, value)
     }
-    let register = k.register(name, value.ty());
-    register.set(value);
-    *register
 }
 
 fn kernel(registered: bool) -> Kernel {

@@ -33,8 +33,9 @@ fn move_up<'k>(stays: Expr<'k>, word: Expr<'k>, by: usize) -> Expr<'k> {
     stays.mux(word, word.low(word.bits() - by).shift_left(by))
 }
 
-/// From an argument to the word in between, a cycle later: the upper bits of the leading one's position, then the bits from
-/// the nibble of the leading one on. Names of wires start with `name`.
+/// First part of the leading-one detection, a cycle later: the upper bits of the leading one's position, then the argument
+/// shifted left until the leading one is in its top nibble, of which [`logarithm`] needs `REST_BITS` bits. Names of wires start
+/// with `name`.
 pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     let halves = first_halves(argument.bits());
     let width = 2 * halves[0];
@@ -59,7 +60,7 @@ pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     concat(&parts)
 }
 
-/// From the word in between to the logarithm, of [`LOG_BITS`] bits. The logarithm of 0 is that of 1.
+/// Rest of the detection, and the logarithm, of [`LOG_BITS`] bits, of what [`locate`] returned. The logarithm of 0 is that of 1.
 pub fn logarithm<'k>(k: &'k Builder, name: &str, located: Expr<'k>) -> Expr<'k> {
     let mut rest = located.low(REST_BITS);
     let mut position = located.slice(REST_BITS, located.bits() - REST_BITS);

@@ -460,14 +460,15 @@ fn product<'k>(k: &'k Builder, value: Expr<'k>, mu: Expr<'k>) -> Expr<'k> {
     k.delay("product", (high.shift_left(LOW) + low).resize(bits))
 }
 
-/// Low bits of a shift, by which its second step moves.
+/// Low bits of a shift amount, which the second step of the shift takes.
 const FINE: usize = 3;
 
 /// A right shift of `SHIFT_BITS` bits in two steps, a cycle each: over all its bits it would be a longest path.
 #[derive(Clone, Copy)]
 struct Shift<'k> {
-    /// The shift, and its low bits a cycle later.
+    /// Shift amount; valid with the value.
     by: Expr<'k>,
+    /// Its low [`FINE`] bits, delayed by a cycle for the second step.
     rest: Expr<'k>,
 }
 
