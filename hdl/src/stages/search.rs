@@ -209,7 +209,7 @@ impl Search {
             bias_start: BitDelay::new(moved + CANDIDATES_LATENCY + 1),
             totals: BitDelay::new(moved + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(moved + 1),
-            step: Delay::new(5, store_latency(formats)),
+            step: Delay::new(5, store_latency(formats) - 1),
             // The target buffer is known one cycle after the set-up and needed one cycle before the write.
             target: Delay::new(BUFFER_BITS, moved - 2),
             moved_address: Delay::new(step, moved),

@@ -9,14 +9,14 @@ use crate::primitives::search::polynomial_word::PolynomialWord;
 use crate::wire::Wire;
 
 /// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
-/// two for y and the halving. The first cycle of an axis adds up the terms to be multiplied by the step, the second
-/// adds or subtracts them.
+/// two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms, one of
+/// which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
 #[derive(LogicBlock)]
 pub struct Taylor {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid with
-    /// `word`.
+    /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid one
+    /// cycle before `word`.
     pub step: Wire<In>,
     /// Polynomials, one per lane; taken in every cycle.
     pub word: Wire<In>,
@@ -49,35 +49,28 @@ impl Taylor {
 fn kernel(layout: &PolynomialWord) -> Kernel {
     let k = Builder::new("taylor");
     let (step, word) = (k.input("step", STEP_BITS), k.input("word", layout.bits()));
-    // The step travels along the pipeline: x moves in the second cycle, y in the fourth.
-    let later = k.delay("later_1", step.slice(2, 3));
-    let later = k.delay("later_2", later);
-    let lane = |lane| k.scope(&format!("lane_{lane}"), || moved(&k, layout, step.low(2), later, word, lane));
+    let lane = |lane| k.scope(&format!("lane_{lane}"), || moved(&k, layout, step, word, lane));
     let lanes: Vec<Vec<Expr>> = (0..layout.lanes).map(lane).collect();
     k.wire("moved", layout.join(&lanes));
     k.finish()
 }
 
-/// The polynomial of one lane: moved along x, then along y by the lower bits of `later`, then halved by its top bit.
-fn moved<'k>(
-    k: &'k Builder,
-    layout: &PolynomialWord,
-    step: Expr<'k>,
-    later: Expr<'k>,
-    word: Expr<'k>,
-    lane: usize,
-) -> Vec<Expr<'k>> {
-    // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
-    let own = |name: &str, value: Expr<'k>| {
-        let register = k.register(name, value.ty()).keep();
-        register.set(value);
-        *register
-    };
-    let (dx, dy, halving) = (own("dx", step), own("dy", later.low(2)), own("halving", later.top()));
+/// The polynomial of one lane: moved along x, then along y, then halved.
+fn moved<'k>(k: &'k Builder, layout: &PolynomialWord, step: Expr<'k>, word: Expr<'k>, lane: usize) -> Vec<Expr<'k>> {
+    // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them. The step travels along the
+    // pipeline: it is used in four cycles, its halving in the last.
+    let mut left = step;
+    let steps = [("dx_1", 0), ("dx_2", 0), ("dy_1", 2), ("dy_2", 0)].map(|(name, used)| {
+        let register = k.register(name, left.slice(used, left.bits() - used).ty()).keep();
+        register.set(left.slice(used, left.bits() - used));
+        left = *register;
+        left
+    });
+    let halving = steps[3].top();
     let start: Vec<Expr> = (0..layout.widths.len()).map(|n| layout.coefficient(word, n, lane)).collect();
-    let along_x = shift(k, "x", &start, dx);
+    let along_x = shift(k, "x", &start, [steps[0], steps[1]]);
     let between: Vec<Expr> = (0..).zip(along_x).map(|(n, value)| k.delay(&format!("between_{n}"), value)).collect();
-    let along_y = shift(k, "y", &between, dy);
+    let along_y = shift(k, "y", &between, [steps[2], steps[3]]);
     let halved = |(n, value): (usize, Expr<'k>)| {
         let value = k.wire(&format!("shifted_{n}"), value);
         let degree = (EXPONENTS[n].0 + EXPONENTS[n].1) as usize;
@@ -87,44 +80,57 @@ fn moved<'k>(
     (0..).zip(along_y).map(halved).collect()
 }
 
-/// A move of the polynomial `w` along an axis: the terms that the step multiplies are registered; the result is that of
-/// one cycle later.
+/// What a coefficient gains in a move: the terms an odd or an even number of orders above it, each times its binomial
+/// factor.
+#[derive(Clone, Copy)]
+struct Gain<'k> {
+    value: Expr<'k>,
+    /// It changes its sign with the step.
+    odd: bool,
+    /// The value is a sum itself.
+    sum: bool,
+}
+
+/// A move of the polynomial `w` along an axis in two cycles; `steps` are the steps of the first and the second cycle.
 ///
 /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3, with d one of −1, 0, 1. So d² is
-/// 1 if there is a move, and d·c is c, −c or 0, where −c is the complement plus one. Written as one sum, which
-/// synthesis maps to one carry chain.
-fn shift<'k>(k: &'k Builder, axis: &str, w: &[Expr<'k>], step: Expr<'k>) -> Vec<Expr<'k>> {
+/// 1 if there is a move, and d·c is c, −c or 0, where −c is the complement plus one.
+fn shift<'k>(k: &'k Builder, axis: &str, w: &[Expr<'k>], steps: [Expr<'k>; 2]) -> Vec<Expr<'k>> {
     let along_x = axis == "x";
     let one = |n: usize| {
         let bits = w[n].bits();
         let (i, j) = EXPONENTS[n];
         let order = if along_x { i } else { j };
-        // The term `by` above, times its binomial factor: those an odd distance above change sign with the step, the
-        // others do not.
+        // The term `by` above, times its binomial factor.
         let term = |by: u32| {
             let above = if along_x { (i + by, j) } else { (i, j + by) };
             let term = w.get(EXPONENTS.iter().position(|&e| e == above)?)?.resize(bits);
             let twice = term.shift_left(1).low(bits);
-            Some(match binomial(order + by, by) {
-                2 => twice,
-                3 => (twice + term.unsigned()).low(bits),
-                _ => term.unsigned(),
-            })
+            let (value, sum) = match binomial(order + by, by) {
+                2 => (twice, false),
+                3 => ((twice + term.unsigned()).low(bits), true),
+                _ => (term.unsigned(), false),
+            };
+            Some(Gain { value, odd: by % 2 == 1, sum })
         };
-        let register = |name: &str, value| k.delay(&format!("{axis}{n}_{name}"), value);
-        let mut sum = register("own", w[n].unsigned());
         let odd = match (term(1), term(3)) {
-            (Some(one), Some(three)) => Some((one + three).low(bits)),
+            (Some(one), Some(three)) => Some(Gain { value: (one.value + three.value).low(bits), odd: true, sum: true }),
             (one, _) => one,
         };
-        if let Some(odd) = odd {
-            let product = (register("odd", odd) & step.at(0).repeat(bits)) ^ step.at(1).repeat(bits);
-            sum = (sum + product + step.at(1)).low(bits);
+        let mut gains: Vec<Gain> = [odd, term(2)].into_iter().flatten().collect();
+        gains.sort_by_key(|gain| gain.sum);
+        let add = |to: Expr<'k>, Gain { value, odd, .. }: Gain<'k>, step: Expr<'k>| {
+            let moved = value & step.at(0).repeat(bits);
+            let sign = step.at(1);
+            if odd { (to + (moved ^ sign.repeat(bits)) + sign).low(bits) } else { (to + moved).low(bits) }
+        };
+        let mut own = w[n].unsigned();
+        if gains.first().is_some_and(|gain| !gain.sum) {
+            own = add(own, gains.remove(0), steps[0]);
         }
-        if let Some(even) = term(2) {
-            sum = (sum + (register("even", even) & step.at(0).repeat(bits))).low(bits);
-        }
-        sum.signed()
+        let own = k.delay(&format!("{axis}{n}_own"), own);
+        let second = gains.first().map(|&gain| Gain { value: k.delay(&format!("{axis}{n}_gain"), gain.value), ..gain });
+        second.map_or(own, |gain| add(own, gain, steps[1])).signed()
     };
     (0..w.len()).map(one).collect()
 }
@@ -170,7 +176,13 @@ mod tests {
             }
             vec![Some(out)]
         };
-        check(block.kernel.kernel(), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, moved));
+        // The step comes a cycle before its polynomials; before the first there is none.
+        let mut step: Option<Word> = None;
+        let delayed = |inputs: &[Word]| {
+            let step = step.replace(inputs[0]);
+            step.map_or(vec![None], |step| moved(&[step, inputs[1]]))
+        };
+        check(block.kernel.kernel(), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, delayed));
     }
 
     /// Degrees 3, 2 and 1; the constant coefficient may wrap.
