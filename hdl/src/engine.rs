@@ -14,6 +14,8 @@
 //!
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
+//! - The passes of several rows of subarrays begin once the first row is in the buffer. [`Arrival`] holds the first
+//!   subarray back until the frame is complete.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
 //! - Subarrays whose values are complete are sent while the next ones are searched.
 //! - While a frame is sent, the next is searched. Of a single subarray that is searched, only the last sweep waits until the
@@ -31,7 +33,7 @@ use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
 use crate::primitives::{
-    count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, OperandSource, StatusSource,
+    count_bits, largest, Arrival, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, OperandSource, StatusSource,
     SATURATION_BITS,
 };
 use crate::stage_list::engine;
@@ -132,6 +134,7 @@ engine! {
             operand_source: OperandSource,
             status_source: StatusSource,
             begins: BitDelay,
+            arrival: Arrival,
             computing: Dff,
             first: Dff,
             filled: Dff,
@@ -216,6 +219,7 @@ impl Engine {
             send: Send::new(model),
             resultants,
             begins: BitDelay::new(1),
+            arrival: Arrival::new(model.begins_with_first_row()),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -308,6 +312,8 @@ impl Logic for Engine {
         self.opens.rst.next = self.rst.val();
         self.begins.clk.next = self.clk.val();
         self.begins.rst.next = self.rst.val();
+        self.arrival.clk.next = self.clk.val();
+        self.arrival.rst.next = self.rst.val();
         self.frame_cycles.rst.next = self.rst.val();
         self.computing.clk.next = self.clk.val();
         self.first.clk.next = self.clk.val();
@@ -343,8 +349,14 @@ impl Logic for Engine {
         self.resultants.clk.next = self.clk.val();
         self.resultants.rst.next = self.rst.val();
 
-        comment!("A frame starts: buffer full, previous frame out of the passes");
-        self.begins.d.next = self.receive.full.val()
+        comment!("A frame starts: buffer full, or its first row of subarrays in it;");
+        comment!("previous frame out of the passes");
+        self.arrival.row_end.next = self.receive.row_end.val();
+        self.arrival.dropped.next = self.receive.dropped.val();
+        self.arrival.free.next = self.contacts.free.val();
+        self.arrival.full.next = self.receive.full.val();
+        self.arrival.begins.next = self.begins.q.val();
+        self.begins.d.next = self.arrival.ready.val()
             & !self.begins.q.val()
             & !self.computing.q.val()
             & (!self.sending.q.val() | self.ahead.val());
@@ -374,22 +386,27 @@ impl Logic for Engine {
         self.sending.d.next =
             (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();
+        self.arrival.complete.next = self.complete.val();
         self.unsent.next = self.sending.q.val() & !self.send.done.val();
         self.behind.next = self.first.q.val() & self.unsent.val() & (!self.single.val() | !self.condition.q.val());
-        self.hand_over.next =
-            self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
+        self.hand_over.next = self.complete.val()
+            & !self.arrival.waits.val()
+            & !self.behind.val()
+            & (!self.searching.q.val() | self.search.done.val());
         self.leaves.next = self.hand_over.val() & self.part.last.val();
         self.passed.next = self.contacts.ended.val() & self.searched_last.q.val();
         if self.ahead.val() {
             self.passed.next = self.leaves.val();
         }
-        self.computing.d.next =
-            (self.begin_frame.val() | (self.computing.q.val() & !self.passed.val())) & !self.rst.val();
+        self.computing.d.next = (self.begin_frame.val()
+            | (self.computing.q.val() & !self.passed.val() & !self.arrival.discards.val()))
+            & !self.rst.val();
         self.searched_case.keep.next = self.hand_over.val();
         self.searched_case.word.next = self.frame_case.kept.val();
         self.handed.d.next = self.hand_over.val();
         self.opens.d.next = self.hand_over.val() & self.first.q.val();
-        self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();
+        self.filled.d.next =
+            self.complete.val() & !self.hand_over.val() & !self.arrival.discards.val() & !self.rst.val();
         self.searching.d.next =
             (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
         self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
@@ -434,7 +451,7 @@ impl Logic for Engine {
         self.part.enable.next = self.hand_over.val();
         self.again.d.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.q.val();
-        comment!("Waiting for the previous frame is not counted");
+        comment!("Waiting for frames or their rest is not counted");
         self.frame_cycles.begin_frame.next = self.begin_frame.val();
         self.frame_cycles.waits.next = self.complete.val() & self.first.q.val() & !self.hand_over.val();
         self.frame_cycles.hand_over.next = self.hand_over.val() & self.first.q.val();
@@ -447,7 +464,7 @@ impl Logic for Engine {
                 self.condition.d.next = self.receive.positive.val() & self.receive.negative.val();
             }
         }
-        if self.begin_frame.val() {
+        if self.arrival.arrives.val() {
             self.framing.d.next = self.receive.framing.val();
         }
 
@@ -462,7 +479,7 @@ impl Logic for Engine {
         self.prepare.m_axis_tready.next = self.receive.s_axis_tready.val();
         self.receive.quad_address.next = self.contacts.quad_address.val();
         self.receive.free.next = self.contacts.free.val();
-        self.receive.reported.next = self.begin_frame.val();
+        self.receive.reported.next = self.arrival.arrives.val();
         self.receive.part.next = self.part.value.val();
         self.normalise.start.next = self.start.val();
         self.normalise.magnitude.next = self.receive.magnitude.val();

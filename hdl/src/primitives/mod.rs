@@ -33,6 +33,7 @@ pub use arithmetic::rescaler::{count_saturations, operand_of, saturating_sum, Re
 pub(crate) use arithmetic::saturated::saturated;
 pub(crate) use arithmetic::unfolder::hadamard;
 pub use arithmetic::unfolder::Unfolder;
+pub use frame::arrival::Arrival;
 #[cfg(test)]
 pub(crate) use frame::average::tests::Sums;
 pub use frame::average::Average;

@@ -92,12 +92,12 @@ impl Banks {
         divide!(
             Of::Own, ReceivePorts, ports,
             reads [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
-            drives [s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing]
+            drives [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing]
         );
         for (number, bank) in banks.iter_mut().enumerate() {
             divide!(
                 Of::Bank(number), ReceivePorts, &mut **bank,
-                reads [s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing],
+                reads [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing],
                 drives [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported]
             );
         }

@@ -19,8 +19,8 @@ use crate::wire::Wire;
 /// s_axis --> frame buffer --> quad (two cycles after quad_address)
 ///       \--> magnitude, positive, negative
 /// ```
-/// `full` is high from two cycles after the frame's last beat until `free`; the gathered values are valid for the same
-/// time.
+/// `full` is high from two cycles after the frame's last beat until `free`; the gathered values of a subarray are valid from
+/// two cycles after its last beat.
 #[derive(LogicBlock)]
 pub struct Receive {
     ports: ReceivePorts,
@@ -61,6 +61,10 @@ ports! {
         pub accept: Signal<Out, Bit>,
         /// The accepted code, 0 for a dead taxel and for tension of a unipolar array; valid with `accept`.
         pub taken_word: Wire<Out>,
+        /// The taxel accepted is the last of a row of subarrays.
+        pub row_end: Signal<Out, Bit>,
+        /// The beat accepted ends its frame early: the frame is dropped.
+        pub dropped: Signal<Out, Bit>,
         /// The frame buffer holds a whole frame, and `which` is its case; high until `free`.
         pub full: Signal<Out, Bit>,
         /// The frame has been read: the buffer may be overwritten.
@@ -73,11 +77,12 @@ ports! {
         pub quad: Wire<Out>,
         /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
         pub part: Wire<In>,
-        /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid while `full`.
+        /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid from two cycles after its last code
+        /// until `free`.
         pub magnitude: Wire<Out>,
-        /// A code of the subarray is above the noise floor; valid while `full`.
+        /// A code of the subarray is above the noise floor; valid as `magnitude` is.
         pub positive: Signal<Out, Bit>,
-        /// A code of the subarray is below minus the noise floor; valid while `full`.
+        /// A code of the subarray is below minus the noise floor; valid as `magnitude` is.
         pub negative: Signal<Out, Bit>,
         /// `tlast` was early or missing since the last `reported`.
         pub framing: Signal<Out, Bit>,
@@ -100,6 +105,8 @@ impl ReceivePorts {
             s_axis_tlast: Default::default(),
             accept: Default::default(),
             taken_word: Wire::new(bits),
+            row_end: Default::default(),
+            dropped: Default::default(),
             full: Default::default(),
             free: Default::default(),
             which: Wire::new(count_bits(cases.len())),
@@ -169,6 +176,8 @@ impl Logic for Receive {
         self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();
         self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.scan.last.val();
         self.accept.next = self.taken.val();
+        self.row_end.next = self.scan.row_end.val();
+        self.dropped.next = self.early.val();
 
         self.which.next = false.into();
         self.scan.which.next = false.into();
@@ -318,10 +327,15 @@ pub(crate) mod tests {
                 let codes: Vec<i32> = part.indices(&model.scene.sensor).map(|at| self.reception.codes[at]).collect();
                 receive(&codes, model.noise_floor)
             });
+            let next = self.reception.codes.len() + 1;
+            let row_end = next.is_multiple_of(self.case().layout().rows * model.scene.sensor.cols);
+            let dropped = inputs[3].number() == 1 && next < model.scene.sensor.taxels();
             vec![
                 Some(ready.into()),
                 Some(taken.is_some().into()),
                 taken.map(|taken| code(taken, bits)),
+                Some((taken.is_some() && row_end).into()),
+                Some((taken.is_some() && dropped).into()),
                 Some(self.full.into()),
                 Some(0.into()),
                 lanes.map(|lanes| Word::of_fields(&lanes, bits)),
@@ -374,7 +388,8 @@ pub(crate) mod tests {
                     changes,
                     inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
                     outputs [
-                        s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing
+                        s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive,
+                        negative, framing
                     ],
                 )
             };

@@ -88,7 +88,6 @@ fn unsearched() -> Scene {
 /// Each experiment finds the defect it is designed for.
 #[test]
 fn a_defect_is_found() {
-    let mut hardware = hardware(&unsearched());
     let defects = [
         // A frame is accepted while the last one has not been read; an early tlast does not restart; a reset leaves a
         // frame in the buffer.
@@ -96,6 +95,18 @@ fn a_defect_is_found() {
         ("tlast", Change::value("receive", "scan__clear", |k| k.named("rst"))),
         ("reset", Change::within("receive", "whole__d", |k| [!k.named("rst"), k.constant(1, 1)])),
     ];
+    are_found(&unsearched(), defects);
+    // Of several rows of subarrays: passes of a frame that is dropped afterwards are handed over; a first subarray does not
+    // wait for the rest of its frame.
+    let defects = [
+        ("tlast", Change::value("arrival", "lost", |k| k.constant(1, 0))),
+        ("tlast", Change::value("arrival", "waits", |k| k.constant(1, 0))),
+    ];
+    are_found(&small(4, 6, "[partition]\ncase = 3\n[search]\nmu_max = 0.05\n"), defects);
+}
+
+fn are_found(scene: &Scene, defects: impl IntoIterator<Item = (&'static str, Change)>) {
+    let mut hardware = hardware(scene);
     for (experiment, defect) in defects {
         let name = defect.to_string();
         hardware.generated = generate_changed(&hardware.model, &[defect]).unwrap();

@@ -2,7 +2,7 @@
 
 use super::resources::Resources;
 use super::storage::Storage;
-use crate::board::Board;
+use crate::board::{Board, EngineKind};
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::prepare::Prepare;
 use crate::fixed::stages::resultants::{self, Summed};
@@ -154,6 +154,20 @@ impl Plan {
     /// Whether the hardware has several cases and chooses one per frame.
     pub fn chooses(&self) -> bool {
         self.cases.len() > 1
+    }
+
+    /// Whether the passes of a frame begin when its first row of subarrays has arrived, before the others: the parallel engine
+    /// with several rows of subarrays, in one case.
+    pub fn begins_with_first_row(&self) -> bool {
+        self.board.engine == EngineKind::Parallel && !self.chooses() && self.grid().rows > 1
+    }
+
+    /// Codes of a frame that arrive after those with which its passes may begin.
+    pub fn codes_after_begin(&self) -> usize {
+        match self.begins_with_first_row() {
+            true => self.scene.sensor.taxels() - self.first().layout().rows * self.scene.sensor.cols,
+            false => 0,
+        }
     }
 
     /// Subarrays along rows and columns of each case built, in the order of [`Plan::cases`].

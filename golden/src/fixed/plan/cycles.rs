@@ -16,6 +16,8 @@
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
+//! input    of several rows of subarrays the passes begin with the first row; the first subarray is handed over when the
+//!          whole frame has arrived
 //! send     begins with the first subarray's values: 13 to the first beat, 14 where each contact has a μ, then one beat a
 //!          cycle; a beat waits for the first value of its subarray
 //! ```
@@ -142,7 +144,8 @@ impl Cycles {
 /// When a frame's output beats leave, at full speed, without the choice of the case.
 #[derive(Default)]
 pub(in crate::fixed) struct BeatCycles {
-    /// Cycles that the status states: from the arrival of the last code behind `prepare` to the first force.
+    /// Cycles that the status states: from the arrival behind `prepare` of the last code with which the passes may begin to
+    /// the first force, without those in which the rest of the frame is awaited.
     pub counted: u64,
     /// Cycles from the last input beat to each output beat, status included.
     pub beats: Vec<u64>,
@@ -157,31 +160,35 @@ impl BeatCycles {
             let beats = (0..count as u64).map(|beat| first + beat * serial::BEAT).collect();
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
-        let forces = forces(plan, case, &values(plan, case, searched, course));
-        let sent = ACCEPT + SEND;
-        let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + sent);
+        let after_begin = plan.codes_after_begin() as u64;
+        let forces_of = |received: u64| forces(plan, case, &values(plan, case, searched, course, received));
+        let counted = forces_of(0).first().copied().unwrap_or(0) + ACCEPT + SEND;
         let before = plan.prepare.latency();
+        // From the last input beat: no force comes before the whole frame has.
+        let forces: Vec<u64> =
+            forces_of(after_begin).iter().map(|force| before + (force + ACCEPT + SEND - after_begin)).collect();
+        let last = forces.last().copied().unwrap_or(0);
         let beats = match plan.sends_resultants() {
             // They are sent once the last force has been added.
-            true => (before + last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
+            true => (last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
             false => {
-                let forces = forces.iter().map(|force| before + force + sent);
-                let labels = (1..=plan.label_beats() as u64).map(|beat| before + last + beat * LABELS);
-                let sent: Vec<u64> = forces.chain(labels).collect();
+                let labels = (1..=plan.label_beats() as u64).map(|beat| last + beat * LABELS);
+                let sent: Vec<u64> = forces.into_iter().chain(labels).collect();
                 let next = sent.last().map_or(0, |beat| beat + 1);
                 sent.into_iter().chain(next..).take(count).collect()
             }
         };
-        BeatCycles { counted: first, beats }
+        BeatCycles { counted, beats }
     }
 }
 
-/// Cycles from the start of a frame to the first value of each subarray.
-fn values(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>) -> Vec<u64> {
+/// Cycles from the start of a frame to the first value of each subarray, where the frame is complete `received` cycles after
+/// what its passes begin with.
+fn values(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>, received: u64) -> Vec<u64> {
     let passes = passes(plan, case, course);
     let early = early_values(plan, case);
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
-    let (mut complete, mut searched_at) = (0, 0);
+    let (mut complete, mut searched_at) = (0, received);
     let value = |&searching: &bool| {
         complete += passes;
         let handed_over = complete.max(searched_at);

@@ -5,7 +5,8 @@
 //! where the mean slides:
 //! ```text
 //! input    2^k T, or T from the last quad that fold has read
-//! pass     the passes of all subarrays, waiting where the search is busy
+//! pass     the passes of all subarrays, waiting where the search is busy; the first of several rows of subarrays waits for
+//!          the whole frame once more
 //! search   one subarray after the other
 //! frame    all of these, one after the other, where block RAM is too short for frames that overlap
 //! send     T and the status beats; the first search of several subarrays waits for it, of one only the last sweep
@@ -63,6 +64,9 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
     let labels = plan.label_beats() as u64 * LABELS;
     // When the last frame's last code arrived, its search ended, its forces had been sent, the next frame can begin.
     let (mut received, mut searched, mut sent, mut begin) = (0, 0, 0, 0);
+    // When a frame whose passes began with its first row of subarrays is complete.
+    let after_begin = plan.codes_after_begin() as u64;
+    let mut complete = after_begin;
     let mut intervals = Vec::with_capacity(courses.len());
     for &course in courses {
         let passes = passes(plan, case, course);
@@ -72,7 +76,8 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
         for part in 0..parts {
             // A whole array's values wait for the force memory, the search of several subarrays does.
             let free = if part == 0 && !whole { sent } else { 0 };
-            handed_over = (start + passes).max(searched).max(free);
+            let arrived = if part == 0 { complete } else { 0 };
+            handed_over = (start + passes).max(searched).max(free).max(arrived);
             searched = handed_over + search;
             if whole {
                 searched = searched.max(sent + last_sweep);
@@ -91,7 +96,8 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
         let free = start + contacts.map_or(quads + FOLDED, |contacts| contacts.free + 1);
         received = (received + taxels * plan.scene.input.frames_per_result() as u64).max(free + taxels - 1);
         let passed = if plan.resources.overlaps { handed_over } else { sent };
-        begin = (received + ACCEPT + choice).max(passed + BEGIN);
+        complete = received + ACCEPT;
+        begin = (complete + choice - after_begin).max(passed + BEGIN);
     }
     intervals
 }

@@ -21,6 +21,8 @@ pub struct Scan {
     pub enable: Signal<In, Bit>,
     /// The current taxel is the array's last.
     pub last: Signal<Out, Bit>,
+    /// `enable`, and the current taxel is the last of a row of subarrays.
+    pub row_end: Signal<Out, Bit>,
     /// Address of the current taxel's word, over all subarrays; combinational from the count, valid from the first
     /// `clear` on.
     pub address: Wire<Out>,
@@ -50,6 +52,7 @@ impl Scan {
             clear: Default::default(),
             enable: Default::default(),
             last: Default::default(),
+            row_end: Default::default(),
             address: Wire::new(quad_address.address.width()),
             part: Wire::new(quad_address.part.width()),
             lane: Wire::new(2),
@@ -88,6 +91,7 @@ impl Logic for Scan {
         self.part_col.enable.next = self.enable.val() & self.col.last.val();
         self.row.enable.next = self.line_end.val();
         self.part_row.enable.next = self.part_end.val();
+        self.row_end.next = self.part_end.val();
         self.last.next =
             self.col.last.val() & self.part_col.last.val() & self.row.last.val() & self.part_row.last.val();
 
@@ -123,12 +127,14 @@ mod tests {
 
     impl Reference for Taxels<'_> {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let Some(taxel) = self.passed else { return vec![None; 5] };
+            let Some(taxel) = self.passed else { return vec![None; 6] };
             let case = &self.cases[inputs[0].number() as usize];
             let place = Place::of(case, taxel);
             let (address, lane) = place.word(self.lanes);
             let last = usize::from(taxel + 1 == taxels(case));
-            let values = [last, address, place.part, lane, usize::from(place.mask)];
+            let row = case.layout().rows * case.layout().cols * case.grid().cols;
+            let row_end = usize::from(inputs[2].number() == 1 && (taxel + 1) % row == 0);
+            let values = [last, row_end, address, place.part, lane, usize::from(place.mask)];
             values.map(|value| Some(Word::from(value as u64))).into()
         }
 
@@ -160,7 +166,7 @@ mod tests {
                     Scan::new(model.cases(), lanes),
                     changes,
                     inputs [which, clear, enable],
-                    outputs [last, address, part, lane, mask],
+                    outputs [last, row_end, address, part, lane, mask],
                 )
             };
             let defects = [

@@ -1,5 +1,6 @@
 //! What is done to the codes of a frame as they arrive.
 
+pub(crate) mod arrival;
 pub(crate) mod average;
 pub(crate) mod calibrate;
 pub(crate) mod frame_stats;

@@ -122,7 +122,11 @@ fn shift<'k>(k: &'k Builder, axis: &str, w: &[Expr<'k>], steps: [Expr<'k>; 2]) -
         let add = |to: Expr<'k>, Gain { value, odd, .. }: Gain<'k>, step: Expr<'k>| {
             let moved = value & step.at(0).repeat(bits);
             let sign = step.at(1);
-            if odd { (to + (moved ^ sign.repeat(bits)) + sign).low(bits) } else { (to + moved).low(bits) }
+            if odd {
+                (to + (moved ^ sign.repeat(bits)) + sign).low(bits)
+            } else {
+                (to + moved).low(bits)
+            }
         };
         let mut own = w[n].unsigned();
         if gains.first().is_some_and(|gain| !gain.sum) {
