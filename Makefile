@@ -10,7 +10,9 @@ VERILATOR ?= verilator
 # Cargo's own variable: a target folder outside the repository is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
+PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv $(LITEX)
+# What LiteX's simulation is built with, and the compiler of its processor.
+LITEX      = gcc-riscv64-unknown-elf libevent-dev libjson-c-dev zlib1g-dev
 # A clean environment for the Python package and its tests.
 VENV       = $(BUILD)/python
 # The short report: make report QUICK=1
@@ -69,12 +71,12 @@ python: setup ## build the Python package, install it into a new environment, bu
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
 
-buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, and with FuseSoC
+buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
 	$(CARGO) build --quiet --bin dermis
-	python3 -m venv --clear $(BUILD)/cocotb-tools
-	$(BUILD)/cocotb-tools/bin/pip install -q --disable-pip-version-check -r tests/cocotb/requirements.txt
-	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/cocotb $(BUILD)/cocotb-tools/bin/python -m pytest -q tests/cocotb
+	python3 -m venv --clear $(BUILD)/soc-tools
+	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt ./python/litex
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc $(BUILD)/soc-tools/bin/python -m pytest -q tests/soc
 
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
 	$(CARGO) build --release --package dermis-c
@@ -120,6 +122,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 nightly: fuzz ## run all variants of the tests, those too that `make test` leaves out
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
 	$(CARGO) test --release -p dermis-sim --test program -- --include-ignored bitstream::
+	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
 	mkdir -p $(BUILD)

@@ -103,8 +103,9 @@ pub struct Status {
     pub rescale_saturations: u32,
     /// Number of force words saturated.
     pub force_saturations: u32,
-    /// Cycles to the first output beat, from the frame's last beat into `receive`; for a frame that waited in the
-    /// buffer, from the cycle before its computation started.
+    /// Cycles to the first output beat, from the frame's last beat into `receive`, with several rows of subarrays from the last
+    /// of the first row, without those in which the rest is awaited; for a frame that waited in the buffer, from the cycle
+    /// before its computation started.
     pub cycles: u32,
 }
 

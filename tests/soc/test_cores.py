@@ -13,7 +13,7 @@ from systemrdl.node import FieldNode
 
 HERE = Path(__file__).resolve().parent
 DERMIS = os.environ.get("DERMIS", "dermis")
-BUILD = Path(os.environ.get("DERMIS_BUILD", HERE.parent.parent / "build/cocotb"))
+BUILD = Path(os.environ.get("DERMIS_BUILD", HERE.parent.parent / "build/soc"))
 SCENE = HERE / "press.toml"
 
 

@@ -1,0 +1,90 @@
+"""The core as a LiteX module."""
+
+import json
+from pathlib import Path
+
+from litex.gen import ClockSignal, If, Instance, LiteXModule, ResetSignal
+from litex.soc.interconnect import stream, wishbone
+
+WORD_BITS = 32
+ID_BITS = 4
+
+
+class CoreError(ValueError):
+    """A folder does not hold what `dermis build SCENE --bus wishbone` writes."""
+
+
+def read_manifest(folder):
+    """The manifest of a core with registers on Wishbone.
+
+    Raises `CoreError` with file, field and what would be right.
+    """
+    path = Path(folder) / "manifest.json"
+    remedy = "write the folder with `dermis build SCENE --bus wishbone`"
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CoreError(f"{path}: {error}; {remedy}") from error
+    core = manifest.get("core") or {}
+    if core.get("bus") != "wishbone":
+        raise CoreError(f"{path}: core.bus = {json.dumps(core.get('bus'))}, not \"wishbone\"; {remedy}")
+    return manifest
+
+
+class Dermis(LiteXModule):
+    """A core between two streams.
+
+    - `sink`: a taxel's code per beat, 32 bits signed, row-major; `last` on a frame's last taxel; `id` names the frame.
+    - `source`: words of 32 bits, fx, fy, fz of each taxel, then status; `keep`, `user` and `id` as the guide says.
+    - `bus`: the register map on Wishbone, addresses of words, 64 registers.
+    - `manifest`: scales and counts, as in `manifest.json`.
+
+    The Verilog and its memory files are added to `platform`.
+    """
+
+    def __init__(self, platform, folder):
+        folder = Path(folder).resolve()
+        self.manifest = read_manifest(folder)
+        bits = self.manifest["core"]["stream_bits"]
+        words = bits // WORD_BITS
+        self.sink = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
+        self.source = stream.Endpoint(
+            [("data", bits), ("keep", bits // 8), ("user", words + 1), ("id", ID_BITS)]
+        )
+        self.bus = wishbone.Interface(data_width=WORD_BITS, address_width=8, addressing="word")
+
+        # # #
+
+        top = self.manifest["top"]
+        self.specials += Instance(
+            top,
+            i_aclk=ClockSignal(),
+            i_aresetn=~ResetSignal(),
+            i_s_axis_tdata=self.sink.data,
+            i_s_axis_tkeep=2 ** (WORD_BITS // 8) - 1,
+            i_s_axis_tid=self.sink.id,
+            i_s_axis_tvalid=self.sink.valid,
+            o_s_axis_tready=self.sink.ready,
+            i_s_axis_tlast=self.sink.last,
+            o_m_axis_tdata=self.source.data,
+            o_m_axis_tkeep=self.source.keep,
+            o_m_axis_tuser=self.source.user,
+            o_m_axis_tid=self.source.id,
+            o_m_axis_tvalid=self.source.valid,
+            i_m_axis_tready=self.source.ready,
+            o_m_axis_tlast=self.source.last,
+            i_wb_cyc=self.bus.cyc,
+            i_wb_stb=self.bus.stb,
+            i_wb_we=self.bus.we,
+            i_wb_adr=self.bus.adr,
+            i_wb_dat_w=self.bus.dat_w,
+            i_wb_sel=self.bus.sel,
+            o_wb_ack=self.bus.ack,
+            o_wb_err=self.bus.err,
+            o_wb_dat_r=self.bus.dat_r,
+        )
+        platform.add_source(str(folder / f"{top}.v"))
+        # $readmemh reads them from the folder in which the tool runs.
+        for name in self.manifest["files"]:
+            if name.endswith(".hex") and not name.startswith(f"{top}_tb"):
+                platform.add_source(str(folder / name), copy=True)
