@@ -13,7 +13,10 @@ const UNREAD: [(&str, &[&str]); 4] = [
         &["column__last", "frame_quads__last", "quads__last"],
     ),
     ("only `last` of this counter is used.", &["period__value"]),
-    ("`receive` writes by mask and `send` reads by lane, both outputs of one block.", &["scan__mask", "scan__lane"]),
+    (
+        "`receive` writes by mask and needs the end of a row, `send` reads by lane: outputs of one block.",
+        &["scan__mask", "scan__row_end", "scan__lane"],
+    ),
     (
         "constant without contacts, of which the test bench observes them.",
         &["operand_source__of_window", "segment__labelled", "segment__labelled_quad"],

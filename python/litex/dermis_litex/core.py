@@ -8,10 +8,19 @@ from litex.soc.interconnect import stream, wishbone
 
 WORD_BITS = 32
 ID_BITS = 4
+REMEDY = "write the folder with `dermis build SCENE --bus wishbone`"
 
 
 class CoreError(ValueError):
     """A folder does not hold what `dermis build SCENE --bus wishbone` writes."""
+
+
+def read_json(path):
+    """A file of the folder."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CoreError(f"{path}: {error}; {REMEDY}") from error
 
 
 def read_manifest(folder):
@@ -20,15 +29,24 @@ def read_manifest(folder):
     Raises `CoreError` with file, field and what would be right.
     """
     path = Path(folder) / "manifest.json"
-    remedy = "write the folder with `dermis build SCENE --bus wishbone`"
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise CoreError(f"{path}: {error}; {remedy}") from error
+    manifest = read_json(path)
     core = manifest.get("core") or {}
     if core.get("bus") != "wishbone":
-        raise CoreError(f"{path}: core.bus = {json.dumps(core.get('bus'))}, not \"wishbone\"; {remedy}")
+        raise CoreError(f"{path}: core.bus = {json.dumps(core.get('bus'))}, not \"wishbone\"; {REMEDY}")
     return manifest
+
+
+def require_width(core, bits):
+    """A core whose results are `bits` wide.
+
+    Raises `CoreError` with field, value and what would be right.
+    """
+    own = core.manifest["core"]["stream_bits"]
+    if own != bits:
+        raise CoreError(
+            f"core.stream_bits = {own}, on a bus of {bits} bits; "
+            f"write the folder with `dermis build SCENE --bus wishbone --stream-bits {bits}`"
+        )
 
 
 class Dermis(LiteXModule):
@@ -38,6 +56,7 @@ class Dermis(LiteXModule):
     - `source`: words of 32 bits, fx, fy, fz of each taxel, then status; `keep`, `user` and `id` as the guide says.
     - `bus`: the register map on Wishbone, addresses of words, 64 registers.
     - `manifest`: scales and counts, as in `manifest.json`.
+    - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
 
     The Verilog and its memory files are added to `platform`.
     """
@@ -45,6 +64,10 @@ class Dermis(LiteXModule):
     def __init__(self, platform, folder):
         folder = Path(folder).resolve()
         self.manifest = read_manifest(folder)
+        constants = read_json(folder / "registers.json")["constants"]
+        rows, cols, self.code_bits, _ = constants["array"].to_bytes(4, "little")
+        self.taxels = rows * cols
+        self.words = 3 * (constants["force_triples"] + constants["status_triples"])
         bits = self.manifest["core"]["stream_bits"]
         words = bits // WORD_BITS
         self.sink = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])

@@ -6,7 +6,7 @@ from litex.soc.integration.soc import SoCRegion
 from litex.soc.interconnect import wishbone
 from litex.soc.interconnect.csr import CSRStorage
 
-from dermis_litex.core import ID_BITS, CoreError, Dermis
+from dermis_litex.core import ID_BITS, Dermis, require_width
 
 
 class DermisDMA(LiteXModule):
@@ -23,12 +23,7 @@ class DermisDMA(LiteXModule):
     """
 
     def __init__(self, core, bus_data_width, bus_adr_width):
-        bits = core.manifest["core"]["stream_bits"]
-        if bits != bus_data_width:
-            raise CoreError(
-                f"core.stream_bits = {bits}, on a bus of {bus_data_width} bits; "
-                f"write the folder with `dermis build SCENE --bus wishbone --stream-bits {bus_data_width}`"
-            )
+        require_width(core, bus_data_width)
         interface = lambda: wishbone.Interface(data_width=bus_data_width, adr_width=bus_adr_width)
         # "big" is LiteX's name for words as they are.
         self.reader = WishboneDMAReader(interface(), endianness="big", with_csr=True)

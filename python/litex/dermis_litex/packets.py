@@ -1,0 +1,82 @@
+"""Frames and results as the payloads of UDP packets: the format, and a host's side of it.
+
+All numbers are little-endian.
+
+| word of 32 bits | bits | meaning |
+|---|---|---|
+| 0 | 7:0 | `KIND_FRAME` from the host, `KIND_RESULT` from the core |
+| | 15:8 | flags of a result: bit 0 a code was clipped |
+| | 23:16 | index of the fragment |
+| | 31:24 | number of fragments of the frame or result |
+| 1 | | sequence number, chosen by the host; a result has that of its frame |
+| 2 … | | `FRAGMENT_WORDS` words of the payload; of the last fragment the rest |
+
+Fragments of a frame may come in any order and more than once. Of a frame that lacks one when the next begins, nothing is
+solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored.
+"""
+
+import struct
+
+HEADER_WORDS = 2
+# 1440 bytes: with the headers of UDP, IP and Ethernet less than 1500.
+FRAGMENT_WORDS = 360
+KIND_FRAME = 0xD1
+KIND_RESULT = 0xD2
+FLAG_CLIPPED = 1
+LATE = 256
+UDP_PORT = 0xDE12
+
+
+def fragment_words(words):
+    """Words of each fragment of a payload of `words` words."""
+    counts = [FRAGMENT_WORDS] * (words // FRAGMENT_WORDS)
+    rest = words % FRAGMENT_WORDS
+    return counts + [rest] if rest else counts
+
+
+def code_words(taxels, code_bytes):
+    """Words of a frame of codes of 2 or 4 bytes."""
+    return -(-taxels * code_bytes // 4)
+
+
+def packets(kind, sequence, words, flags=0):
+    """The packets of a payload, each as bytes."""
+    counts = fragment_words(len(words))
+    result = []
+    for index, count in enumerate(counts):
+        payload = words[index * FRAGMENT_WORDS :][:count]
+        head = kind | flags << 8 | index << 16 | len(counts) << 24
+        result.append(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload))
+    return result
+
+
+def frame_packets(sequence, codes, code_bytes=2):
+    """The packets of a frame of signed codes, row-major."""
+    form = {2: "h", 4: "i"}[code_bytes]
+    data = struct.pack(f"<{len(codes)}{form}", *codes)
+    data += bytes(-len(data) % 4)
+    return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data))
+
+
+class Results:
+    """Puts results together from their packets, in any order."""
+
+    def __init__(self):
+        self.fragments = {}
+
+    def add(self, packet):
+        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other packets are ignored."""
+        if len(packet) < 4 * HEADER_WORDS or len(packet) % 4:
+            return None
+        head, sequence, *words = struct.unpack(f"<{len(packet) // 4}I", packet)
+        kind, flags, index, count = head.to_bytes(4, "little")
+        if kind != KIND_RESULT or index >= count:
+            return None
+        # A result that lacks a packet is given up once it is old.
+        self.fragments = {key: own for key, own in self.fragments.items() if (sequence - key) % 2**32 <= LATE}
+        own = self.fragments.setdefault(sequence, {})
+        own[index] = words
+        if len(own) < count:
+            return None
+        del self.fragments[sequence]
+        return sequence, [word for index in range(count) for word in own[index]], flags

@@ -1,0 +1,331 @@
+"""Frames from the network to a core, and its results back, in UDP packets; the format is in `packets`.
+
+```text
+ UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
+              two frame buffers          a packet at a time
+                    └── who asked, by id ──┘
+```
+"""
+
+from functools import reduce
+from operator import and_
+
+from liteeth.common import eth_udp_user_description
+from litex.gen import Case, Cat, FSM, If, LiteXModule, Memory, NextState, NextValue, Replicate, Signal
+from litex.soc.interconnect import stream
+from litex.soc.interconnect.csr import CSRStatus
+
+from dermis_litex.core import ID_BITS, WORD_BITS, require_width
+from dermis_litex.packets import (
+    FRAGMENT_WORDS,
+    HEADER_WORDS,
+    KIND_FRAME,
+    KIND_RESULT,
+    LATE,
+    UDP_PORT,
+    code_words,
+    fragment_words,
+)
+
+WORD_BYTES = WORD_BITS // 8
+SEQUENCE_BITS = 32
+BYTE = 8
+
+
+def choose(target, index, values):
+    """`target` is the value at `index`."""
+    return Case(index, {**{key: target.eq(value) for key, value in enumerate(values)}, "default": target.eq(0)})
+
+
+class Requesters(LiteXModule):
+    """Who sent each frame that is under way: address, port and sequence number, by the frame's id."""
+
+    def __init__(self):
+        layout = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
+        self.written = stream.Endpoint(layout)
+        self.read = stream.Endpoint(layout)
+        self.write_id = Signal(ID_BITS)
+        self.read_id = Signal(ID_BITS)
+
+        # # #
+
+        bits = sum(width for _, width in layout)
+        memory = Memory(bits, 2**ID_BITS)
+        write, read = memory.get_port(write_capable=True), memory.get_port()
+        self.specials += memory, write, read
+        self.comb += [
+            write.adr.eq(self.write_id),
+            write.dat_w.eq(Cat(*(getattr(self.written, name) for name, _ in layout))),
+            write.we.eq(self.written.valid),
+            read.adr.eq(self.read_id),
+            Cat(*(getattr(self.read, name) for name, _ in layout)).eq(read.dat_r),
+        ]
+
+
+class FrameReceiver(LiteXModule):
+    """Packets in, whole frames out: `source` has a code of 32 bits per beat.
+
+    A frame leaves only when all its packets have come; the next is collected meanwhile. Codes of 16 bits are those of the
+    converter: they are shifted up to the `code_bits` of the engine. Five numbers count packets: `taken`, `ignored` (late, or come
+    before), `refused` (another kind, number of fragments or length, or damaged), `overrun` (two frames wait already), and
+    frames: `cut` (given up without a packet).
+    """
+
+    def __init__(self, taxels, code_bits, code_bytes):
+        words = code_words(taxels, code_bytes)
+        counts = fragment_words(words)
+        self.sink = sink = stream.Endpoint(eth_udp_user_description(WORD_BITS))
+        self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
+        self.requester = requester = stream.Endpoint([("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)])
+        # A whole frame waits until the one before has left.
+        self.waits = full = Signal()
+        self.counters = {name: Signal(32) for name in ("taken", "ignored", "refused", "overrun", "cut")}
+
+        # # #
+
+        depth = 2 ** (words - 1).bit_length()
+        memory = Memory(WORD_BITS, 2 * depth)
+        write, read = memory.get_port(write_capable=True), memory.get_port()
+        self.specials += memory, write, read
+
+        # The frame that is collected, and the newest before it.
+        bank, collects = Signal(), Signal()
+        sequence, newest, has_newest = Signal(SEQUENCE_BITS), Signal(SEQUENCE_BITS), Signal()
+        come = Signal(len(counts))
+        ip_address, port = Signal(32), Signal(16)
+
+        # The packet.
+        head = Signal(WORD_BITS)
+        index, expected = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
+        base, at = Signal(max=2 * depth), Signal(max=FRAGMENT_WORDS + 1)
+        has_come, is_right = Signal(), Signal()
+        age = Signal(SEQUENCE_BITS)
+        same, late = Signal(), Signal()
+        self.comb += [
+            index.eq(head[16:24]),
+            choose(expected, index, counts),
+            choose(base, index, [number * FRAGMENT_WORDS for number in range(len(counts))]),
+            choose(has_come, index, list(come)),
+            is_right.eq(
+                (head[:8] == KIND_FRAME)
+                & (head[24:] == len(counts))
+                & (index < len(counts))
+                & (sink.length == WORD_BYTES * (HEADER_WORDS + expected))
+            ),
+            same.eq(collects & (sink.data == sequence)),
+            age.eq(newest - sink.data),
+            late.eq(has_newest & (age <= LATE)),
+        ]
+
+        def count(name):
+            return NextValue(self.counters[name], self.counters[name] + 1)
+
+        def skip(name):
+            return [count(name), If(sink.last, NextState("HEAD")).Else(NextState("SKIP"))]
+
+        begins = [
+            NextValue(sequence, sink.data),
+            NextValue(newest, sink.data),
+            NextValue(has_newest, 1),
+            NextValue(collects, 1),
+            NextValue(come, 0),
+            NextValue(ip_address, sink.ip_address),
+            NextValue(port, sink.src_port),
+            NextValue(at, 0),
+            If(collects & (come != 0), count("cut")),
+            NextState("PAYLOAD"),
+        ]
+        self.fsm = fsm = FSM(reset_state="HEAD")
+        fsm.act(
+            "HEAD",
+            sink.ready.eq(1),
+            NextValue(head, sink.data),
+            If(sink.valid, If(sink.last, count("refused")).Else(NextState("SEQUENCE"))),
+        )
+        fsm.act(
+            "SEQUENCE",
+            sink.ready.eq(1),
+            If(
+                sink.valid,
+                If(~is_right | sink.last, *skip("refused"))
+                .Elif(same & ~full & ~has_come, NextValue(at, 0), NextState("PAYLOAD"))
+                .Elif(same | late, *skip("ignored"))
+                .Elif(full, *skip("overrun"))
+                .Else(*begins),
+            ),
+        )
+        whole = Signal()
+        self.comb += whole.eq((at + 1 == expected) & (sink.error == 0))
+        fsm.act(
+            "PAYLOAD",
+            sink.ready.eq(1),
+            write.we.eq(sink.valid & (at < expected)),
+            If(
+                sink.valid,
+                If(at < expected, NextValue(at, at + 1)),
+                If(
+                    sink.last,
+                    If(whole, count("taken"), NextValue(come, come | (1 << index))).Else(count("refused")),
+                    NextState("HEAD"),
+                ),
+            ),
+        )
+        fsm.act("SKIP", sink.ready.eq(1), If(sink.valid & sink.last, NextState("HEAD")))
+        self.comb += [
+            write.adr.eq(Cat((base + at)[: depth.bit_length() - 1], bank)),
+            write.dat_w.eq(sink.data),
+            full.eq(collects & reduce(and_, list(come))),
+        ]
+
+        # The other bank leaves, a code per beat.
+        per_word = WORD_BYTES // code_bytes
+        leaves, taxel = Signal(), Signal(max=taxels)
+        place, next_place = Signal(max=2 * depth), Signal(max=2 * depth)
+        steps, swap = Signal(), Signal()
+        identifier = Signal(ID_BITS)
+        part = taxel[: per_word.bit_length() - 1] if per_word > 1 else 0
+        bits = BYTE * code_bytes
+        code = Signal(bits)
+        up = max(code_bits - bits, 0)
+        extended = Cat(Replicate(0, up), code, Replicate(code[-1], WORD_BITS))[:WORD_BITS]
+        last = taxel == taxels - 1
+        self.comb += [
+            swap.eq(full & ~leaves),
+            steps.eq(source.valid & source.ready),
+            If(swap, next_place.eq(Cat(Replicate(0, depth.bit_length() - 1), bank)))
+            .Elif(steps & (part == per_word - 1), next_place.eq(place + 1))
+            .Else(next_place.eq(place)),
+            read.adr.eq(next_place),
+            choose(code, part, [read.dat_r[bits * number :][:bits] for number in range(per_word)]),
+            source.valid.eq(leaves),
+            source.data.eq(extended),
+            source.last.eq(last),
+            source.id.eq(identifier),
+            requester.valid.eq(swap),
+            requester.ip_address.eq(ip_address),
+            requester.port.eq(port),
+            requester.sequence.eq(sequence),
+        ]
+        # The id of the frame that leaves next is that of the requester written.
+        self.next_id = Signal(ID_BITS)
+        self.comb += self.next_id.eq(identifier + 1)
+        self.sync += [
+            place.eq(next_place),
+            If(steps, taxel.eq(taxel + 1), If(last, taxel.eq(0), leaves.eq(0))),
+            If(swap, leaves.eq(1), bank.eq(~bank), identifier.eq(self.next_id), collects.eq(0), come.eq(0)),
+        ]
+
+
+class PacketQueue(LiteXModule):
+    """Packets of at most `words` words in; each leaves when it is whole.
+
+    LiteX's PacketFIFO (2024.12) takes the parameters of a packet once more in each cycle in which its last word waits for room.
+    """
+
+    def __init__(self, layout, words):
+        self.sink = sink = stream.Endpoint(layout)
+        self.source = source = stream.Endpoint(layout)
+
+        # # #
+
+        self.payload = payload = stream.SyncFIFO(stream.EndpointDescription(layout.payload_layout), words)
+        self.params = params = stream.SyncFIFO(layout.param_layout, 2)
+        names = {name for name, *_ in layout.payload_layout} | {"last"}
+        self.comb += [
+            sink.connect(payload.sink, keep=names),
+            params.sink.payload.raw_bits().eq(sink.param.raw_bits()),
+            payload.sink.valid.eq(sink.valid & params.sink.ready),
+            params.sink.valid.eq(sink.valid & sink.last & payload.sink.ready),
+            sink.ready.eq(payload.sink.ready & params.sink.ready),
+            payload.source.connect(source, keep=names),
+            source.param.raw_bits().eq(params.source.payload.raw_bits()),
+            source.valid.eq(params.source.valid),
+            payload.source.ready.eq(source.valid & source.ready),
+            params.source.ready.eq(source.valid & source.last & source.ready),
+        ]
+
+
+class ResultSender(LiteXModule):
+    """The words of results in, packets out, each as a whole: a network has no pauses within a packet."""
+
+    def __init__(self, words, requesters, udp_port):
+        counts = fragment_words(words)
+        self.sink = sink = stream.Endpoint([("data", WORD_BITS), ("user", 2), ("id", ID_BITS)])
+
+        # # #
+
+        layout = eth_udp_user_description(WORD_BITS)
+        self.packets = fifo = PacketQueue(layout, 2 ** (FRAGMENT_WORDS + HEADER_WORDS - 1).bit_length())
+        self.source = fifo.source
+        packet = fifo.sink
+        fragment, at = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
+        count = Signal(max=FRAGMENT_WORDS + 1)
+        ends = Signal()
+        self.comb += [
+            choose(count, fragment, counts),
+            ends.eq((at + 1 == count) | sink.last),
+            requesters.read_id.eq(sink.id),
+            packet.src_port.eq(udp_port),
+            packet.dst_port.eq(requesters.read.port),
+            packet.ip_address.eq(requesters.read.ip_address),
+            packet.length.eq(WORD_BYTES * (HEADER_WORDS + count)),
+        ]
+        self.fsm = fsm = FSM(reset_state="WAIT")
+        fsm.act("WAIT", NextValue(fragment, 0), NextValue(at, 0), If(sink.valid, NextState("HEAD")))
+        fsm.act(
+            "HEAD",
+            packet.valid.eq(1),
+            packet.data.eq(Cat(Signal(8, reset=KIND_RESULT), sink.user[1], Signal(7), fragment, Signal(8, reset=len(counts)))),
+            If(packet.ready, NextState("SEQUENCE")),
+        )
+        fsm.act(
+            "SEQUENCE",
+            packet.valid.eq(1),
+            packet.data.eq(requesters.read.sequence),
+            If(packet.ready, NextState("PAYLOAD")),
+        )
+        fsm.act(
+            "PAYLOAD",
+            packet.valid.eq(sink.valid),
+            sink.ready.eq(packet.ready),
+            packet.data.eq(sink.data),
+            packet.last.eq(ends),
+            If(ends, packet.last_be.eq(1 << (WORD_BYTES - 1))),
+            If(
+                sink.valid & packet.ready,
+                NextValue(at, at + 1),
+                If(sink.last, NextState("WAIT")).Elif(
+                    ends, NextValue(at, 0), NextValue(fragment, fragment + 1), NextState("NEXT")
+                ),
+            ),
+        )
+        # The next fragment's id is on `sink` once its first word is offered.
+        fsm.act("NEXT", If(sink.valid, NextState("HEAD")))
+
+
+class DermisUDP(LiteXModule):
+    """A core between the two directions of a UDP port of LiteEth with words of 32 bits.
+
+    The counters of `FrameReceiver` are CSRs.
+    """
+
+    def __init__(self, core, port, code_bytes=2, udp_port=UDP_PORT):
+        require_width(core, WORD_BITS)
+        self.requesters = Requesters()
+        self.receiver = FrameReceiver(core.taxels, core.code_bits, code_bytes)
+        self.sender = ResultSender(core.words, self.requesters, udp_port)
+
+        # # #
+
+        self.comb += [
+            port.source.connect(self.receiver.sink),
+            self.receiver.source.connect(core.sink),
+            self.receiver.requester.connect(self.requesters.written, omit={"ready"}),
+            self.requesters.write_id.eq(self.receiver.next_id),
+            core.source.connect(self.sender.sink, omit={"keep"}),
+            self.sender.source.connect(port.sink),
+        ]
+        for name, counter in self.receiver.counters.items():
+            status = CSRStatus(32, name=name, description=f"Packets or frames: {name}.")
+            setattr(self, f"_{name}", status)
+            self.comb += status.status.eq(counter)

@@ -1,0 +1,301 @@
+"""Frames and results in UDP packets: lost, doubled, reordered, damaged and wrong packets, in Migen's simulation."""
+
+import os
+import random
+import re
+from collections import Counter
+
+import pytest
+from dermis_litex.core import ID_BITS
+from dermis_litex.packets import FRAGMENT_WORDS, KIND_FRAME, LATE, Results, code_words, fragment_words, frame_packets
+from dermis_litex.udp import FrameReceiver, Requesters, ResultSender
+from dermis_litex import Dermis, DermisUDP
+from litex.gen import ClockDomain, LiteXModule
+from litex.gen.fhdl import verilog
+from litex.gen.sim import passive, run_simulation
+from litex.soc.interconnect import stream
+from liteeth.common import eth_udp_user_description
+from test_cores import BUILD, generate, icarus
+
+CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
+
+
+class Received:
+    """What a receiver does with packets that come one after the other, each once it is whole."""
+
+    def __init__(self, words):
+        self.counts = fragment_words(words)
+        self.newest, self.collected, self.come = None, None, {}
+        self.counters = Counter()
+
+    def add(self, head, sequence, payload, length, damaged, waits):
+        """Takes a packet; the payload of a frame that is whole now. `waits`: a whole frame waits for the one that leaves."""
+        kind, index, count = head & 255, head >> 16 & 255, head >> 24
+        expected = self.counts[index] if index < len(self.counts) else 0
+        if sequence is None or kind != KIND_FRAME or count != len(self.counts) or not expected or length != 4 * (2 + expected):
+            return self.tell("refused")
+        if sequence != self.collected or waits or index in self.come:
+            late = self.newest is not None and (self.newest - sequence) % 2**32 <= LATE
+            if sequence == self.collected or late:
+                return self.tell("ignored")
+            if waits:
+                return self.tell("overrun")
+            if self.collected is not None and self.come:
+                self.tell("cut")
+            self.newest, self.collected, self.come = sequence, sequence, {}
+        if len(payload) != expected or damaged:
+            return self.tell("refused")
+        self.tell("taken")
+        self.come[index] = payload
+        if len(self.come) < len(self.counts):
+            return None
+        whole = [word for index in range(len(self.counts)) for word in self.come[index]]
+        self.collected, self.come = None, {}
+        return whole
+
+    def tell(self, name):
+        self.counters[name] += 1
+
+
+def codes_of(words, taxels, code_bits, code_bytes):
+    data = b"".join(word.to_bytes(4, "little") for word in words)
+    codes = [int.from_bytes(data[code_bytes * k :][:code_bytes], "little", signed=True) for k in range(taxels)]
+    return [code << max(code_bits - 8 * code_bytes, 0) for code in codes]
+
+
+def traffic(draw, taxels, code_bytes):
+    """Packets of frames, some lost, doubled, swapped, wrong or damaged: (words, length, damaged)."""
+    sequence = draw.randrange(2**32)
+    waiting = []
+    while True:
+        # Now and then a host begins anew.
+        sequence = draw.randrange(2**32) if draw.random() < 0.02 else (sequence + draw.choice([1, 1, 1, 2, 90])) % 2**32
+        codes = [draw.randrange(-(2 ** (8 * code_bytes - 1)), 2 ** (8 * code_bytes - 1)) for _ in range(taxels)]
+        for data in frame_packets(sequence, codes, code_bytes):
+            words = [int.from_bytes(data[k : k + 4], "little") for k in range(0, len(data), 4)]
+            form = draw.random()
+            if form < 0.03:
+                continue
+            length, damaged = 4 * len(words), False
+            if form < 0.06:
+                damaged = True
+            elif form < 0.08:
+                words = words[: draw.randrange(1, len(words))]
+            elif form < 0.10:
+                words, length = words[:-1] if len(words) > 3 else words + [0], length
+            elif form < 0.12:
+                words[0] ^= 1 << draw.randrange(32) & 0xFFFF00FF
+            elif form < 0.14:
+                length += draw.choice([-4, 4])
+            waiting += [(words, length, damaged)] * (2 if draw.random() < 0.05 else 1)
+        if draw.random() < 0.1:
+            draw.shuffle(waiting)
+        # A packet of a frame may come with the next frame's.
+        while len(waiting) > (3 if draw.random() < 0.3 else 0):
+            yield waiting.pop(0)
+
+
+@pytest.mark.parametrize("taxels, code_bits, code_bytes", [(12, 20, 2), (15, 14, 2), (730, 20, 2), (7, 20, 4)])
+def test_only_whole_frames_leave(taxels, code_bits, code_bytes):
+    only_whole_frames_leave(taxels, code_bits, code_bytes)
+
+
+def test_a_receiver_that_takes_late_packets_is_found(monkeypatch):
+    monkeypatch.setattr("dermis_litex.udp.LATE", 0)
+    with pytest.raises(AssertionError):
+        only_whole_frames_leave(12, 20, 2)
+
+
+def only_whole_frames_leave(taxels, code_bits, code_bytes):
+    dut = FrameReceiver(taxels, code_bits, code_bytes)
+    draw = random.Random(taxels)
+    reference = Received(code_words(taxels, code_bytes))
+    expected, left, requesters, counters = [], [], [], {}
+    sent = 0
+
+    def send():
+        nonlocal sent
+        yield dut.sink.ip_address.eq(1)
+        for words, length, damaged in traffic(draw, taxels, code_bytes):
+            if sent >= CYCLES + 10 * taxels:
+                break
+            sent += len(words)
+            yield dut.sink.length.eq(length)
+            # A frame that is whole waits while another leaves.
+            waits = None
+            for at, word in enumerate(words):
+                yield dut.sink.valid.eq(1)
+                yield dut.sink.data.eq(word)
+                yield dut.sink.last.eq(at == len(words) - 1)
+                yield dut.sink.error.eq(damaged and at == len(words) - 1)
+                yield dut.sink.src_port.eq(words[1] & 0xFFFF if len(words) > 1 else 0)
+                yield
+                while not (yield dut.sink.ready):
+                    yield
+                if at == 1:
+                    waits = (yield dut.waits)
+            yield dut.sink.valid.eq(0)
+            whole = reference.add(words[0], words[1] if len(words) > 2 else None, words[2:], length, damaged, waits)
+            if whole:
+                expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+            for _ in range(draw.choice([0, 0, 1, taxels])):
+                yield
+        # What has come whole leaves.
+        for _ in range(8 * taxels):
+            yield
+        for name, counter in dut.counters.items():
+            counters[name] = yield counter
+
+    @passive
+    def take():
+        frame, pace = [], 1.0
+        while True:
+            yield dut.source.ready.eq(draw.random() < pace)
+            yield
+            if (yield dut.requester.valid):
+                requesters.append((yield dut.requester.sequence))
+            if (yield dut.source.valid) and (yield dut.source.ready):
+                code = yield dut.source.data
+                frame.append(code - 2**32 if code >> 31 else code)
+                if (yield dut.source.last):
+                    left.append((frame, (yield dut.source.id)))
+                    frame, pace = [], draw.choice([1.0, 0.5, 0.3])
+
+    run_simulation(dut, [send(), take()])
+    assert [(frame, number) for frame, number in left] == [
+        (frame, (k + 1) % 2**ID_BITS) for k, (frame, _) in enumerate(expected)
+    ]
+    assert requesters == [sequence for _, sequence in expected]
+    assert counters == {name: reference.counters[name] for name in counters}
+    # Only a frame of several packets can lack one.
+    rare = "overrun" if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else "cut"
+    assert len(left) > 3 and min(counters[name] for name in ("taken", "refused", "ignored", rare)) > 0, counters
+
+
+class Sending(LiteXModule):
+    """A sender, and the table of requesters that it reads."""
+
+    def __init__(self, words):
+        self.requesters = Requesters()
+        self.sender = ResultSender(words, self.requesters, 7)
+
+
+@pytest.mark.parametrize("words", [9, FRAGMENT_WORDS, 2 * FRAGMENT_WORDS + 5])
+def test_results_leave_in_whole_packets(words):
+    dut = Sending(words)
+    draw = random.Random(words)
+    frames = [[draw.randrange(2**32) for _ in range(words)] for _ in range(max(3, 400 // words))]
+    clipped = [draw.randrange(2) for _ in frames]
+    sink, packet = dut.sender.sink, dut.sender.source
+    results, packets = [], []
+
+    def send():
+        for number, frame in enumerate(frames):
+            yield dut.requesters.written.valid.eq(1)
+            yield dut.requesters.write_id.eq(number % 2**ID_BITS)
+            yield dut.requesters.written.ip_address.eq(number + 1)
+            yield dut.requesters.written.port.eq(number + 100)
+            yield dut.requesters.written.sequence.eq(3 * number)
+            yield
+            yield dut.requesters.written.valid.eq(0)
+            for at, word in enumerate(frame):
+                yield sink.valid.eq(1)
+                yield sink.data.eq(word)
+                yield sink.id.eq(number % 2**ID_BITS)
+                yield sink.user.eq(clipped[number] << 1)
+                yield sink.last.eq(at == words - 1)
+                yield
+                while not (yield sink.ready):
+                    yield
+                yield sink.valid.eq(0)
+                # The engine pauses within a frame.
+                for _ in range(draw.choice([0, 0, 0, 3])):
+                    yield
+        for _ in range(4 * words):
+            yield
+
+    @passive
+    def take():
+        own, pauses = [], False
+        while True:
+            yield packet.ready.eq(draw.random() < 0.4)
+            yield
+            if (yield packet.valid) and not (yield packet.ready):
+                continue
+            if not (yield packet.valid):
+                pauses |= bool(own)
+                continue
+            own.append((yield packet.data))
+            assert (yield packet.length) <= 1472
+            if (yield packet.last):
+                assert not pauses, "a pause within a packet"
+                assert (yield packet.length) == 4 * len(own) and (yield packet.last_be) == 8
+                where = ((yield packet.ip_address), (yield packet.dst_port), (yield packet.src_port))
+                packets.append((where, b"".join(word.to_bytes(4, "little") for word in own)))
+                own = []
+
+    run_simulation(dut, [send(), take()])
+    host = Results()
+    for (ip_address, port, own_port), data in packets:
+        assert (ip_address + 99, own_port) == (port, 7)
+        result = host.add(data)
+        if result:
+            results.append((ip_address, *result))
+    assert results == [(k + 1, 3 * k, frame, clipped[k]) for k, frame in enumerate(frames)]
+
+
+class Sources:
+    """In the place of a LiteX platform: the files that a core adds."""
+
+    def __init__(self):
+        self.files = []
+
+    def add_source(self, name, copy=False):
+        self.files.append(name)
+
+
+class Port:
+    """In the place of a UDP port of LiteEth."""
+
+    def __init__(self):
+        self.sink, self.source = [stream.Endpoint(eth_udp_user_description(32)) for _ in range(2)]
+
+
+class Network(LiteXModule):
+    """A core between the two directions of a UDP port."""
+
+    def __init__(self, folder, code_bytes):
+        self.cd_sys = ClockDomain()
+        self.platform, self.port = Sources(), Port()
+        self.core = Dermis(self.platform, folder)
+        self.udp = DermisUDP(self.core, self.port, code_bytes)
+
+    def pins(self):
+        return {"sys_clk": self.cd_sys.clk, "sys_rst": self.cd_sys.rst} | {
+            f"{end}_{signal.backtrace[-1][0].removeprefix('payload_').removeprefix('param_')}": signal
+            for end in ("source", "sink")
+            for signal in getattr(self.port, end).flatten()
+        }
+
+
+def test_a_core_on_the_network(monkeypatch):
+    """The core between packets, under Icarus; packets so short that a frame has several."""
+    for module in ("packets", "udp"):
+        monkeypatch.setattr(f"dermis_litex.{module}.FRAGMENT_WORDS", 5)
+    folder = BUILD / "udp"
+    generate(folder, "--bus", "wishbone", "--stream-bits", "32")
+    network = Network(folder, 4)
+    pins = network.pins()
+    for name, signal in pins.items():
+        signal.name_override = name
+    text = str(verilog.convert(network, ios=set(pins.values()), name="network"))
+    # An event-driven simulator does not run `always @(*)` before an input changes: what is assigned begins undefined, until the
+    # reset.
+    assigned = set(re.findall(r"(\w+) <=", text))
+    first = lambda match: f"{match[1]};" if match[2] in assigned else match[0]
+    text = re.sub(r"^(reg [^=;]*?(\w+)) = [^;]*;", first, text, flags=re.MULTILINE)
+    (folder / "network.v").write_text(text)
+    generate(folder / "engine")
+    environment = {"DERMIS_VECTORS": next((folder / "engine").glob("*_tb_codes.hex")).as_posix().removesuffix("_codes.hex")}
+    sources = [folder / "network.v", *(name for name in network.platform.files if name.endswith(".v"))]
+    assert icarus(folder, "network", sources, "udp", environment) == (2, 0)
