@@ -5,8 +5,8 @@
 //! where the mean slides:
 //! ```text
 //! input    2^k T, or T from the last quad that fold has read
-//! pass     the passes of all subarrays, waiting where the search is busy; the first of several rows of subarrays waits for
-//!          the whole frame once more
+//! pass     the passes of all subarrays, waiting where the search is busy; with several rows of subarrays they begin with
+//!          the first row, and the first subarray waits for the rest of the frame
 //! search   one subarray after the other
 //! frame    all of these, one after the other, where block RAM is too short for frames that overlap
 //! send     T and the status beats; the first search of several subarrays waits for it, of one only the last sweep
@@ -76,8 +76,8 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
         for part in 0..parts {
             // A whole array's values wait for the force memory, the search of several subarrays does.
             let free = if part == 0 && !whole { sent } else { 0 };
-            let arrived = if part == 0 { complete } else { 0 };
-            handed_over = (start + passes).max(searched).max(free).max(arrived);
+            let whole_frame = if part == 0 { complete } else { 0 };
+            handed_over = (start + passes).max(searched).max(free).max(whole_frame);
             searched = handed_over + search;
             if whole {
                 searched = searched.max(sent + last_sweep);

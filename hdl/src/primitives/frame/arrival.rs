@@ -28,7 +28,7 @@ pub struct Arrival {
     pub begins: Signal<In, Bit>,
     /// The passes of a subarray are complete, until it is handed over.
     pub complete: Signal<In, Bit>,
-    /// What has arrived is enough to begin the passes; with early rows from two cycles after `row_end`.
+    /// What has arrived is enough to begin the passes; where a row of subarrays is, from two cycles after its last taxel.
     pub ready: Signal<Out, Bit>,
     /// The frame in the passes is not complete: its first subarray must not be handed over.
     pub waits: Signal<Out, Bit>,
