@@ -8,7 +8,7 @@ import dermis_litex.packets
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, RisingEdge
 
-# As in test_udp.py.
+# As in test_udp.py: a frame has several packets.
 dermis_litex.packets.FRAGMENT_WORDS = 5
 # Cycles of the test with wrong packets.
 CYCLES = 20_000

@@ -154,8 +154,9 @@ class FrameReceiver(LiteXModule):
                 .Else(*begins),
             ),
         )
+        # Behind the length that UDP states, Ethernet pads short packets.
         whole = Signal()
-        self.comb += whole.eq((at + 1 == expected) & (sink.error == 0))
+        self.comb += whole.eq((at + 1 >= expected) & (sink.error == 0))
         fsm.act(
             "PAYLOAD",
             sink.ready.eq(1),
