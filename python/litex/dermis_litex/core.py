@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from litex.gen import ClockSignal, If, Instance, LiteXModule, ResetSignal
+from litex.gen import ClockSignal, Instance, LiteXModule, ResetSignal
 from litex.soc.interconnect import stream, wishbone
 
 WORD_BITS = 32
