@@ -43,41 +43,16 @@ class Packets(LiteXModule):
         }
 
 
-def event_driven(text):
-    """Verilog of LiteX for an event-driven simulator: LiteX writes for those that sort logic by its dependences.
-
-    A combinational block assigns a default and then its exceptions, each of which wakes the blocks that read it, and two such
-    blocks wake one another for ever: here a block assigns each of its values once. `always @(*)` does not run before an input
-    changes, so registers have their first value from 1 ns on, and what follows from them has none.
-    """
-    widths = {name: width for width, name in re.findall(r"^ *(?:output )?reg +(\[[^\]]*\])? *(\w+)", text, flags=re.MULTILINE)}
-    assigned = set(re.findall(r"^\s+(\w+)\S* <= ", text, flags=re.MULTILINE))
-    held = []
-
-    def once(block):
-        names = sorted(set(re.findall(r"^\s+(\w+)\S* <= ", block[0], flags=re.MULTILINE)))
-        held.extend(f"reg {widths[name]} next_{name};" for name in names)
-        body = re.sub(r"^(\s+)(\w+\S*) <= ", r"\1next_\2 = ", block[0].removesuffix("end"), flags=re.MULTILINE)
-        return body + "".join(f"    {name} = next_{name};\n" for name in names) + "end"
-
-    text = re.sub(r"^always @\(\*\) begin$.*?^end$", once, text, flags=re.MULTILINE | re.DOTALL)
-
-    def first(declared):
-        declaration, name, value = declared.groups()
-        if name not in assigned:
-            return declared[0]
-        return f"{declaration};" if f"reg {widths[name]} next_{name};" in held else f"{declaration}; initial #1 {name} = {value};"
-
-    text = re.sub(r"^(reg [^=;]*?(\w+)) = ([^;]*);", first, text, flags=re.MULTILINE)
-    head, logic = text.split("always @(*)", 1)
-    return head + "\n".join(held) + "\nalways @(*)" + logic
-
-
 def write_verilog(module, pins, folder, name):
     """Writes `module` with these pins as `name` into a folder; all Verilog files of the design."""
     for pin, signal in pins.items():
         signal.name_override = pin
-    text = event_driven(str(verilog.convert(module, ios=set(pins.values()), name=name)))
+    text = str(verilog.convert(module, ios=set(pins.values()), name=name))
+    # An event-driven simulator does not run `always @(*)` before an input changes: what is assigned begins undefined, until the
+    # reset.
+    assigned = set(re.findall(r"^\s+(\w+)\S* <= ", text, flags=re.MULTILINE))
+    first = lambda declared: f"{declared[1]};" if declared[2] in assigned else declared[0]
+    text = re.sub(r"^(reg [^=;]*?(\w+)) = [^;]*;", first, text, flags=re.MULTILINE)
     path = folder / f"{name}.v"
     path.write_text(text)
     return [path, *(source for source in module.platform.files if source.endswith(".v"))]

@@ -11,7 +11,7 @@ from dermis_litex.udp import FrameReceiver, Requesters, ResultSender
 from gateware import Packets, write_verilog
 from litex.gen import LiteXModule
 from litex.gen.sim import passive, run_simulation
-from test_cores import BUILD, generate, icarus
+from test_cores import BUILD, environment, generate, icarus
 
 CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
 
@@ -250,5 +250,5 @@ def test_a_core_on_the_network(monkeypatch):
     generate(folder / "engine")
     network = Packets(folder, 4)
     sources = write_verilog(network, network.pins(), folder, "network")
-    environment = {"DERMIS_VECTORS": str(folder / "engine/dermis_press_tb")}
-    assert icarus(folder, "network", sources, "udp", environment) == (2, 0)
+    own = environment("wishbone", 32, folder / "engine/dermis_press_tb")
+    assert icarus(folder, "network", sources, "udp", own) == (2, 0)

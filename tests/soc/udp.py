@@ -1,28 +1,20 @@
 """A core between packets of a UDP port, in Icarus: run by test_udp.py, which makes the top module `network`."""
 
-import os
 import random
+import struct
 
 import cocotb
 import dermis_litex.packets
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, RisingEdge
+from core import BEATS, CODES
 
 # As in test_udp.py: a frame has several packets.
 dermis_litex.packets.FRAGMENT_WORDS = 5
 # Cycles of the test with wrong packets.
 CYCLES = 20_000
 PORT, ADDRESS = 4321, 0x0A000001
-
-
-def words(ending):
-    """The numbers of a memory file of the engine's testbench."""
-    with open(f"{os.environ['DERMIS_VECTORS']}{ending}", encoding="utf-8") as file:
-        return [int(line, 16) for line in file]
-
-
-CODES = [code - (1 << 20) if code >> 19 else code for code in words("_codes.hex")]
-RESULT = [beat >> 32 * part & 0xFFFFFFFF for beat in words("_beats.hex") for part in range(3)]
+RESULT = [word for (word,) in struct.iter_unpack("<I", BEATS)]
 
 
 class Host:

@@ -29,6 +29,7 @@ from dermis_litex.packets import (
 
 WORD_BYTES = WORD_BITS // 8
 SEQUENCE_BITS = 32
+REQUESTER = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
 BYTE = 8
 
 
@@ -41,24 +42,22 @@ class Requesters(LiteXModule):
     """Who sent each frame that is under way: address, port and sequence number, by the frame's id."""
 
     def __init__(self):
-        layout = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
-        self.written = stream.Endpoint(layout)
-        self.read = stream.Endpoint(layout)
+        self.written = stream.Endpoint(REQUESTER)
+        self.read = stream.Endpoint(REQUESTER)
         self.write_id = Signal(ID_BITS)
         self.read_id = Signal(ID_BITS)
 
         # # #
 
-        bits = sum(width for _, width in layout)
-        memory = Memory(bits, 2**ID_BITS)
+        memory = Memory(sum(width for _, width in REQUESTER), 2**ID_BITS)
         write, read = memory.get_port(write_capable=True), memory.get_port()
         self.specials += memory, write, read
         self.comb += [
             write.adr.eq(self.write_id),
-            write.dat_w.eq(Cat(*(getattr(self.written, name) for name, _ in layout))),
+            write.dat_w.eq(self.written.payload.raw_bits()),
             write.we.eq(self.written.valid),
             read.adr.eq(self.read_id),
-            Cat(*(getattr(self.read, name) for name, _ in layout)).eq(read.dat_r),
+            self.read.payload.raw_bits().eq(read.dat_r),
         ]
 
 
@@ -76,7 +75,7 @@ class FrameReceiver(LiteXModule):
         counts = fragment_words(words)
         self.sink = sink = stream.Endpoint(eth_udp_user_description(WORD_BITS))
         self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
-        self.requester = requester = stream.Endpoint([("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)])
+        self.requester = requester = stream.Endpoint(REQUESTER)
         # A whole frame waits until the one before has left.
         self.waits = full = Signal()
         self.counters = {name: Signal(32) for name in ("taken", "ignored", "refused", "overrun", "cut")}

@@ -161,12 +161,15 @@ impl BeatCycles {
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
         let after_begin = plan.codes_after_begin() as u64;
-        let forces_of = |received: u64| forces(plan, case, &values(plan, case, searched, course, received));
-        let counted = forces_of(0).first().copied().unwrap_or(0) + ACCEPT + SEND;
+        let values_of = |received: u64| values(plan, case, searched, course, received);
+        // The first force is requested with the first value.
+        let counted = values_of(0).first().copied().unwrap_or(0) + ACCEPT + SEND;
         let before = plan.prepare.latency();
         // From the last input beat: no force comes before the whole frame has.
-        let forces: Vec<u64> =
-            forces_of(after_begin).iter().map(|force| before + (force + ACCEPT + SEND - after_begin)).collect();
+        let forces: Vec<u64> = forces(plan, case, &values_of(after_begin))
+            .iter()
+            .map(|force| before + (force + ACCEPT + SEND - after_begin))
+            .collect();
         let last = forces.last().copied().unwrap_or(0);
         let beats = match plan.sends_resultants() {
             // They are sent once the last force has been added.

@@ -38,7 +38,6 @@ pub struct Scan {
     part_row: CaseCounter,
     quad_address: QuadAddress,
     line_end: Signal<Local, Bit>,
-    part_end: Signal<Local, Bit>,
 }
 
 impl Scan {
@@ -63,7 +62,6 @@ impl Scan {
             part_row: each(&|case| case.grid().rows),
             quad_address,
             line_end: Default::default(),
-            part_end: Default::default(),
         }
     }
 }
@@ -86,12 +84,11 @@ impl Logic for Scan {
         self.part_row.which.next = self.which.val();
         self.quad_address.which.next = self.which.val();
         self.line_end.next = self.enable.val() & self.col.last.val() & self.part_col.last.val();
-        self.part_end.next = self.line_end.val() & self.row.last.val();
+        self.row_end.next = self.line_end.val() & self.row.last.val();
         self.col.enable.next = self.enable.val();
         self.part_col.enable.next = self.enable.val() & self.col.last.val();
         self.row.enable.next = self.line_end.val();
-        self.part_row.enable.next = self.part_end.val();
-        self.row_end.next = self.part_end.val();
+        self.part_row.enable.next = self.row_end.val();
         self.last.next =
             self.col.last.val() & self.part_col.last.val() & self.row.last.val() & self.part_row.last.val();
 

@@ -33,9 +33,9 @@ fn move_up<'k>(stays: Expr<'k>, word: Expr<'k>, by: usize) -> Expr<'k> {
     stays.mux(word, word.low(word.bits() - by).shift_left(by))
 }
 
-/// First part of the leading-one detection, a cycle later: the upper bits of the leading one's position, then the argument
-/// shifted left until the leading one is in its top nibble, of which [`logarithm`] needs `REST_BITS` bits. Names of wires start
-/// with `name`.
+/// Leading-one detection to the nibble, with a latency of one cycle. The result has the upper bits of the leading one's position
+/// on top; below them the top `REST_BITS` bits of the argument, shifted left until its top nibble holds the leading one.
+/// [`logarithm`] takes it. Names of wires start with `name`.
 pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     let halves = first_halves(argument.bits());
     let width = 2 * halves[0];
@@ -60,7 +60,8 @@ pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
     concat(&parts)
 }
 
-/// Rest of the detection, and the logarithm, of [`LOG_BITS`] bits, of what [`locate`] returned. The logarithm of 0 is that of 1.
+/// The logarithm, [`LOG_BITS`] bits, from the result of [`locate`]: detects the leading one within the nibble and reads the table.
+/// The logarithm of 0 is that of 1.
 pub fn logarithm<'k>(k: &'k Builder, name: &str, located: Expr<'k>) -> Expr<'k> {
     let mut rest = located.low(REST_BITS);
     let mut position = located.slice(REST_BITS, located.bits() - REST_BITS);

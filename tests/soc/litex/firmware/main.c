@@ -29,6 +29,12 @@ static void print(const char *name, uint32_t value)
 	put('\n');
 }
 
+static void print_words(const char *name, uint32_t count)
+{
+	for (uint32_t word = 0; word < count; word++)
+		print(name, words[word]);
+}
+
 static volatile uint32_t *reg(uint32_t offset)
 {
 	return (volatile uint32_t *)(DERMIS_BASE + offset);
@@ -75,8 +81,7 @@ int main(void)
 	receive_begin(count);
 	send(TAXELS);
 	receive_end();
-	for (uint32_t word = 0; word < count; word++)
-		print("right", words[word]);
+	print_words("right", count);
 	print("errors", *reg(DERMIS_ERRORS_OFFSET));
 
 	/* One that ends early has no answer, and the next is right. */
@@ -84,8 +89,7 @@ int main(void)
 	send(TAXELS - 1);
 	send(TAXELS);
 	receive_end();
-	for (uint32_t word = 0; word < count; word++)
-		print("after", words[word]);
+	print_words("after", count);
 	print("errors", *reg(DERMIS_ERRORS_OFFSET));
 	*reg(DERMIS_ERRORS_OFFSET) = DERMIS_ERRORS_FRAMING_MASK;
 
