@@ -235,7 +235,10 @@ mod tests {
         let (header, rdl) = (c_header(), system_rdl());
         for register in REGISTERS {
             let upper = register.name.to_uppercase();
-            assert!(header.contains(&format!("#define DERMIS_{upper} 0x{:02x}u\n", register.address)), "{upper}");
+            assert!(
+                header.contains(&format!("#define DERMIS_{upper}_OFFSET 0x{:02x}u\n", register.address)),
+                "{upper}"
+            );
             assert!(rdl.contains(&format!("}} {} @ 0x{:02x};", register.name, register.address)), "{upper}");
             for field in register.fields {
                 assert!(header.contains(&format!(
