@@ -17,6 +17,8 @@
 //! | `misfit` | the stated noise does not explain what the estimate leaves, or noise found from the frame is above a tenth of its peak; with a network also a frame unlike those of its training | `Checks::flags`, estimators but `search` |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |
+//! | `tables-incomplete` | the hardware's tables are not whole: no force is computed from them | the engine |
+//! | `tables-refused` | the last tables sent to the hardware were refused; it has those of before | the engine |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -60,11 +62,15 @@ pub enum Flag {
     Misfit,
     /// There are more contacts than get a μ; the smallest have no shear.
     TooManyContacts,
+    /// The tables of the hardware are not whole, and every stress is taken as 0.
+    TablesIncomplete,
+    /// The hardware refused the last tables that it was sent.
+    TablesRefused,
 }
 
 impl Flag {
     /// All flags, in order.
-    pub const ALL: [Flag; 15] = [
+    pub const ALL: [Flag; 17] = [
         Flag::NoContact,
         Flag::NoCompression,
         Flag::ConditionUnmet,
@@ -80,6 +86,8 @@ impl Flag {
         Flag::ShearNotResolved,
         Flag::Misfit,
         Flag::TooManyContacts,
+        Flag::TablesIncomplete,
+        Flag::TablesRefused,
     ];
 }
 
@@ -167,6 +175,8 @@ mod tests {
             "shear-not-resolved",
             "misfit",
             "too-many-contacts",
+            "tables-incomplete",
+            "tables-refused",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

@@ -17,7 +17,7 @@ pub const REGISTER_BITS: usize = 32;
 /// Content of register `id`: the letters DERM, the first in the low byte.
 pub const ID: u32 = u32::from_le_bytes(*b"DERM");
 /// Content of register `map_version`.
-pub const MAP_VERSION: u32 = 1;
+pub const MAP_VERSION: u32 = 2;
 
 /// Cycles for which field `reset` of register `control` resets engine and streams.
 pub const RESET_CYCLES: u64 = 16;
@@ -34,6 +34,8 @@ pub enum Access {
     ClearedByOne,
     /// A bit written as 1 acts once; reads as 0.
     Pulse,
+    /// A write hands a byte over; a read says whether there is room for one.
+    Push,
 }
 
 impl Access {
@@ -44,12 +46,13 @@ impl Access {
             Access::ReadOnly => "read",
             Access::ClearedByOne => "read, 1 clears",
             Access::Pulse => "1 acts once",
+            Access::Push => "read, a write hands over",
         }
     }
 
     /// Whether a write has an effect.
     pub fn is_written(self) -> bool {
-        matches!(self, Access::ClearedByOne | Access::Pulse)
+        matches!(self, Access::ClearedByOne | Access::Pulse | Access::Push)
     }
 }
 
@@ -101,10 +104,21 @@ pub const PARTIAL: Field = field("partial", 1, 1, "a beat of the input did not h
 /// A frame of another length.
 pub const FRAMING: Field = field("framing", 2, 1, "`tlast` was not on the last taxel of a frame");
 /// A wrong access.
-pub const ACCESS: Field = field("access", 3, 1, "an unknown address, or a write to a register that is only read");
+pub const ACCESS: Field =
+    field("access", 3, 1, "an unknown address, or a write to a register that is only read or has no room");
+
+/// A byte of an image; the low byte of the register.
+pub const BYTE: Field = field("byte", 0, 8, "the byte; reads as 0");
+/// The image's end.
+pub const LAST: Field = field("last", 8, 1, "it is the image's last; reads as 0");
+/// No room.
+pub const WAITING: Field =
+    field("waiting", 16, 1, "the byte written last waits for the frames before it: a write is refused");
+/// The engine has writable tables.
+pub const WRITABLE: Field = field("writable", 17, 1, "the engine takes tables; else a write is refused");
 
 /// All registers, by address.
-pub const REGISTERS: [Register; 16] = [
+pub const REGISTERS: [Register; 17] = [
     number("id", 0x00, Access::Constant, "the letters DERM, the first in the low byte"),
     number("map_version", 0x04, Access::Constant, "version of this map"),
     number("scene", 0x08, Access::Constant, "hash of all that determines the forces, as `dermis host` compares it"),
@@ -143,6 +157,13 @@ pub const REGISTERS: [Register; 16] = [
     number("frames_misframed", 0x34, Access::ReadOnly, "`tlast` too early or missing"),
     number("accesses_refused", 0x38, Access::ReadOnly, "accesses answered with an error"),
     number("cycles", 0x3c, Access::ReadOnly, "clock cycles"),
+    Register {
+        name: "tables",
+        address: 0x40,
+        access: Access::Push,
+        meaning: "a byte of an image of tables, as `dermis load` makes one; only with hardware.tables = writable",
+        fields: &[BYTE, LAST, WAITING, WRITABLE],
+    },
 ];
 
 /// The content of the constant registers of an engine of `plan` whose output has beats of `stream_bytes` bytes, by name.
@@ -200,6 +221,7 @@ pub fn system_rdl() -> String {
             Access::ReadOnly => "sw = r; hw = w;",
             Access::ClearedByOne => "sw = rw; hw = w; woclr;",
             Access::Pulse => "sw = w; hw = r; singlepulse; reset = 0;",
+            Access::Push => "sw = rw; hw = rw; swacc;",
         };
         let _ = writeln!(text, "  reg {{\n    desc = \"{}\";", meaning.replace('"', "\\\""));
         for Field { name, low, bits, meaning } in fields {

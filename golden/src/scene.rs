@@ -19,7 +19,8 @@
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
-//! | | `search_width` (the board's; 4, 2, 1) |
+//! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
+//! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]): what writable tables may hold |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | | `plausible_MPa` (10) |
@@ -232,8 +233,28 @@ pub enum CoefficientCheck {
     Signature,
 }
 
+/// Fewest bits of a code with writable tables, whose bytes are numbers beyond the codes.
+pub const TABLE_CODE_BITS: u32 = 9;
+
+/// Where the tables of a specimen of the array stand: zero and gain of each taxel, threshold, noise floor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TableStorage {
+    /// In the bitstream, which then serves one specimen.
+    #[default]
+    Rom,
+    /// Written while the engine rests ([`load`](crate::fixed::stages::load)); the bitstream holds those of its scene.
+    Writable,
+}
+
+/// Table `[hardware.table_range]`: what the tables that are written may hold.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableRange {
+    /// Least and largest |gain|, above 0, in MPa per unit of the readings; `None` takes those of the scene's table, without one 1.
+    pub gain: Option<[f64; 2]>,
+}
+
 /// Table `[hardware]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct HardwareSpec {
     /// One of [`crate::board::Board::names`], or the path of a board's file, relative to the working folder.
     pub board: String,
@@ -243,6 +264,17 @@ pub struct HardwareSpec {
     pub coefficient_check: CoefficientCheck,
     /// Taxels that the search computes per cycle: 4, 2 or 1; `None` takes the board's.
     pub search_width: Option<usize>,
+    /// Where the tables of a specimen stand.
+    pub tables: TableStorage,
+    /// What tables that are written may hold.
+    pub table_range: TableRange,
+}
+
+impl HardwareSpec {
+    /// Whether tables are written.
+    pub fn has_writable_tables(&self) -> bool {
+        self.tables == TableStorage::Writable
+    }
 }
 
 /// How frames are averaged.
@@ -417,6 +449,8 @@ impl Default for HardwareSpec {
             link: LinkKind::Uart,
             coefficient_check: CoefficientCheck::None,
             search_width: None,
+            tables: TableStorage::Rom,
+            table_range: TableRange::default(),
         }
     }
 }

@@ -104,7 +104,7 @@ engine! {
     /// ```
     /// | port | direction | width | meaning |
     /// |---|---|---|---|
-    /// | `s_axis_tdata` | in | `code_bits` | a taxel's code, two's complement; row-major, frame after frame |
+    /// | `s_axis_tdata` | in | `stream_bits` | a taxel's code, two's complement; row-major, frame after frame; or a byte of an image of tables |
     /// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
     /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
     ///
@@ -193,7 +193,7 @@ impl Engine {
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(formats.code_bits as usize),
+            s_axis_tdata: Wire::new(model.stream_bits() as usize),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -280,22 +280,22 @@ impl Logic for Engine {
         self.fold.clk.next = self.clk.val();
         self.pass.clk.next = self.clk.val();
         self.estimate.clk.next = self.clk.val();
-        self.estimate.rst.next = self.rst.val();
+        self.estimate.rst.next = self.prepare.restart.val();
         self.rescale.clk.next = self.clk.val();
         self.segment.clk.next = self.clk.val();
-        self.segment.rst.next = self.rst.val();
+        self.segment.rst.next = self.prepare.restart.val();
         self.contacts.clk.next = self.clk.val();
-        self.contacts.rst.next = self.rst.val();
+        self.contacts.rst.next = self.prepare.restart.val();
         self.window.clk.next = self.clk.val();
-        self.window.rst.next = self.rst.val();
+        self.window.rst.next = self.prepare.restart.val();
         self.label_beats.clk.next = self.clk.val();
-        self.label_beats.rst.next = self.rst.val();
+        self.label_beats.rst.next = self.prepare.restart.val();
         self.shear.clk.next = self.clk.val();
-        self.shear.rst.next = self.rst.val();
+        self.shear.rst.next = self.prepare.restart.val();
         self.operand_source.clk.next = self.clk.val();
-        self.operand_source.rst.next = self.rst.val();
+        self.operand_source.rst.next = self.prepare.restart.val();
         self.relax.clk.next = self.clk.val();
-        self.relax.rst.next = self.rst.val();
+        self.relax.rst.next = self.prepare.restart.val();
         self.unfold.clk.next = self.clk.val();
         self.search.clk.next = self.clk.val();
         self.forces.clk.next = self.clk.val();
@@ -303,18 +303,18 @@ impl Logic for Engine {
         self.frame_cycles.clk.next = self.clk.val();
         self.part.clk.next = self.clk.val();
         self.again.clk.next = self.clk.val();
-        self.again.rst.next = self.rst.val();
+        self.again.rst.next = self.prepare.restart.val();
         self.handed.clk.next = self.clk.val();
-        self.handed.rst.next = self.rst.val();
+        self.handed.rst.next = self.prepare.restart.val();
         self.seeks.clk.next = self.clk.val();
-        self.seeks.rst.next = self.rst.val();
+        self.seeks.rst.next = self.prepare.restart.val();
         self.opens.clk.next = self.clk.val();
-        self.opens.rst.next = self.rst.val();
+        self.opens.rst.next = self.prepare.restart.val();
         self.begins.clk.next = self.clk.val();
-        self.begins.rst.next = self.rst.val();
+        self.begins.rst.next = self.prepare.restart.val();
         self.arrival.clk.next = self.clk.val();
-        self.arrival.rst.next = self.rst.val();
-        self.frame_cycles.rst.next = self.rst.val();
+        self.arrival.rst.next = self.prepare.restart.val();
+        self.frame_cycles.rst.next = self.prepare.restart.val();
         self.computing.clk.next = self.clk.val();
         self.first.clk.next = self.clk.val();
         self.filled.clk.next = self.clk.val();
@@ -338,16 +338,16 @@ impl Logic for Engine {
         self.received_frames.clk.next = self.clk.val();
         self.frame_frames.clk.next = self.clk.val();
         self.searched_frames.clk.next = self.clk.val();
-        self.receive.rst.next = self.rst.val();
-        self.fold.rst.next = self.rst.val();
-        self.pass.rst.next = self.rst.val();
-        self.rescale.rst.next = self.rst.val();
-        self.unfold.rst.next = self.rst.val();
-        self.search.rst.next = self.rst.val();
-        self.forces.rst.next = self.rst.val();
-        self.send.rst.next = self.rst.val();
+        self.receive.rst.next = self.prepare.restart.val();
+        self.fold.rst.next = self.prepare.restart.val();
+        self.pass.rst.next = self.prepare.restart.val();
+        self.rescale.rst.next = self.prepare.restart.val();
+        self.unfold.rst.next = self.prepare.restart.val();
+        self.search.rst.next = self.prepare.restart.val();
+        self.forces.rst.next = self.prepare.restart.val();
+        self.send.rst.next = self.prepare.restart.val();
         self.resultants.clk.next = self.clk.val();
-        self.resultants.rst.next = self.rst.val();
+        self.resultants.rst.next = self.prepare.restart.val();
 
         comment!("A frame starts: buffer full, or its first row of subarrays in it;");
         comment!("previous frame out of the passes");
@@ -384,7 +384,7 @@ impl Logic for Engine {
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.searched_case.kept.val();
         self.sending.d.next =
-            (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
+            (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.prepare.restart.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();
         self.arrival.complete.next = self.complete.val();
         self.unsent.next = self.sending.q.val() & !self.send.done.val();
@@ -400,15 +400,15 @@ impl Logic for Engine {
         }
         self.computing.d.next = (self.begin_frame.val()
             | (self.computing.q.val() & !self.passed.val() & !self.arrival.discards.val()))
-            & !self.rst.val();
+            & !self.prepare.restart.val();
         self.searched_case.keep.next = self.hand_over.val();
         self.searched_case.word.next = self.frame_case.kept.val();
         self.handed.d.next = self.hand_over.val();
         self.opens.d.next = self.hand_over.val() & self.first.q.val();
         self.filled.d.next =
-            self.complete.val() & !self.hand_over.val() & !self.arrival.discards.val() & !self.rst.val();
+            self.complete.val() & !self.hand_over.val() & !self.arrival.discards.val() & !self.prepare.restart.val();
         self.searching.d.next =
-            (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
+            (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.prepare.restart.val();
         self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
         self.searched_condition.d.next = self.searched_condition.q.val();
         self.searched_first.d.next = self.searched_first.q.val();
@@ -447,7 +447,7 @@ impl Logic for Engine {
         self.forces.frames.next = self.searched_frames.kept.val();
 
         comment!("Then the next subarray starts");
-        self.part.clear.next = self.rst.val();
+        self.part.clear.next = self.prepare.restart.val();
         self.part.enable.next = self.hand_over.val();
         self.again.d.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.q.val();
@@ -467,6 +467,20 @@ impl Logic for Engine {
         if self.arrival.arrives.val() {
             self.framing.d.next = self.receive.framing.val();
         }
+
+        comment!("Tables are written while no frame is under way");
+        self.prepare.idle.next = !self.receive.full.val()
+            & !self.begins.q.val()
+            & !self.computing.q.val()
+            & !self.filled.q.val()
+            & !self.searching.q.val()
+            & !self.sending.q.val()
+            & !self.resultants.m_axis_tvalid.val();
+        self.receive.floor.next = self.prepare.noise_floor.val();
+        self.window.floor.next = self.prepare.noise_floor.val();
+        self.forces.threshold.next = self.prepare.threshold.val();
+        self.forces.version.next = self.prepare.version.val();
+        self.forces.incomplete.next = self.prepare.incomplete.val();
 
         comment!("prepare -> receive -> normalise -> fold");
         self.prepare.s_axis_tdata.next = self.s_axis_tdata.val();

@@ -33,7 +33,7 @@ macro_rules! engine {
             pub clk: Signal<In, Clock>,
             /// Synchronous reset, active high.
             pub rst: Signal<In, Bit>,
-            /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
+            /// A taxel's code, two's complement, or a byte of an image of tables; valid with `s_axis_tvalid`.
             pub s_axis_tdata: Wire<In>,
             /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
             pub s_axis_tvalid: Signal<In, Bit>,

@@ -22,6 +22,7 @@
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
+//! | `tables` | images of tables between frames: equality before, after, and while tables are not whole |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
 //! | `circles` | no two modules of a crate use one another, directly or through others; layers are in order |

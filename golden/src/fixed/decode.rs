@@ -8,7 +8,7 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::send::{
     labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
-    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
+    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES, FRAMES_SHIFT, STATUS_BEATS, TABLES_REFUSED,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;
@@ -101,6 +101,12 @@ impl Model {
             if status.flags & FLAG_COEFFICIENTS != 0 {
                 flags.push(Flag::CoefficientsDamaged);
             }
+            if status.flags & FLAG_TABLES != 0 {
+                flags.push(Flag::TablesIncomplete);
+            }
+            if status.tables & TABLES_REFUSED != 0 {
+                flags.push(Flag::TablesRefused);
+            }
             if status.flags & FLAG_MORE_CONTACTS != 0 {
                 flags.push(Flag::TooManyContacts);
             }
@@ -167,6 +173,9 @@ impl Model {
         if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.
             result.extra.mean_frames = status.first().map(|beat| (beat[2] as u32 >> FRAMES_SHIFT) as usize);
+        }
+        if self.has_writable_tables() {
+            result.extra.tables_version = all.first().map(|status| status.tables & !TABLES_REFUSED);
         }
         if self.chooses() {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();

@@ -62,6 +62,32 @@ pub enum FixedError {
         /// Its value.
         value: String,
     },
+    /// The gain of a taxel is outside the range for which the hardware is built.
+    #[error("input.calibration: the gain of taxel {place:?} is {gain}; hardware.table_range.gain allows {} to {}", allowed[0], allowed[1])]
+    TableRange {
+        /// Row and column.
+        place: [usize; 2],
+        /// Its gain, MPa per unit of the readings.
+        gain: f64,
+        /// Least and largest |gain|.
+        allowed: [f64; 2],
+    },
+    /// A scene asks of the hardware of another what is not in the tables that can be written.
+    #[error("{part}: differs from that of the hardware's scene, and is in no table that can be written (input.calibration, input.tare, search.noise_floor_MPa, threshold.min_force_N)")]
+    NoTable {
+        /// The table or field of the scene.
+        part: &'static str,
+    },
+    /// Tables for hardware that holds them in the bitstream, or a version that is none.
+    #[error("{field}: {value} is not possible; expected {expected}")]
+    Tables {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What is possible.
+        expected: &'static str,
+    },
     /// A file named by the input options cannot be used, or the frames do not fit them.
     #[error(transparent)]
     Input(#[from] InputError),

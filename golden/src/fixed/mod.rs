@@ -33,6 +33,7 @@ mod error;
 mod model;
 mod passes;
 mod run;
+mod specimen;
 mod subarray;
 
 pub use contacts::{Contact, Contacts};

@@ -10,12 +10,14 @@ use super::plan::contact_cycles::Course;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
 use super::stages::forces::Force;
+use super::stages::load::Outcome;
 use super::stages::prepare::Prepared;
 use super::stages::receive::mask;
 use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
 use super::stages::send::{
-    labels_to_beats, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FRAMES_SHIFT,
+    labels_to_beats, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES,
+    FRAMES_SHIFT, TABLES_REFUSED,
 };
 use super::subarray::{SubarrayTrace, Told};
 use crate::board::EngineKind;
@@ -54,7 +56,11 @@ impl Model {
     /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array;
     /// with a sliding mean all frames since a reset.
     pub fn run(&self, codes: &[i32]) -> Trace {
-        self.run_prepared(&self.prepare.run(codes))
+        let mut prepared = self.prepare.run(codes);
+        if self.tables_outcome == Outcome::Broken {
+            prepared.words.fill(0);
+        }
+        self.run_prepared(&prepared)
     }
 
     /// Computes one reconstruction from the words of the frame buffer.
@@ -73,6 +79,7 @@ impl Model {
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
 
+        let refused = if self.tables_outcome == Outcome::Whole { 0 } else { TABLES_REFUSED };
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {
             part.scatter(sensor, &solved.forces(case, self.threshold), &mut forces);
@@ -87,11 +94,13 @@ impl Model {
                     | flag(told.score.is_some(), FLAG_FOUND)
                     | flag(!contact, FLAG_NO_CONTACT)
                     | flag(told.more_contacts, FLAG_MORE_CONTACTS)
+                    | flag(self.tables_outcome == Outcome::Broken, FLAG_TABLES)
                     | number << CASE_SHIFT
                     | frames << FRAMES_SHIFT,
                 score: told.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,
+                tables: self.tables_version | refused,
                 rescale_saturations: s.saturations,
                 force_saturations,
                 cycles: sending.counted as u32,

@@ -18,7 +18,7 @@ impl Identity {
     /// The identity of the hardware of `plan`.
     ///
     /// # Errors
-    /// [`LinkError`]: the scene averages or chooses its case per frame; a payload is too long; the board lacks the link or its
+    /// [`LinkError`]: the scene averages, chooses its case per frame or has writable tables, for which there is no packet; a payload is too long; the board lacks the link or its
     /// clock is too slow for the bit rate.
     pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
@@ -26,6 +26,9 @@ impl Identity {
         let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
         if scene.input.average > 0 {
             return refuse("input.average", scene.input.average.to_string());
+        }
+        if plan.has_writable_tables() {
+            return refuse("hardware.tables", "writable".to_owned());
         }
         if plan.chooses() {
             return refuse("partition.case", scene.partition.case.to_string());

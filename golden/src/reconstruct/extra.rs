@@ -10,6 +10,7 @@
 //! | `wrench` | a force per taxel, or a record for each contact | force and moment of the whole array |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
 //! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
+//! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::{shear_sigma_N, Resultant, Wrench};
@@ -47,6 +48,9 @@ pub struct Extra {
     /// Number of frames that a sliding mean holds: as many of equal weight have its noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_frames: Option<usize>,
+    /// Version of the tables of the hardware; 0 is that of the bitstream's, and of tables that are not whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tables_version: Option<u16>,
     /// The forces of `output.forces = "resultants"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resultants: Option<Vec<Resultant>>,

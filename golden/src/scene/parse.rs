@@ -3,8 +3,8 @@
 use super::reader::Reader;
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
-    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec,
-    ThresholdSpec, MAX_CONTACTS, PLAUSIBLE_MPA,
+    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, TableRange,
+    TableStorage, ThresholdSpec, MAX_CONTACTS, PLAUSIBLE_MPA,
 };
 use crate::board::{Board, SEARCH_WIDTHS};
 use crate::link::LinkKind;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 11] = [
+const SCHEMA: [(&str, &[&str]); 12] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
@@ -25,7 +25,8 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check", "search_width"]),
+    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables"]),
+    ("hardware.table_range", &["gain"]),
     (
         "input",
         &[
@@ -304,13 +305,38 @@ fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
 }
 
 fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
+    let tables = [("rom", TableStorage::Rom), ("writable", TableStorage::Writable)];
     let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
     Ok(HardwareSpec {
         board: board(reader, origin)?,
         link: reader.choice("hardware.link", &LinkKind::NAMES)?,
         coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
         search_width: search_width(reader)?,
+        tables: reader.choice("hardware.tables", &tables)?,
+        table_range: table_range(reader)?,
     })
+}
+
+/// Without writable tables a range has no meaning.
+fn table_range(reader: &Reader) -> Result<TableRange, SceneError> {
+    let table = "hardware.table_range";
+    if let (Some(value), None | Some("rom")) =
+        (reader.value(table), reader.value("hardware.tables").map_or(Some("rom"), Value::as_str))
+    {
+        return Err(reader.wrong(table, value, "left out, or hardware.tables = \"writable\""));
+    }
+    Ok(TableRange { gain: range(reader, "hardware.table_range.gain")? })
+}
+
+/// Two numbers above 0 in ascending order.
+fn range(reader: &Reader, path: &str) -> Result<Option<[f64; 2]>, SceneError> {
+    let number = |value: &Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
+    let read = |value: &Value| {
+        let [least, most] = value.as_array()?.as_slice() else { return None };
+        let range = [number(least)?, number(most)?];
+        (0.0 < range[0] && range[0] <= range[1] && range[1].is_finite()).then_some(range)
+    };
+    reader.typed(path, read, "[least, largest], numbers above 0")
 }
 
 /// A built-in board's name, or the path of a file, which the scene gives relative to its own folder.

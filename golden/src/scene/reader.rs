@@ -37,19 +37,28 @@ impl<'a> Reader<'a> {
                 return Err(unknown(name.clone()));
             };
             let table = value.as_table().ok_or_else(|| self.wrong(name, value, "a table"))?;
-            if let Some(field) = table.keys().find(|key| !fields.contains(&key.as_str())) {
-                return Err(unknown(join(name, field)));
+            for (key, value) in table.iter().filter(|(key, _)| !fields.contains(&key.as_str())) {
+                let path = join(name, key);
+                let Some((_, fields)) = schema.iter().find(|(table, _)| *table == path) else {
+                    return Err(unknown(path));
+                };
+                let table = value.as_table().ok_or_else(|| self.wrong(&path, value, "a table"))?;
+                if let Some(field) = table.keys().find(|key| !fields.contains(&key.as_str())) {
+                    return Err(unknown(join(&path, field)));
+                }
             }
         }
         Ok(())
     }
 
-    /// The value at `table.field`, if present.
+    /// The value at `table.field` or `table.table.field`, if present.
     pub(super) fn value(&self, path: &str) -> Option<&'a Value> {
-        match path.split_once('.') {
-            Some((table, field)) => self.root.get(table)?.as_table()?.get(field),
-            None => self.root.get(path),
+        let (tables, field) = path.rsplit_once('.').map_or((None, path), |(tables, field)| (Some(tables), field));
+        let mut table = self.root;
+        for name in tables.into_iter().flat_map(|tables| tables.split('.')) {
+            table = table.get(name)?.as_table()?;
         }
+        table.get(field)
     }
 
     /// An integer in a range, or `default`.

@@ -23,10 +23,15 @@
 //! dead taxel needs its own matrices, while the subarrays of the engine share theirs: with several subarrays, dead
 //! taxels are rejected.
 //!
+//! Writable tables: not with "adaptive" or the serial engine.
+//!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
 
-use super::{CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use super::{
+    CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError,
+    TABLE_CODE_BITS,
+};
 use crate::learned::{Place, Window};
 use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
@@ -117,6 +122,13 @@ impl Scene {
                 "input.unipolar",
                 "true".to_string(),
                 "false, or search.estimator = learned",
+            ),
+            rule(several && self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adaptive"),
+            rule(
+                self.hardware.has_writable_tables() && self.fixed.input_bits < TABLE_CODE_BITS,
+                "fixed.input_bits",
+                self.fixed.input_bits.to_string(),
+                "at least 9 with hardware.tables = writable, whose bytes are no codes",
             ),
         ])?;
         match self.for_hardware().estimator() {
@@ -213,6 +225,12 @@ impl Scene {
                 "hardware.coefficient_check",
                 "signature".to_string(),
                 none,
+            ),
+            rule(
+                self.hardware.has_writable_tables(),
+                "hardware.tables",
+                writable(),
+                "rom on a board with the serial engine",
             ),
             rule(
                 self.hardware.search_width.is_some(),
@@ -325,7 +343,11 @@ impl Scene {
     /// The input option, if any, that needs `input.full_scale_MPa` in hardware because its words are relative to it.
     pub(crate) fn scaled_input(&self) -> Option<&'static str> {
         let input = &self.input;
-        let asked = [("input.calibration", input.calibration.is_some()), ("input.tare", input.tare.is_some())];
+        let asked = [
+            ("input.calibration", input.calibration.is_some()),
+            ("input.tare", input.tare.is_some()),
+            ("hardware.tables", self.hardware.has_writable_tables()),
+        ];
         asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
     }
 
@@ -333,6 +355,7 @@ impl Scene {
     pub(crate) fn field_value(&self, field: &str) -> String {
         match field {
             "input.calibration" => path(&self.input.calibration),
+            "hardware.tables" => writable(),
             _ => path(&self.input.tare),
         }
     }
@@ -345,6 +368,11 @@ impl Scene {
             [first, ..] => format!("[{first:?}, …]"),
         }
     }
+}
+
+/// The value of `hardware.tables` that some scenes cannot have, for messages.
+fn writable() -> String {
+    "writable".to_string()
 }
 
 fn path(file: &Option<std::path::PathBuf>) -> String {

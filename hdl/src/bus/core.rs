@@ -6,7 +6,7 @@ use dermis_golden::registers::{constants, ADDRESS_BITS, REGISTER_BITS};
 use rust_hdl::prelude::*;
 
 use super::stream_in::WORD_BYTES;
-use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, Wishbone, ID_BITS};
+use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, Wishbone, ID_BITS};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::{Dff, Queue};
@@ -73,6 +73,7 @@ macro_rules! core {
             // Registered, because the engine is large and its reset has a long route.
             restart: Dff,
             stream_in: StreamIn,
+            tables_in: TablesIn,
             labels: Queue,
             engine: $engine,
             stream_out: StreamOut,
@@ -107,10 +108,14 @@ macro_rules! core {
                     $($wire_out: Wire::new($out_bits),)+
                     restart: Default::default(),
                     stream_in: StreamIn::new(model.scene.sensor.taxels(), model.formats().code_bits as usize),
+                    tables_in: TablesIn::new(model.formats().code_bits as usize, model.has_writable_tables()),
                     labels: Queue::new(ID_BITS + 1),
                     engine: <$engine>::new(model),
                     stream_out: StreamOut::new(words, model.force_beats()),
-                    registers: Registers::new(&constants(model, REGISTER_BITS / 8 * words)),
+                    registers: Registers::new(
+                        &constants(model, REGISTER_BITS / 8 * words),
+                        model.has_writable_tables(),
+                    ),
                     bus: Default::default(),
                     rst: Default::default(),
                     unused: Default::default(),
@@ -125,6 +130,7 @@ macro_rules! core {
             fn update(&mut self) {
                 self.restart.clk.next = self.aclk.val();
                 self.stream_in.clk.next = self.aclk.val();
+                self.tables_in.clk.next = self.aclk.val();
                 self.labels.clk.next = self.aclk.val();
                 self.engine.clk.next = self.aclk.val();
                 self.stream_out.clk.next = self.aclk.val();
@@ -135,6 +141,7 @@ macro_rules! core {
                 self.bus.rst.next = self.rst.val();
                 self.registers.rst.next = self.rst.val();
                 self.stream_in.rst.next = self.restart.q.val();
+                self.tables_in.rst.next = self.restart.q.val();
                 self.labels.rst.next = self.restart.q.val();
                 self.engine.rst.next = self.restart.q.val();
                 self.stream_out.rst.next = self.restart.q.val();
@@ -145,10 +152,17 @@ macro_rules! core {
                 self.stream_in.s_axis_tvalid.next = self.s_axis_tvalid.val() & !self.restart.q.val();
                 self.stream_in.s_axis_tlast.next = self.s_axis_tlast.val();
                 self.s_axis_tready.next = self.stream_in.s_axis_tready.val() & !self.restart.q.val();
-                self.engine.s_axis_tdata.next = self.stream_in.m_axis_tdata.val();
-                self.engine.s_axis_tvalid.next = self.stream_in.m_axis_tvalid.val();
-                self.engine.s_axis_tlast.next = self.stream_in.m_axis_tlast.val();
-                self.stream_in.m_axis_tready.next = self.engine.s_axis_tready.val();
+                self.tables_in.s_axis_tdata.next = self.stream_in.m_axis_tdata.val();
+                self.tables_in.s_axis_tvalid.next = self.stream_in.m_axis_tvalid.val();
+                self.tables_in.s_axis_tlast.next = self.stream_in.m_axis_tlast.val();
+                self.stream_in.m_axis_tready.next = self.tables_in.s_axis_tready.val();
+                self.tables_in.octet.next = self.registers.octet.val();
+                self.tables_in.octet_valid.next = self.registers.octet_valid.val();
+                self.registers.octet_taken.next = self.tables_in.octet_taken.val();
+                self.engine.s_axis_tdata.next = self.tables_in.m_axis_tdata.val();
+                self.engine.s_axis_tvalid.next = self.tables_in.m_axis_tvalid.val();
+                self.engine.s_axis_tlast.next = self.tables_in.m_axis_tlast.val();
+                self.tables_in.m_axis_tready.next = self.engine.s_axis_tready.val();
 
                 self.stream_in.room.next = self.labels.room.val();
                 self.labels.reserve.next = self.stream_in.complete.val();

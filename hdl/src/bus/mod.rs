@@ -14,6 +14,7 @@ mod generate;
 mod registers;
 mod stream_in;
 mod stream_out;
+mod tables_in;
 mod testbench;
 mod wishbone;
 
@@ -23,6 +24,7 @@ pub use generate::{generate_core, generate_core_changed};
 pub use registers::Registers;
 pub use stream_in::StreamIn;
 pub use stream_out::{StreamOut, WIDTHS};
+pub use tables_in::TablesIn;
 pub use wishbone::Wishbone;
 
 /// Bits of a frame's identifier, `tid`.

@@ -82,7 +82,7 @@ impl Receive {
             reported: Default::default(),
             taxels: Counter::new(taxels),
             frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
-            stats: FrameStats::new(bits, floor, 1),
+            stats: FrameStats::new(bits, Some(floor), 1),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),
@@ -118,6 +118,7 @@ impl Logic for Receive {
         self.stats.clear.next = self.rst.val() | self.free.val() | self.early.val();
         self.stats.part.next = false.into();
         self.stats.select.next = false.into();
+        self.stats.floor.next = false.into();
         self.stats.code.next = self.s_axis_tdata.val();
         self.magnitude.next = self.stats.magnitude.val();
         self.positive.next = self.stats.positive.val();

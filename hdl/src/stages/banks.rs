@@ -67,7 +67,7 @@ impl Banks {
     pub fn new(model: &Model) -> Self {
         let cases = model.cases();
         let mut block = Banks {
-            ports: ReceivePorts::new(cases),
+            ports: ReceivePorts::new(cases, model.floor_bits()),
             banks: (0..cases.len()).map(|case| Receive::new(model, case)).collect(),
             choose: Choose::new(model),
             kernel: Body::default(),
@@ -91,14 +91,14 @@ impl Banks {
         let (mut reads, mut drives) = (Reads::new(), Drives::new());
         divide!(
             Of::Own, ReceivePorts, ports,
-            reads [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
+            reads [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
             drives [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing]
         );
         for (number, bank) in banks.iter_mut().enumerate() {
             divide!(
                 Of::Bank(number), ReceivePorts, &mut **bank,
                 reads [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing],
-                drives [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported]
+                drives [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor]
             );
         }
         divide!(

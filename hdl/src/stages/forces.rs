@@ -6,7 +6,7 @@ use rust_hdl::prelude::*;
 
 use crate::primitives::{
     count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, CYCLE_BITS,
-    SATURATION_BITS,
+    SATURATION_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
 };
 use crate::wire::Wire;
 
@@ -71,6 +71,12 @@ pub struct Forces {
     pub labels: Wire<In>,
     /// There are more contacts than get a μ; constant while the frame is sent.
     pub overflow: Signal<In, Bit>,
+    /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
+    pub threshold: Wire<In>,
+    /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
+    pub version: Wire<In>,
+    /// The tables are not whole, where they are written.
+    pub incomplete: Signal<In, Bit>,
     /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
     /// The receiver accepts a beat in this cycle.
@@ -124,6 +130,9 @@ impl Forces {
             label_address: Wire::new(address),
             labels: Wire::new(unit.labels.width()),
             overflow: Default::default(),
+            threshold: Wire::new(THRESHOLD_BITS),
+            version: Wire::new(VERSION_WORD_BITS),
+            incomplete: Default::default(),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -180,6 +189,9 @@ impl Logic for Forces {
         self.label_address.next = self.asked.q.val();
         self.unit.labels.next = self.labels.val();
         self.unit.overflow.next = self.overflow.val();
+        self.unit.threshold.next = self.threshold.val();
+        self.unit.version.next = self.version.val();
+        self.unit.incomplete.next = self.incomplete.val();
 
         self.leaving.reserve.next = self.offer.val();
         self.room.next = self.leaving.room.val();
@@ -245,8 +257,8 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [valid, address, ready] = [24, 25, 26].map(|input| inputs[input]);
-            let mut of_unit = inputs[..24].to_vec();
+            let [valid, address, ready] = [27, 28, 29].map(|input| inputs[input]);
+            let mut of_unit = inputs[..27].to_vec();
             of_unit[VALUES] = self.values.shown().unwrap_or_default();
             let [beat, written, last] = [0, 1, 2].map(|output| self.unit.outputs(&of_unit)[output].unwrap_or_default());
             self.leaving.clock(&[inputs[0], inputs[5], written, last, beat, ready]);
@@ -297,6 +309,9 @@ mod tests {
                 random_word(&mut random, CYCLE_BITS),
                 Word::default(),
                 random.bool().into(),
+                random.u64(..1 << 32).into(),
+                Word::default(),
+                random.bool().into(),
                 (2..2 + steps).contains(&at).into(),
                 random.u64(..steps as u64).into(),
                 random.bool().into(),
@@ -304,7 +319,7 @@ mod tests {
             forces.clock(&inputs);
             inputs
         };
-        let reset = [vec![Word::from(true)], vec![Word::default(); 26]].concat();
+        let reset = [vec![Word::from(true)], vec![Word::default(); 29]].concat();
         let all = (0..frames).flat_map(|_| 0..offers + 230).map(&mut cycle);
         [reset.clone(), reset].into_iter().chain(all).collect()
     }
@@ -321,7 +336,7 @@ mod tests {
                 inputs [
                     rst, which, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
                     normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels,
-                    overflow, values_valid, address, m_axis_tready,
+                    overflow, threshold, version, incomplete, values_valid, address, m_axis_tready,
                 ],
                 outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata, label_address],
             )

@@ -1,9 +1,9 @@
-//! Stage `prepare`: calibration and averaging before `receive`; options that the scene does not use are wires.
+//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{Average, Calibrate};
+use crate::primitives::{Average, Calibrate, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::wire::Wire;
 
 /// Codes in, words of the frame buffer out.
@@ -13,7 +13,9 @@ pub struct Prepare {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
+    /// No frame is in the engine behind this stage.
+    pub idle: Signal<In, Bit>,
+    /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
     /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
@@ -31,6 +33,17 @@ pub struct Prepare {
     pub m_axis_tlast: Signal<Out, Bit>,
     /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
     pub frames: Wire<Out>,
+    /// Reset of the engine: `rst`, or tables are written.
+    pub restart: Signal<Out, Bit>,
+    /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
+    pub noise_floor: Wire<Out>,
+    /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
+    pub threshold: Wire<Out>,
+    /// Version of the tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
+    pub version: Wire<Out>,
+    /// The tables are not whole.
+    pub incomplete: Signal<Out, Bit>,
+    load: Load,
     /// Zero and gain of each taxel.
     pub calibrate: Calibrate,
     average: Average,
@@ -45,7 +58,8 @@ impl Prepare {
         Prepare {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
+            idle: Default::default(),
+            s_axis_tdata: Wire::new(model.stream_bits() as usize),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -54,7 +68,13 @@ impl Prepare {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             frames: Wire::new(average.frames.width()),
-            calibrate: Calibrate::new(&model.prepare, taxels, bits),
+            restart: Default::default(),
+            noise_floor: Wire::new(model.floor_bits() as usize),
+            threshold: Wire::new(THRESHOLD_BITS),
+            version: Wire::new(VERSION_WORD_BITS),
+            incomplete: Default::default(),
+            load: Load::new(model),
+            calibrate: Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables()),
             average,
         }
     }
@@ -63,14 +83,30 @@ impl Prepare {
 impl Logic for Prepare {
     #[hdl_gen]
     fn update(&mut self) {
+        self.load.clk.next = self.clk.val();
+        self.load.rst.next = self.rst.val();
+        self.load.idle.next = self.idle.val();
+        self.restart.next = self.load.restart.val();
+        self.noise_floor.next = self.load.noise_floor.val();
+        self.threshold.next = self.load.threshold.val();
+        self.version.next = self.load.version.val();
+        self.incomplete.next = self.load.incomplete.val();
+        self.load.s_axis_tdata.next = self.s_axis_tdata.val();
+        self.load.s_axis_tvalid.next = self.s_axis_tvalid.val();
+        self.load.s_axis_tlast.next = self.s_axis_tlast.val();
+        self.s_axis_tready.next = self.load.s_axis_tready.val();
         self.calibrate.clk.next = self.clk.val();
-        self.calibrate.rst.next = self.rst.val();
+        self.calibrate.rst.next = self.load.restart.val();
+        self.calibrate.write.next = self.load.write.val();
+        self.calibrate.write_taxel.next = self.load.taxel.val();
+        self.calibrate.write_entry.next = self.load.entry.val();
+        self.calibrate.incomplete.next = self.load.incomplete.val();
         self.average.clk.next = self.clk.val();
-        self.average.rst.next = self.rst.val();
-        self.calibrate.s_axis_tdata.next = self.s_axis_tdata.val();
-        self.calibrate.s_axis_tvalid.next = self.s_axis_tvalid.val();
-        self.calibrate.s_axis_tlast.next = self.s_axis_tlast.val();
-        self.s_axis_tready.next = self.calibrate.s_axis_tready.val();
+        self.average.rst.next = self.load.restart.val();
+        self.calibrate.s_axis_tdata.next = self.load.m_axis_tdata.val();
+        self.calibrate.s_axis_tvalid.next = self.load.m_axis_tvalid.val();
+        self.calibrate.s_axis_tlast.next = self.load.m_axis_tlast.val();
+        self.load.m_axis_tready.next = self.calibrate.s_axis_tready.val();
         self.average.s_axis_tdata.next = self.calibrate.m_axis_tdata.val();
         self.average.s_axis_tvalid.next = self.calibrate.m_axis_tvalid.val();
         self.average.s_axis_tlast.next = self.calibrate.m_axis_tlast.val();
@@ -112,7 +148,7 @@ mod tests {
         fn inputs(&mut self, inputs: &[Word]) -> [Vec<Word>; 2] {
             // Whether the sums take a word does not depend on the word.
             let ready = self.sums.outputs(inputs)[3].unwrap_or_default();
-            let table = [&inputs[..4], &[ready]].concat();
+            let table = [&inputs[..4], &[ready], &[Word::default(); 4]].concat();
             let [valid, last, data] = [1, 2, 3].map(|output| self.table.outputs(&table)[output].unwrap_or_default());
             [table, vec![inputs[0], data, valid, last, inputs[4]]]
         }
@@ -122,7 +158,9 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let [table, sums] = self.inputs(inputs);
             let sums = self.sums.outputs(&sums);
-            [&self.table.outputs(&table)[..1], &sums[..3], &sums[4..]].concat()
+            // Without writable tables.
+            let constant = [Some(inputs[0]), None, None, None, None].map(|word| word.or(Some(Word::default())));
+            [&self.table.outputs(&table)[..1], &sums[..3], &sums[4..], &constant].concat()
         }
 
         fn clock(&mut self, inputs: &[Word]) {
@@ -136,8 +174,11 @@ mod tests {
         block_subject!(
             Prepare::new(model),
             changes,
-            inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-            outputs [s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast, frames],
+            inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, idle],
+            outputs [
+                s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast, frames, restart, noise_floor, threshold, version,
+                incomplete,
+            ],
         )
     }
 
@@ -156,7 +197,14 @@ mod tests {
             // Mostly frames of the right length.
             beats = if rst { 0 } else { beats + usize::from(offered) };
             let last = if random.u8(..60) == 0 { random.bool() } else { beats % taxels == 0 };
-            vec![rst.into(), random_word(&mut random, bits), offered.into(), last.into(), ready.into()]
+            vec![
+                rst.into(),
+                random_word(&mut random, bits),
+                offered.into(),
+                last.into(),
+                ready.into(),
+                random.bool().into(),
+            ]
         };
         let stimulus: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
         let defects = [
@@ -169,11 +217,12 @@ mod tests {
     #[test]
     fn without_options_the_stream_passes() {
         let model = model(2, 3, "");
-        let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1]);
+        let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1, 1]);
         let of = |inputs: &[Word]| {
             let stream = [4, 2, 1, 3].map(|input| Some(inputs[input]));
-            stream.into_iter().chain([Some(Word::default())]).collect()
+            let zero = Some(Word::default());
+            stream.into_iter().chain([zero, Some(inputs[0]), zero, zero, zero, zero]).collect()
         };
-        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 5, of));
+        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 10, of));
     }
 }

@@ -77,6 +77,8 @@ ports! {
         pub quad: Wire<Out>,
         /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
         pub part: Wire<In>,
+        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+        pub floor: Wire<In>,
         /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid from two cycles after its last code
         /// until `free`.
         pub magnitude: Wire<Out>,
@@ -92,8 +94,8 @@ ports! {
 }
 
 impl ReceivePorts {
-    /// For frames that are read in the layout of any of `cases`.
-    pub(super) fn new(cases: &[CasePlan]) -> Self {
+    /// For frames that are read in the layout of any of `cases`, and a noise floor of `floor_bits` bits.
+    pub(super) fn new(cases: &[CasePlan], floor_bits: u32) -> Self {
         let bits = cases[0].formats.input_bits as usize;
         let parts: Vec<usize> = cases.iter().map(|case| case.parts.len()).collect();
         ReceivePorts {
@@ -113,6 +115,7 @@ impl ReceivePorts {
             quad_address: Wire::new(count_bits(frame_quads(cases))),
             quad: Wire::new(4 * bits),
             part: Wire::new(count_bits(largest(&parts))),
+            floor: Wire::new(floor_bits as usize),
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
@@ -133,12 +136,12 @@ impl Receive {
         let quads = count * own.formats.quads;
         let taxels = model.scene.sensor.taxels();
         Receive {
-            ports: ReceivePorts::new(std::slice::from_ref(own)),
+            ports: ReceivePorts::new(std::slice::from_ref(own), model.floor_bits()),
             scan: Scan::new(std::slice::from_ref(own), Quads::LANES),
             input_mask: InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar),
             broadcast: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
-            stats: FrameStats::new(bits, model.noise_floor, count),
+            stats: FrameStats::new(bits, model.built_in_floor(), count),
             stats_enable: BitDelay::new(1),
             stats_part: Delay::new(count_bits(count), 1),
             stats_code: Delay::new(bits, 1),
@@ -206,6 +209,7 @@ impl Logic for Receive {
         self.clears.d.next = self.rst.val() | self.free.val() | self.early.val();
         self.stats.clear.next = self.clears.q.val();
         self.stats.part.next = self.stats_part.q.val();
+        self.stats.floor.next = self.floor.val();
         self.stats.select.next = self.part.val();
         self.stats.code.next = self.stats_code.q.val();
         self.magnitude.next = self.stats.magnitude.val();
@@ -365,7 +369,11 @@ pub(crate) mod tests {
         let parts = model(10, 14, &format!("[partition]\ncases = [0, 1]\n{noise}"));
         let dead = model(5, 7, &format!("{noise}dead = [[0, 3], [4, 6]]\n"));
         assert!(parts.noise_floor > 0 && dead.dead.len() == 2);
+        let tables = noise.replace("[input]", "[hardware]\ntables = \"writable\"\n[input]");
+        let mut written = model(4, 5, &tables);
+        written.noise_floor += 17;
         for (model, case, defect) in [
+            (written, 0, Change::value("", "stats__floor", |k| k.constant(20, (1 << 19) - 1))),
             (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),
             (dead, 0, Change::value("", "input_mask__clear", |k| k.named("rst"))),
         ] {
@@ -373,11 +381,12 @@ pub(crate) mod tests {
             let mut buffer = Buffer::new(&model, case);
             let count = buffer.case().parts.len();
             let quads = count * buffer.case().formats.quads;
+            let floor = Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64);
             let cycle = |cycle: usize| {
                 let beat = buffer.reception.beat(&mut random, cycle);
                 let free = buffer.full && random.u8(..40) == 0;
                 let [address, part] = [quads, count].map(|limit| Word::from(random.u64(..limit as u64)));
-                let inputs = [&beat[..], &[free.into(), address, part, (random.u8(..20) == 0).into()]].concat();
+                let inputs = [&beat[..], &[free.into(), address, part, (random.u8(..20) == 0).into(), floor]].concat();
                 buffer.clock(&inputs);
                 inputs
             };
@@ -386,7 +395,7 @@ pub(crate) mod tests {
                 block_subject!(
                     Receive::new(&model, case),
                     changes,
-                    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
+                    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
                     outputs [
                         s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive,
                         negative, framing

@@ -48,6 +48,8 @@ pub struct Window {
     pub quad: Wire<In>,
     /// Labels of the quad's four taxels; two cycles after `quad_address`.
     pub labels: Wire<In>,
+    /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+    pub floor: Wire<In>,
     /// A quad is written to the window memory.
     pub write: Signal<Out, Bit>,
     /// High limbs of the four parities of the quad, signed; valid with `write`.
@@ -65,7 +67,7 @@ pub struct Window {
 kernel_block!(
     Window,
     clock clk,
-    inputs [rst, start, middle_row, middle_col, label, quad, labels],
+    inputs [rst, start, middle_row, middle_col, label, quad, labels, floor],
     outputs [quad_address, write, write_quad, mask_quad, positive, negative]
 );
 
@@ -90,6 +92,7 @@ impl Window {
             quad_address: Wire::new(address),
             quad: Wire::new(4 * bits),
             labels: Wire::new(4 * label_bits),
+            floor: Wire::new(model.floor_bits() as usize),
             write: Default::default(),
             write_quad: Wire::new(4 * (formats.fold_bits - formats.input_low_bits) as usize),
             mask_quad: Wire::new(4 * MASK_BITS),
@@ -111,6 +114,7 @@ impl Window {
             label: k.input("label", self.label.width()),
             quad: k.input("quad", self.quad.width()),
             labels: k.input("labels", self.labels.width()),
+            floor: k.input("floor", self.floor.width()),
         };
         match &model.by_contact {
             Some(contacts) => own.window(model, &contacts.window),
@@ -140,6 +144,7 @@ struct Ports<'k> {
     label: Expr<'k>,
     quad: Expr<'k>,
     labels: Expr<'k>,
+    floor: Expr<'k>,
 }
 
 /// The taxel of a cycle of the scan.
@@ -192,7 +197,7 @@ impl<'k> Ports<'k> {
         };
         let magnitude = magnitude_of(code);
         let magnitude = gathered("magnitude", magnitude & valid.repeat(magnitude.bits()));
-        let [above, below] = beyond(k, code, model.noise_floor);
+        let [above, below] = beyond(k, code, model.built_in_floor(), self.floor);
         let counts = self.bit("counts", own & valid);
         gathered("positive", k.delay("above", above) & counts);
         gathered("negative", k.delay("below", below) & counts);

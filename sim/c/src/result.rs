@@ -46,6 +46,10 @@ pub enum dermis_flag {
     Misfit = 1 << 13,
     /// `too-many-contacts`
     TooManyContacts = 1 << 14,
+    /// `tables-incomplete`
+    TablesIncomplete = 1 << 15,
+    /// `tables-refused`
+    TablesRefused = 1 << 16,
 }
 
 /// The bit of a flag.
@@ -66,6 +70,8 @@ pub fn bit(flag: Flag) -> u32 {
         Flag::ShearNotResolved => dermis_flag::ShearNotResolved,
         Flag::Misfit => dermis_flag::Misfit,
         Flag::TooManyContacts => dermis_flag::TooManyContacts,
+        Flag::TablesIncomplete => dermis_flag::TablesIncomplete,
+        Flag::TablesRefused => dermis_flag::TablesRefused,
     };
     bit as u32
 }

@@ -97,6 +97,8 @@ enum Command {
     Block(super::block::Arguments),
     /// Print the register map of a core, as `dermis build --bus` generates one.
     Registers(super::registers::Arguments),
+    /// Make the image of a specimen's tables for hardware with writable tables.
+    Load(super::load::Arguments),
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     Cosim(super::cosim::Arguments),
     /// Measure errors and times of all engines and write an HTML page with tables and pictures.
@@ -186,6 +188,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Live(arguments) => Ok((super::live::run(arguments, print)?, true)),
         Command::Build(arguments) => Ok((super::build::run(arguments, build_dir)?, true)),
         Command::Cosim(arguments) => super::cosim::run(arguments, build_dir),
+        Command::Load(arguments) => Ok((super::load::run(arguments, build_dir)?, true)),
         Command::Bitstream(arguments) => super::bitstream::run(arguments, build_dir),
         Command::Check(arguments) => Ok((super::check::run(arguments)?, true)),
         Command::New(arguments) => Ok((super::new::run(arguments)?, true)),

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use dermis_golden::scene::Scene;
 
 use super::inputs::{resolve, BoardOverride};
 use crate::cosim::hardware::Simulator;
-use crate::cosim::verify::verify;
+use crate::cosim::verify::verify_specimen;
 use crate::cosim::waves::waves;
 use crate::report::{self, CosimReport};
 
@@ -18,6 +19,7 @@ use crate::report::{self, CosimReport};
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
   dermis cosim eight-by-eight --device rust-hdl
   dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
+  dermis cosim pad.toml --tables left-hand.toml      hardware of pad.toml that takes the tables of a specimen
   dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
   dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
 pub struct Arguments {
@@ -29,6 +31,9 @@ pub struct Arguments {
     /// Print the report as JSON and nothing else.
     #[arg(long)]
     json: bool,
+    /// Scene of a specimen: its tables are loaded first, with version 1 (`dermis load`); frames are the specimen's.
+    #[arg(long, value_name = "SCENE", conflicts_with = "waves")]
+    tables: Option<String>,
     /// Simulator of the hardware.
     #[arg(long, value_enum, default_value = "both")]
     device: DeviceChoice,
@@ -67,10 +72,11 @@ impl DeviceChoice {
 /// # Errors
 /// Wrong input, a scene without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
-    let Arguments { scene, frames, json, device, waves: with_waves, target } = arguments;
+    let Arguments { scene, frames, json, tables, device, waves: with_waves, target } = arguments;
     let (scene, frames) = resolve(scene.as_deref(), frames)?;
     let scene = target.apply(scene);
-    let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
+    let specimen = tables.as_deref().map(Scene::load).transpose()?;
+    let verified = verify_specimen(&scene, specimen.as_ref(), &frames, device.simulators(), build_dir)?;
     let mut text =
         if *json { serde_json::to_string(&CosimReport::new(&verified))? + "\n" } else { report::cosim(&verified) };
     if *with_waves {

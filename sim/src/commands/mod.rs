@@ -48,6 +48,7 @@ pub mod host;
 pub mod import;
 pub mod inputs;
 pub mod live;
+mod load;
 pub mod new;
 pub mod noise;
 pub mod power;

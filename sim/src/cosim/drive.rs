@@ -60,6 +60,7 @@ pub fn record(
         let accepted = inputs.s_valid && outputs.s_ready;
         if accepted {
             sender.accepted(cycle, &mut receiver.recording.times);
+            receiver.skip_unanswered(&sender);
         }
         // Surplus beats do not count, so that the watchdog also ends a device that sends forever.
         let delivered = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;

@@ -65,6 +65,12 @@ impl Findings {
         self.count == 0
     }
 
+    /// The same findings; frames are numbered without the first `count`, whose own mismatches count with frame 0.
+    pub fn without_first(mut self, count: usize) -> Findings {
+        self.unequal = self.unequal.into_iter().map(|frame| frame.saturating_sub(count)).collect();
+        self
+    }
+
     /// Adds another comparison's findings.
     pub fn extend(&mut self, other: Findings) {
         self.kept.extend(other.kept);

@@ -12,6 +12,7 @@ use anyhow::Result;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::Scene;
 use dermis_hdl::device::{Device, Tap};
 use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
@@ -62,8 +63,10 @@ impl Simulator {
 
 /// A scene's model and the hardware generated from it.
 pub struct Hardware {
-    /// The bit-true model.
+    /// The bit-true model, with the tables that a run loads.
     pub model: Model,
+    /// The model of what is built.
+    built: Model,
     /// Verilog, memory files, taps, manifest.
     pub generated: Generated,
     /// Cache folder of Verilator libraries and netlists.
@@ -77,7 +80,21 @@ impl Hardware {
     /// A design that the generator refuses.
     pub fn new(model: Model, build: &Path) -> Result<Self> {
         let generated = generate(&model)?;
-        Ok(Hardware { model, generated, cache: build.join("verilator") })
+        Ok(Hardware { built: model.clone(), model, generated, cache: build.join("verilator") })
+    }
+
+    /// From now on every run begins with the tables of `specimen`, which the model then has.
+    ///
+    /// # Errors
+    /// As [`Model::with_tables`].
+    pub fn load(&mut self, specimen: &Scene, version: u16) -> Result<()> {
+        self.model = self.model.with_tables(specimen, version)?;
+        Ok(())
+    }
+
+    /// The image with which every run begins, if tables have been loaded.
+    pub fn image(&self) -> Option<Vector> {
+        (self.model.tables_version > 0).then(|| Vector::of_image(&self.model))
     }
 
     /// Starts a simulation of many cycles.
@@ -100,7 +117,7 @@ impl Hardware {
     fn device_with(&self, simulator: Simulator, optimisation: Optimisation) -> Result<Box<dyn Device>> {
         Ok(match simulator {
             Simulator::Verilator => Box::new(self.verilated(&self.generated, false, optimisation)?),
-            Simulator::RustHdl => self::simulator(&self.model)?,
+            Simulator::RustHdl => self::simulator(&self.built)?,
             Simulator::Netlist => {
                 let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
                 Box::new(self.verilated(&netlist, false, optimisation)?)
@@ -127,7 +144,7 @@ impl Hardware {
             top: &generated.top,
             files: files.collect(),
             taps: &generated.taps,
-            input_bits: self.model.formats().code_bits,
+            input_bits: self.model.stream_bits(),
             open_state,
             optimisation,
         };
@@ -140,10 +157,10 @@ impl Hardware {
     /// As [`Hardware::device`]; a scene whose board has no link.
     pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
         Ok(match simulator {
-            Simulator::RustHdl => board_simulator(&self.model)?,
+            Simulator::RustHdl => board_simulator(&self.built)?,
             _ => {
                 let link = self.model.scene.hardware.link;
-                Box::new(VerilatedBoard::new(&generate_board(&self.model)?, link, &self.cache)?)
+                Box::new(VerilatedBoard::new(&generate_board(&self.built)?, link, &self.cache)?)
             }
         })
     }

@@ -79,8 +79,25 @@ pub struct Verified {
 /// # Errors
 /// A scene that cannot be built, a frame of another sensor, no Verilator.
 pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
+    verify_specimen(scene, None, frames, simulators, build)
+}
+
+/// As [`verify`]; the hardware of `scene` takes the tables of `specimen` first, if there is one, whose frames follow.
+///
+/// # Errors
+/// As [`verify`], and for tables that the hardware does not take.
+pub fn verify_specimen(
+    scene: &Scene,
+    specimen: Option<&Scene>,
+    frames: &[Frame],
+    simulators: &[Simulator],
+    build: &Path,
+) -> Result<Verified> {
     let board = Board::load(&scene.hardware.board)?;
-    let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
+    let mut hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
+    if let Some(specimen) = specimen {
+        hardware.load(specimen, 1)?;
+    }
     // The model's scene has the full scale filled in, so that all models use the same codes.
     let golden = Golden::new(&hardware.model.scene)?;
     let vectors = hardware.vectors(frames)?;
@@ -134,14 +151,18 @@ fn simulate(
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device_for(simulator, vectors, stimuli.len())?;
-    let (taps, vectors) = hardware.observable(simulator, vectors);
+    let image = hardware.image();
+    let images = image.iter().len();
+    let all: Vec<Vector> = image.into_iter().chain(vectors.iter().cloned()).collect();
+    let (taps, vectors) = hardware.observable(simulator, &all);
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());
         let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
         let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, times) = run(dut, &vectors, stimulus);
-        verified.findings.extend(findings);
+        let (findings, mut times) = run(dut, &vectors, stimulus);
+        verified.findings.extend(findings.without_first(images));
+        times.drain(..images);
         verified.runs.push(label);
         match stimulus {
             Stimulus::FullSpeed => full_speed = times,

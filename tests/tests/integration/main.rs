@@ -31,6 +31,7 @@ mod scenes;
 mod serial;
 mod streams;
 mod synthesis;
+mod tables;
 mod words;
 
 /// The compiler does not tell of a file that no `mod` names, and its tests would not run.

@@ -13,6 +13,7 @@ use super::fit::{fit, Design};
 use super::widths::{widths, Shape};
 use crate::board::{Board, EngineKind};
 use crate::fixed::error::FixedError;
+use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::{Prepare, Scale};
 use crate::learned::Window;
 use crate::matrices::{Matrices, MAX_DEGREE};
@@ -115,24 +116,13 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
     if let [only] = cases[..] {
         scene.partition.case = only;
     }
-    let full_scale = scene.input.full_scale_MPa;
-    if let (Some(field), None) = (scene.scaled_input(), full_scale) {
-        return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
-    }
-    let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match full_scale {
-        _ if value == 0.0 => Ok(0.0),
-        Some(full_scale) => Ok(value / unit(full_scale)),
-        None => Err(FixedError::NoFullScale { field, value: value.to_string() }),
-    };
-    let prepare = Prepare::new(&scene, scale.clone(), full_scale.unwrap_or(1.0));
-    let code_lsb = |full_scale: f64| full_scale / prepare.largest();
-    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
-    let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
-    let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
+    let Limits { prepare, noise_floor, threshold } = limits(&scene, scale.clone(), force_exponent)?;
     Ok(Plan {
-        noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
-        threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+        noise_floor,
+        threshold,
         prepare,
+        tables_version: 0,
+        tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
         dead: planned[0].parts[0].local_indices(&scene.input.dead),
         resources,
@@ -145,6 +135,42 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
         scene,
         cases: planned,
         dropped: Vec::new(),
+    })
+}
+
+/// What depends on the specimen of the array and on what its user wants to see.
+pub struct Limits {
+    /// Zero and gain of each taxel, and averaging.
+    pub prepare: Prepare,
+    /// Noise floor in LSBs of a frame buffer word, rounded down.
+    pub noise_floor: i32,
+    /// Threshold in force LSBs, 2^`force_exponent` code LSBs in MPa · 1 N/MPa, rounded up.
+    pub threshold: i64,
+}
+
+/// The limits of a scene in the words of its hardware.
+///
+/// # Errors
+/// [`FixedError::NoFullScale`].
+pub fn limits(scene: &Scene, scale: Scale, force_exponent: i32) -> Result<Limits, FixedError> {
+    let full_scale = scene.input.full_scale_MPa;
+    if let (Some(field), None) = (scene.scaled_input(), full_scale) {
+        return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
+    }
+    let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match full_scale {
+        _ if value == 0.0 => Ok(0.0),
+        Some(full_scale) => Ok(value / unit(full_scale)),
+        None => Err(FixedError::NoFullScale { field, value: value.to_string() }),
+    };
+    let prepare = Prepare::new(scene, scale, full_scale.unwrap_or(1.0));
+    let code_lsb = |full_scale: f64| full_scale / prepare.largest();
+    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
+    let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
+    let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
+    Ok(Limits {
+        noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
+        threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+        prepare,
     })
 }
 

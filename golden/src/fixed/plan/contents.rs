@@ -4,6 +4,7 @@ use super::resources::Resources;
 use super::storage::Storage;
 use crate::board::{Board, EngineKind};
 use crate::fixed::stages::choose::FrameStats;
+use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::Prepare;
 use crate::fixed::stages::resultants::{self, Summed};
 use crate::fixed::stages::segment::cycles::Segmentation;
@@ -31,6 +32,10 @@ pub struct Plan {
     pub noise_floor: i32,
     /// `threshold.min_force_N` in force LSBs, rounded up.
     pub threshold: i64,
+    /// Version of the tables: 0 for those of the bitstream.
+    pub tables_version: u16,
+    /// What became of the last image of tables.
+    pub tables_outcome: Outcome,
     /// Dead taxels, row-major in the array, ascending.
     pub dead: Vec<usize>,
     /// Segmentation and window, where each contact has a μ of its own.
@@ -193,6 +198,31 @@ impl Plan {
     /// Whether a network gives μ.
     pub fn has_network(&self) -> bool {
         self.formats().has_network()
+    }
+
+    /// Whether zero, gain, threshold and noise floor are written at run time.
+    pub fn has_writable_tables(&self) -> bool {
+        self.scene.hardware.has_writable_tables()
+    }
+
+    /// Width of a word on the input stream: with writable tables one bit more than a code, see
+    /// [`load`](crate::fixed::stages::load).
+    pub fn stream_bits(&self) -> u32 {
+        self.formats().code_bits + u32::from(self.has_writable_tables())
+    }
+
+    /// Width of the noise floor on its way through the engine; one bit, 0, where it is not written.
+    pub fn floor_bits(&self) -> u32 {
+        if self.has_writable_tables() {
+            self.formats().input_bits
+        } else {
+            1
+        }
+    }
+
+    /// The noise floor in codes that is built in; `None` where it is written.
+    pub fn built_in_floor(&self) -> Option<i32> {
+        (!self.has_writable_tables()).then_some(self.noise_floor)
     }
 
     /// Whether the scene asks for the coefficient check.

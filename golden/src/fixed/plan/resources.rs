@@ -238,8 +238,9 @@ impl Resources {
         let memory = |holds: Holds, words: usize, bits: usize| Memory::new(holds, [words, bits], board, shallow);
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
         let mut memories = Vec::new();
-        if input.calibration.is_some() || input.tare.is_some() {
-            let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
+        let gains = input.calibration.is_some() || scene.hardware.has_writable_tables();
+        if gains || input.tare.is_some() {
+            let gain = if gains { GAIN_BITS } else { 0 };
             memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize));
         }
         if input.average > 0 {
@@ -282,10 +283,7 @@ impl Resources {
         }
         let values = f.sweep_steps(cases.iter().map(frame_quads).max().unwrap_or(0));
         memories.push(memory(Holds::Values, values, f.search_width * f.search_bits[0] as usize));
-        let calibrate = match input.calibration {
-            Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
-            None => 0,
-        };
+        let calibrate = if gains { board.multipliers_for(f.code_bits + 1, GAIN_BITS) } else { 0 };
         // Operands times μ, and the size of μ.
         let scale = 4 * board.multipliers_for(f.data_bits, MU_BITS);
         let of = |wanted: bool, count: usize| if wanted { count } else { 0 };

@@ -4,6 +4,7 @@ pub mod choose;
 pub mod estimate;
 pub mod fold;
 pub mod forces;
+pub mod load;
 pub mod normalise;
 pub mod pass;
 pub mod prepare;

@@ -75,14 +75,31 @@ impl Scale {
         Scale { table, tare: Some(vec![0.0; taxels]), largest: 1.0 }
     }
 
-    /// Reads the calibration table and the tare frame that the scene names.
+    /// Reads the calibration table and the tare frame that the scene names. Where tables are written there is always one, and
+    /// the largest gain is that of `hardware.table_range`, so that a code keeps its meaning.
+    ///
+    /// # Errors
+    /// What is wrong with a file; [`FixedError::TableRange`].
     pub fn new(scene: &Scene) -> Result<Scale, FixedError> {
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose();
         let table = table.map_err(InputError::from)?;
         let tare = spec.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, scene)?.zero));
+        let tare = tare.transpose()?;
         let largest = table.as_ref().map_or(1.0, |table| table.gain.iter().fold(0.0f64, |most, g| most.max(g.abs())));
-        Ok(Scale { tare: tare.transpose()?, table, largest })
+        if !scene.hardware.has_writable_tables() {
+            return Ok(Scale { tare, table, largest });
+        }
+        let table = table.unwrap_or_else(|| Calibration::identity(scene.sensor.taxels()));
+        let Some([least, most]) = scene.hardware.table_range.gain else {
+            return Ok(Scale { tare, table: Some(table), largest });
+        };
+        let outside = |gain: &f64| !(least..=most).contains(&gain.abs());
+        if let Some(taxel) = table.gain.iter().position(outside) {
+            let place = [taxel / scene.sensor.cols, taxel % scene.sensor.cols];
+            return Err(FixedError::TableRange { place, gain: table.gain[taxel], allowed: [least, most] });
+        }
+        Ok(Scale { tare, table: Some(table), largest: most })
     }
 }
 

@@ -7,7 +7,7 @@
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
 //! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
-//! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
+//! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise`; from bit 16 on the [version](Status::tables) of the tables |
 //! | 2 | saturations of `rescale` | saturations of `forces` | cycles to the first output beat, see [`Status::cycles`] |
 //!
 //! With a μ for each contact there are [`label_beats`] between forces and status, and the status of each of
@@ -18,6 +18,8 @@
 //! ([`ln_sigma_word`]); the saturations of `estimate` and `relax` are counted with those of `rescale`.
 
 use serde::Serialize;
+
+use super::load::VERSION_BITS;
 
 /// Status beats per subarray after the forces.
 pub const STATUS_BEATS: usize = 3;
@@ -35,8 +37,15 @@ pub const FLAG_FRAMING: u32 = 1 << 3;
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
 /// Flag bit: there are more contacts than get a μ; only with `partition.case = "contacts"`.
 pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
+/// Flag bit: the tables are not whole, and every stress is taken as 0; only with `hardware.tables = "writable"`
+/// ([`load`](super::load)).
+pub const FLAG_TABLES: u32 = 1 << 6;
 /// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
+/// Position of the version of the tables beside the shift of `normalise`.
+pub const TABLES_SHIFT: u32 = 16;
+/// Bit above the version: the last image was refused.
+pub const TABLES_REFUSED: u16 = 1 << VERSION_BITS;
 /// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.
 pub const FRAMES_SHIFT: u32 = 16;
 
@@ -97,8 +106,11 @@ pub struct Status {
     pub score: i32,
     /// Right shift of `rescale`.
     pub rescale: u32,
-    /// Left shift of `normalise`.
+    /// Left shift of `normalise`, below 2^16.
     pub normalise: u32,
+    /// Version of the tables, 15 bits, 0 for those of the bitstream; [`TABLES_REFUSED`] if the last image was refused.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tables: u16,
     /// Number of words saturated in `rescale`.
     pub rescale_saturations: u32,
     /// Number of force words saturated.
@@ -109,12 +121,16 @@ pub struct Status {
     pub cycles: u32,
 }
 
+fn is_zero(version: &u16) -> bool {
+    *version == 0
+}
+
 impl Status {
     /// The status as beats `[fx, fy, fz]`.
     pub fn beats(&self) -> [[i32; 3]; STATUS_BEATS] {
         [
             [self.position[0], self.position[1], self.flags as i32],
-            [self.score, self.rescale as i32, self.normalise as i32],
+            [self.score, self.rescale as i32, (u32::from(self.tables) << TABLES_SHIFT | self.normalise) as i32],
             [self.rescale_saturations as i32, self.force_saturations as i32, self.cycles as i32],
         ]
     }
@@ -130,7 +146,8 @@ impl Status {
             flags: flags as u32,
             score,
             rescale: rescale as u32,
-            normalise: normalise as u32,
+            normalise: normalise as u32 & ((1 << TABLES_SHIFT) - 1),
+            tables: (normalise as u32 >> TABLES_SHIFT) as u16,
             rescale_saturations: rescale_saturations as u32,
             force_saturations: force_saturations as u32,
             cycles: cycles as u32,
@@ -162,7 +179,7 @@ mod tests {
     #[test]
     fn beats_read_back() {
         let status =
-            Status { position: [-3, 384], flags: 5, score: -70_000, rescale: 20, normalise: 3, ..Status::default() };
+            Status { position: [-3, 384], flags: 5, score: -70_000, normalise: 3, tables: 0x8005, ..Status::default() };
         assert_eq!(Status::of_beats(&status.beats()), Some(status));
         assert_eq!(Status::of_beats(&[[0; 3]]), None);
     }

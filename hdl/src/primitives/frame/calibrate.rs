@@ -1,11 +1,11 @@
-//! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table in a memory file.
+//! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table that a memory file initialises.
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::language::{Body, Builder, Contents, Expr, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::stream::pass_through::wires;
 use crate::wire::Wire;
@@ -37,13 +37,21 @@ pub struct Calibrate {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
+    /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; during a reset.
+    pub write: Signal<In, Bit>,
+    /// Index of the taxel; valid with `write`.
+    pub write_taxel: Wire<In>,
+    /// Zero in the low bits, gain above; valid with `write`.
+    pub write_entry: Wire<In>,
+    /// Every stress is 0, where tables are writable: they are not whole.
+    pub incomplete: Signal<In, Bit>,
     kernel: Body,
 }
 
 kernel_block!(
     Calibrate,
     clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, write, write_taxel, write_entry, incomplete],
     outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
 );
 
@@ -51,12 +59,12 @@ kernel_block!(
 pub const CALIBRATION_FILE: &str = "calibration.hex";
 
 impl Calibrate {
-    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`.
-    pub fn new(prepare: &Prepare, taxels: usize, bits: usize) -> Self {
-        Calibrate::of(prepare.zero.as_deref(), prepare.gain.as_deref(), taxels, bits)
+    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not.
+    pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Self {
+        Calibrate::of(prepare.zero.as_deref(), prepare.gain.as_deref(), taxels, bits, written)
     }
 
-    fn of(zero: Option<&[i32]>, gain: Option<&[i32]>, taxels: usize, bits: usize) -> Self {
+    fn of(zero: Option<&[i32]>, gain: Option<&[i32]>, taxels: usize, bits: usize, written: bool) -> Self {
         let block = Calibrate {
             clk: Default::default(),
             rst: Default::default(),
@@ -68,12 +76,34 @@ impl Calibrate {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
+            write: Default::default(),
+            write_taxel: Wire::new(count_bits(taxels)),
+            write_entry: Wire::new(bits + GAIN_BITS as usize),
+            incomplete: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(match zero {
-            None => wires("calibrate", bits, "No zero and no gain: the stream passes through.").finish(),
-            Some(zero) => kernel(zero, gain, taxels, bits),
-        })
+        let k = match zero {
+            None => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
+            Some(_) => Builder::new("calibrate"),
+        };
+        let stream = zero.is_some().then(|| {
+            let bit = |name: &str| k.input(name, 1);
+            let (rst, data) = (bit("rst"), k.input("s_axis_tdata", bits));
+            Stream { rst, data, offered: bit("s_axis_tvalid"), tlast: bit("s_axis_tlast"), ready: bit("m_axis_tready") }
+        });
+        let write = [
+            ("write", 1),
+            ("write_taxel", block.write_taxel.width()),
+            ("write_entry", block.write_entry.width()),
+            ("incomplete", 1),
+        ];
+        let write = write.map(|(name, bits)| k.input(name, bits));
+        if let Some((zero, stream)) = zero.zip(stream) {
+            let table = Table { zero, gain, written: written.then_some(write) };
+            calibrated(&k, stream, table, bits);
+        }
+        let kernel = k.finish();
+        block.bind(kernel)
     }
 
     /// Content of [`CALIBRATION_FILE`] for `$readmemh`; `None` without a table.
@@ -82,17 +112,43 @@ impl Calibrate {
     }
 }
 
-fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Kernel {
+/// The table, and how it is written.
+struct Table<'a, 'k> {
+    zero: &'a [i32],
+    gain: Option<&'a [i32]>,
+    /// Whether, where, what; whether the table is not whole.
+    written: Option<[Expr<'k>; 4]>,
+}
+
+/// The inputs of the stream.
+struct Stream<'k> {
+    rst: Expr<'k>,
+    data: Expr<'k>,
+    offered: Expr<'k>,
+    tlast: Expr<'k>,
+    ready: Expr<'k>,
+}
+
+fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, bits: usize) {
+    let Stream { rst, data, offered, tlast, ready } = stream;
+    let Table { zero, gain, written } = table;
+    let taxels = zero.len();
     let (gain_bits, steps) = gain.map_or((0, 2), |_| (GAIN_BITS as usize, 4));
     let word = |taxel: usize| {
         let gain = gain.map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
         vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
     };
-    let k = Builder::new("calibrate");
-    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
-    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
     let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words: (0..taxels).map(word).collect() };
     let entries = k.memory("entries", taxels, bits + gain_bits, contents).holds(Holds::Calibration);
+    let entries = match written {
+        None => entries,
+        Some([write, taxel, entry, _]) => {
+            // Nothing is read during the reset in which it is written.
+            let entries = entries.unchecked();
+            entries.write(write, taxel, entry);
+            entries
+        }
+    };
     let taxel = k.state("taxel", Type::unsigned(count_bits(taxels)), rst, 0);
     let entry = k.register("entry", Type::unsigned(bits + gain_bits));
     let code = k.register("code", Type::signed(bits));
@@ -121,7 +177,7 @@ fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Ker
     let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
     let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
     let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
-    let calibrated = k.register("m_axis_tdata", Type::unsigned(bits));
+    let stress = k.register("m_axis_tdata", Type::unsigned(bits));
     k.when(moves, || {
         valids.set(valids.low(steps - 1).concat(offered));
         let after = tlast | taxel.is(taxels as u64 - 1);
@@ -129,9 +185,10 @@ fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Ker
         lasts.set(lasts.low(steps - 1).concat(tlast));
         entry.set(entries.read(*taxel));
         code.set(data.signed());
-        calibrated.set(clipped.mux(limit, result.low(bits)));
+        let calibrated = clipped.mux(limit, result.low(bits));
+        let whole = |[.., incomplete]: [Expr<'k>; 4]| incomplete.mux(k.constant(bits, 0), calibrated);
+        stress.set(written.map_or(calibrated, whole));
     });
-    k.finish()
 }
 
 #[cfg(test)]
@@ -208,12 +265,28 @@ pub(crate) mod tests {
                 let rst = cycle < 2 || random.u16(..300) == 0;
                 let [offered, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
                 let last = Word::from(random.u8(..10) == 0);
-                vec![rst.into(), random_word(&mut random, BITS), offered, last, ready]
+                let beat = vec![rst.into(), random_word(&mut random, BITS), offered, last, ready];
+                [beat, vec![Word::default(); 4]].concat()
             })
             .collect();
         for gain in [None, Some(&gain[..])] {
-            let block = Calibrate::of(Some(&zero), gain, TAXELS, BITS);
+            let block = Calibrate::of(Some(&zero), gain, TAXELS, BITS, false);
             check(block.kernel.kernel(), &stimulus, &mut Table::new(&zero, gain, BITS));
         }
+        // What is written during a reset is used from then on.
+        let writes = (0..TAXELS).map(|taxel| {
+            let word = (gain[taxel] as u64) << BITS | zero[taxel] as u64 & ((1 << BITS) - 1);
+            let rest = [Word::default(); 4];
+            let write =
+                [Word::from(true), (taxel as u64).into(), Word::from(word & ((1 << (BITS + 18)) - 1)), false.into()];
+            [&[Word::from(true)], &rest[..], &write].concat()
+        });
+        let written: Vec<Vec<Word>> = writes.chain(stimulus).collect();
+        let block = Calibrate::of(Some(&[0; TAXELS]), Some(&[0; TAXELS]), TAXELS, BITS, true);
+        check(block.kernel.kernel(), &written, &mut Table::new(&zero, Some(&gain), BITS));
+        // Until the table is whole every stress is 0.
+        let mut incomplete = written.clone();
+        incomplete.iter_mut().for_each(|inputs| inputs[8] = true.into());
+        check(block.kernel.kernel(), &incomplete, &mut Table::new(&zero, Some(&[0; TAXELS]), BITS));
     }
 }

@@ -24,6 +24,8 @@ pub struct FrameStats {
     pub part: Wire<In>,
     /// Index of the subarray on the outputs; combinational.
     pub select: Wire<In>,
+    /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+    pub floor: Wire<In>,
     /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code; includes a code from
     /// the cycle after its `accept`.
     pub magnitude: Wire<Out>,
@@ -37,13 +39,13 @@ pub struct FrameStats {
 kernel_block!(
     FrameStats,
     clock clk,
-    inputs [clear, accept, code, part, select],
+    inputs [clear, accept, code, part, select, floor],
     outputs [magnitude, positive, negative]
 );
 
 impl FrameStats {
-    /// For codes of `bits` bits, a noise floor of `floor` codes and `parts` subarrays.
-    pub fn new(bits: usize, floor: i32, parts: usize) -> Self {
+    /// For codes of `bits` bits, a noise floor of `floor` codes, or if there is none, of port `floor`, and `parts` subarrays.
+    pub fn new(bits: usize, floor: Option<i32>, parts: usize) -> Self {
         let block = FrameStats {
             clk: Default::default(),
             clear: Default::default(),
@@ -51,6 +53,7 @@ impl FrameStats {
             code: Wire::new(bits),
             part: Wire::new(count_bits(parts)),
             select: Wire::new(count_bits(parts)),
+            floor: Wire::new(floor_bits(floor, bits)),
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
@@ -66,21 +69,33 @@ pub(crate) fn magnitude_of(code: Expr<'_>) -> Expr<'_> {
     code.low(bits) ^ code.top().repeat(bits)
 }
 
-/// Whether a signed code is above the noise floor of `floor` codes, and whether it is below minus the noise floor.
-pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: i32) -> [Expr<'k>; 2] {
-    let bits = code.bits();
-    // A floor beyond the code's range is clamped to its end, which no code exceeds either.
-    let floor = i64::from(floor).min((1 << (bits - 1)) - 1);
-    let [most, least] = [floor, -floor].map(|limit| k.signed_constant(bits, limit));
-    [most.less(code.signed()), code.signed().less(least)]
+/// Whether a signed code is above the noise floor of `floor` codes, and whether it is below minus the noise floor; without a
+/// number the floor is that of `written`, as wide as the code.
+pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: Option<i32>, written: Expr<'k>) -> [Expr<'k>; 2] {
+    let (code, bits) = (code.signed(), code.bits());
+    let [most, least] = match floor {
+        // A floor beyond the code's range is clamped to its end, which no code exceeds either.
+        Some(floor) => {
+            let floor = i64::from(floor).min((1 << (bits - 1)) - 1);
+            [floor, -floor].map(|limit| k.signed_constant(bits, limit))
+        }
+        None => [written.signed(), (k.signed_constant(bits, 0) - written.signed()).resize(bits)],
+    };
+    [most.less(code), code.less(least)]
 }
 
-fn kernel(bits: usize, floor: i32, parts: usize) -> Kernel {
+/// Width of port `floor`.
+fn floor_bits(floor: Option<i32>, bits: usize) -> usize {
+    floor.map_or(bits, |_| 1)
+}
+
+fn kernel(bits: usize, floor: Option<i32>, parts: usize) -> Kernel {
     let k = Builder::new("frame_stats");
     let (clear, accept, code) = (k.input("clear", 1), k.input("accept", 1), k.input("code", bits));
     let (part, select) = (k.input("part", count_bits(parts)), k.input("select", count_bits(parts)));
+    let written = k.input("floor", floor_bits(floor, bits));
     let magnitude = k.wire("own_magnitude", magnitude_of(code));
-    let [above, below] = beyond(&k, code, floor);
+    let [above, below] = beyond(&k, code, floor, written);
     let (above, below) = (k.wire("above", above), k.wire("below", below));
     // Each the OR over the accepted codes of a subarray.
     for (name, value) in [("magnitude", magnitude), ("positive", above), ("negative", below)] {
@@ -135,16 +150,19 @@ mod tests {
 
     #[test]
     fn codes_of_each_subarray_are_gathered() {
-        for (floor, parts) in [(7, 3), (255, 1), (100, 4)] {
-            let mut stimulus = random_words(4000, &[1, 1, BITS, count_bits(parts), count_bits(parts)]);
+        for (floor, parts, written) in [(7, 3, false), (255, 1, false), (100, 4, false), (31, 2, true), (255, 1, true)]
+        {
+            let floor_bits = if written { BITS } else { 1 };
+            let mut stimulus = random_words(4000, &[1, 1, BITS, count_bits(parts), count_bits(parts), floor_bits]);
             for (cycle, inputs) in stimulus.iter_mut().enumerate() {
                 inputs[0] = (cycle % 29 == 0).into();
+                inputs[5] = Word::from(if written { floor } else { 0 });
                 if parts == 1 {
                     (inputs[3], inputs[4]) = Default::default();
                 }
             }
-            let block = FrameStats::new(BITS, floor, parts);
-            let mut seen = Seen { floor: floor.into(), parts, each: Vec::new() };
+            let block = FrameStats::new(BITS, (!written).then_some(floor as i32), parts);
+            let mut seen = Seen { floor: floor as i64, parts, each: Vec::new() };
             check(block.kernel.kernel(), &stimulus, &mut seen);
         }
     }

@@ -5,4 +5,5 @@ pub(crate) mod average;
 pub(crate) mod calibrate;
 pub(crate) mod frame_stats;
 pub(crate) mod input_mask;
+pub(crate) mod load;
 pub(crate) mod sliding_mean;

@@ -2,7 +2,7 @@
 
 use dermis_golden::fixed::plan::cycles::ACCEPT;
 use dermis_golden::fixed::stages::resultants::Summed;
-use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT};
+use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT, TABLES_SHIFT};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::symmetry::quads::Quads;
@@ -15,6 +15,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::primitives::address::quad_address::lane_of;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
+use crate::primitives::frame::load::{THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::primitives::frame::sliding_mean::frames_bits;
 use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
 use crate::primitives::pass::raw_length::shift_bits;
@@ -84,6 +85,12 @@ pub struct ForceUnit {
     pub labels: Wire<In>,
     /// There are more contacts than get a μ; sampled when the beat with the flags leaves.
     pub overflow: Signal<In, Bit>,
+    /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
+    pub threshold: Wire<In>,
+    /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
+    pub version: Wire<In>,
+    /// The tables are not whole, where they are written.
+    pub incomplete: Signal<In, Bit>,
     /// `beat_data` holds a beat in this cycle.
     pub valid: Signal<Out, Bit>,
     /// The beat is the frame's last; valid with `valid`.
@@ -99,7 +106,8 @@ kernel_block!(
     clock clk,
     inputs [
         rst, which, begin_frame, start, part, offer, beat, beat_part, lane, quad, position_x, position_y, normalise,
-        rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels, overflow,
+        rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels, overflow, threshold,
+        version, incomplete,
     ],
     outputs [valid, last, beat_data]
 );
@@ -123,7 +131,7 @@ const WORD: usize = FORCE_BITS as usize;
 /// Width of a μ word, in bits.
 const MU_BITS: usize = MULTIPLIER_BITS as usize;
 /// Flags of a subarray, the bits below the case's number.
-const FLAGS: usize = 6;
+const FLAGS: usize = 7;
 /// Width of a right shift, in bits.
 const SHIFT_BITS: usize = 6;
 
@@ -145,8 +153,8 @@ struct Shape {
     mu_step: i64,
     /// Right shift for exponents of zero.
     base_shift: u64,
-    /// Forces with a smaller |fz| are zero.
-    threshold: u64,
+    /// Forces with a smaller |fz| are zero; `None` where the threshold is written.
+    threshold: Option<u64>,
     /// The scene has the coefficient check.
     checks: bool,
     /// Bits of the number of frames in a sliding mean; `None` where the mean does not slide.
@@ -185,7 +193,7 @@ impl ForceUnit {
             fraction: f.mu_fraction as usize,
             mu_step: f.mu_step,
             base_shift: force_shift(f, 0, 0).into(),
-            threshold: model.threshold.clamp(0, 1 << WORD) as u64,
+            threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
             checks: model.has_coefficient_check(),
             frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
             counts: model.cases().iter().map(|case| parts(model, case)).collect(),
@@ -220,6 +228,9 @@ impl ForceUnit {
             cycles: Wire::new(CYCLE_BITS),
             labels: Wire::new(Quads::LANES * shape.label_bits()),
             overflow: Default::default(),
+            threshold: Wire::new(THRESHOLD_BITS),
+            version: Wire::new(VERSION_WORD_BITS),
+            incomplete: Default::default(),
             valid: Default::default(),
             last: Default::default(),
             beat_data: Wire::new(shape.beat_bits()),
@@ -303,6 +314,8 @@ impl Shape {
         let score = k.input("score", self.score_bits).signed();
         let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
         let (labels, overflow) = (k.input("labels", Quads::LANES * self.label_bits()), k.input("overflow", 1));
+        let (threshold, version) = (k.input("threshold", THRESHOLD_BITS), k.input("version", VERSION_WORD_BITS));
+        let incomplete = k.input("incomplete", 1);
 
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
         let offers = k.state("offers", Type::unsigned(asked), rst, 0);
@@ -362,11 +375,16 @@ impl Shape {
         let [x, y] = [round("x", x), round("y", y)];
         let all = [Some(z), y, x];
         let force = concat(&all.map(|one| one.map_or(k.constant(WORD, 0), |one| one.force)));
-        let below = (self.threshold > 0).then(|| {
+        let limit = match self.threshold {
+            None => Some(threshold.extend(WORD + 1)),
+            Some(0) => None,
+            Some(own) => Some(k.constant(WORD + 1, own)),
+        };
+        let below = limit.map(|limit| {
             let wide = z.word.extend(WORD + 1).unsigned();
             let magnitude = wide.top().mux((k.constant(WORD + 1, 0) - wide).low(WORD + 1), wide);
             k.comment("The result of the threshold is registered beside the words.");
-            k.delay("below", magnitude.less(k.constant(WORD + 1, self.threshold)))
+            k.delay("below", magnitude.less(limit))
         });
         let presses = k.delay("presses", z.word.any());
 
@@ -388,6 +406,7 @@ impl Shape {
         let flags = [
             case,
             k.constant(CASE_SHIFT as usize - FLAGS, 0),
+            if self.threshold.is_none() { incomplete } else { k.constant(1, 0) },
             if self.contacts { overflow } else { k.constant(1, 0) },
             if self.checks { kept.status("damages", damaged) } else { k.constant(1, 0) },
             framing,
@@ -404,7 +423,11 @@ impl Shape {
         let [normalise, rescale] = [kept.status("normalises", normalise), kept.status("rescales", rescale)];
         let rescale_saturations = kept.status("rescale_saturations", saturations);
         let first = concat(&[concat(&flags), y, x]);
-        let second = concat(&[word(normalise), word(rescale), kept.status("scores", score)]);
+        let normalise = match self.threshold {
+            None => version.extend(WORD - TABLES_SHIFT as usize).concat(normalise.extend(TABLES_SHIFT as usize)),
+            Some(_) => word(normalise),
+        };
+        let second = concat(&[normalise, word(rescale), kept.status("scores", score)]);
         let third = concat(&[word(*cycles_held), word(*force_saturations), word(rescale_saturations)]);
         let status = k.wire("status", beat_out.case(&[(1, first), (2, second)], third));
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));

@@ -89,7 +89,9 @@ fn kernel(bits: usize) -> Kernel {
     let taken = k.wire("taken", *valid & ready);
     let moves = k.wire("moves", !*valid | ready);
     let waits = k.wire("waits", written.differs(*read));
-    let now_reserved = k.wire("now_reserved", (*reserved + reserve - taken).low(PLACE_BITS + 1));
+    k.comment("Both counts are at hand when reserve arrives, which is late.");
+    let kept = k.wire("kept", (*reserved - taken).low(PLACE_BITS + 1));
+    let grown = k.wire("grown", (*reserved + k.constant(1, 1) - taken).low(PLACE_BITS + 1));
     let head = k.wire("head", places.read(read.low(PLACE_BITS)));
     places.write(write, written.low(PLACE_BITS), last.concat(word));
     k.when(moves & waits, || {
@@ -98,8 +100,8 @@ fn kernel(bits: usize) -> Kernel {
         read.set(read.plus(1));
     });
     k.when(write, || written.set(written.plus(1)));
-    reserved.set(now_reserved);
-    room.set(!now_reserved.is(PLACES as u64));
+    reserved.set(k.wire("now_reserved", reserve.mux(grown, kept)));
+    room.set(reserve.mux(!grown.is(PLACES as u64), !kept.is(PLACES as u64)));
     k.when(moves, || valid.set(waits));
     k.finish()
 }

@@ -25,6 +25,11 @@ fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, mor
     model
 }
 
+/// Input `floor`.
+fn floor_word(model: &Model) -> Word {
+    Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64)
+}
+
 fn window_of(model: &Model) -> learned::Window {
     model.by_contact.as_ref().unwrap().window
 }
@@ -108,7 +113,7 @@ impl Contact {
         control
             .into_iter()
             .chain([row, col, label].map(|number| Word::from(number as u64)))
-            .chain([quad, labels])
+            .chain([quad, labels, floor_word(model)])
             .collect()
     }
 }
@@ -189,7 +194,7 @@ fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
     block_subject!(
         Window::new(model),
         changes,
-        inputs [rst, start, middle_row, middle_col, label, quad, labels],
+        inputs [rst, start, middle_row, middle_col, label, quad, labels, floor],
         outputs [quad_address, write, write_quad, mask_quad, positive, negative],
     )
 }
@@ -204,7 +209,7 @@ fn windows_are_those_of_the_model() {
     for (array, own, contacts, more) in [
         ([5, 8], [11, 10], 8, "[fixed]\ninput_bits = 12\n[input]\ndead = [[4, 7]]\n"),
         ([3, 2], [3, 11], 8, ""),
-        ([10, 7], [1, 2], 1, ""),
+        ([10, 7], [1, 2], 1, "[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n"),
     ] {
         let model = with_contacts(array, own, contacts, more);
         let (contacts, inputs) = stimulus(&model, 60);
@@ -232,7 +237,7 @@ fn a_window_that_differs_is_found() {
 #[test]
 fn without_contacts_there_is_no_window() {
     let block = Window::new(&model(4, 5, ""));
-    let widths = [1, 1, 2, 3, 4, 80, 16];
+    let widths = [1, 1, 2, 3, 4, 80, 16, 1];
     let outputs = |_: &[Word]| vec![Some(Word::default()); 6];
     check(block.kernel.kernel(), &random_words(100, &widths), &mut Pipeline::new(0, 6, outputs));
 }

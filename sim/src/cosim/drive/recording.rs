@@ -1,6 +1,6 @@
 //! Input and recording of a run.
 
-/// Input of one reconstruction, with the number of output beats expected.
+/// Input of one reconstruction, with the number of output beats expected; or an image of tables, one frame that has none.
 #[derive(Clone, Copy, Debug)]
 pub struct InputFrame<'a> {
     /// Codes of all frames in order, each row-major.

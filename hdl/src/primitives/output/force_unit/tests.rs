@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::fixed::stages::send::{
-    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT,
+    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES,
 };
 
 use super::*;
@@ -101,7 +101,11 @@ impl Requests {
                 let shift = force_shift(f, part.normalise, part.rescale);
                 let own = if f.by_contact() { self.parts[entry.label] } else { part };
                 let mu = own.position.map(|x| mu_word(f, x));
-                let result = force(f, entry.value, mu, shift, self.model.threshold);
+                let threshold = match self.model.has_writable_tables() {
+                    true => inputs[24].number() as i64,
+                    false => self.model.threshold,
+                };
+                let result = force(f, entry.value, mu, shift, threshold);
                 frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
                 frame.contact |= result.words[2] != 0;
                 result.words
@@ -115,13 +119,17 @@ impl Requests {
                     | flag(!frame.contact, FLAG_NO_CONTACT)
                     | flag(inputs[16].number() == 1, FLAG_FRAMING)
                     | flag(part.damaged, FLAG_COEFFICIENTS)
+                    | flag(self.model.has_writable_tables() && inputs[26].number() == 1, FLAG_TABLES)
                     | flag(f.by_contact() && inputs[23].number() == 1, FLAG_MORE_CONTACTS)
                     | number << CASE_SHIFT
                     | part.frames << FRAMES_SHIFT;
                 let position = if f.degree > 0 { part.position } else { [0; 2] };
                 [position[0], position[1], flags as i32]
             }
-            2 => [part.score, part.rescale as i32, part.normalise as i32],
+            2 => {
+                let version = if self.model.has_writable_tables() { inputs[25].number() as u32 } else { 0 };
+                [part.score, part.rescale as i32, (version << TABLES_SHIFT | part.normalise) as i32]
+            }
             _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
         }
     }
@@ -181,11 +189,13 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
     let cases = model.cases().len() as u64;
     let parts = most_parts(model);
     let mut which = 0;
+    let mut threshold = 0;
     let inputs = |cycle: usize| {
         // 40 cycles of a frame begin it and store the subarrays, the rest request beats.
         let at = cycle % 300;
         if at == 0 {
             which = random.u64(..cases);
+            threshold = random.u64(..1 << 32) >> random.u8(..32);
         }
         let offer = (40..280).contains(&at) && random.u8(..4) > 0;
         // Small values are below the threshold or round to zero, large ones saturate.
@@ -217,6 +227,9 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             random_word(&mut random, CYCLE_BITS),
             Word::of_fields(&[(); 4].map(|()| random.i64(0..parts as i64)), label_bits(model)),
             random.bool().into(),
+            threshold.into(),
+            random_word(&mut random, VERSION_WORD_BITS),
+            random.bool().into(),
         ]
     };
     (0..cycles).map(inputs).collect()
@@ -237,6 +250,8 @@ fn check_forces(model: Model) {
 fn beats_are_those_of_the_model() {
     is_the_model_s(4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n", 1000);
     is_the_model_s(4, "[search]\nmu_max = 0.0\n", 0);
+    let written = "[search]\nmu_max = 0.05\n[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n";
+    is_the_model_s(4, written, 0);
     let sliding = "[input]\naverage = 3\nmean = \"sliding\"\n";
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";

@@ -1,0 +1,135 @@
+//! Tables of a specimen for hardware that is built with writable tables: from a scene to an image, and the model of the
+//! hardware that has taken it.
+
+use serde_json::json;
+
+use super::error::FixedError;
+use super::model::Model;
+use super::plan::cases::{limits, Limits};
+use super::plan::contents::Plan;
+use super::stages::load::{self, Outcome, Tables, VERSION_BITS};
+use super::stages::prepare::{Prepare, Scale};
+use crate::deviations::Deviations;
+use crate::scene::Scene;
+
+impl Plan {
+    /// The tables that the hardware holds; `None` unless they are writable.
+    pub fn tables(&self) -> Option<Tables> {
+        let Prepare { zero: Some(zero), gain: Some(gain), .. } = &self.prepare else { return None };
+        // No code exceeds the largest floor.
+        let largest_floor = (1i64 << (self.formats().input_bits - 1)) - 1;
+        self.has_writable_tables().then(|| Tables {
+            version: self.tables_version,
+            threshold: self.threshold.clamp(0, u32::MAX.into()) as u32,
+            noise_floor: i64::from(self.noise_floor).clamp(0, largest_floor) as i32,
+            zero: zero.clone(),
+            gain: gain.clone(),
+        })
+    }
+
+    /// CRC-32 over what the words of an image depend on: this program's version, array, formats, what a code means. Hardware
+    /// refuses an image of another layout.
+    pub fn table_layout(&self) -> u32 {
+        let text = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "array": [self.scene.sensor.rows, self.scene.sensor.cols],
+            "formats": self.formats(),
+            "full_scale_MPa": self.scene.input.full_scale_MPa,
+            "reading_per_MPa": self.prepare.reading_per_MPa,
+        });
+        crc32fast::hash(text.to_string().as_bytes())
+    }
+
+    /// The image of the tables; empty unless they are writable.
+    pub fn image(&self) -> Vec<u8> {
+        self.tables().map(|tables| tables.image(self.table_layout(), self.formats().code_bits)).unwrap_or_default()
+    }
+
+    /// What the hardware does with the bytes of an image.
+    pub fn load(&mut self, image: &[u8]) -> Outcome {
+        let (layout, code_bits) = (self.table_layout(), self.formats().code_bits);
+        let Some(mut tables) = self.tables() else { return Outcome::Refused };
+        self.tables_outcome = match (tables.load(image, layout, code_bits), self.tables_outcome) {
+            // Tables that are not whole stay so.
+            (Outcome::Refused, Outcome::Broken) => Outcome::Broken,
+            (outcome, _) => outcome,
+        };
+        match self.tables_outcome {
+            Outcome::Refused => {}
+            Outcome::Broken => self.tables_version = 0,
+            Outcome::Whole => {
+                (self.threshold, self.noise_floor) = (tables.threshold.into(), tables.noise_floor);
+                (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));
+                self.tables_version = tables.version;
+            }
+        }
+        self.tables_outcome
+    }
+}
+
+impl Model {
+    /// The model of this hardware with the tables of the specimen that `scene` describes; frames report `version`, 1 to 32767.
+    ///
+    /// # Errors
+    /// [`FixedError::Tables`]: the hardware's tables are not writable, or such a version is not possible.
+    /// [`FixedError::NoTable`]: the scene differs from the hardware's in more than zero, gain, noise floor and threshold.
+    /// [`FixedError::TableRange`], and what is wrong with the files that it names.
+    pub fn with_tables(&self, scene: &Scene, version: u16) -> Result<Model, FixedError> {
+        let wrong = |field, value, expected| Err(FixedError::Tables { field, value, expected });
+        if !self.has_writable_tables() {
+            return wrong("hardware.tables", "rom".into(), "\"writable\" in the scene of the hardware");
+        }
+        if version == 0 || version >> VERSION_BITS != 0 {
+            return wrong("version", version.to_string(), "1 to 32767");
+        }
+        let mut own = self.scene.clone();
+        let specimen = scene.for_hardware();
+        if let Some(part) = differs(&own, &specimen) {
+            return Err(FixedError::NoTable { part });
+        }
+        own.name = specimen.name;
+        (own.input.calibration, own.input.tare) = (specimen.input.calibration, specimen.input.tare);
+        own.search.noise_floor_MPa = specimen.search.noise_floor_MPa;
+        own.threshold = specimen.threshold;
+        let scale = Scale::new(&own)?;
+        let Limits { prepare, noise_floor, threshold } = limits(&own, scale, self.formats().force_exponent)?;
+        if prepare.reading_per_MPa != self.prepare.reading_per_MPa {
+            return Err(FixedError::NoTable { part: "the largest gain, without hardware.table_range.gain," });
+        }
+        let mut model = self.clone();
+        (model.prepare, model.noise_floor, model.threshold) = (prepare, noise_floor, threshold);
+        (model.tables_version, model.tables_outcome) = (version, Outcome::Whole);
+        model.scene = own;
+        model.deviations = Deviations::of_scene(&model.scene)?;
+        Ok(model)
+    }
+
+    /// The beats of this model's image on the input stream, as codes.
+    pub fn image_beats(&self) -> Vec<i32> {
+        load::beats(&self.image(), self.formats().code_bits)
+    }
+}
+
+/// The first part of a specimen's scene that differs from the hardware's and is in no table that can be written.
+fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
+    let mut other = specimen.clone();
+    (other.input.calibration, other.input.tare) = (own.input.calibration.clone(), own.input.tare.clone());
+    other.search.noise_floor_MPa = own.search.noise_floor_MPa;
+    // The hardware's scale may have been taken from its frames.
+    other.input.full_scale_MPa = other.input.full_scale_MPa.or(own.input.full_scale_MPa);
+    let same = [
+        ("sensor", own.sensor == other.sensor),
+        ("medium", own.medium == other.medium),
+        ("partition", own.partition == other.partition),
+        ("search", own.search == other.search),
+        ("inverse", own.inverse == other.inverse),
+        ("fixed", own.fixed == other.fixed),
+        ("hardware", own.hardware == other.hardware),
+        ("input", own.input == other.input),
+        ("output", own.output == other.output),
+    ];
+    same.into_iter().find_map(|(part, same)| (!same).then_some(part))
+}
+
+#[cfg(test)]
+mod tests;

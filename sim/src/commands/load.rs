@@ -1,0 +1,57 @@
+//! `dermis load`: an image of tables of a specimen, for hardware with writable tables.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+
+use crate::report::{self, LoadReport};
+
+/// Arguments of `dermis load`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis load pad.toml left-hand.toml                tables of the specimen that left-hand.toml describes
+  dermis load pad.toml left-hand.toml --tables-version 7 --out left-hand.tables --json
+
+The hardware is built from pad.toml with hardware.tables = \"writable\". A specimen's scene differs from it in input.calibration,
+input.tare, search.noise_floor_MPa and threshold.min_force_N; anything else is refused by its field. A driver writes the bytes
+one after the other to register `tables` of a core (`dermis registers`); `dermis cosim pad.toml --tables left-hand.toml` does
+so in simulation and compares the forces.")]
+pub struct Arguments {
+    /// Built-in name or path of the scene of the hardware.
+    hardware: String,
+    /// Path of the scene of the specimen.
+    specimen: String,
+    /// Version that frames report, 1 to 32767.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    tables_version: u16,
+    /// File to write [default: <build-dir>/<specimen>/tables.bin].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the result as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command: writes the image.
+///
+/// # Errors
+/// A scene that cannot be used, tables that the hardware does not take, a file that cannot be written.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
+    let Arguments { hardware, specimen, tables_version, out, json } = arguments;
+    let hardware = Model::new(&Scene::load(hardware)?)?;
+    let specimen = Scene::load(specimen)?;
+    let model = hardware.with_tables(&specimen, *tables_version)?;
+    let path = out.clone().unwrap_or_else(|| build_dir.join(&specimen.name).join("tables.bin"));
+    let image = model.image();
+    let shown = path.display();
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).with_context(|| format!("{shown}"))?;
+    }
+    fs::write(&path, &image).with_context(|| format!("{shown}"))?;
+    let report = LoadReport::new(&model, &image, &path);
+    Ok(if *json { serde_json::to_string(&report)? + "\n" } else { report::load(&report) })
+}

@@ -1,0 +1,136 @@
+//! Tables that are written at run time: the hardware equals the model before an image, after it, and while its tables are not
+//! whole; without a reset in between, at full speed, back to back and with stalls.
+
+use std::fs;
+
+use dermis_golden::fixed::stages::load::{beats, Outcome};
+use dermis_golden::fixed::Model;
+use dermis_golden::input::calibration::Calibration;
+use dermis_golden::scene::{Scene, TableStorage};
+use dermis_hdl::generate_changed;
+use dermis_hdl::language::Change;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::Vector;
+use dermis_tests::{assert_equal, build_dir, compare, with_network};
+use tempfile::TempDir;
+
+const SCENE: &str = "name = \"writable\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
+                     thickness_mm = 2.0\n[hardware]\ntables = \"writable\"\n[hardware.table_range]\ngain = [0.5, 2.0]\n";
+
+/// A specimen of the array of `scene`: another zero and gain for each taxel, a noise floor, a threshold.
+fn specimen(scene: &Scene) -> (TempDir, Scene) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut table = Calibration::identity(scene.sensor.taxels());
+    table.gain.iter_mut().for_each(|gain| *gain = 0.5 + 1.5 * random.f64());
+    table.offset.iter_mut().for_each(|offset| *offset = 0.002 * random.f64() - 0.001);
+    let path = folder.path().join("table.csv");
+    fs::write(&path, table.to_csv(&scene.sensor)).unwrap();
+    let mut specimen = scene.clone();
+    specimen.input.calibration = Some(path);
+    (specimen.search.noise_floor_MPa, specimen.threshold.min_force_N) = (0.01, 0.02);
+    (folder, specimen)
+}
+
+/// A frame of noise alone.
+const NOISE: u64 = 6;
+
+/// The last of frames of a press and noise, as codes, and what `model` makes of all since a reset.
+fn frame(model: &Model, numbers: &[u64]) -> Vector {
+    let taxels = model.scene.sensor.taxels();
+    let codes: Vec<i32> = numbers.iter().flat_map(|&number| codes(model, number)).collect();
+    let last = codes[codes.len() - taxels..].to_vec();
+    Vector::new(model, format!("frame {numbers:?}"), last, model.run(&codes))
+}
+
+fn codes(model: &Model, number: u64) -> Vec<i32> {
+    let mut random = fastrand::Rng::with_seed(number);
+    let sensor = &model.scene.sensor;
+    let press = if number == NOISE { 0 } else { 1i32 << 17 };
+    let [row, col] = [random.usize(..sensor.rows), random.usize(..sensor.cols)];
+    let code = |taxel: usize| {
+        let away = (taxel / sensor.cols).abs_diff(row) + (taxel % sensor.cols).abs_diff(col);
+        (press >> (2 * away).min(17)) + random.i32(-2000..2000)
+    };
+    (0..sensor.taxels()).map(code).collect()
+}
+
+/// Hardware of `scene`, and its frames around images: of a specimen, damaged, for other hardware.
+fn sequence(scene: &Scene) -> (Hardware, Vec<Vector>) {
+    let (_folder, own) = specimen(scene);
+    let built = Model::new(scene).unwrap();
+    let own = built.with_tables(&own, 1234).unwrap();
+    let damaged = |at: usize| {
+        let mut vector = Vector::of_image(&own);
+        let mut image = own.image();
+        image[at] ^= 16;
+        vector.codes = beats(&image, own.formats().code_bits);
+        (vector, image)
+    };
+    let [(other, other_image), (broken, broken_image)] = [damaged(1), damaged(40)];
+    let mut refused = built.clone();
+    assert_eq!(refused.load(&other_image), Outcome::Refused);
+    let mut spoiled = own.clone();
+    assert_eq!(spoiled.load(&broken_image), Outcome::Broken);
+    // Only a refused image leaves a sliding mean as it was.
+    let [second, last] = if scene.input.slides() { [&[1, 2][..], &[5, NOISE]] } else { [&[2][..], &[NOISE]] };
+    let vectors = vec![
+        frame(&built, &[1]),
+        other,
+        frame(&refused, second),
+        Vector::of_image(&own),
+        frame(&own, &[3]),
+        broken,
+        frame(&spoiled, &[4]),
+        Vector::of_image(&own),
+        frame(&own, &[5]),
+        frame(&own, last),
+    ];
+    assert!(frame(&own, &[3]).expected.beats != frame(&built, &[3]).expected.beats, "the tables matter");
+    assert!(frame(&spoiled, &[4]).expected.beats.iter().all(|force| *force == [0; 3]));
+    (Hardware::new(built, &build_dir()).unwrap(), vectors)
+}
+
+fn is_equal(scene: &Scene, what: &str) {
+    let (hardware, vectors) = sequence(scene);
+    for stimulus in [Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: 3 }] {
+        assert_equal(&compare(&hardware, Simulator::Verilator, &vectors, stimulus), format!("{what}, {stimulus}"));
+    }
+    assert_equal(&compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed), format!("{what}, rust-hdl"));
+}
+
+#[test]
+fn hardware_with_loaded_tables_is_the_specimen_s() {
+    let full_scale = "[input]\nfull_scale_MPa = 1.0\n";
+    let sliding = "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\naverage = 2\nmean = \"sliding\"\n";
+    for (more, what) in [(full_scale, "whole array"), (sliding, "two subarrays, sliding mean")] {
+        is_equal(&Scene::parse(&format!("{SCENE}{more}"), "writable.toml").unwrap(), what);
+    }
+    let contacts = "[search]\nmu_max = 0.3\n[partition]\ncase = \"contacts\"\n[input]\nfull_scale_MPa = 1.0\n";
+    let (scene, _network) = with_network(&format!("{SCENE}{contacts}"), &[7]);
+    assert_eq!(scene.hardware.tables, TableStorage::Writable);
+    is_equal(&scene, "contacts");
+}
+
+#[test]
+fn a_defect_is_found() {
+    let scene = Scene::parse(&format!("{SCENE}[input]\nfull_scale_MPa = 1.0\n"), "writable.toml").unwrap();
+    let (mut hardware, vectors) = sequence(&scene);
+    let defects = [
+        // A damaged image counts as whole.
+        Change::value("prepare__load", "wrong_crc", |k| k.constant(1, 0)),
+        // An image begins while a frame is computed.
+        Change::value("prepare", "load__idle", |k| k.constant(1, 1)),
+        // The noise floor stays that of the bitstream.
+        Change::value("", "receive__floor", |k| k.constant(20, 0)),
+        // The threshold stays that of the bitstream.
+        Change::value("", "forces__threshold", |k| k.constant(32, 0)),
+    ];
+    for defect in defects {
+        let what = defect.to_string();
+        hardware.generated = generate_changed(&hardware.model, &[defect]).unwrap();
+        let found = compare(&hardware, Simulator::Verilator, &vectors, Stimulus::BackToBack);
+        assert!(!found.is_equal(), "not found: {what}");
+    }
+}
