@@ -39,7 +39,7 @@ pub(crate) fn reconstruction(model: &Model) -> Reconstruction {
 /// The testbench and its two memory files.
 pub(crate) fn testbench(model: &Model, top: &str) -> Vec<GeneratedFile> {
     let Reconstruction { codes, beats, patience } = reconstruction(model);
-    let bits = model.formats().code_bits;
+    let bits = model.stream_bits();
     let mask = (1i64 << bits) - 1;
     let digits = bits.div_ceil(4) as usize;
     let code_lines: String = codes.iter().map(|&code| format!("{:0digits$x}\n", i64::from(code) & mask)).collect();

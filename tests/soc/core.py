@@ -237,8 +237,10 @@ async def a_wrong_access_is_refused_and_changes_nothing(dut):
         assert (await registers.access(address, 1))[1], hex(address)
     assert (await registers.access(REGISTERS["frames_in"]["address"], 7))[1]
     assert (await registers.access(REGISTERS["id"]["address"], 7))[1]
+    # The tables are in the bitstream.
+    assert (await registers.access(REGISTERS["tables"]["address"], 7))[1] and await registers.read("tables") == 0
     assert await registers.read("id") == MAP["constants"]["id"]
-    assert await registers.read("accesses_refused") == 6
+    assert await registers.read("accesses_refused") == 7
     assert await registers.errors() == {"access"}
     await bench.send(tid=1)
     await bench.expect(1)

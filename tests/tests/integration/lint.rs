@@ -6,7 +6,7 @@ use std::process::Command;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::LinkKind;
 use dermis_golden::partition::Case;
-use dermis_golden::scene::Condition;
+use dermis_golden::scene::{Condition, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
@@ -65,6 +65,22 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
         assert_eq!(idle_waivers(&format!("{}{idle}\n", waivers.text), &warnings), [idle]);
         let first = waivers.text.lines().find(|line| line.starts_with("lint_off")).unwrap();
         assert_eq!(idle_waivers(&format!("`verilator_config\n{first}\n"), &warnings), [first]);
+    }
+}
+
+/// `eight-by-eight` with writable tables.
+fn writable() -> Model {
+    let mut scene = scene("eight-by-eight").0;
+    scene.hardware.tables = TableStorage::Writable;
+    scene.input.full_scale_MPa = Some(1.0);
+    Model::new(&scene).unwrap()
+}
+
+#[test]
+fn writable_tables_are_clean_with_the_same_waivers() {
+    let core = CoreShape { bus: Bus::AxiLite, words: 1 };
+    for generated in [generate(&writable()).unwrap(), generate_core(&writable(), core).unwrap()] {
+        lint(&generated).unwrap_or_else(|log| panic!("{log}"));
     }
 }
 

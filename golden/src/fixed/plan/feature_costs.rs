@@ -11,7 +11,7 @@ use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::input::sliding::most_frames;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec};
+use crate::scene::{CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableStorage};
 use crate::symmetry::quads::Quads;
 
 /// An optional feature of the hardware.
@@ -54,12 +54,21 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
-    let (table, tare) = (input.calibration.is_some(), input.calibration.is_some() || input.tare.is_some());
+    let written = plan.has_writable_tables();
+    let table = input.calibration.is_some() || written;
+    let tare = table || input.tare.is_some();
     add("tare frame", tare, "a zero per taxel".into(), &|| {
         scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
     });
     add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
         scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
+    });
+    add("writable tables", written, "zero, gain, noise floor and threshold".into(), &|| {
+        let writable = with(&|s| {
+            s.hardware.tables = TableStorage::Writable;
+            s.input.full_scale_MPa = Some(full_scale);
+        });
+        planned_with(&writable, Scale::of_tare(taxels, true), None)
     });
     let (average, slides, power) = (input.average > 0, input.slides(), input.average.max(1));
     let frames = if slides { most_frames(power) } else { 1 << power };
@@ -138,6 +147,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     };
     if slides {
         without("sliding mean", &|s| s.input.mean = MeanKind::Block);
+    }
+    if written {
+        without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
     }
     if dead > 0 {
         without("dead taxels", &|s| s.input.dead.clear());
