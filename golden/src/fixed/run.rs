@@ -56,11 +56,18 @@ impl Model {
     /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array;
     /// with a sliding mean all frames since a reset.
     pub fn run(&self, codes: &[i32]) -> Trace {
-        let mut prepared = self.prepare.run(codes);
+        let mut prepared = self.prepare.empty();
+        self.add(&mut prepared, codes);
+        self.run_prepared(&prepared)
+    }
+
+    /// Adds frames of codes to `prepared`, as [`Prepare::add`](super::stages::prepare::Prepare::add) does; every stress is 0
+    /// while the tables are not whole.
+    pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
+        self.prepare.add(prepared, codes);
         if self.tables_outcome == Outcome::Broken {
             prepared.words.fill(0);
         }
-        self.run_prepared(&prepared)
     }
 
     /// Computes one reconstruction from the words of the frame buffer.

@@ -45,6 +45,20 @@ impl Plan {
         self.tables().map(|tables| tables.image(self.table_layout(), self.formats().code_bits)).unwrap_or_default()
     }
 
+    /// What the hardware does with an image between the codes of a frame: it refuses it.
+    pub fn refuse_image(&mut self) {
+        if self.tables_outcome == Outcome::Whole {
+            self.tables_outcome = Outcome::Refused;
+        }
+    }
+
+    /// What a reset does: the tables stay as they are, and it is forgotten that an image was refused.
+    pub fn reset(&mut self) {
+        if self.tables_outcome == Outcome::Refused {
+            self.tables_outcome = Outcome::Whole;
+        }
+    }
+
     /// What the hardware does with the bytes of an image.
     pub fn load(&mut self, image: &[u8]) -> Outcome {
         let (layout, code_bits) = (self.table_layout(), self.formats().code_bits);

@@ -19,7 +19,7 @@ use crate::report::{self, CosimReport};
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
   dermis cosim eight-by-eight --device rust-hdl
   dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
-  dermis cosim pad.toml --tables left-hand.toml      hardware of pad.toml that takes the tables of a specimen
+  dermis cosim hand.toml --tables left-hand.toml     hardware of hand.toml that takes the tables of a specimen
   dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
   dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
 pub struct Arguments {

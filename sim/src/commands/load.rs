@@ -13,12 +13,12 @@ use crate::report::{self, LoadReport};
 /// Arguments of `dermis load`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  dermis load pad.toml left-hand.toml                tables of the specimen that left-hand.toml describes
-  dermis load pad.toml left-hand.toml --tables-version 7 --out left-hand.tables --json
+  dermis load hand.toml left-hand.toml                tables of the specimen that left-hand.toml describes
+  dermis load hand.toml left-hand.toml --tables-version 7 --out left-hand.tables --json
 
-The hardware is built from pad.toml with hardware.tables = \"writable\". A specimen's scene differs from it in input.calibration,
+The hardware is built from hand.toml with hardware.tables = \"writable\". A specimen's scene differs from it in input.calibration,
 input.tare, search.noise_floor_MPa and threshold.min_force_N; anything else is refused by its field. A driver writes the bytes
-one after the other to register `tables` of a core (`dermis registers`); `dermis cosim pad.toml --tables left-hand.toml` does
+one after the other to register `tables` of a core (`dermis registers`); `dermis cosim hand.toml --tables left-hand.toml` does
 so in simulation and compares the forces.")]
 pub struct Arguments {
     /// Built-in name or path of the scene of the hardware.

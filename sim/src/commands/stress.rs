@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{Scene, TableStorage};
 
 use crate::cosim::hardware::Hardware;
 use crate::cosim::stress::{stress, Outcome};
@@ -25,6 +25,9 @@ pub struct Arguments {
     /// Cycles of each experiment.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     cycles: u64,
+    /// With `hardware.tables = "writable"` in every scene: images of tables are sent too.
+    #[arg(long)]
+    tables: bool,
     /// Seed of rates, codes, wrong tlast and resets.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -35,7 +38,8 @@ pub struct Arguments {
 
 const EXAMPLES: &str = "Examples:
   dermis stress                                      gaps, wrong tlast and resets on sensor-1
-  dermis stress eight-by-eight --cycles 50000 --seed 7 --json";
+  dermis stress eight-by-eight --cycles 50000 --seed 7 --json
+  dermis stress eight-by-eight --cycles 50000 --tables     and images of tables, right and wrong ones";
 
 /// The counts of an experiment for the run log.
 fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
@@ -44,6 +48,8 @@ fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
         ("wrong tlast", outcome.wrong_tlast),
         ("frames cut short", outcome.cut),
         ("frames flagged", outcome.flagged),
+        ("images taken", outcome.images),
+        ("images refused or broken", outcome.images_refused + outcome.images_broken),
         ("resets", outcome.resets),
         ("violations", outcome.violations),
     ];
@@ -57,10 +63,14 @@ fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
 /// An unknown scene, one without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let mut outcomes = Vec::new();
-    let Arguments { scenes, cycles, seed, .. } = arguments;
-    let mut log = RunLog::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
+    let Arguments { scenes, cycles, seed, tables, .. } = arguments;
+    let also = if *tables { " --tables" } else { "" };
+    let mut log = RunLog::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}{also}", scenes.join(" ")));
     for name in scenes {
-        let scene = Scene::load(name)?;
+        let mut scene = Scene::load(name)?;
+        if *tables {
+            scene.hardware.tables = TableStorage::Writable;
+        }
         let frames = Frame::shipped(&scene);
         let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
         let _progress = Progress::start(&format!("{}: stress", scene.name));

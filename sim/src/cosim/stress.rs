@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | `stalls` | frames back to back at changing valid and ready rates; now and then one frame alone at full speed | every frame leaves once, in order, equal to the bit-true model; alone, every beat in the model's cycle |
 //! | `tlast` | every other frame has an early, missing, doubled or late `tlast`; random valid and ready rates | frames cut short are dropped; the next frame carries the framing flag, once |
+//! | `tables` | with writable tables: frames and images of tables, half of them damaged, too short or long, for other hardware, inside a frame, broken off by a frame or a reset | every frame leaves once, with the forces of the tables of its time, their version and state |
 //! | `reset` | a reset at a given cycle of a frame, held for one cycle up to a frame's time | no beat of the frames inside leaves; the next frame is right, without flag, and in time |
 //!
 //! Each experiment runs for about the requested number of cycles; `reset` ends earlier once every cycle of a frame has
@@ -15,6 +16,7 @@ mod outcome;
 mod resets;
 mod samples;
 mod scoreboard;
+mod tables;
 mod testbench;
 
 use anyhow::Result;
@@ -37,12 +39,15 @@ pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> 
     samples.extend(synthetic_samples(&hardware.model, &mut random));
     let mut device = hardware.device(Simulator::Verilator)?;
     let mut outcomes = Vec::new();
-    for experiment in ["stalls", "tlast", "reset"] {
+    let all = ["stalls", "tlast", "reset", "tables"];
+    let written = hardware.model.has_writable_tables();
+    for experiment in all.into_iter().filter(|experiment| *experiment != "tables" || written) {
         let mut bench = Testbench::new(device.as_mut(), &hardware.model, &samples);
         bench.reset(RESET_CYCLES, &mut random);
         match experiment {
             "stalls" => stalls(&mut bench, &mut random, cycles),
             "tlast" => tlast(&mut bench, &mut random, cycles),
+            "tables" => tables::tables(&mut bench, &hardware.model, &mut random, cycles),
             _ => resets::resets(&mut bench, &mut random, cycles),
         }
         let scene = hardware.model.scene.name.clone();

@@ -115,6 +115,11 @@ fn prepare(work: &Path) {
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();
     fs::write(work.join("my-scene.toml"), &scene).unwrap();
     fs::write(work.join("averaging.toml"), format!("{scene}\n[input]\naverage = 1\n")).unwrap();
+    let array = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/eight-by-eight.toml"));
+    let written = "\n[input]\nfull_scale_MPa = 1.0\n\n[hardware]\ntables = \"writable\"\n";
+    let hand = array.unwrap().replace("\"eight-by-eight\"", "\"hand\"") + written;
+    fs::write(work.join("left-hand.toml"), format!("{hand}\n[threshold]\nmin_force_N = 0.01\n")).unwrap();
+    fs::write(work.join("hand.toml"), hand).unwrap();
     let frame = |out: &str, seed: &str| {
         let args = ["generate", "sensor-1", "--random", "1", "--seed", seed, "--out", out];
         assert!(Command::new(program()).current_dir(work).args(args).status().unwrap().success());

@@ -13,7 +13,7 @@
 //! One byte is a beat, which is no code: its top bit differs from the next ([`beats`]). The image's last has `tlast`.
 //! The stage takes an image when all frames before it have been sent. Word 0 is compared before anything is written. From then
 //! on until the CRC the tables are not whole: every stress is 0, and the status says why. An image that is refused leaves
-//! what was there, if its word 0 is wrong, else tables that are not whole. After an image the engine is as after a reset.
+//! what was there, if its word 0 is wrong or it comes between the codes of a frame, else tables that are not whole. After an image the engine is as after a reset.
 
 use super::prepare::GAIN_BITS;
 

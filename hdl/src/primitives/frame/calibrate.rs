@@ -165,13 +165,14 @@ fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, bits
         Some(_) => {
             let held = k.register("held", difference.ty());
             let held_gain = k.register("held_gain", Type::signed(gain_bits));
-            let product = k.register("product", Type::signed(difference.bits() + gain_bits));
+            let dropped = GAIN_FRACTION as usize - 1;
+            let product = k.register("product", Type::signed(difference.bits() + gain_bits - dropped));
             k.when(moves, || {
                 held.set(difference);
                 held_gain.set(entry.slice(bits, gain_bits).signed());
-                product.set(*held * *held_gain);
+                product.set((*held * *held_gain).shift_right(dropped));
             });
-            k.wire("rounded", product.shift_right(GAIN_FRACTION as usize - 1).round_shift(1))
+            k.wire("rounded", product.round_shift(1))
         }
     };
     let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));

@@ -19,7 +19,8 @@ use crate::wire::Wire;
 /// ```
 /// Without writable tables the stream passes through, and all but `restart`, which is `rst`, is constant 0.
 ///
-/// The first byte waits until `idle` has been high, and no code has passed, for [`REST`] cycles. A byte is taken in one cycle and used in the next.
+/// The first byte waits until `idle` has been high, and no code has passed, for [`REST`] cycles. A byte is taken in one cycle
+/// and used in the next, but for a reset.
 /// From the first written word to the last byte `restart` is high. What is in the tables, whether they are whole and their
 /// version stand in memories, which a reset leaves and the bitstream initialises.
 #[derive(LogicBlock)]
@@ -215,7 +216,8 @@ impl Shape {
         });
 
         k.comment("The byte taken in the cycle before, and the word that it ends.");
-        let uses = k.wire("uses", *took & *image);
+        // Not in a reset: before the first one the registers hold anything, and nothing of it may be written.
+        let uses = k.wire("uses", *took & *image & !rst);
         let ends_word = k.wire("ends_word", uses & place.is(WORD_BYTES as u64 - 1));
         let at = |number: usize| ends_word & index.is(number as u64);
         let head = k.constant(word_bits, u64::from(MAGIC) << 32 | u64::from(self.layout));

@@ -16,7 +16,7 @@ pub struct Violation {
 pub struct Outcome {
     /// Scene name.
     pub scene: String,
-    /// `stalls`, `tlast` or `reset`.
+    /// `stalls`, `tlast`, `reset` or `tables`.
     pub experiment: &'static str,
     /// Clock cycles simulated.
     pub cycles: u64,
@@ -34,6 +34,12 @@ pub struct Outcome {
     pub cut: u64,
     /// Frames delivered with the framing flag, as expected.
     pub flagged: u64,
+    /// Images of tables that were taken.
+    pub images: u64,
+    /// Images that were refused: at their first word, or between the codes of a frame.
+    pub images_refused: u64,
+    /// Images that were refused later, which leave tables that are not whole.
+    pub images_broken: u64,
     /// Number of resets.
     pub resets: u64,
     /// Number of cycles of a frame at full speed, at each of which a reset can start.

@@ -31,9 +31,20 @@ impl Sample {
         Sample::after(model, codes, &mut model.prepare.empty())
     }
 
+    /// The same codes with the results of `model`, whose tables are other ones.
+    pub(crate) fn with_tables(&self, model: &Model) -> Sample {
+        let trace = model.run(&self.codes);
+        Sample {
+            beats: [trace.beats, trace.status].concat(),
+            cycles: trace.cycles,
+            beat_cycles: trace.beat_cycles,
+            ..self.clone()
+        }
+    }
+
     /// With the results of `codes` after the frames in a sliding mean, which are then in it too.
     pub(crate) fn after(model: &Model, codes: Vec<i32>, mean: &mut Prepared) -> Sample {
-        model.prepare.add(mean, &codes);
+        model.add(mean, &codes);
         let trace = model.run_prepared(mean);
         let forces = trace.beats.len();
         let beats = [trace.beats, trace.status].concat();

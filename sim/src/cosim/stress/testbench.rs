@@ -1,5 +1,6 @@
 //! Test bench of the stress experiments: a device between sender and receiver, checked in every cycle.
 
+use dermis_golden::fixed::stages::load;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
 
@@ -49,6 +50,25 @@ impl Burst {
         let count = burst.codes.len();
         burst.codes[count - 2].1 = true;
         burst
+    }
+
+    /// An image of tables.
+    pub(super) fn image(image: &[u8], code_bits: u32) -> Burst {
+        let beats = load::beats(image, code_bits);
+        let last = beats.len() - 1;
+        Burst { sample: 0, codes: beats.into_iter().enumerate().map(|(at, beat)| (beat, at == last)).collect() }
+    }
+
+    /// Without `tlast` at the end.
+    pub(super) fn without_end(mut self) -> Burst {
+        self.codes.iter_mut().for_each(|(_, last)| *last = false);
+        self
+    }
+
+    /// `other` before the beat `at`.
+    pub(super) fn with(mut self, at: usize, other: Burst) -> Burst {
+        self.codes.splice(at..at, other.codes);
+        self
     }
 
     /// `tlast` one beat late: a frame without `tlast`, and one cut after a single code.
@@ -136,7 +156,7 @@ impl<'a> Testbench<'a> {
                 offering |= rates.sends();
                 let offer = offering.then_some((code, last));
                 if self.step(offer, rates.receives()) {
-                    self.scoreboard.accepted(self.cycle - 1, burst.sample, last, alone);
+                    self.scoreboard.accepted(self.cycle - 1, burst.sample, (code, last), alone);
                     break;
                 }
                 if !self.can_continue() {
@@ -155,7 +175,7 @@ impl<'a> Testbench<'a> {
                     return false;
                 }
             }
-            self.scoreboard.accepted(self.cycle - 1, burst.sample, last, alone);
+            self.scoreboard.accepted(self.cycle - 1, burst.sample, (code, last), alone);
         }
         true
     }

@@ -83,7 +83,7 @@ impl Reference for Loader {
         let bit = |bit: bool| self.reset.then(|| Word::from(bit));
         let [takes, passes] = self.moves(inputs);
         let entries = HEAD_WORDS..HEAD_WORDS + self.plan.scene.sensor.taxels();
-        let entry = self.ended().filter(|(number, _)| self.writing && entries.contains(number));
+        let entry = self.ended().filter(|(number, _)| self.writing && entries.contains(number) && !rst);
         let tables = self.plan.tables().unwrap();
         // While an image is written the tables are not whole.
         let whole = !self.writing && self.plan.tables_outcome != Outcome::Broken;
@@ -109,6 +109,16 @@ impl Reference for Loader {
         let [rst, idle, valid, last, ready] = [0, 1, 3, 4, 5].map(|k| inputs[k].number() == 1);
         let [takes, passes] = self.moves(inputs);
         let (ended, took) = (self.ended(), self.took.take());
+        if rst {
+            // The byte taken last is not used, and the bytes before it are no image.
+            if let Some(mut image) = self.image.take().filter(|_| self.writing) {
+                image.truncate(image.len() - usize::from(took.is_some()));
+                self.plan.load(&image);
+            }
+            let (plan, floor, threshold) = (self.plan.clone(), self.floor, self.threshold);
+            *self = Loader { floor, threshold, reset: true, ..Loader::new(&plan) };
+            return;
+        }
         let full = image_bytes(self.plan.scene.sensor.taxels());
         // A frame interrupts an image that has begun.
         let broken_off = valid && !self.is_byte(inputs) && took.is_none();
@@ -148,14 +158,6 @@ impl Reference for Loader {
         }
         if moved {
             self.inside = !last;
-        }
-        if rst {
-            if self.writing {
-                // The bytes so far are no image.
-                self.plan.load(&self.image.take().unwrap_or_default());
-            }
-            let (plan, floor, threshold) = (self.plan.clone(), self.floor, self.threshold);
-            *self = Loader { floor, threshold, reset: true, ..Loader::new(&plan) };
         }
     }
 }

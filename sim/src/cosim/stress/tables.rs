@@ -1,0 +1,81 @@
+//! Experiment `tables`: images of tables between frames, right and wrong ones.
+
+use dermis_golden::fixed::stages::load::{Tables, VERSION_BITS, WORD_BYTES};
+use dermis_golden::fixed::stages::prepare::GAIN_BITS;
+use dermis_golden::fixed::Model;
+
+use super::handshake_rates::HandshakeRates;
+use super::testbench::{Burst, Testbench};
+
+/// Longest reset in cycles.
+const LONGEST_RESET: u64 = 40;
+
+/// Random tables for the hardware of `model`.
+fn random_tables(model: &Model, random: &mut fastrand::Rng) -> Tables {
+    let code_bits = model.formats().code_bits;
+    let mut entries = |bits: u32| {
+        let half = 1i32 << (bits - 1);
+        (0..model.scene.sensor.taxels()).map(|_| random.i32(-half..half)).collect::<Vec<i32>>()
+    };
+    let [zero, gain] = [entries(code_bits - 4), entries(GAIN_BITS)];
+    Tables {
+        version: random.u16(1..1 << VERSION_BITS),
+        threshold: random.u32(..) >> random.u32(..32),
+        noise_floor: (random.u32(..) >> (33 - code_bits)) as i32 >> random.u32(..code_bits),
+        zero,
+        gain,
+    }
+}
+
+/// Frames back to back and images between them: of which half are right, and the others damaged, too short, too long, for other
+/// hardware, between the codes of a frame, broken off by a frame or by a reset.
+pub(super) fn tables(bench: &mut Testbench, model: &Model, random: &mut fastrand::Rng, cycles: u64) {
+    let code_bits = model.formats().code_bits;
+    while bench.can_continue() && bench.cycle() < cycles {
+        let mut rates = HandshakeRates::random(random);
+        for _ in 0..random.usize(..4) {
+            let sample = random.usize(..bench.sample_count());
+            bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
+        }
+        let mut image = random_tables(model, random).image(model.table_layout(), code_bits);
+        let inner = random.usize(WORD_BYTES..image.len());
+        let sample = random.usize(..bench.sample_count());
+        let frame = Burst::whole(bench.sample(sample), sample);
+        let mut resets = false;
+        let burst = match random.u32(..14) {
+            0 => {
+                image[inner] ^= 1 << random.u32(..8);
+                Burst::image(&image, code_bits)
+            }
+            1 => Burst::image(&image[..inner], code_bits),
+            2 => {
+                image.push(0);
+                Burst::image(&image, code_bits)
+            }
+            3 => {
+                image[random.usize(..WORD_BYTES)] ^= 1 << random.u32(..8);
+                Burst::image(&image, code_bits)
+            }
+            4 => frame.with(1 + random.usize(..model.scene.sensor.taxels() - 1), Burst::image(&image, code_bits)),
+            5 => frame.with(0, Burst::image(&image[..inner], code_bits).without_end()),
+            6 => {
+                resets = true;
+                Burst::image(&image[..1 + random.usize(..image.len() - 1)], code_bits).without_end()
+            }
+            _ => Burst::image(&image, code_bits),
+        };
+        bench.send(&burst, &mut rates);
+        if resets {
+            let held = 1 + random.u64(..LONGEST_RESET);
+            bench.reset(held, random);
+            let outcome = bench.outcome();
+            outcome.resets += 1;
+            outcome.longest_reset = outcome.longest_reset.max(held);
+        }
+        if random.u32(..4) == 0 {
+            let sample = random.usize(..bench.sample_count());
+            bench.send_alone(&Burst::whole(bench.sample(sample), sample));
+        }
+    }
+    bench.drain(&mut HandshakeRates::full_speed());
+}
