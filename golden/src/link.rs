@@ -35,7 +35,9 @@ pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
 pub const CRC_BYTES: usize = 4;
 /// Bit that is set in the type of an answer, which is otherwise that of its request.
 pub const ANSWER: u8 = 0x80;
-/// Residue: the CRC-32 (reflected polynomial 0xEDB88320) over a packet including its CRC, before the final inversion.
+/// Polynomial of CRC-32, reflected.
+pub const CRC_POLYNOMIAL: u32 = 0xedb8_8320;
+/// Residue: the CRC-32 (polynomial [`CRC_POLYNOMIAL`]) over a packet including its CRC, before the final inversion.
 pub const CRC_RESIDUE: u32 = 0xdebb_20e3;
 
 /// Type of a packet; the discriminant is the number in the packet.

@@ -42,3 +42,4 @@ pub use model::Model;
 pub use plan::contents::{CasePlan, Dropped, Plan};
 pub use plan::cycles::Cycles;
 pub use run::{Stage, Trace};
+pub use specimen::Intake;

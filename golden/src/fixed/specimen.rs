@@ -7,7 +7,7 @@ use super::error::FixedError;
 use super::model::Model;
 use super::plan::cases::{limits, Limits};
 use super::plan::contents::Plan;
-use super::stages::load::{self, Outcome, Tables, VERSION_BITS};
+use super::stages::load::{self, image_bytes, Outcome, Tables, VERSION_BITS, WORD_BYTES};
 use super::stages::prepare::{Prepare, Scale};
 use crate::deviations::Deviations;
 use crate::scene::Scene;
@@ -45,39 +45,104 @@ impl Plan {
         self.tables().map(|tables| tables.image(self.table_layout(), self.formats().code_bits)).unwrap_or_default()
     }
 
-    /// What the hardware does with an image between the codes of a frame: it refuses it.
-    pub fn refuse_image(&mut self) {
+    /// What the hardware does with the bytes of an image: what becomes of it. Tables that are not whole stay so after an image
+    /// that is refused.
+    pub fn load(&mut self, image: &[u8]) -> Outcome {
+        let (layout, code_bits) = (self.table_layout(), self.formats().code_bits);
+        let Some(mut tables) = self.tables() else { return Outcome::Refused };
+        let outcome = tables.load(image, layout, code_bits);
+        match outcome {
+            Outcome::Refused => self.refuse(),
+            Outcome::Broken => (self.tables_version, self.tables_outcome) = (0, Outcome::Broken),
+            Outcome::Whole => {
+                (self.threshold, self.noise_floor) = (tables.threshold.into(), tables.noise_floor);
+                (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));
+                (self.tables_version, self.tables_outcome) = (tables.version, Outcome::Whole);
+            }
+        }
+        outcome
+    }
+
+    fn refuse(&mut self) {
         if self.tables_outcome == Outcome::Whole {
             self.tables_outcome = Outcome::Refused;
         }
     }
+}
 
-    /// What a reset does: the tables stay as they are, and it is forgotten that an image was refused.
-    pub fn reset(&mut self) {
-        if self.tables_outcome == Outcome::Refused {
-            self.tables_outcome = Outcome::Whole;
-        }
+/// The input stream as the hardware takes it, beat by beat: where an image begins and ends.
+#[derive(Clone, Debug, Default)]
+pub struct Intake {
+    /// The bytes of an image that has begun.
+    image: Vec<u8>,
+    /// The rest of a refused image follows.
+    skipping: bool,
+}
+
+impl Intake {
+    /// Whether an image, or the rest of one, is expected.
+    pub fn is_busy(&self) -> bool {
+        self.skipping || !self.image.is_empty()
     }
 
-    /// What the hardware does with the bytes of an image.
-    pub fn load(&mut self, image: &[u8]) -> Outcome {
-        let (layout, code_bits) = (self.table_layout(), self.formats().code_bits);
-        let Some(mut tables) = self.tables() else { return Outcome::Refused };
-        self.tables_outcome = match (tables.load(image, layout, code_bits), self.tables_outcome) {
-            // Tables that are not whole stay so.
-            (Outcome::Refused, Outcome::Broken) => Outcome::Broken,
-            (outcome, _) => outcome,
-        };
-        match self.tables_outcome {
-            Outcome::Refused => {}
-            Outcome::Broken => self.tables_version = 0,
-            Outcome::Whole => {
-                (self.threshold, self.noise_floor) = (tables.threshold.into(), tables.noise_floor);
-                (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));
-                self.tables_version = tables.version;
-            }
+    /// Whether the rest of a refused image follows.
+    pub fn is_skipping(&self) -> bool {
+        self.skipping
+    }
+
+    /// The bytes of an image that has begun; from the last of its first word on, tables are written.
+    pub fn image(&self) -> &[u8] {
+        &self.image
+    }
+
+    /// A byte, the last of its image or not, between the codes of a frame or not: what becomes of the image if it is over.
+    pub fn byte(&mut self, plan: &mut Plan, byte: u8, last: bool, in_frame: bool) -> Option<Outcome> {
+        if self.skipping {
+            self.skipping = !last;
+            return None;
         }
-        self.tables_outcome
+        if self.image.is_empty() && in_frame {
+            self.skipping = !last;
+            plan.refuse();
+            return Some(Outcome::Refused);
+        }
+        self.image.push(byte);
+        let count = self.image.len();
+        let full = count == image_bytes(plan.scene.sensor.taxels());
+        let wrong_head = count == WORD_BYTES && !plan.image().starts_with(&self.image);
+        if !(last || full || wrong_head) {
+            return None;
+        }
+        if full && !last {
+            // It is longer than it may be.
+            self.image.push(0);
+        }
+        let outcome = self.ends(plan);
+        self.skipping = outcome != Outcome::Whole && !last;
+        Some(outcome)
+    }
+
+    /// A code: the rest of an image that has begun will not come.
+    pub fn code(&mut self, plan: &mut Plan) -> Option<Outcome> {
+        self.skipping = false;
+        (!self.image.is_empty()).then(|| self.ends(plan))
+    }
+
+    /// A reset: an image ends whose first word was right. The tables stay as they are, and it is forgotten that one was
+    /// refused. The last `unused` bytes do not count: a byte that is taken in the cycle before a reset is not used.
+    pub fn reset(&mut self, plan: &mut Plan, unused: usize) -> Option<Outcome> {
+        self.image.truncate(self.image.len().saturating_sub(unused));
+        let begun = self.image.len() >= WORD_BYTES;
+        let outcome = begun.then(|| self.ends(plan));
+        if plan.tables_outcome == Outcome::Refused {
+            plan.tables_outcome = Outcome::Whole;
+        }
+        *self = Intake::default();
+        outcome
+    }
+
+    fn ends(&mut self, plan: &mut Plan) -> Outcome {
+        plan.load(&std::mem::take(&mut self.image))
     }
 }
 

@@ -1,6 +1,6 @@
 //! CRC-32, two bits per cycle: bytes on a link are further apart, and this takes few logic cells.
 
-use dermis_golden::link::CRC_RESIDUE;
+use dermis_golden::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -9,11 +9,9 @@ use crate::wire::Wire;
 
 /// Initial value of the CRC register.
 const START: u32 = u32::MAX;
-/// Polynomial of CRC-32, reflected.
-const POLYNOMIAL: u32 = 0xedb8_8320;
 /// The reflected polynomial shifted by one, for the first of two bits; its lowest bit is 0, so that it does not change
 /// the second.
-const BEFORE: u32 = POLYNOMIAL >> 1;
+const BEFORE: u32 = CRC_POLYNOMIAL >> 1;
 /// Cycles that a byte takes after the one with `load`.
 pub const CYCLES: u32 = 4;
 
@@ -69,7 +67,7 @@ fn kernel() -> Kernel {
     k.wire("right", crc.is(CRC_RESIDUE.into()));
     let feedback = |bit: usize, polynomial: u32| crc.at(bit).mux(k.constant(32, polynomial.into()), k.constant(32, 0));
     k.when(busy, || {
-        crc.set(crc.slice(2, 30).extend(32) ^ feedback(0, BEFORE) ^ feedback(1, POLYNOMIAL));
+        crc.set(crc.slice(2, 30).extend(32) ^ feedback(0, BEFORE) ^ feedback(1, CRC_POLYNOMIAL));
         left.set(left.minus(1));
     });
     k.when(load, || {
@@ -87,7 +85,7 @@ mod tests {
 
     /// The CRC of the bytes so far, inverted, bit by bit as in its definition.
     fn crc_32(bytes: &[u8]) -> u32 {
-        let bit = |crc: u32, _| crc >> 1 ^ if crc & 1 == 1 { POLYNOMIAL } else { 0 };
+        let bit = |crc: u32, _| crc >> 1 ^ if crc & 1 == 1 { CRC_POLYNOMIAL } else { 0 };
         bytes.iter().fold(START, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), bit))
     }
 

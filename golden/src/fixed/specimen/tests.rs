@@ -75,7 +75,7 @@ fn a_refused_image_leaves_the_tables_and_a_broken_one_no_force() {
     assert_eq!(hardware.load(&broken), Outcome::Broken);
     assert!(hardware.run(&codes).beats.iter().all(|force| *force == [0; 3]));
     // A refused image does not make tables whole.
-    assert_eq!(hardware.load(&other), Outcome::Broken);
+    assert_eq!((hardware.load(&other), hardware.tables_outcome), (Outcome::Refused, Outcome::Broken));
     assert!(flags(&hardware).contains(&crate::flags::Flag::TablesIncomplete));
     assert_eq!(hardware.load(&image), Outcome::Whole);
     assert!(!flags(&hardware).contains(&crate::flags::Flag::TablesIncomplete));
@@ -100,4 +100,36 @@ fn what_no_table_holds_is_refused_by_field() {
     let (_folder, scene) = specimen(1.0);
     assert!(rom.with_tables(&scene, 1).unwrap_err().to_string().starts_with("hardware.tables: rom is not possible"));
     assert_eq!((rom.image(), rom.clone().load(&[])), (Vec::new(), Outcome::Refused));
+}
+
+#[test]
+fn an_image_ends_as_the_stream_says() {
+    let mut hardware = hardware();
+    let (_folder, scene) = specimen(1.0);
+    let image = hardware.with_tables(&scene, 3).unwrap().image();
+    let mut intake = Intake::default();
+    let mut send = |plan: &mut Plan, bytes: &[u8], in_frame| {
+        let count = bytes.len();
+        let each = bytes.iter().enumerate().map(|(at, &byte)| intake.byte(plan, byte, at + 1 == count, in_frame));
+        let all: Vec<Outcome> = each.flatten().collect();
+        assert!(!intake.is_busy());
+        all
+    };
+    assert_eq!(send(&mut hardware, &image, true), [Outcome::Refused]);
+    assert_eq!(send(&mut hardware, &image, false), [Outcome::Whole]);
+    assert_eq!((hardware.tables_version, hardware.tables_outcome), (3, Outcome::Whole));
+    assert_eq!(send(&mut hardware, &[&image[..], &[0, 0]].concat(), false), [Outcome::Broken]);
+    assert_eq!(send(&mut hardware, &image[..40], false), [Outcome::Broken]);
+    let mut wrong = image.clone();
+    wrong[5] ^= 1;
+    assert_eq!(send(&mut hardware, &wrong, false), [Outcome::Refused]);
+    assert_eq!(hardware.tables_outcome, Outcome::Broken);
+    // Broken off by a code, and by a reset.
+    for (bytes, outcome) in [(3, Outcome::Refused), (7, Outcome::Broken)] {
+        image[..bytes].iter().for_each(|&byte| assert_eq!(intake.byte(&mut hardware, byte, false, false), None));
+        assert_eq!(intake.code(&mut hardware), Some(outcome));
+        image[..bytes].iter().for_each(|&byte| assert_eq!(intake.byte(&mut hardware, byte, false, false), None));
+        assert_eq!(intake.reset(&mut hardware, 0), (outcome == Outcome::Broken).then_some(outcome));
+        assert_eq!(intake.code(&mut hardware), None);
+    }
 }

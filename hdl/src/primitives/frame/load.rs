@@ -3,7 +3,7 @@
 use dermis_golden::fixed::stages::load::{Tables, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES};
 use dermis_golden::fixed::stages::prepare::GAIN_BITS;
 use dermis_golden::fixed::Plan;
-use dermis_golden::link::CRC_RESIDUE;
+use dermis_golden::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -82,8 +82,6 @@ pub const REST: u64 = 31;
 pub const THRESHOLD_BITS: usize = 32;
 /// Width of the version with the bit above it.
 pub const VERSION_WORD_BITS: usize = VERSION_BITS as usize + 1;
-/// Polynomial of CRC-32, reflected.
-const POLYNOMIAL: u64 = 0xedb8_8320;
 
 impl Load {
     /// For the tables of `plan`.
@@ -132,7 +130,7 @@ struct Shape {
 fn crc_after<'k>(k: &'k Builder, crc: Expr<'k>, byte: Expr<'k>) -> Expr<'k> {
     let start = crc.slice(8, 24).concat(crc.low(8) ^ byte);
     (0..8).fold(start, |crc, _| {
-        let feedback = crc.at(0).mux(k.constant(32, POLYNOMIAL), k.constant(32, 0));
+        let feedback = crc.at(0).mux(k.constant(32, CRC_POLYNOMIAL.into()), k.constant(32, 0));
         crc.slice(1, 31).extend(32) ^ feedback
     })
 }

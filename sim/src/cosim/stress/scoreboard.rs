@@ -9,10 +9,10 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::stages::load::{image_bytes, Outcome as Loaded, WORD_BYTES};
+use dermis_golden::fixed::stages::load::Outcome as Loaded;
 use dermis_golden::fixed::stages::prepare::Prepared;
 use dermis_golden::fixed::stages::send::{FLAG_FRAMING, STATUS_BEATS, TABLES_REFUSED, TABLES_SHIFT};
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{Intake, Model};
 
 use super::outcome::{Outcome, Violation};
 use super::samples::Sample;
@@ -44,10 +44,8 @@ pub(super) struct Scoreboard<'a> {
     mean: Prepared,
     /// Codes accepted of the current frame.
     accepted: usize,
-    /// The bytes of an image that has begun.
-    image: Option<Vec<u8>>,
-    /// The rest of a refused image follows.
-    skipping: bool,
+    /// What has come of an image of tables.
+    intake: Intake,
     /// Whether a `tlast` was wrong since the last complete frame.
     framing_error: bool,
     pending: VecDeque<PendingFrame<'a>>,
@@ -62,8 +60,7 @@ impl<'a> Scoreboard<'a> {
             model: Cow::Borrowed(model),
             samples,
             mean: model.prepare.empty(),
-            image: None,
-            skipping: false,
+            intake: Intake::default(),
             accepted: 0,
             framing_error: false,
             pending: VecDeque::new(),
@@ -93,10 +90,9 @@ impl<'a> Scoreboard<'a> {
         if self.model.has_writable_tables() && code >> (self.model.formats().code_bits - 1) == 1 {
             return self.accepted_byte(code as u8, last);
         }
-        // A code in an image: its rest will not come.
-        self.skipping = false;
-        if let Some(image) = self.image.take() {
-            self.load(&image);
+        if self.intake.is_busy() {
+            let outcome = self.intake.code(self.model.to_mut());
+            self.count_image(outcome);
         }
         let Sample { codes, taxels, .. } = &self.samples[sample];
         self.accepted += 1;
@@ -124,50 +120,28 @@ impl<'a> Scoreboard<'a> {
     }
 
     fn accepted_byte(&mut self, byte: u8, last: bool) {
-        if self.skipping {
-            self.skipping = !last;
-            return;
-        }
-        let taxels = self.model.scene.sensor.taxels();
-        if self.image.is_none() && !self.accepted.is_multiple_of(taxels) {
-            self.model.to_mut().refuse_image();
-            self.outcome.images_refused += 1;
-            self.skipping = !last;
+        let in_frame = !self.accepted.is_multiple_of(self.model.scene.sensor.taxels());
+        let outcome = self.intake.byte(self.model.to_mut(), byte, last, in_frame);
+        if in_frame && outcome.is_some() {
             self.pending.iter_mut().for_each(|frame| frame.may_refuse = true);
-            return;
         }
-        let mut image = self.image.take().unwrap_or_default();
-        image.push(byte);
-        let wrong_head = image.len() == WORD_BYTES && image[..] != self.model.image()[..WORD_BYTES];
-        let full = image.len() == image_bytes(taxels);
-        if !(last || full || wrong_head) {
-            self.image = Some(image);
-            return;
-        }
-        if full && !last {
-            // It is longer than it may be.
-            image.push(0);
-        }
-        self.skipping = self.load(&image) != Loaded::Whole && !last;
+        self.count_image(outcome);
     }
 
-    /// The hardware has all that it takes of an image.
-    fn load(&mut self, image: &[u8]) -> Loaded {
-        // What becomes of this one; tables that were not whole before stay so if it is refused.
-        let refused = image.len() < WORD_BYTES || image[..WORD_BYTES] != self.model.image()[..WORD_BYTES];
-        let outcome = self.model.to_mut().load(image);
-        if refused {
-            self.outcome.images_refused += 1;
-            return Loaded::Refused;
-        }
-        match outcome {
-            Loaded::Whole => self.outcome.images += 1,
-            _ => self.outcome.images_broken += 1,
-        }
-        // The engine is as after a reset.
+    /// Counts an image that is over. Once tables have been written the engine is as after a reset.
+    fn count_image(&mut self, outcome: Option<Loaded>) {
+        let counts = match outcome {
+            None => return,
+            Some(Loaded::Refused) => {
+                self.outcome.images_refused += 1;
+                return;
+            }
+            Some(Loaded::Whole) => &mut self.outcome.images,
+            Some(Loaded::Broken) => &mut self.outcome.images_broken,
+        };
+        *counts += 1;
         (self.accepted, self.framing_error) = (0, false);
         self.mean = self.model.prepare.empty();
-        outcome
     }
 
     /// Checks a delivered beat.
@@ -208,20 +182,14 @@ impl<'a> Scoreboard<'a> {
         }
     }
 
-    /// Discards all frames in the device; the last byte of an image was accepted in the cycle before.
+    /// Discards all frames in the device.
     pub(super) fn reset(&mut self) {
         self.outcome.frames_in -= self.pending.len() as u64;
-        if let Some(mut image) = self.image.take() {
-            // The byte taken in the cycle before is not used.
-            image.pop();
-            if image.len() >= WORD_BYTES {
-                self.load(&image);
-            }
-        }
         if self.model.has_writable_tables() {
-            self.model.to_mut().reset();
+            // The last byte was accepted in the cycle before.
+            let outcome = self.intake.reset(self.model.to_mut(), 1);
+            self.count_image(outcome);
         }
-        self.skipping = false;
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
         self.mean = self.model.prepare.empty();
         self.pending.clear();

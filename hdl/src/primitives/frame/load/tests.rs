@@ -1,4 +1,5 @@
-use dermis_golden::fixed::stages::load::{beats, image_bytes, Outcome};
+use dermis_golden::fixed::stages::load::{beats, Outcome};
+use dermis_golden::fixed::Intake;
 
 use super::*;
 use crate::language::testbench::{block_subject, check, check_with_defects, random_words, Pipeline, Reference};
@@ -8,21 +9,17 @@ use crate::wire::Word;
 
 const WRITABLE: &str = "[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n";
 
-/// The bytes of an image as they come, and what the bit-true model makes of all of them.
+/// The stream as the model takes it; a byte is taken in one cycle and used in the next.
 #[derive(Clone)]
 struct Loader {
     plan: Plan,
-    /// The bytes taken of an image that may still become whole.
-    image: Option<Vec<u8>>,
-    skipping: bool,
-    /// A byte was taken in the cycle before, with this `tlast`.
-    took: Option<bool>,
-    writing: bool,
-    inside: bool,
+    intake: Intake,
+    /// A byte was taken in the cycle before; with it, unless it is skipped, the byte and its `tlast`.
+    took: Option<Option<(u8, bool)>>,
+    in_frame: bool,
     rests: u64,
-    refused: bool,
     /// What stands in the tables, whole or not.
-    floor: i64,
+    floor: u64,
     threshold: u64,
     reset: bool,
 }
@@ -31,14 +28,11 @@ impl Loader {
     fn new(plan: &Plan) -> Self {
         Loader {
             plan: plan.clone(),
-            image: None,
-            skipping: false,
+            intake: Intake::default(),
             took: None,
-            writing: false,
-            inside: false,
+            in_frame: false,
             rests: 0,
-            refused: false,
-            floor: plan.noise_floor.into(),
+            floor: plan.noise_floor as u64,
             threshold: plan.threshold as u64,
             reset: false,
         }
@@ -51,10 +45,9 @@ impl Loader {
     /// Whether a byte is taken, and whether a code passes, if the receiver is ready.
     fn moves(&self, inputs: &[Word]) -> [bool; 2] {
         let [rst, valid] = [0, 3].map(|k| inputs[k].number() == 1);
-        let busy = self.image.is_some() || self.skipping;
-        let free = valid && self.took.is_none() && !rst;
-        let is_byte = self.is_byte(inputs);
-        [free && is_byte && (busy || self.inside || self.rests == REST), free && !is_byte && !busy]
+        let (free, is_byte) = (valid && self.took.is_none() && !rst, self.is_byte(inputs));
+        let may_begin = self.in_frame || self.rests == REST;
+        [free && is_byte && (self.intake.is_busy() || may_begin), free && !is_byte && !self.intake.is_busy()]
     }
 
     fn is_byte(&self, inputs: &[Word]) -> bool {
@@ -62,19 +55,24 @@ impl Loader {
         inputs[2].field(bits, 1) != inputs[2].field(bits - 1, 1)
     }
 
-    /// The word that the last byte taken ended: its number and its content.
-    fn ended(&self) -> Option<(usize, u64)> {
-        let image = self.image.as_ref().filter(|image| self.took.is_some() && image.len() % WORD_BYTES == 0)?;
-        let mut bytes = [0; 8];
-        bytes[..WORD_BYTES].copy_from_slice(&image[image.len() - WORD_BYTES..]);
-        Some((image.len() / WORD_BYTES - 1, u64::from_le_bytes(bytes)))
+    /// Tables are written: the image's first word was right.
+    fn writing(&self) -> bool {
+        self.intake.image().len() >= WORD_BYTES
     }
 
-    /// The image is over: the tables are what the model makes of its bytes.
-    fn ends(&mut self, image: &[u8]) {
-        self.refused = self.plan.load(image) != Outcome::Whole;
-        (self.image, self.writing) = (None, false);
+    /// The word that the last byte taken ends, if it is written: its number and its content.
+    fn written(&self) -> Option<(usize, u64)> {
+        let (byte, _) = self.took.flatten().filter(|_| self.writing())?;
+        let image = [self.intake.image(), &[byte]].concat();
+        let mut bytes = [0; 8];
+        bytes[..WORD_BYTES].copy_from_slice(&image[image.len() - WORD_BYTES..]);
+        image.len().is_multiple_of(WORD_BYTES).then(|| (image.len() / WORD_BYTES - 1, u64::from_le_bytes(bytes)))
     }
+}
+
+/// The low `bits` bits.
+fn low(word: u64, bits: usize) -> u64 {
+    word & ((1 << bits) - 1)
 }
 
 impl Reference for Loader {
@@ -83,12 +81,13 @@ impl Reference for Loader {
         let bit = |bit: bool| self.reset.then(|| Word::from(bit));
         let [takes, passes] = self.moves(inputs);
         let entries = HEAD_WORDS..HEAD_WORDS + self.plan.scene.sensor.taxels();
-        let entry = self.ended().filter(|(number, _)| self.writing && entries.contains(number) && !rst);
-        let tables = self.plan.tables().unwrap();
+        let entry = self.written().filter(|(number, _)| entries.contains(number) && !rst);
         // While an image is written the tables are not whole.
-        let whole = !self.writing && self.plan.tables_outcome != Outcome::Broken;
-        let version = if whole { tables.version } else { 0 };
-        let spoiled = u64::from(self.refused || !whole);
+        let (outcome, version) = match self.writing() {
+            true => (Outcome::Broken, 0),
+            false => (self.plan.tables_outcome, self.plan.tables_version),
+        };
+        let spoiled = u64::from(outcome != Outcome::Whole);
         vec![
             bit(passes),
             passes.then(|| Word::from(inputs[2].field(0, self.bits()))),
@@ -96,68 +95,56 @@ impl Reference for Loader {
             bit(takes || (passes && ready)),
             bit(entry.is_some()),
             entry.map(|(number, _)| Word::from((number - HEAD_WORDS) as u64)),
-            entry.map(|(_, word)| Word::from(word & ((1 << (self.bits() + GAIN_BITS as usize)) - 1))),
-            bit(rst || self.writing),
-            Some(Word::from(self.floor as u64)),
+            entry.map(|(_, word)| Word::from(low(word, self.bits() + GAIN_BITS as usize))),
+            bit(rst || self.writing()),
+            Some(Word::from(self.floor)),
             Some(Word::from(self.threshold)),
             bit(true).map(|_| Word::from(spoiled << VERSION_BITS | u64::from(version))),
-            bit(!whole),
+            bit(outcome == Outcome::Broken),
         ]
     }
 
     fn clock(&mut self, inputs: &[Word]) {
         let [rst, idle, valid, last, ready] = [0, 1, 3, 4, 5].map(|k| inputs[k].number() == 1);
         let [takes, passes] = self.moves(inputs);
-        let (ended, took) = (self.ended(), self.took.take());
+        let written = self.written();
+        let Loader { plan, intake, .. } = self;
         if rst {
-            // The byte taken last is not used, and the bytes before it are no image.
-            if let Some(mut image) = self.image.take().filter(|_| self.writing) {
-                image.truncate(image.len() - usize::from(took.is_some()));
-                self.plan.load(&image);
-            }
-            let (plan, floor, threshold) = (self.plan.clone(), self.floor, self.threshold);
-            *self = Loader { floor, threshold, reset: true, ..Loader::new(&plan) };
+            // The byte taken last has not been used.
+            intake.reset(plan, 0);
+            let (took, in_frame, rests, reset) = (None, false, 0, true);
+            *self = Loader { took, in_frame, rests, reset, ..self.clone() };
             return;
         }
-        let full = image_bytes(self.plan.scene.sensor.taxels());
-        // A frame interrupts an image that has begun.
-        let broken_off = valid && !self.is_byte(inputs) && took.is_none();
-        match (self.image.clone(), took) {
-            (Some(image), Some(last)) => {
-                let head = self.plan.image()[..WORD_BYTES] != image[..image.len().min(WORD_BYTES)];
-                if let (Some((1, word)), true) = (ended, self.writing) {
-                    self.threshold = word & u64::from(u32::MAX);
+        match self.took.take() {
+            Some(Some((byte, last))) => {
+                match written {
+                    Some((1, word)) => self.threshold = low(word, THRESHOLD_BITS),
+                    Some((2, word)) => self.floor = low(word, plan.formats().input_bits as usize),
+                    _ => {}
                 }
-                if let (Some((2, word)), true) = (ended, self.writing) {
-                    self.floor = word as i64 & ((1 << self.plan.formats().input_bits) - 1);
-                }
-                self.writing |= matches!(ended, Some((0, _))) && !head;
-                if (image.len() == WORD_BYTES && head) || last != (image.len() == full) || image.len() == full {
-                    // Without its end the image is longer than it may be.
-                    let more = usize::from(image.len() == full && !last);
-                    self.ends(&[image, vec![0; more]].concat());
-                    self.skipping = self.refused && !last;
-                }
+                intake.byte(plan, byte, last, false);
             }
-            (Some(image), None) if broken_off => self.ends(&image),
-            (None, Some(true)) => self.skipping = false,
-            (None, None) if broken_off => self.skipping = false,
+            None if valid && !self.is_byte(inputs) => {
+                self.intake.code(&mut self.plan);
+            }
             _ => {}
         }
         let moved = passes && ready;
         self.rests = if !idle || moved { 0 } else { (self.rests + 1).min(REST) };
         if takes {
             let byte = inputs[2].field(0, 8) as u8;
-            self.took = Some(last);
-            match &mut self.image {
-                Some(image) => image.push(byte),
-                None if self.skipping => {}
-                None if self.inside => (self.skipping, self.refused) = (true, true),
-                None => self.image = Some(vec![byte]),
+            let begins = !self.intake.is_busy();
+            if self.intake.is_skipping() || (begins && self.in_frame) {
+                // An image between the codes of a frame is refused at once.
+                self.intake.byte(&mut self.plan, byte, last, self.in_frame);
+                self.took = Some(None);
+            } else {
+                self.took = Some(Some((byte, last)));
             }
         }
         if moved {
-            self.inside = !last;
+            self.in_frame = !last;
         }
     }
 }
@@ -232,14 +219,17 @@ fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
 fn an_image_is_taken_as_the_model_takes_it() {
     let model = model(2, 3, WRITABLE);
     let stimulus = stimulus(&model, 40_000);
-    let mut whole = [false; 2];
+    let mut seen = [false; 3];
     let mut loader = Loader::new(&model);
     for inputs in &stimulus {
         loader.clock(inputs);
-        whole[usize::from(loader.plan.tables_outcome == Outcome::Broken)] |=
-            loader.plan.tables_version > 0 || loader.refused;
+        match loader.plan.tables_outcome {
+            Outcome::Whole => seen[0] |= loader.plan.tables_version > 0,
+            Outcome::Refused => seen[1] = true,
+            Outcome::Broken => seen[2] = true,
+        }
     }
-    assert_eq!(whole, [true; 2], "images are taken, and are broken");
+    assert_eq!(seen, [true; 3], "images are taken, refused and broken");
     let subject = |changes: &[Change]| {
         block_subject!(
             Load::new(&model),
