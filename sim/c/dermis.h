@@ -135,6 +135,14 @@ typedef enum {
    * `too-many-contacts`
    */
   DERMIS_FLAG_TOO_MANY_CONTACTS = (1 << 14),
+  /**
+   * `tables-incomplete`
+   */
+  DERMIS_FLAG_TABLES_INCOMPLETE = (1 << 15),
+  /**
+   * `tables-refused`
+   */
+  DERMIS_FLAG_TABLES_REFUSED = (1 << 16),
 } dermis_flag;
 
 /**

@@ -63,7 +63,7 @@ fn a_refused_image_leaves_the_tables_and_a_broken_one_no_force() {
     let before = hardware.run(&codes);
     let flags = |model: &Model| {
         let trace = model.run(&codes);
-        model.decode(&[frame.clone()], "fixed", &trace.beats, &trace.status).unwrap().flags
+        model.decode(std::slice::from_ref(&frame), "fixed", &trace.beats, &trace.status).unwrap().flags
     };
     let mut other = image.clone();
     other[0] ^= 1;
