@@ -108,7 +108,7 @@ pub const ACCESS: Field =
     field("access", 3, 1, "an unknown address, or a write to a register that is only read or has no room");
 
 /// A byte of an image; the low byte of the register.
-pub const BYTE: Field = field("octet", 0, 8, "the byte; reads as 0");
+pub const OCTET: Field = field("octet", 0, 8, "the byte; reads as 0");
 /// The image's end.
 pub const LAST: Field = field("last", 8, 1, "it is the image's last; reads as 0");
 /// No room.
@@ -162,7 +162,7 @@ pub const REGISTERS: [Register; 17] = [
         address: 0x40,
         access: Access::Push,
         meaning: "a byte of an image of tables, as `dermis load` makes one; only with hardware.tables = writable",
-        fields: &[BYTE, LAST, WAITING, WRITABLE],
+        fields: &[OCTET, LAST, WAITING, WRITABLE],
     },
 ];
 

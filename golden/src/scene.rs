@@ -275,6 +275,11 @@ impl HardwareSpec {
     pub fn has_writable_tables(&self) -> bool {
         self.tables == TableStorage::Writable
     }
+
+    /// Puts the tables into the bitstream, as for frames that need no calibration.
+    pub fn fix_tables(&mut self) {
+        (self.tables, self.table_range) = Default::default();
+    }
 }
 
 /// How frames are averaged.

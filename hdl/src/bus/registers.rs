@@ -143,7 +143,7 @@ fn kernel(constants: &[(&'static str, u32)], has_tables: bool) -> Kernel {
             k.when(octet_taken, || waiting.set(k.constant(1, 0)));
             k.when(pushed, || {
                 waiting.set(k.constant(1, 1));
-                octet.set(last.concat(data.low(registers::BYTE.bits)));
+                octet.set(last.concat(data.low(registers::OCTET.bits)));
             });
         }
     }

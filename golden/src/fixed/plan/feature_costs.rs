@@ -115,7 +115,8 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
             plain(&with(&|s| s.hardware.search_width = Some(Quads::LANES)))
         });
     }
-    let threshold = scene.threshold.min_force_N > 0.0;
+    // A threshold that is written is there whatever the scene's.
+    let threshold = scene.threshold.min_force_N > 0.0 || written;
     let own = format!("{} N", scene.threshold.min_force_N);
     add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
         let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
@@ -149,7 +150,7 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         without("sliding mean", &|s| s.input.mean = MeanKind::Block);
     }
     if written {
-        without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
+        without("writable tables", &|s| s.hardware.fix_tables());
     }
     if dead > 0 {
         without("dead taxels", &|s| s.input.dead.clear());
