@@ -31,9 +31,14 @@ def status(data):
     return version & (REFUSED - 1), bool(version & REFUSED), bool(word(2) & INCOMPLETE)
 
 
+async def reads(registers, field):
+    """Whether a bit of the register is high."""
+    return bool((await registers.read("tables")) >> FIELDS[field] & 1)
+
+
 async def push(registers, byte, last):
     """Writes a byte once there is room for it."""
-    while (await registers.read("tables")) >> FIELDS["waiting"] & 1:
+    while await reads(registers, "waiting"):
         pass
     await registers.write("tables", byte | last << FIELDS["last"])
 
@@ -41,7 +46,7 @@ async def push(registers, byte, last):
 async def load(registers, image):
     for place, byte in enumerate(image):
         await push(registers, byte, place + 1 == len(image))
-    while (await registers.read("tables")) >> FIELDS["waiting"] & 1:
+    while await reads(registers, "waiting"):
         pass
 
 
@@ -63,7 +68,7 @@ async def begin(dut):
 async def a_frame_after_an_image_is_the_specimen_s(dut):
     bench = await Bench.begin(dut)
     assert SPECIMEN != OWN
-    assert (await bench.registers.read("tables")) >> FIELDS["writable"] & 1
+    assert await reads(bench.registers, "writable")
     assert await frame(bench) == (OWN, (0, False, False))
     await load(bench.registers, IMAGE)
     assert await frame(bench) == (SPECIMEN, (VERSION, False, False))
@@ -83,7 +88,7 @@ async def a_byte_waits_for_the_frame_and_another_is_refused(dut):
     await bench.send(CODES, tid=2)
     await ClockCycles(dut.aclk, 60)
     await registers.write("tables", IMAGE[0])
-    assert (await registers.read("tables")) >> FIELDS["waiting"] & 1
+    assert await reads(registers, "waiting")
     assert (await registers.access(REGISTERS["tables"]["address"], IMAGE[1]))[1]
     assert await registers.errors() == {"access"}
     data, *_ = await bench.receive()

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::write::write;
 
 use crate::report::{self, LoadReport};
 
@@ -47,11 +48,10 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
     let model = hardware.with_tables(&specimen, *tables_version)?;
     let path = out.clone().unwrap_or_else(|| build_dir.join(&specimen.name).join("tables.bin"));
     let image = model.image();
-    let shown = path.display();
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).with_context(|| format!("{shown}"))?;
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    fs::write(&path, &image).with_context(|| format!("{shown}"))?;
+    write(&path, &image)?;
     let report = LoadReport::new(&model, &image, &path);
     Ok(if *json { serde_json::to_string(&report)? + "\n" } else { report::load(&report) })
 }

@@ -54,12 +54,13 @@ impl Vector {
     /// The image of the tables of `model`, which nothing answers.
     pub fn of_image(model: &Model) -> Vector {
         let codes = model.image_beats();
-        let mut expected = model.run(&vec![0; model.scene.sensor.taxels()]);
-        expected.stages.iter_mut().for_each(|stage| stage.words.clear());
-        expected.stages.push(Stage { name: "instruction", words: Vec::new() });
-        (expected.beats, expected.status, expected.beat_cycles) = Default::default();
         let frame = format!("tables of version {}", model.tables_version);
-        Vector { frame, cols: model.scene.sensor.cols, taxels: codes.len(), codes, expected }
+        let of_zeros = model.run(&vec![0; model.scene.sensor.taxels()]);
+        let mut vector = Vector { taxels: codes.len(), ..Vector::new(model, frame, codes, of_zeros) };
+        let expected = &mut vector.expected;
+        expected.stages.iter_mut().for_each(|stage| stage.words.clear());
+        (expected.beats, expected.status, expected.beat_cycles) = Default::default();
+        vector
     }
 
     /// What is sent, and how many beats answer it.

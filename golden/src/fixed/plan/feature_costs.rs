@@ -64,11 +64,8 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
     });
     add("writable tables", written, "zero, gain, noise floor and threshold".into(), &|| {
-        let writable = with(&|s| {
-            s.hardware.tables = TableStorage::Writable;
-            s.input.full_scale_MPa = Some(full_scale);
-        });
-        planned_with(&writable, Scale::of_tare(taxels, true), None)
+        let writable = (TableStorage::Writable, Some(full_scale));
+        plain(&with(&|s| (s.hardware.tables, s.input.full_scale_MPa) = writable))
     });
     let (average, slides, power) = (input.average > 0, input.slides(), input.average.max(1));
     let frames = if slides { most_frames(power) } else { 1 << power };

@@ -173,7 +173,8 @@ impl Shape {
 
         let image = k.state("image", bit, rst, 0);
         let skipping = k.state("skipping", bit, rst, 0);
-        let writing = k.state("writing", bit, rst, 0);
+        let writing =
+            k.state("writing", bit, rst, 0).comment("Word 0 was right; a register, since it resets the engine.");
         let took = k.state("took", bit, rst, 0);
         let refused = k.state("refused", bit, rst, 0);
         let in_frame = k.state("in_frame", bit, rst, 0);
@@ -248,14 +249,14 @@ impl Shape {
         let new_version = k.register("new_version", Type::unsigned(VERSION_BITS as usize));
         let second = k.wire("second", at(1));
         k.when(second, || new_version.set(word.slice(THRESHOLD_BITS, VERSION_BITS as usize)));
-        thresholds.write(second & *writing, zero, word.low(THRESHOLD_BITS));
-        floors.write(at(2) & *writing, zero, word.low(self.input_bits));
+        thresholds.write(second, zero, word.low(THRESHOLD_BITS));
+        floors.write(at(2), zero, word.low(self.input_bits));
         let new_state = done.mux(k.constant(1, 1).concat(*new_version), k.constant(1 + VERSION_BITS as usize, 0));
         states.write(done | right_head, zero, new_state);
 
         let first = k.constant(index.bits(), HEAD_WORDS as u64);
         let is_entry = !index.less(first) & !index.is(words as u64 - 1);
-        k.wire("write", ends_word & is_entry & *writing);
+        k.wire("write", ends_word & is_entry);
         k.wire("taxel", (*index - first).low(count_bits(self.taxels)));
         k.wire("entry", word.low(bits + GAIN_BITS as usize));
         k.wire("restart", rst | *writing);

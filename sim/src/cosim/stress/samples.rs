@@ -27,19 +27,8 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    fn new(model: &Model, codes: Vec<i32>) -> Sample {
+    pub(super) fn new(model: &Model, codes: Vec<i32>) -> Sample {
         Sample::after(model, codes, &mut model.prepare.empty())
-    }
-
-    /// The same codes with the results of `model`, whose tables are other ones.
-    pub(crate) fn with_tables(&self, model: &Model) -> Sample {
-        let trace = model.run(&self.codes);
-        Sample {
-            beats: [trace.beats, trace.status].concat(),
-            cycles: trace.cycles,
-            beat_cycles: trace.beat_cycles,
-            ..self.clone()
-        }
     }
 
     /// With the results of `codes` after the frames in a sliding mean, which are then in it too.

@@ -111,7 +111,7 @@ impl<'a> Scoreboard<'a> {
             let flagged = std::mem::take(&mut self.framing_error);
             let sample = match self.model.scene.input.slides() {
                 true => Cow::Owned(Sample::after(&self.model, codes.clone(), &mut self.mean)),
-                false if self.model.has_writable_tables() => Cow::Owned(self.samples[sample].with_tables(&self.model)),
+                false if self.model.has_writable_tables() => Cow::Owned(Sample::new(&self.model, codes.clone())),
                 false => Cow::Borrowed(&self.samples[sample]),
             };
             self.pending.push_back(PendingFrame { sample, flagged, may_refuse: false, timed: alone.then_some(cycle) });
