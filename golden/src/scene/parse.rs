@@ -1,6 +1,6 @@
 //! Parsing and checking scene text: the schema, and one function per table.
 
-use super::reader::Reader;
+use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
     InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, TableRange,
@@ -330,11 +330,10 @@ fn table_range(reader: &Reader) -> Result<TableRange, SceneError> {
 
 /// Two numbers above 0 in ascending order.
 fn range(reader: &Reader, path: &str) -> Result<Option<[f64; 2]>, SceneError> {
-    let number = |value: &Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
     let read = |value: &Value| {
         let [least, most] = value.as_array()?.as_slice() else { return None };
-        let range = [number(least)?, number(most)?];
-        (0.0 < range[0] && range[0] <= range[1] && range[1].is_finite()).then_some(range)
+        let range = [number_of(least)?, number_of(most)?];
+        (0.0 < range[0] && range[0] <= range[1]).then_some(range)
     };
     reader.typed(path, read, "[least, largest], numbers above 0")
 }

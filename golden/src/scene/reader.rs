@@ -14,6 +14,11 @@ pub(super) struct Reader<'a> {
     root: &'a Table,
 }
 
+/// A finite number; integers are accepted as well.
+pub(super) fn number_of(value: &Value) -> Option<f64> {
+    value.as_float().or(value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
+}
+
 impl<'a> Reader<'a> {
     pub(super) fn new(file: &'a str, root: &'a Table) -> Self {
         Reader { file, root }
@@ -88,15 +93,9 @@ impl<'a> Reader<'a> {
         let Some(value) = self.value(path) else {
             return Ok(None);
         };
-        let number = match value {
-            Value::Float(number) => *number,
-            Value::Integer(number) => *number as f64,
-            _ => return Err(self.wrong(path, value, allowed)),
-        };
-        if number.is_finite() && test(number) {
-            Ok(Some(number))
-        } else {
-            Err(self.wrong(path, value, allowed))
+        match number_of(value).filter(|number| test(*number)) {
+            Some(number) => Ok(Some(number)),
+            None => Err(self.wrong(path, value, allowed)),
         }
     }
 
