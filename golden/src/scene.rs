@@ -20,7 +20,8 @@
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
-//! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]): what writable tables may hold |
+//! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]), `thickness_mm` (the sensor's; \[least, largest\]) |
+//! | | `dead_taxels` (0; fewer than all): what writable tables may hold |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | | `plausible_MPa` (10) |
@@ -236,7 +237,8 @@ pub enum CoefficientCheck {
 /// Fewest bits of a code with writable tables, whose bytes are numbers beyond the codes.
 pub const TABLE_CODE_BITS: u32 = 9;
 
-/// Where the tables of a specimen of the array stand: zero and gain of each taxel, threshold, noise floor.
+/// Where the tables of a specimen of the array stand: zero and gain of each taxel, threshold, noise floor, and coefficients if
+/// [`TableRange`] has some.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableStorage {
     /// In the bitstream, which then serves one specimen.
@@ -251,6 +253,17 @@ pub enum TableStorage {
 pub struct TableRange {
     /// Least and largest |gain|, above 0, in MPa per unit of the readings; `None` takes those of the scene's table, without one 1.
     pub gain: Option<[f64; 2]>,
+    /// Least and largest thickness of the cover in mm, above 0; `None` is that of the sensor alone.
+    pub thickness_mm: Option<[f64; 2]>,
+    /// Most dead taxels; 0 leaves those of the scene as they are.
+    pub dead_taxels: usize,
+}
+
+impl TableRange {
+    /// Whether the coefficients differ between specimens: they are for another thickness, or for other dead taxels.
+    pub fn has_coefficients(&self) -> bool {
+        self.thickness_mm.is_some() || self.dead_taxels > 0
+    }
 }
 
 /// Table `[hardware]`.
@@ -276,9 +289,21 @@ impl HardwareSpec {
         self.tables == TableStorage::Writable
     }
 
-    /// Puts the tables into the bitstream, as for frames that need no calibration.
+    /// Whether the coefficients of the passes are among the tables that are written.
+    pub fn has_writable_coefficients(&self) -> bool {
+        self.has_writable_tables() && self.table_range.has_coefficients()
+    }
+
+    /// Whether the dead taxels are those of the tables that are written.
+    pub fn has_writable_dead_taxels(&self) -> bool {
+        self.has_writable_tables() && self.table_range.dead_taxels > 0
+    }
+
+    /// Puts the tables into the bitstream, as for frames that need no calibration. The formats remain those of
+    /// [`TableRange`]'s coefficients, so that a frame has the same forces.
     pub fn fix_tables(&mut self) {
-        (self.tables, self.table_range) = Default::default();
+        self.tables = TableStorage::Rom;
+        self.table_range.gain = None;
     }
 }
 

@@ -476,6 +476,10 @@ impl Logic for Engine {
             & !self.searching.q.val()
             & !self.sending.q.val()
             & !self.resultants.m_axis_tvalid.val();
+        self.pass.coefficient_write.next = self.prepare.coefficient_write.val();
+        self.pass.coefficient_word.next = self.prepare.coefficient_word.val();
+        self.pass.coefficient_pair.next = self.prepare.coefficient_pair.val();
+        self.pass.coefficient_data.next = self.prepare.coefficient_data.val();
         self.receive.floor.next = self.prepare.noise_floor.val();
         self.window.floor.next = self.prepare.noise_floor.val();
         self.forces.threshold.next = self.prepare.threshold.val();

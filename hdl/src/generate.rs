@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
-use dermis_golden::fixed::stages::load::image_bytes;
 use dermis_golden::fixed::stages::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, FLAG_TABLES,
     FRAMES_SHIFT, STATUS_BEATS, TABLES_SHIFT,
@@ -293,9 +292,10 @@ fn manifest(
         "formats": f,
         "input": {
             "bits": f.code_bits,
-            "tables": model.has_writable_tables().then(|| json!({
+            "tables": model.tables().map(|tables| json!({
                 "stream_bits": model.stream_bits(),
-                "image_bytes": image_bytes(scene.sensor.taxels()),
+                "image_bytes": tables.image_bytes(),
+                "coefficients": tables.coefficients.len(),
                 "layout": model.table_layout(),
             })),
             "average": model.prepare.average,

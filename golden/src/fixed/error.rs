@@ -72,8 +72,18 @@ pub enum FixedError {
         /// Least and largest |gain|.
         allowed: [f64; 2],
     },
+    /// A specimen is outside the range for which the hardware is built.
+    #[error("{field}: {value} is not possible with these tables: {allowed}")]
+    OutsideRange {
+        /// The scene's field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What is possible.
+        allowed: String,
+    },
     /// A scene asks of the hardware of another what is not in the tables that can be written.
-    #[error("{part}: differs from that of the hardware's scene, and is in no table that can be written (input.calibration, input.tare, search.noise_floor_MPa, threshold.min_force_N)")]
+    #[error("{part}: differs from that of the hardware's scene, and is in no table that can be written (input.calibration, input.tare, search.noise_floor_MPa, threshold.min_force_N; sensor.thickness_mm and input.dead with hardware.table_range)")]
     NoTable {
         /// The table or field of the scene.
         part: &'static str,

@@ -5,10 +5,11 @@ use serde_json::json;
 
 use super::error::FixedError;
 use super::model::Model;
-use super::plan::cases::{limits, Limits};
-use super::plan::contents::Plan;
-use super::stages::load::{self, image_bytes, Outcome, Tables, VERSION_BITS, WORD_BYTES};
+use super::plan::cases::{limits, requantised, Limits};
+use super::plan::contents::{CasePlan, Plan};
+use super::stages::load::{self, Outcome, Tables, VERSION_BITS, WORD_BYTES};
 use super::stages::prepare::{Prepare, Scale};
+use super::words::quantised::Quantised;
 use crate::deviations::Deviations;
 use crate::scene::Scene;
 
@@ -24,17 +25,24 @@ impl Plan {
             noise_floor: i64::from(self.noise_floor).clamp(0, largest_floor) as i32,
             zero: zero.clone(),
             gain: gain.clone(),
+            coefficients: match self.scene.hardware.has_writable_coefficients() {
+                true => self.cases().iter().flat_map(CasePlan::memory).flatten().collect(),
+                false => Vec::new(),
+            },
         })
     }
 
     /// CRC-32 over what the words of an image depend on: this program's version, array, formats, what a code means. Hardware
     /// refuses an image of another layout.
     pub fn table_layout(&self) -> u32 {
+        let Scene { sensor, input, hardware, .. } = &self.scene;
+        let cover = || json!([sensor.thickness_mm, input.dead]);
         let text = json!({
             "version": env!("CARGO_PKG_VERSION"),
-            "array": [self.scene.sensor.rows, self.scene.sensor.cols],
+            "array": [sensor.rows, sensor.cols],
             "formats": self.formats(),
-            "full_scale_MPa": self.scene.input.full_scale_MPa,
+            "cover": (!hardware.has_writable_coefficients()).then(cover),
+            "full_scale_MPa": input.full_scale_MPa,
             "reading_per_MPa": self.prepare.reading_per_MPa,
         });
         crc32fast::hash(text.to_string().as_bytes())
@@ -57,10 +65,22 @@ impl Plan {
             Outcome::Whole => {
                 (self.threshold, self.noise_floor) = (tables.threshold.into(), tables.noise_floor);
                 (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));
+                self.take(&tables.coefficients);
                 (self.tables_version, self.tables_outcome) = (tables.version, Outcome::Whole);
             }
         }
         outcome
+    }
+
+    /// Takes coefficients for the matrices, as [`Tables`] has them.
+    fn take(&mut self, coefficients: &[i64]) {
+        let lanes = 4 * self.formats().lanes_per_parity;
+        let words: Vec<Vec<i64>> = coefficients.chunks(lanes).map(<[i64]>::to_vec).collect();
+        if !words.is_empty() {
+            // Writable coefficients have one case.
+            let CasePlan { storage, formats, quantised, .. } = self.first_mut();
+            storage.restore(formats, quantised, &words);
+        }
     }
 
     fn refuse(&mut self) {
@@ -108,7 +128,7 @@ impl Intake {
         }
         self.image.push(byte);
         let count = self.image.len();
-        let full = count == image_bytes(plan.scene.sensor.taxels());
+        let full = plan.tables().is_some_and(|tables| count == tables.image_bytes());
         let wrong_head = count == WORD_BYTES && !plan.image().starts_with(&self.image);
         if !(last || full || wrong_head) {
             return None;
@@ -151,8 +171,9 @@ impl Model {
     ///
     /// # Errors
     /// [`FixedError::Tables`]: the hardware's tables are not writable, or such a version is not possible.
-    /// [`FixedError::NoTable`]: the scene differs from the hardware's in more than zero, gain, noise floor and threshold.
-    /// [`FixedError::TableRange`], and what is wrong with the files that it names.
+    /// [`FixedError::NoTable`]: the scene differs from the hardware's in more than zero, gain, noise floor, threshold, and
+    /// thickness and dead taxels where `hardware.table_range` has them.
+    /// [`FixedError::TableRange`], [`FixedError::OutsideRange`], and what is wrong with the files that it names.
     pub fn with_tables(&self, scene: &Scene, version: u16) -> Result<Model, FixedError> {
         let wrong = |field, value, expected| Err(FixedError::Tables { field, value, expected });
         if !self.has_writable_tables() {
@@ -170,6 +191,8 @@ impl Model {
         (own.input.calibration, own.input.tare) = (specimen.input.calibration, specimen.input.tare);
         own.search.noise_floor_MPa = specimen.search.noise_floor_MPa;
         own.threshold = specimen.threshold;
+        (own.sensor.thickness_mm, own.input.dead) = (specimen.sensor.thickness_mm, specimen.input.dead);
+        let quantised = self.quantised_for(&own)?;
         let scale = Scale::new(&own)?;
         let Limits { prepare, noise_floor, threshold } = limits(&own, scale, self.formats().force_exponent)?;
         if prepare.reading_per_MPa != self.prepare.reading_per_MPa {
@@ -177,10 +200,41 @@ impl Model {
         }
         let mut model = self.clone();
         (model.prepare, model.noise_floor, model.threshold) = (prepare, noise_floor, threshold);
+        if let Some(quantised) = quantised {
+            model.first_mut().quantised = quantised;
+        }
         (model.tables_version, model.tables_outcome) = (version, Outcome::Whole);
         model.scene = own;
         model.deviations = Deviations::of_scene(&model.scene)?;
         Ok(model)
+    }
+
+    /// The matrices of a specimen in this hardware's words; `None` where they are not written.
+    fn quantised_for(&self, specimen: &Scene) -> Result<Option<Quantised>, FixedError> {
+        let range = &self.scene.hardware.table_range;
+        if !self.scene.hardware.has_writable_coefficients() {
+            return Ok(None);
+        }
+        let outside = |field, value, allowed| Err(FixedError::OutsideRange { field, value, allowed });
+        let (thickness, dead) = (specimen.sensor.thickness_mm, &specimen.input.dead);
+        if let Some([least, most]) = range.thickness_mm.filter(|[least, most]| !(least..=most).contains(&&thickness)) {
+            let allowed = format!("hardware.table_range.thickness_mm allows {least} to {most}");
+            return outside("sensor.thickness_mm", thickness.to_string(), allowed);
+        }
+        if range.dead_taxels > 0 && dead.len() > range.dead_taxels {
+            let allowed = format!("hardware.table_range.dead_taxels allows {}", range.dead_taxels);
+            return outside("input.dead", format!("{} taxels", dead.len()), allowed);
+        }
+        match requantised(self, specimen)? {
+            Some(quantised) => Ok(Some(quantised)),
+            None => {
+                let allowed = format!(
+                    "with sensor.thickness_mm = {thickness} the coefficients need wider words than this hardware has; build it for a \
+                     wider hardware.table_range"
+                );
+                outside("input.dead", format!("{dead:?}"), allowed)
+            }
+        }
     }
 
     /// The beats of this model's image on the input stream, as codes.
@@ -194,6 +248,17 @@ fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
     let mut other = specimen.clone();
     (other.input.calibration, other.input.tare) = (own.input.calibration.clone(), own.input.tare.clone());
     other.search.noise_floor_MPa = own.search.noise_floor_MPa;
+    let range = &own.hardware.table_range;
+    if range.thickness_mm.is_some() {
+        other.sensor.thickness_mm = own.sensor.thickness_mm;
+    }
+    if range.dead_taxels > 0 {
+        other.input.dead.clone_from(&own.input.dead);
+    }
+    if range.has_coefficients() {
+        // That of the specimen that needs most.
+        other.search.degree = other.search.degree.or(own.search.degree);
+    }
     // The hardware's scale may have been taken from its frames.
     other.input.full_scale_MPa = other.input.full_scale_MPa.or(own.input.full_scale_MPa);
     let same = [

@@ -26,7 +26,7 @@ const SCHEMA: [(&str, &[&str]); 12] = [
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board", "link", "coefficient_check", "search_width", "tables"]),
-    ("hardware.table_range", &["gain"]),
+    ("hardware.table_range", &["gain", "thickness_mm", "dead_taxels"]),
     (
         "input",
         &[
@@ -74,6 +74,7 @@ impl Scene {
         let reader = Reader::new(origin, &root);
         reader.check_names(&SCHEMA)?;
         let sensor = sensor(&reader)?;
+        let input = input(&reader, origin, &sensor)?;
         Ok(Scene {
             name: name(&reader, origin)?,
             medium: medium(&reader)?,
@@ -82,8 +83,8 @@ impl Scene {
             inverse: inverse(&reader)?,
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
-            hardware: hardware(&reader, origin)?,
-            input: input(&reader, origin, &sensor)?,
+            hardware: hardware(&reader, origin, &sensor, input.dead.len())?,
+            input,
             output: output(&reader)?,
             sensor,
         })
@@ -304,7 +305,7 @@ fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
     Ok(reader.typed("fixed.lanes", read, "a multiple of 4 from 4 to 1024")?.map(|lanes| lanes as u32))
 }
 
-fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
+fn hardware(reader: &Reader, origin: &str, sensor: &Sensor, dead: usize) -> Result<HardwareSpec, SceneError> {
     let tables = [("rom", TableStorage::Rom), ("writable", TableStorage::Writable)];
     let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
     Ok(HardwareSpec {
@@ -313,19 +314,36 @@ fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
         coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
         search_width: search_width(reader)?,
         tables: reader.choice("hardware.tables", &tables)?,
-        table_range: table_range(reader)?,
+        table_range: table_range(reader, sensor, dead)?,
     })
 }
 
-/// Without writable tables a range has no meaning.
-fn table_range(reader: &Reader) -> Result<TableRange, SceneError> {
+/// Without writable tables a range has no meaning. The scene itself, with its number of `dead` taxels, is within it.
+fn table_range(reader: &Reader, sensor: &Sensor, dead: usize) -> Result<TableRange, SceneError> {
     let table = "hardware.table_range";
     if let (Some(value), None | Some("rom")) =
         (reader.value(table), reader.value("hardware.tables").map_or(Some("rom"), Value::as_str))
     {
         return Err(reader.wrong(table, value, "left out, or hardware.tables = \"writable\""));
     }
-    Ok(TableRange { gain: range(reader, "hardware.table_range.gain")? })
+    let field = "hardware.table_range.thickness_mm";
+    let thickness_mm = range(reader, field)?;
+    let holds_own = |[least, most]: [f64; 2]| (least..=most).contains(&sensor.thickness_mm);
+    if let (Some(value), Some(false)) = (reader.value(field), thickness_mm.map(holds_own)) {
+        return Err(reader.wrong(
+            field,
+            value,
+            format!("a range that contains sensor.thickness_mm = {}", sensor.thickness_mm),
+        ));
+    }
+    let field = "hardware.table_range.dead_taxels";
+    let most = sensor.taxels() - 1;
+    // In range, so that the cast keeps the value.
+    let dead_taxels = reader.integer(field, 0..=most as i64, Some(0))? as usize;
+    if let Some(value) = reader.value(field).filter(|_| (1..dead).contains(&dead_taxels)) {
+        return Err(reader.wrong(field, value, format!("{dead} to {most}: input.dead has {dead}")));
+    }
+    Ok(TableRange { gain: range(reader, "hardware.table_range.gain")?, thickness_mm, dead_taxels })
 }
 
 /// Two numbers above 0 in ascending order.

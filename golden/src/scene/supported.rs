@@ -23,7 +23,9 @@
 //! dead taxel needs its own matrices, while the subarrays of the engine share theirs: with several subarrays, dead
 //! taxels are rejected.
 //!
-//! Writable tables: not with "adaptive" or the serial engine.
+//! Writable tables: not with "adaptive" or the serial engine. Writable coefficients (`hardware.table_range.thickness_mm`,
+//! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
+//! the bitstream; dead taxels with one subarray, as above.
 //!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
@@ -124,6 +126,25 @@ impl Scene {
                 "false, or search.estimator = learned",
             ),
             rule(several && self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adaptive"),
+            rule(
+                self.hardware.has_writable_coefficients() && self.for_hardware().estimator() == EstimatorKind::Network,
+                "search.estimator",
+                search.estimator.name().to_string(),
+                "search, with hardware.table_range.thickness_mm or dead_taxels: a network was trained for one cover",
+            ),
+            rule(
+                self.hardware.has_writable_coefficients()
+                    && self.hardware.coefficient_check == CoefficientCheck::Signature,
+                "hardware.coefficient_check",
+                "signature".to_string(),
+                "none, with hardware.table_range.thickness_mm or dead_taxels: its signatures are in the bitstream",
+            ),
+            rule(
+                self.hardware.has_writable_dead_taxels() && self.partition.case != Case::WHOLE,
+                "hardware.table_range.dead_taxels",
+                self.hardware.table_range.dead_taxels.to_string(),
+                "0, or partition.case = 0",
+            ),
             rule(
                 self.hardware.has_writable_tables() && self.fixed.input_bits < TABLE_CODE_BITS,
                 "fixed.input_bits",

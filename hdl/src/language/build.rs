@@ -380,10 +380,19 @@ impl<'k> MemoryPort<'k> {
         if data.ty().bits != self.bits {
             data.width_error(format!("a word of the memory has {} bits", self.bits));
         }
+        self.write_part(enable, address, 0, data);
+    }
+
+    /// Writes `data` to the bits from `low` on of the word at `address` at the clock edge if `enable` is 1. The others keep
+    /// their values.
+    pub fn write_part(&self, enable: Expr<'k>, address: Expr<'k>, low: usize, data: Expr<'k>) {
+        if low + data.ty().bits > self.bits {
+            data.width_error(format!("bit {low} and following of a word of {} bits", self.bits));
+        }
         if enable.bits() != 1 {
             enable.width_error(format!("a write enable of {} bits", enable.bits()));
         }
-        let write = Write { enable: enable.id, address: address.id, data: data.id };
+        let write = Write { enable: enable.id, address: address.id, data: data.id, low };
         self.builder.kernel.borrow_mut().memories[self.memory].writes.push(write);
     }
 

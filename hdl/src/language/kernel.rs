@@ -186,6 +186,8 @@ pub(crate) struct Write {
     pub(crate) enable: NodeId,
     pub(crate) address: NodeId,
     pub(crate) data: NodeId,
+    /// Bit of the word at which the data begin; they may be narrower than the word.
+    pub(crate) low: usize,
 }
 
 /// A memory with asynchronous read ports; a register that takes a read directly is its output register.

@@ -37,6 +37,9 @@ struct WritePort {
     enable: usize,
     address: usize,
     data: usize,
+    /// First bit of the word that is written, and number of bits.
+    low: usize,
+    bits: usize,
 }
 
 /// A memory's words, one after the other.
@@ -45,6 +48,19 @@ struct Words {
     words: usize,
     limbs: usize,
     content: Vec<u64>,
+}
+
+/// Replaces up to 64 bits of a word from bit `low` on; says whether any changed.
+fn replace(word: &mut [u64], low: usize, bits: usize, value: u64) -> bool {
+    let (limb, shift) = (low / 64, low % 64);
+    let [wide, new] = [mask(bits), value & mask(bits)].map(|value| u128::from(value) << shift);
+    let mut changed = false;
+    for (own, half) in word[limb..].iter_mut().zip([0, 64]) {
+        let next = *own & !((wide >> half) as u64) | (new >> half) as u64;
+        changed |= *own != next;
+        *own = next;
+    }
+    changed
 }
 
 /// The state of a kernel.
@@ -104,6 +120,8 @@ impl Simulation {
                 enable: node(write.enable),
                 address: node(write.address),
                 data: node(write.data),
+                low: write.low,
+                bits: kernel.ty(write.data).bits,
             }));
         }
         let memories = kernel.memories.iter().map(|memory| {
@@ -194,10 +212,11 @@ impl Simulation {
             let memory = &mut memories[write.memory];
             let address = slots[write.address] as usize;
             if address < memory.words {
-                let data = &slots[write.data..][..memory.limbs];
                 let word = &mut memory.content[address * memory.limbs..][..memory.limbs];
-                changed |= word != data;
-                word.copy_from_slice(data);
+                for (limb, &data) in slots[write.data..][..limbs(write.bits) as usize].iter().enumerate() {
+                    let bits = (write.bits - 64 * limb).min(64);
+                    changed |= replace(word, write.low + 64 * limb, bits, data);
+                }
             }
         }
         let mut at = 0;

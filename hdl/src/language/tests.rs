@@ -239,10 +239,14 @@ fn state() -> Kernel {
     ram.write(up, address, data);
     let read = k.register("read", Type::unsigned(70));
     k.when(down, || read.set(ram.read(address)));
+    let parts = k.memory("parts", 8, 70, Contents::Undefined);
+    parts.write_part(up, address, 0, data.low(33));
+    parts.write_part(down, address, 33, data.slice(33, 37));
+    k.register("joined", Type::unsigned(70)).set(parts.read(address));
     let words = (0..8).map(|word| vec![word * 0x1111_2222_3333, word]).collect();
     let rom = k.memory("rom", 8, 70, Contents::File { name: "rom.hex".into(), words });
     k.wire("direct", rom.read(address));
-    let names = ["count", "held", "one", "two", "read", "direct"];
+    let names = ["count", "held", "one", "two", "read", "joined", "direct"];
     let outputs: Vec<(&str, usize)> = names.iter().map(|name| (*name, if *name == "count" { 4 } else { 70 })).collect();
     bound(k.finish(), &outputs)
 }
@@ -254,6 +258,9 @@ struct State {
     swapped: [Option<Word>; 2],
     ram: [Option<Word>; 8],
     read: Option<Word>,
+    /// Lower 33 and upper 37 bits.
+    parts: [[Option<u64>; 2]; 8],
+    joined: [Option<u64>; 2],
 }
 
 impl Reference for State {
@@ -261,7 +268,12 @@ impl Reference for State {
         let address = inputs[4].number();
         let mut direct = Word::default();
         direct.set_limbs(&[address * 0x1111_2222_3333, address]);
-        vec![self.count.map(Word::from), self.held, self.swapped[0], self.swapped[1], self.read, Some(direct)]
+        let joined = self.joined[0].zip(self.joined[1]).map(|(low, high)| {
+            let mut joined = Word::default();
+            joined.set_limbs(&[low | high << 33, high >> 31]);
+            joined
+        });
+        vec![self.count.map(Word::from), self.held, self.swapped[0], self.swapped[1], self.read, joined, Some(direct)]
     }
 
     fn clock(&mut self, inputs: &[Word]) {
@@ -279,6 +291,13 @@ impl Reference for State {
         self.swapped = [if up { Some(data) } else { self.swapped[1] }, self.swapped[0]];
         if down {
             self.read = self.ram[address];
+        }
+        self.joined = self.parts[address];
+        if up {
+            self.parts[address][0] = Some(data.field(0, 33));
+        }
+        if down {
+            self.parts[address][1] = Some(data.field(33, 37));
         }
         if up {
             self.ram[address] = Some(data);

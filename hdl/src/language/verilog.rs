@@ -219,12 +219,13 @@ impl Printer<'_> {
         let mut reset: BTreeMap<NodeId, [Vec<String>; 2]> = BTreeMap::new();
         for memory in kernel.memories.iter().filter(|_| domain.is_none()) {
             for write in &memory.writes {
-                let assign = format!(
-                    "{}[{}] <= {};",
-                    memory.name,
-                    self.expressions.root(write.address),
-                    self.expressions.root(write.data)
-                );
+                let bits = kernel.ty(write.data).bits;
+                let part = match bits == memory.bits {
+                    true => String::new(),
+                    false => format!("[{}:{}]", write.low + bits - 1, write.low),
+                };
+                let [address, data] = [write.address, write.data].map(|node| self.expressions.root(node));
+                let assign = format!("{}[{address}]{part} <= {data};", memory.name);
                 free[0].push(format!("if ({}) {assign}", self.expressions.root(write.enable)));
             }
         }

@@ -40,6 +40,14 @@ pub struct Pass {
     pub position_x: Wire<In>,
     /// Position of μ2 in mu_max/384, signed, with a network; valid as `position_x`.
     pub position_y: Wire<In>,
+    /// Writes `coefficient_data` to the coefficient memory; only in a reset.
+    pub coefficient_write: Signal<In, Bit>,
+    /// Word of the memory; valid with `coefficient_write`.
+    pub coefficient_word: Wire<In>,
+    /// Pair of lanes; valid with `coefficient_write`.
+    pub coefficient_pair: Wire<In>,
+    /// The coefficients of two lanes; valid with `coefficient_write`.
+    pub coefficient_data: Wire<In>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a row of a layer of a network; `quad_valid` is low.
@@ -98,6 +106,10 @@ impl Pass {
             vector_valid: Default::default(),
             position_x: Wire::new(position_bits()),
             position_y: Wire::new(position_bits()),
+            coefficient_write: Default::default(),
+            coefficient_word: Wire::new(lanes.coefficient_word.width()),
+            coefficient_pair: Wire::new(lanes.coefficient_pair.width()),
+            coefficient_data: Wire::new(lanes.coefficient_data.width()),
             quad: Wire::new(4 * formats.lane_bits as usize),
             layer_valid: Default::default(),
             quad_valid: Default::default(),
@@ -183,6 +195,10 @@ impl Logic for Pass {
         self.scale.position_y.next = self.position_y.val();
 
         self.coefficient_address.d.next = self.pass_program.coefficient_address.val();
+        self.lanes.coefficient_write.next = self.coefficient_write.val();
+        self.lanes.coefficient_word.next = self.coefficient_word.val();
+        self.lanes.coefficient_pair.next = self.coefficient_pair.val();
+        self.lanes.coefficient_data.next = self.coefficient_data.val();
         self.lanes.address.next = self.coefficient_address.q.val();
         self.lanes.operands.next = self.scale.scaled.val();
         self.lanes.valid.next = self.valid.q.val();
@@ -465,6 +481,8 @@ mod tests {
                 }
                 let valid = at > 12 && pause == 0 && sent < whole;
                 let read = passes.input_address(2).and_then(|address| input.get(address).copied());
+                // The coefficients are not written.
+                let [write, word, pair, data] = [Word::default(); 4];
                 let inputs = vec![
                     (at == 0 && cut).into(),
                     Word::from(which as u64),
@@ -474,6 +492,10 @@ mod tests {
                     valid.into(),
                     position[0],
                     position[1],
+                    write,
+                    word,
+                    pair,
+                    data,
                 ];
                 passes.clock(&inputs);
                 all.push(inputs);
@@ -503,7 +525,10 @@ mod tests {
                 block_subject!(
                     Pass::new(&model),
                     changes,
-                    inputs [rst, which, start, input_quad, vector_quad, vector_valid, position_x, position_y],
+                    inputs [
+                        rst, which, start, input_quad, vector_quad, vector_valid, position_x, position_y,
+                        coefficient_write, coefficient_word, coefficient_pair, coefficient_data,
+                    ],
                     outputs [input_address, quad, quad_valid, quad_soon, layer_valid, damaged, issued, step],
                 )
             };

@@ -35,6 +35,14 @@ pub struct Prepare {
     pub frames: Wire<Out>,
     /// Reset of the engine: `rst`, or tables are written.
     pub restart: Signal<Out, Bit>,
+    /// Writes `coefficient_data` to lanes `coefficient_pair` of word `coefficient_word` of the coefficient memory; only with `restart`.
+    pub coefficient_write: Signal<Out, Bit>,
+    /// Word of the memory; valid with `coefficient_write`.
+    pub coefficient_word: Wire<Out>,
+    /// Pair of lanes; valid with `coefficient_write`.
+    pub coefficient_pair: Wire<Out>,
+    /// The coefficients of two lanes; valid with `coefficient_write`.
+    pub coefficient_data: Wire<Out>,
     /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
     pub noise_floor: Wire<Out>,
     /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
@@ -54,6 +62,7 @@ impl Prepare {
     pub fn new(model: &Model) -> Self {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
+        let load = Load::new(model);
         let average = Average::new(taxels, bits, model.prepare.average, model.prepare.mean);
         Prepare {
             clk: Default::default(),
@@ -69,11 +78,15 @@ impl Prepare {
             m_axis_tlast: Default::default(),
             frames: Wire::new(average.frames.width()),
             restart: Default::default(),
+            coefficient_write: Default::default(),
+            coefficient_word: Wire::new(load.coefficient_word.width()),
+            coefficient_pair: Wire::new(load.coefficient_pair.width()),
+            coefficient_data: Wire::new(load.coefficient_data.width()),
             noise_floor: Wire::new(model.floor_bits() as usize),
             threshold: Wire::new(THRESHOLD_BITS),
             version: Wire::new(VERSION_WORD_BITS),
             incomplete: Default::default(),
-            load: Load::new(model),
+            load,
             calibrate: Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables()),
             average,
         }
@@ -87,6 +100,10 @@ impl Logic for Prepare {
         self.load.rst.next = self.rst.val();
         self.load.idle.next = self.idle.val();
         self.restart.next = self.load.restart.val();
+        self.coefficient_write.next = self.load.coefficient_write.val();
+        self.coefficient_word.next = self.load.coefficient_word.val();
+        self.coefficient_pair.next = self.load.coefficient_pair.val();
+        self.coefficient_data.next = self.load.coefficient_data.val();
         self.noise_floor.next = self.load.noise_floor.val();
         self.threshold.next = self.load.threshold.val();
         self.version.next = self.load.version.val();
@@ -159,8 +176,8 @@ mod tests {
             let [table, sums] = self.inputs(inputs);
             let sums = self.sums.outputs(&sums);
             // Without writable tables.
-            let constant = [Some(inputs[0]), None, None, None, None].map(|word| word.or(Some(Word::default())));
-            [&self.table.outputs(&table)[..1], &sums[..3], &sums[4..], &constant].concat()
+            let constant = [Some(Word::default()); 8];
+            [&self.table.outputs(&table)[..1], &sums[..3], &sums[4..], &[Some(inputs[0])], &constant].concat()
         }
 
         fn clock(&mut self, inputs: &[Word]) {
@@ -177,7 +194,7 @@ mod tests {
             inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, idle],
             outputs [
                 s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast, frames, restart, noise_floor, threshold, version,
-                incomplete,
+                incomplete, coefficient_write, coefficient_word, coefficient_pair, coefficient_data,
             ],
         )
     }
@@ -221,8 +238,8 @@ mod tests {
         let of = |inputs: &[Word]| {
             let stream = [4, 2, 1, 3].map(|input| Some(inputs[input]));
             let zero = Some(Word::default());
-            stream.into_iter().chain([zero, Some(inputs[0]), zero, zero, zero, zero]).collect()
+            stream.into_iter().chain([zero, Some(inputs[0])]).chain([zero; 8]).collect()
         };
-        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 10, of));
+        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 14, of));
     }
 }

@@ -18,7 +18,8 @@ use crate::report::{self, LoadReport};
   dermis load hand.toml left-hand.toml --tables-version 7 --out left-hand.tables --json
 
 The hardware is built from hand.toml with hardware.tables = \"writable\". A specimen's scene differs from it in input.calibration,
-input.tare, search.noise_floor_MPa and threshold.min_force_N; anything else is refused by its field. A driver writes the bytes
+input.tare, search.noise_floor_MPa and threshold.min_force_N, and in sensor.thickness_mm and input.dead within
+hardware.table_range; anything else is refused by its field. A driver writes the bytes
 one after the other to register `tables` of a core (`dermis registers`); `dermis cosim hand.toml --tables left-hand.toml` does
 so in simulation and compares the forces.")]
 pub struct Arguments {

@@ -68,10 +68,11 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
     }
 }
 
-/// `eight-by-eight` with writable tables.
-fn writable() -> Model {
+/// `eight-by-eight` with writable tables, for one cover or several.
+fn writable(thickness_mm: Option<[f64; 2]>) -> Model {
     let mut scene = scene("eight-by-eight").0;
     scene.hardware.tables = TableStorage::Writable;
+    scene.hardware.table_range.thickness_mm = thickness_mm;
     scene.input.full_scale_MPa = Some(1.0);
     Model::new(&scene).unwrap()
 }
@@ -79,7 +80,8 @@ fn writable() -> Model {
 #[test]
 fn writable_tables_are_clean_with_the_same_waivers() {
     let core = CoreShape { bus: Bus::AxiLite, words: 1 };
-    for generated in [generate(&writable()).unwrap(), generate_core(&writable(), core).unwrap()] {
+    let covers = generate(&writable(Some([2.0, 4.0]))).unwrap();
+    for generated in [generate(&writable(None)).unwrap(), generate_core(&writable(None), core).unwrap(), covers] {
         lint(&generated).unwrap_or_else(|log| panic!("{log}"));
     }
 }

@@ -50,11 +50,11 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
     let models = [
         // Six subarrays, groups of rows, a list of columns, a sliding mean.
         small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n[input]\naverage = 3\nmean = \"sliding\"\n"),
-        // Three flips more of every matrix, columns left out; zero and gain in a memory that is written.
+        // Three flips more of every matrix; coefficients, zero and gain in memories that are written.
         small(
             "dead",
             "[search]\nmu_max = 0.1\ndegree = 1\n[input]\ndead = [[4, 7], [0, 2]]\nfull_scale_MPa = 1.0\n[fixed]\nlanes = 16\n\
-             prune_bits = 10\n[hardware]\ntables = \"writable\"\n",
+             [hardware]\ntables = \"writable\"\n[hardware.table_range]\nthickness_mm = [2.5, 3.5]\n",
         ),
         // All of the paper's cases, chosen per frame.
         small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\n"),

@@ -18,7 +18,13 @@ use tempfile::TempDir;
 const SCENE: &str = "name = \"writable\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
                      thickness_mm = 2.0\n[hardware]\ntables = \"writable\"\n[hardware.table_range]\ngain = [0.5, 2.0]\n";
 
-/// A specimen of the array of `scene`: another zero and gain for each taxel, a noise floor, a threshold.
+/// Coefficients are written.
+const COVERS: &str = "thickness_mm = [1.5, 2.5]\ndead_taxels = 3\n[input]\nfull_scale_MPa = 1.0\n";
+/// The same with two subarrays, which share them.
+const PARTS: &str = "thickness_mm = [2.0, 2.5]\n[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\n";
+
+/// A specimen of the array of `scene`: another zero and gain for each taxel, a noise floor, a threshold; another cover and dead
+/// taxels if its hardware has them.
 fn specimen(scene: &Scene) -> (TempDir, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let mut random = fastrand::Rng::with_seed(5);
@@ -30,6 +36,12 @@ fn specimen(scene: &Scene) -> (TempDir, Scene) {
     let mut specimen = scene.clone();
     specimen.input.calibration = Some(path);
     (specimen.search.noise_floor_MPa, specimen.threshold.min_force_N) = (0.01, 0.02);
+    if let Some([_, most]) = scene.hardware.table_range.thickness_mm {
+        specimen.sensor.thickness_mm = most;
+    }
+    if scene.hardware.table_range.dead_taxels > 0 {
+        specimen.input.dead = vec![[0, 0], [1, 2]];
+    }
     (folder, specimen)
 }
 
@@ -68,7 +80,7 @@ fn sequence(scene: &Scene) -> (Hardware, Vec<Vector>) {
         vector.codes = beats(&image, own.formats().code_bits);
         (vector, image)
     };
-    let [(other, other_image), (broken, broken_image)] = [damaged(1), damaged(40)];
+    let [(other, other_image), (broken, broken_image)] = [1, own.image().len() - 20].map(damaged);
     let mut refused = built.clone();
     assert_eq!(refused.load(&other_image), Outcome::Refused);
     let mut spoiled = own.clone();
@@ -107,6 +119,9 @@ fn hardware_with_loaded_tables_is_the_specimen_s() {
     for (more, what) in [(full_scale, "whole array"), (sliding, "two subarrays, sliding mean")] {
         is_equal(&Scene::parse(&format!("{SCENE}{more}"), "writable.toml").unwrap(), what);
     }
+    for (more, what) in [(COVERS, "another cover, dead taxels"), (PARTS, "another cover, two subarrays")] {
+        is_equal(&Scene::parse(&format!("{SCENE}{more}"), "writable.toml").unwrap(), what);
+    }
     let contacts = "[search]\nmu_max = 0.3\n[partition]\ncase = \"contacts\"\n[input]\nfull_scale_MPa = 1.0\n";
     let (scene, _network) = with_network(&format!("{SCENE}{contacts}"), &[7]);
     assert_eq!(scene.hardware.tables, TableStorage::Writable);
@@ -115,7 +130,7 @@ fn hardware_with_loaded_tables_is_the_specimen_s() {
 
 #[test]
 fn a_defect_is_found() {
-    let scene = Scene::parse(&format!("{SCENE}[input]\nfull_scale_MPa = 1.0\n"), "writable.toml").unwrap();
+    let scene = Scene::parse(&format!("{SCENE}{COVERS}"), "writable.toml").unwrap();
     let (mut hardware, vectors) = sequence(&scene);
     let defects = [
         // A damaged image counts as whole.
@@ -126,6 +141,10 @@ fn a_defect_is_found() {
         Change::value("", "receive__floor", |k| k.constant(20, 0)),
         // The threshold stays that of the bitstream.
         Change::value("", "forces__threshold", |k| k.constant(32, 0)),
+        // The coefficients stay those of the bitstream.
+        Change::value("pass", "lanes__coefficient_write", |k| k.constant(1, 0)),
+        // The upper of two coefficients is that of the lower.
+        Change::value("pass", "lanes__coefficient_data", |k| k.named("coefficient_data").low(18).repeat(2)),
     ];
     for defect in defects {
         let what = defect.to_string();

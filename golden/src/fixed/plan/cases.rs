@@ -10,11 +10,14 @@
 use super::contents::{CasePlan, ContactPlan, Dropped, Plan};
 use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
+use super::specimens::specimens;
 use super::widths::{widths, Shape};
 use crate::board::{Board, EngineKind};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::{Prepare, Scale};
+use crate::fixed::words::formats::Formats;
+use crate::fixed::words::quantised::Quantised;
 use crate::learned::Window;
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::misfit::Misfit;
@@ -23,6 +26,10 @@ use crate::scene::Scene;
 use crate::segment::{self, Segmenter};
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
+
+/// By how much norms of other sets of dead taxels may exceed those of the sets that are looked at; without it one specimen in
+/// four would be refused.
+const DEAD_MARGIN: f64 = 1.25;
 
 /// The plan of a scene, whether it fits its board or not.
 ///
@@ -45,7 +52,10 @@ pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Resul
     }
     match scene.partition.case {
         Case::Adaptive => several(scene, &scale, degree, &board),
-        case => of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)]),
+        case => {
+            let others = other_shapes(scene, case, degree)?;
+            of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)], &others)
+        }
     }
 }
 
@@ -62,7 +72,7 @@ fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -
     // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
     let whole = shape(scene, Case::WHOLE, degree)?;
     if !listed {
-        let alone = of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
+        let alone = of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())], &[])?;
         if !short(&alone).is_empty() {
             return Ok(alone);
         }
@@ -74,7 +84,7 @@ fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -
     let all: Vec<usize> = (0..choices.len()).collect();
     let of = |subset: &[usize]| -> Result<Plan, FixedError> {
         let pick = |&at: &usize| (choices[at], shapes[at].clone());
-        of_shapes(scene, scale, board, subset.iter().map(pick).collect())
+        of_shapes(scene, scale, board, subset.iter().map(pick).collect(), &[])
     };
     if listed {
         return of(&all);
@@ -99,10 +109,16 @@ fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -
     Ok(plan)
 }
 
-/// The plan of `cases`; where there are several, case 0 is the first.
-fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shape)>) -> Result<Plan, FixedError> {
+/// The plan of `cases`; where there are several, case 0 is the first. Its formats serve `others` as well.
+fn of_shapes(
+    scene: &Scene,
+    scale: &Scale,
+    board: &Board,
+    cases: Vec<(Case, Shape)>,
+    others: &[Shape],
+) -> Result<Plan, FixedError> {
     let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
-    let (designs, resources) = fit(scene, &shapes, board, widths(scene, &shapes, board)?);
+    let (designs, resources) = fit(scene, &shapes, board, widths(scene, &shapes, others, board)?);
     let force_exponent = designs[0].formats.force_exponent;
     let mut scene = scene.clone();
     let mut planned = Vec::with_capacity(cases.len());
@@ -116,6 +132,10 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
     if let [only] = cases[..] {
         scene.partition.case = only;
     }
+    if scene.hardware.table_range.has_coefficients() {
+        // That of the specimen that needs most; all have it.
+        scene.search.degree = Some(planned[0].formats.degree).filter(|degree| *degree > 0);
+    }
     let Limits { prepare, noise_floor, threshold } = limits(&scene, scale.clone(), force_exponent)?;
     Ok(Plan {
         noise_floor,
@@ -124,7 +144,10 @@ fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shap
         tables_version: 0,
         tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
-        dead: planned[0].parts[0].local_indices(&scene.input.dead),
+        dead: match scene.hardware.has_writable_dead_taxels() {
+            true => Vec::new(),
+            false => planned[0].parts[0].local_indices(&scene.input.dead),
+        },
         resources,
         by_contact: (scene.partition.case == Case::Contacts).then(|| ContactPlan {
             segmenter: Segmenter::new(&scene.sensor, segment::WIDTH),
@@ -177,6 +200,30 @@ pub fn limits(scene: &Scene, scale: Scale, force_exponent: i32) -> Result<Limits
 /// The subarrays of a case; contacts are found on the whole array.
 fn parts(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {
     subarrays(if case == Case::Contacts { Case::WHOLE } else { case }, sensor)
+}
+
+/// The shapes of the specimens at the bounds of `hardware.table_range`.
+fn other_shapes(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Vec<Shape>, FixedError> {
+    let of = |specimen: &Scene| {
+        let shape = shape(specimen, case, degree)?;
+        let margin = scene.hardware.table_range.dead_taxels > 0 && !specimen.input.dead.is_empty();
+        Ok(if margin { shape.scaled(DEAD_MARGIN) } else { shape })
+    };
+    specimens(scene).iter().map(of).collect()
+}
+
+/// The matrices of a specimen in the words of the hardware of `plan`, which has one case; `None` if they need others.
+///
+/// # Errors
+/// Those of the matrices.
+pub fn requantised(plan: &Plan, specimen: &Scene) -> Result<Option<Quantised>, FixedError> {
+    let (own, case) = (plan.first(), plan.first().case);
+    let mut others = other_shapes(&plan.scene, case, None)?;
+    others.push(shape(&plan.scene, case, None)?);
+    let widths = widths(&plan.scene, &[shape(specimen, case, None)?], &others, &plan.board)?;
+    let Formats { lanes_per_parity, groups, .. } = own.formats;
+    let same = Formats { lanes_per_parity, groups, ..widths.formats } == own.formats;
+    Ok(widths.quantised.into_iter().next().filter(|_| same))
 }
 
 /// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series

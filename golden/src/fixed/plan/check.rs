@@ -53,7 +53,7 @@ fn read_addresses(case: &CasePlan, section: &Section) -> Vec<usize> {
 
 /// The signature after all words that the passes of a section read.
 pub fn signature(case: &CasePlan, section: &Section) -> u32 {
-    let words = case.storage.memory(&case.formats, &case.quantised);
+    let words = case.memory();
     let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
     read_addresses(case, section).into_iter().fold(START, |s, address| step(s, parities[address - case.storage.base]))
 }

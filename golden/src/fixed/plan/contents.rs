@@ -36,7 +36,7 @@ pub struct Plan {
     pub tables_version: u16,
     /// What became of the last image of tables.
     pub tables_outcome: Outcome,
-    /// Dead taxels, row-major in the array, ascending.
+    /// Dead taxels, row-major in the array, ascending; none where they are written, as gains of 0.
     pub dead: Vec<usize>,
     /// Segmentation and window, where each contact has a μ of its own.
     pub by_contact: Option<ContactPlan>,
@@ -296,6 +296,11 @@ impl CasePlan {
     /// The paper's number of the case, 0 to 3; 0 for a partition that the paper does not number.
     pub fn number(&self) -> u32 {
         (0..4).find(|&number| Case::numbered(number) == Some(self.case)).unwrap_or(0) as u32
+    }
+
+    /// The words of the case in the coefficient memory: one coefficient per lane.
+    pub fn memory(&self) -> Vec<Vec<i64>> {
+        self.storage.memory(&self.formats, &self.quantised)
     }
 
     /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays.

@@ -11,8 +11,13 @@ use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::input::sliding::most_frames;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableStorage};
+use crate::scene::{
+    CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableRange, TableStorage,
+};
 use crate::symmetry::quads::Quads;
+
+/// Covers for which writable coefficients are counted where the scene has none, over its own thickness.
+const OTHER_COVERS: [f64; 2] = [0.8, 1.25];
 
 /// An optional feature of the hardware.
 #[derive(Debug)]
@@ -66,6 +71,22 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     add("writable tables", written, "zero, gain, noise floor and threshold".into(), &|| {
         let writable = (TableStorage::Writable, Some(full_scale));
         plain(&with(&|s| (s.hardware.tables, s.input.full_scale_MPa) = writable))
+    });
+    let range = &scene.hardware.table_range;
+    let covers = range.thickness_mm.unwrap_or(OTHER_COVERS.map(|of_own| of_own * scene.sensor.thickness_mm));
+    let own = [
+        range.thickness_mm.map(|[least, most]| format!("covers of {least} to {most} mm")),
+        (range.dead_taxels > 0).then(|| format!("up to {} dead taxels", range.dead_taxels)),
+    ];
+    let own = own.into_iter().flatten().collect::<Vec<_>>().join(", ");
+    let cover = format!("covers of {:.3} to {:.3} mm", covers[0], covers[1]);
+    let coefficients = scene.hardware.has_writable_coefficients();
+    add("writable coefficients", coefficients, set(coefficients, own, &cover), &|| {
+        let writable = |s: &mut Scene| {
+            (s.hardware.tables, s.input.full_scale_MPa) = (TableStorage::Writable, Some(full_scale));
+            s.hardware.table_range.thickness_mm = Some(covers);
+        };
+        plain(&with(&writable))
     });
     let (average, slides, power) = (input.average > 0, input.slides(), input.average.max(1));
     let frames = if slides { most_frames(power) } else { 1 << power };
@@ -147,7 +168,12 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         without("sliding mean", &|s| s.input.mean = MeanKind::Block);
     }
     if written {
-        without("writable tables", &|s| s.hardware.fix_tables());
+        without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
+    }
+    if coefficients {
+        without("writable coefficients", &|s| {
+            s.hardware.table_range = TableRange { gain: s.hardware.table_range.gain, ..TableRange::default() }
+        });
     }
     if dead > 0 {
         without("dead taxels", &|s| s.input.dead.clear());

@@ -51,19 +51,22 @@ fn parallel(
     board: &Board,
 ) -> (Vec<LaidOut>, Resources) {
     let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
+    let written = scene.hardware.table_range.has_coefficients();
     let network = quantised.iter().find_map(|quantised| quantised.network.as_ref());
     // Rows of a layer leave before the next ones are complete.
     let most = network.and_then(|network| network.layers.iter().map(|layer| layer.inputs + 1).min()).unwrap_or(quads);
     let most = most.min(quads);
     let largest = |quantised: &Quantised| quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
     let threshold = |quantised: &Quantised, matrix: Matrix| match matrix.kind {
-        _ if network.is_some() => 0,
+        // Nor is anything left out that another specimen may need.
+        _ if network.is_some() || written => 0,
         Kind::InverseHigh | Kind::InverseLow => largest(quantised) >> prune_bits,
         Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
         Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => 0,
     };
-    let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1;
+    // Coefficients are written to one memory.
+    let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1 && !written;
     let with = |groups: usize, narrow: bool| {
         let lanes_per_parity = quads.div_ceil(groups);
         let lay_out = |(quantised, shape): (&Quantised, &Shape)| {

@@ -8,6 +8,7 @@
 //! | module | content |
 //! |---|---|
 //! | [`widths`] | widths and scales from the norms of the matrices |
+//! | [`specimens`] | the specimens for which widths and scales are made, where coefficients are written |
 //! | [`storage`] | the coefficient memory: which columns are kept, in which order |
 //! | [`resources`] | memories and multipliers, as the synthesiser counts them |
 //! | [`serial`] | what the serial engine has in place of lanes: memories, words, cycles |
@@ -35,6 +36,7 @@ pub mod interval;
 pub mod program;
 pub mod resources;
 pub mod serial;
+pub mod specimens;
 pub mod storage;
 pub mod timeline;
 pub mod widths;

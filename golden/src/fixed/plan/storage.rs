@@ -14,7 +14,7 @@
 //! The layers of a network are further matrices of other sizes, each with its own number of groups.
 
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
-use crate::fixed::words::quantised::{coefficient, Quantised};
+use crate::fixed::words::quantised::{coefficient, with_operand, Quantised};
 use crate::fixed::words::schedule::{accumulations, layer, schedule, Kind, Matrix, Product, Target};
 
 /// Least number of cycles from a quad's row of low limbs to its row of high limbs: the first is written one cycle after
@@ -225,13 +225,32 @@ impl Storage {
                 })
                 .collect()
         };
-        let mut words = Vec::with_capacity(self.words());
-        for (index, &matrix) in self.matrices.iter().enumerate() {
-            for (group, columns) in self.columns[index].iter().enumerate() {
-                words.extend(columns.iter().map(|&j| word(matrix, group, j)));
+        self.places().map(|(matrix, group, j)| word(matrix, group, j)).collect()
+    }
+
+    /// Takes the words of the case, as [`Storage::memory`] gives them, for the matrices.
+    pub fn restore(&self, formats: &Formats, quantised: &mut Quantised, words: &[Vec<i64>]) {
+        let lanes = formats.lanes_per_parity;
+        for ((matrix, group, j), word) in self.places().zip(words) {
+            let [rows, columns] = quantised.size(matrix, formats.quads);
+            let Some(own) = quantised.blocks_mut(matrix) else { continue };
+            for (lane, &operand) in word.iter().enumerate() {
+                let (parity, i) = (lane / lanes, group * lanes + lane % lanes);
+                if i < rows {
+                    let c = &mut own.parity[parity][i * columns + j];
+                    *c = with_operand(formats, matrix.kind, *c, operand);
+                }
             }
         }
-        words
+    }
+
+    /// Matrix, group of rows and column of each word.
+    fn places(&self) -> impl Iterator<Item = (Matrix, usize, usize)> + '_ {
+        self.matrices.iter().zip(&self.columns).flat_map(|(&matrix, groups)| {
+            let of = move |(group, columns): (usize, &'_ Vec<usize>)| (group, columns.clone());
+            let all = groups.iter().enumerate().map(of);
+            all.flat_map(move |(group, columns)| columns.into_iter().map(move |j| (matrix, group, j)))
+        })
     }
 }
 

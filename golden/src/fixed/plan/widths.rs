@@ -39,6 +39,14 @@ impl Shape {
     pub fn quads(&self) -> Quads {
         Quads { rows: self.matrices.sensor.rows, cols: self.matrices.sensor.cols }
     }
+
+    /// The shape with all coefficients times `factor`.
+    pub fn scaled(mut self, factor: f64) -> Shape {
+        for matrix in [&mut self.matrices.cz_pinv, &mut self.matrices.ax, &mut self.matrices.ay] {
+            *matrix *= faer::Scale(factor);
+        }
+        self
+    }
 }
 
 /// The widths of all words, and the matrices in these widths.
@@ -51,23 +59,25 @@ pub struct Widths {
 
 /// Quantises the matrices of a scene's cases and derives the widths of all words; `board` has the multipliers. Where
 /// there are several cases the whole array's is the first. They share the hardware: every word has the width and scale
-/// that serves all of them. The formats are those of the first case with a lane for each row.
+/// that serves all of them, and `others`, whose coefficients may be written at run time. The formats are those of the first
+/// case with a lane for each row.
 ///
 /// # Errors
 /// [`FixedError::Format`] if a word needs more than the 48-bit accumulator, or a norm of A more headroom than the data
 /// word has.
-pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, FixedError> {
+pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) -> Result<Widths, FixedError> {
     let spec = &scene.fixed;
     let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
-    let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
+    let all: &Vec<&Shape> = &shapes.iter().chain(others).collect();
+    let degree = all.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
     // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
     let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits[1]);
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
-    let mut quantised = quantised(scene, shapes, coef_bits)?;
+    let mut quantised = quantised(scene, all, coef_bits)?;
     let composed = composed(scene)?;
-    // The largest of a bound over all cases.
+    // The largest of a bound over all cases and others.
     let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
-        let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
+        let each = quantised.iter().zip(all).map(|(quantised, shape)| of(quantised, shape.quads().len()));
         each.max().unwrap_or(0)
     };
     // The same in all cases: a scene with dead taxels, which break the symmetry, has one case and one subarray.
@@ -123,7 +133,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         has: a_exponent.max(0) as u32,
     })?;
 
-    let each = quantised.iter().zip(shapes);
+    let each = quantised.iter().zip(all);
     let growths: Vec<Vec<f64>> =
         each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
     let headroom = if composed.is_empty() { 0 } else { headroom(&growths, degree) };
@@ -199,6 +209,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         let missing = FixedError::Format { what: "network", needs: formats.lane_bits + 1, has: formats.lane_bits };
         quantised[0].network = Some(network.ok_or(missing)?);
     }
+    quantised.truncate(shapes.len());
     Ok(Widths { formats, quantised })
 }
 
@@ -231,11 +242,12 @@ fn search_width(scene: &Scene, board: &Board, degree: usize, shapes: &[Shape]) -
 }
 
 /// The matrices of all cases as stored, on one scale.
-fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
+fn quantised(scene: &Scene, shapes: &[&Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
     let spec = &scene.fixed;
     let scale = -4.0 / 3.0 * scene.search.mu_max;
     // A dead taxel breaks the mirror symmetry: then every flip is tried, that of the symmetry first.
-    let looked_at = if scene.input.dead.is_empty() { 1 } else { 4 };
+    let range = &scene.hardware.table_range;
+    let looked_at = if scene.input.dead.is_empty() && range.dead_taxels == 0 { 1 } else { 4 };
     let folded = |shape: &Shape, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
         let scaled = |Flipped { flip, parity }| {
             let parity: [Vec<f64>; 4] = parity;
@@ -244,12 +256,14 @@ fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quan
         (0..looked_at).map(|other| scaled(parity_blocks(shape.quads(), matrix, own ^ other))).collect()
     };
     let inverses: Vec<_> = shapes.iter().map(|shape| folded(shape, &shape.matrices.cz_pinv, 0, 1.0)).collect();
-    let pair = |shape: &Shape| {
+    let pair = |shape: &&Shape| {
         [folded(shape, &shape.matrices.ax, FLIP_X, scale), folded(shape, &shape.matrices.ay, FLIP_Y, scale)]
     };
     let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
-    let mut inverses = quantise(&inverses, spec.inverse_bits).into_iter();
-    let mut pairs = quantise(&pairs, coef_bits).into_iter();
+    // What is zero here need not be so in another specimen.
+    let all_flips = range.has_coefficients();
+    let mut inverses = quantise(&inverses, spec.inverse_bits, all_flips).into_iter();
+    let mut pairs = quantise(&pairs, coef_bits, all_flips).into_iter();
     let mut next =
         || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()?, network: None });
     shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()

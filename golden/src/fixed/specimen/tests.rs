@@ -1,6 +1,10 @@
 use super::*;
+use crate::fixed::words::formats::HALVINGS;
 use crate::frame::Frame;
 use crate::input::calibration::Calibration;
+use crate::matrices::Matrices;
+use crate::random::Random;
+use crate::reconstruct::Reconstruction;
 
 const HARDWARE: &str = "
 name = \"hardware\"
@@ -147,4 +151,108 @@ fn errors_are_expected_and_features_counted_of_writable_hardware_too() {
     let written = all.iter().find(|feature| feature.name == "writable tables").unwrap();
     let without = written.without_feature.as_ref().unwrap().resources.multipliers();
     assert!(written.with_feature.is_none() && without <= model.resources.multipliers());
+}
+
+/// The hardware of covers and dead taxels.
+fn of_range(rows: usize, range: &str) -> Scene {
+    let text = HARDWARE.replace("rows = 4", &format!("rows = {rows}")).replace("gain = [0.5, 2.0]", range);
+    Scene::parse(&text, "range").unwrap()
+}
+
+fn with(scene: &Scene, thickness_mm: f64, dead: &[[usize; 2]]) -> Scene {
+    let mut specimen = scene.clone();
+    (specimen.sensor.thickness_mm, specimen.input.dead) = (thickness_mm, dead.to_vec());
+    specimen
+}
+
+/// Even and odd arrays; the coefficients are those of the specimen, to the bit, and its forces near those of hardware for it alone.
+#[test]
+fn coefficients_of_another_cover_are_loaded() {
+    let ranges = ["thickness_mm = [1.0, 3.0]", "thickness_mm = [1.5, 2.5]\ndead_taxels = 2", "dead_taxels = 3"];
+    for (rows, range) in [4, 5].into_iter().flat_map(|rows| ranges.map(|range| (rows, range))) {
+        let scene = of_range(rows, range);
+        let hardware = Model::new(&scene).unwrap();
+        assert!(!hardware.storage().is_pruned(hardware.formats().quads) && hardware.dead.is_empty());
+        let covers = if scene.hardware.table_range.thickness_mm.is_some() { [1.7, 2.5] } else { [2.0, 2.0] };
+        let dead: &[[usize; 2]] = if scene.hardware.table_range.dead_taxels > 0 { &[[0, 1], [2, 3]] } else { &[] };
+        for thickness_mm in covers {
+            let specimen = with(&scene, thickness_mm, dead);
+            let own = hardware.with_tables(&specimen, 3).unwrap();
+            let mut loaded = hardware.clone();
+            assert_eq!(loaded.load(&own.image()), Outcome::Whole, "{range}");
+            assert_eq!(loaded.cases()[0].memory(), own.cases()[0].memory());
+            // A force over one taxel, with shear.
+            let matrices = Matrices::of(&specimen, &specimen.sensor, 3).unwrap();
+            let stress = |taxel| {
+                let [z, x, y] = [&matrices.cz, &matrices.cx, &matrices.cy].map(|c| c[(taxel, 8)]);
+                5.0 * (z + 0.3 * x - 0.2 * y)
+            };
+            let stress = (0..scene.sensor.taxels()).map(stress).collect();
+            let frame = Frame::from_stress("f", &specimen.sensor, stress).unwrap();
+            let codes = own.readings(std::slice::from_ref(&frame)).unwrap();
+            assert_eq!(loaded.run(&codes), own.run(&codes));
+            assert_ne!(hardware.run(&codes).beats, own.run(&codes).beats);
+            // Hardware of this specimen alone has other words; its μ is two steps of the search away at most.
+            let mut alone = own.scene.clone();
+            (alone.hardware.tables, alone.hardware.table_range) = Default::default();
+            let alone = Model::new(&alone).unwrap().reconstruct(&frame).unwrap();
+            let own = own.reconstruct(&frame).unwrap();
+            let step = scene.search.mu_max / f64::from(3 << HALVINGS);
+            for (own, alone) in own.subarrays[0].mu.iter().zip(alone.subarrays[0].mu) {
+                assert!((own - alone).abs() < 2.5 * step, "{rows} {range} {thickness_mm}: {own} {alone}");
+            }
+            let forces =
+                |of: &Reconstruction| [&of.forces_N.fx, &of.forces_N.fy, &of.forces_N.fz].map(Vec::clone).concat();
+            let (own, alone) = (forces(&own), forces(&alone));
+            let largest = alone.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+            for (own, alone) in own.iter().zip(&alone) {
+                assert!((own - alone).abs() < 5.0 * step * largest, "{rows} {range} {thickness_mm}: {own} {alone}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_specimen_outside_the_range_is_refused_by_field() {
+    let scene = of_range(4, "thickness_mm = [1.5, 2.5]\ndead_taxels = 2");
+    let hardware = Model::new(&scene).unwrap();
+    let error = |scene: &Scene| hardware.with_tables(scene, 1).unwrap_err().to_string();
+    assert_eq!(
+        error(&with(&scene, 2.6, &[])),
+        "sensor.thickness_mm: 2.6 is not possible with these tables: hardware.table_range.thickness_mm allows 1.5 to 2.5"
+    );
+    assert_eq!(
+        error(&with(&scene, 2.0, &[[0, 0], [0, 1], [0, 2]])),
+        "input.dead: 3 taxels is not possible with these tables: hardware.table_range.dead_taxels allows 2"
+    );
+    let mut other = with(&scene, 2.0, &[]);
+    other.sensor.pitch_x_mm = 2.5;
+    assert!(error(&other).starts_with("sensor: differs"));
+    // Without a range the cover is that of the bitstream.
+    let mut fixed = super::super::Model::new(&of_range(4, "gain = [0.5, 2.0]")).unwrap();
+    let thick = with(&fixed.scene, 2.5, &[]);
+    assert!(fixed.with_tables(&thick, 1).unwrap_err().to_string().starts_with("sensor: differs"));
+    // An image of the same array without coefficients, or of another cover, is for other hardware.
+    assert_eq!(fixed.load(&super::super::Model::new(&thick).unwrap().image()), Outcome::Refused);
+    assert_eq!(fixed.load(&hardware.image()), Outcome::Refused);
+}
+
+/// Whatever is within the range needs no wider words than the specimens at its bounds.
+#[test]
+fn specimens_within_the_range_are_accepted() {
+    let mut random = Random::new(24);
+    for range in ["thickness_mm = [1.0, 3.0]", "thickness_mm = [1.6, 2.4]\ndead_taxels = 4"] {
+        let scene = of_range(6, range);
+        let hardware = Model::new(&scene).unwrap();
+        let own = &scene.hardware.table_range;
+        let taxels: Vec<[usize; 2]> = (0..scene.sensor.taxels()).map(|taxel| [taxel / 5, taxel % 5]).collect();
+        for _ in 0..60 {
+            let [least, most] = own.thickness_mm.unwrap();
+            let drawn = (0..own.dead_taxels).filter_map(|_| random.pick(&taxels).copied());
+            let dead: std::collections::BTreeSet<[usize; 2]> = drawn.collect();
+            let dead: Vec<[usize; 2]> = dead.into_iter().collect();
+            let specimen = with(&scene, random.between(least, most), &dead);
+            assert!(hardware.with_tables(&specimen, 1).is_ok(), "{range}: {specimen:?}");
+        }
+    }
 }

@@ -7,8 +7,12 @@
 //! | 0 | layout, 32 bits: [`Plan::table_layout`](crate::fixed::Plan::table_layout) | [`MAGIC`], 16 bits |
 //! | 1 | threshold in force LSBs, 32 bits | version, 15 bits |
 //! | 2 | noise floor in codes, `input_bits` | 0 |
-//! | 3 … | zero of a taxel, `code_bits` signed | its gain, 18 bits signed ([`prepare`](super::prepare)) |
+//! | 3 … | zero of a taxel, `code_bits` signed | its gain, 18 bits signed ([`prepare`](super::prepare)); 0 for a dead one |
+//! | then … | coefficient of a lane, 18 bits signed | that of the next lane, 18 bits signed |
 //! | last | 0, 16 bits | CRC-32 |
+//!
+//! Coefficients are there if [`TableRange`](crate::scene::TableRange) has some: word after word of their memory, in each two
+//! lanes at a time.
 //!
 //! One byte is a beat, which is no code: its top bit differs from the next ([`beats`]). The image's last has `tlast`.
 //! The stage takes an image when all frames before it have been sent. Word 0 is compared before anything is written. From then
@@ -16,6 +20,7 @@
 //! what was there, if its word 0 is wrong or it comes between the codes of a frame, else tables that are not whole. After an image the engine is as after a reset.
 
 use super::prepare::GAIN_BITS;
+use crate::fixed::words::formats::MULTIPLIER_BITS;
 
 /// Bytes of a word.
 pub const WORD_BYTES: usize = 6;
@@ -25,11 +30,13 @@ pub const MAGIC: u16 = u16::from_le_bytes(*b"DT");
 pub const VERSION_BITS: u32 = 15;
 /// Words before those of the taxels.
 pub const HEAD_WORDS: usize = 3;
+/// Coefficients in a word.
+pub const COEFFICIENTS_PER_WORD: usize = 2;
 /// Bytes of the CRC.
 const CRC_BYTES: usize = 4;
 
 /// What an image holds, or the bitstream.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tables {
     /// Version, [`VERSION_BITS`] bits; 0 is that of the bitstream.
     pub version: u16,
@@ -41,6 +48,9 @@ pub struct Tables {
     pub zero: Vec<i32>,
     /// Gain of each taxel, 18 bits signed, 2^−16 per LSB.
     pub gain: Vec<i32>,
+    /// Coefficients, 18 bits signed, an even number: the words of their memory one after the other, lane 0 first. None if they
+    /// are not written.
+    pub coefficients: Vec<i64>,
 }
 
 /// Whether tables are whole, and whether the last image was refused.
@@ -66,7 +76,13 @@ impl Tables {
             u64::from(self.version) << 32 | u64::from(self.threshold),
             self.noise_floor as u64,
         ];
-        let words = head.into_iter().chain(self.zero.iter().zip(&self.gain).map(entry)).chain([0]);
+        let pair = |pair: &[i64]| {
+            let one = |c: i64| c as u64 & ((1 << MULTIPLIER_BITS) - 1);
+            pair.iter().rev().fold(0, |word, &c| word << MULTIPLIER_BITS | one(c))
+        };
+        let taxels = self.zero.iter().zip(&self.gain).map(entry);
+        let coefficients = self.coefficients.chunks(COEFFICIENTS_PER_WORD).map(pair);
+        let words = head.into_iter().chain(taxels).chain(coefficients).chain([0]);
         let mut bytes: Vec<u8> = words.flat_map(|word| word.to_le_bytes().into_iter().take(WORD_BYTES)).collect();
         bytes.truncate(bytes.len() - CRC_BYTES);
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
@@ -84,28 +100,34 @@ impl Tables {
         if word(0) != Some(u64::from(MAGIC) << 32 | u64::from(layout)) {
             return Outcome::Refused;
         }
-        let whole = image.len() == image_bytes(self.zero.len())
+        let whole = image.len() == self.image_bytes()
             && image.split_last_chunk().is_some_and(|(all, crc)| crc32fast::hash(all) == u32::from_le_bytes(*crc));
         if !whole {
             return Outcome::Broken;
         }
-        let signed = |word: u64, low: u32, bits: u32| ((word << (64 - low - bits)) as i64 >> (64 - bits)) as i32;
+        let signed = |word: u64, low: u32, bits: u32| (word << (64 - low - bits)) as i64 >> (64 - bits);
         let words = |index| word(index).unwrap_or_default();
-        let entries: Vec<u64> = (0..self.zero.len()).map(|taxel| words(HEAD_WORDS + taxel)).collect();
+        let taxels = self.zero.len();
+        let entries: Vec<u64> = (0..taxels).map(|taxel| words(HEAD_WORDS + taxel)).collect();
+        let coefficient = |index: usize| {
+            let (word, at) = (index / COEFFICIENTS_PER_WORD, index % COEFFICIENTS_PER_WORD);
+            signed(words(HEAD_WORDS + taxels + word), at as u32 * MULTIPLIER_BITS, MULTIPLIER_BITS)
+        };
         *self = Tables {
             version: (words(1) >> 32) as u16 & ((1 << VERSION_BITS) - 1),
             threshold: words(1) as u32,
             noise_floor: words(2) as u32 as i32,
-            zero: entries.iter().map(|&entry| signed(entry, 0, code_bits)).collect(),
-            gain: entries.iter().map(|&entry| signed(entry, code_bits, GAIN_BITS)).collect(),
+            zero: entries.iter().map(|&entry| signed(entry, 0, code_bits) as i32).collect(),
+            gain: entries.iter().map(|&entry| signed(entry, code_bits, GAIN_BITS) as i32).collect(),
+            coefficients: (0..self.coefficients.len()).map(coefficient).collect(),
         };
         Outcome::Whole
     }
-}
 
-/// Bytes of an image for so many taxels.
-pub fn image_bytes(taxels: usize) -> usize {
-    (HEAD_WORDS + taxels + 1) * WORD_BYTES
+    /// Bytes of the image.
+    pub fn image_bytes(&self) -> usize {
+        (HEAD_WORDS + self.zero.len() + self.coefficients.len() / COEFFICIENTS_PER_WORD + 1) * WORD_BYTES
+    }
 }
 
 /// The beats of an image on the input stream, as codes: just beyond the largest of `code_bits` bits, of which there are
@@ -122,15 +144,16 @@ mod tests {
 
     fn tables(version: u16) -> Tables {
         let zero = vec![-(1 << 19), 5, -1, (1 << 19) - 1];
-        Tables { version, threshold: 4_000_000_000, noise_floor: 900, zero, gain: vec![1 << 16, -(1 << 17), 0, -1] }
+        let (gain, coefficients) = (vec![1 << 16, -(1 << 17), 0, -1], vec![-(1 << 17), (1 << 17) - 1, -1, 7]);
+        Tables { version, threshold: 4_000_000_000, noise_floor: 900, zero, gain, coefficients }
     }
 
     #[test]
     fn an_image_is_read_back_and_a_damaged_one_is_not_whole() {
         let (own, layout) = (tables(77), 0xdead_beef);
         let image = own.image(layout, BITS);
-        assert_eq!(image.len(), image_bytes(4));
-        let empty = Tables { zero: vec![0; 4], gain: vec![0; 4], ..tables(1) };
+        assert_eq!(image.len(), own.image_bytes());
+        let empty = Tables { zero: vec![0; 4], gain: vec![0; 4], coefficients: vec![0; 4], ..tables(1) };
         let mut read = empty.clone();
         assert_eq!(read.load(&image, layout, BITS), Outcome::Whole);
         assert_eq!(read, own);

@@ -38,7 +38,7 @@ pub const GAIN_BITS: u32 = GAIN_FRACTION + 2;
 pub struct Prepare {
     /// Zero of each taxel in codes, if the scene has a tare frame or a table.
     pub zero: Option<Vec<i32>>,
-    /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table.
+    /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table; 0 for a dead taxel that is written.
     pub gain: Option<Vec<i32>>,
     /// k: 2^average frames are added up, or the last gain of a sliding mean is 2^−average.
     pub average: u32,
@@ -112,9 +112,15 @@ impl Prepare {
         let unit = f64::from(1u32 << GAIN_FRACTION);
         let word = |gain: &f64| (gain / scale.largest * unit).round() as i32;
         let offset = scale.table.as_ref().map(|table| table.offset.as_slice());
+        let mut gain: Option<Vec<i32>> = scale.table.as_ref().map(|table| table.gain.iter().map(word).collect());
+        if let Some(gain) = gain.as_mut().filter(|_| scene.hardware.has_writable_dead_taxels()) {
+            for [row, col] in &scene.input.dead {
+                gain[row * scene.sensor.cols + col] = 0;
+            }
+        }
         Prepare {
             zero: scale.tare.as_deref().or(offset).map(codes),
-            gain: scale.table.as_ref().map(|table| table.gain.iter().map(word).collect()),
+            gain,
             average: scene.input.average,
             mean: scene.input.mean,
             reading_per_MPa,

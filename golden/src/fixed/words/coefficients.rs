@@ -17,7 +17,7 @@
 //!                  Σ over the distinct images n of j of (−1)^{p·n} M(image k of i, image n of j)
 //! ```
 //! If dead taxels come in mirrored pairs, one symmetry remains: a flip whose coefficients all round to zero is not
-//! stored.
+//! stored, unless coefficients are written at run time.
 //!
 //! | matrix | stored as | width | LSB |
 //! |---|---|---|---|
@@ -122,8 +122,8 @@ pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f6
 }
 
 /// Quantises folded matrices to signed integers of `bits` bits with one common exponent, the largest at which all fit.
-/// The first flip of a matrix is always kept, another flip only if a coefficient of it is not zero.
-pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
+/// The first flip of a matrix is always kept, another flip only if a coefficient of it is not zero, or `all_flips` are asked for.
+pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32, all_flips: bool) -> Vec<Blocks> {
     let all = folded.iter().flatten().flat_map(|flipped| flipped.parity.iter().flatten());
     let largest = all.fold(0.0f64, |m, c| m.max(c.abs()));
     let limit = ((1i64 << (bits - 1)) - 1) as f64;
@@ -136,8 +136,9 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
         flip: *flip,
         parity: std::array::from_fn(|p| parity[p].iter().map(|c| (c * 2f64.powi(exponent)).round() as i64).collect()),
     };
-    let kept =
-        |(index, flipped): &(usize, Flipped<i64>)| *index == 0 || flipped.parity.iter().flatten().any(|&c| c != 0);
+    let kept = |(index, flipped): &(usize, Flipped<i64>)| {
+        *index == 0 || all_flips || flipped.parity.iter().flatten().any(|&c| c != 0)
+    };
     let blocks = |flips: &Vec<Flipped<f64>>| {
         let flips = flips.iter().map(integers).enumerate().filter(kept).map(|(_, flipped)| flipped).collect();
         Blocks { flips, exponent }
@@ -211,11 +212,13 @@ mod tests {
     fn quantised_coefficients_fill_their_word() {
         let own = Flipped { flip: 0, parity: [vec![0.3], vec![-0.7], vec![0.0], vec![0.1]] };
         let other = |flip, value: f64| Flipped { flip, parity: [vec![0.0], vec![value], vec![0.0], vec![0.0]] };
-        let blocks = &quantise(&[vec![own, other(1, 0.003), other(3, -0.02)]], 8)[0];
+        let folded = [vec![own, other(1, 0.003), other(3, -0.02)]];
+        let blocks = &quantise(&folded, 8, false)[0];
         assert_eq!(blocks.exponent, 7);
         assert_eq!(blocks.flips[0].parity[1], vec![-90]);
         // All coefficients of flip 1 round to zero.
         assert_eq!(blocks.flips(), [0, 3]);
+        assert_eq!(quantise(&folded, 8, true)[0].flips(), [0, 1, 3]);
         assert_eq!(blocks.norm(1), 93);
     }
 }

@@ -74,3 +74,14 @@ pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
         Kind::Ax | Kind::Ay | Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => c,
     }
 }
+
+/// Coefficient `c` of a matrix of `kind` with the limb that `operand`, an 18-bit word of a lane, holds of it.
+pub fn with_operand(formats: &Formats, kind: Kind, c: i64, operand: i64) -> i64 {
+    let low = formats.inverse_low_bits;
+    let mask = (1 << low) - 1;
+    match kind {
+        Kind::InverseHigh => operand << low | c & mask,
+        Kind::InverseLow => c & !mask | operand >> (formats.limb_align - low) & mask,
+        Kind::Ax | Kind::Ay | Kind::Layer(_) | Kind::Mask | Kind::Bias(_) => operand,
+    }
+}

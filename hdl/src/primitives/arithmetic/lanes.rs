@@ -10,6 +10,7 @@ use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Net, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::frame::load::{CoefficientPlaces, PAIR_BITS};
 use crate::primitives::pass::pass_program::{programs, Control};
 use crate::wire::Wire;
 
@@ -44,6 +45,15 @@ pub struct Lanes {
     pub valid: Signal<In, Bit>,
     /// Last product of an accumulation, and what else [`Control`] has. Valid with `valid`.
     pub control: Wire<In>,
+    /// Writes `coefficient_data` to the coefficient memory ([`Load`](crate::primitives::Load)); only in a reset. Not read where the
+    /// coefficients are not written.
+    pub coefficient_write: Signal<In, Bit>,
+    /// Word of the memory; valid with `coefficient_write`.
+    pub coefficient_word: Wire<In>,
+    /// Pair of lanes; valid with `coefficient_write`.
+    pub coefficient_pair: Wire<In>,
+    /// The coefficients of two lanes; valid with `coefficient_write`.
+    pub coefficient_data: Wire<In>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a row.
@@ -66,7 +76,10 @@ pub const LOW_FILE: &str = "low_coefficients.hex";
 kernel_block!(
     Lanes,
     clock clk,
-    inputs [rst, which, address, operands, valid, control],
+    inputs [
+        rst, which, address, operands, valid, control, coefficient_write, coefficient_word, coefficient_pair,
+        coefficient_data,
+    ],
     outputs [quad, quad_valid, quad_soon, layer_valid, damaged]
 );
 
@@ -84,6 +97,8 @@ struct Shape {
     memory: Vec<Vec<i64>>,
     /// The last so many words are in a memory of their own, with so many bits per lane.
     narrow: (usize, usize),
+    /// Where coefficients are written.
+    written: CoefficientPlaces,
     /// Expected signatures of the sections, with the coefficient check.
     signatures: Option<Vec<u32>>,
     control: Control,
@@ -93,15 +108,15 @@ impl Lanes {
     /// The lanes of `model`, with the coefficients of all its cases in one memory.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (model.formats(), model.cases());
-        let words = |case: &CasePlan| case.storage.memory(&case.formats, &case.quantised);
         let programs = programs(model);
         Lanes::of(&Shape {
             per_parity: formats.lanes_per_parity,
             lane_bits: formats.lane_bits as usize,
             groups: programs.iter().map(|(case, _)| case.formats.groups).collect(),
             last_rows: programs.iter().map(|(case, _)| last_rows(&case.formats)).collect(),
-            memory: cases.iter().flat_map(words).collect(),
+            memory: cases.iter().flat_map(CasePlan::memory).collect(),
             narrow: (model.first().storage.narrow, formats.limb_align as usize),
+            written: CoefficientPlaces::new(model),
             signatures: model
                 .has_coefficient_check()
                 .then(|| programs.iter().map(|(case, section)| signature(case, section)).collect()),
@@ -110,6 +125,7 @@ impl Lanes {
     }
 
     fn of(shape: &Shape) -> Self {
+        let [address_bits, pair_bits] = shape.written.bits();
         let block = Lanes {
             clk: Default::default(),
             rst: Default::default(),
@@ -118,6 +134,10 @@ impl Lanes {
             operands: Wire::new(4 * M),
             valid: Default::default(),
             control: Wire::new(shape.control.bits()),
+            coefficient_write: Default::default(),
+            coefficient_word: Wire::new(address_bits),
+            coefficient_pair: Wire::new(pair_bits),
+            coefficient_data: Wire::new(PAIR_BITS),
             quad: Wire::new(4 * shape.lane_bits),
             quad_valid: Default::default(),
             quad_soon: Default::default(),
@@ -178,7 +198,15 @@ impl Shape {
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
         let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
         let (valid, control) = (k.input("valid", 1), k.input("control", self.control.bits()));
-        let coefficients = self.coefficients(&k, address);
+        let [address_bits, pair_bits] = self.written.bits();
+        let write = [
+            ("coefficient_write", 1),
+            ("coefficient_word", address_bits),
+            ("coefficient_pair", pair_bits),
+            ("coefficient_data", PAIR_BITS),
+        ];
+        let write = write.map(|(name, bits)| k.input(name, bits));
+        let coefficients = self.coefficients(&k, address, write);
 
         let later = |name: &str, value| {
             let state = k.state(name, bit, rst, 0);
@@ -224,7 +252,7 @@ impl Shape {
     }
 
     /// One coefficient per lane, three cycles after its address.
-    fn coefficients<'k>(&self, k: &'k Builder, address: Expr<'k>) -> Expr<'k> {
+    fn coefficients<'k>(&self, k: &'k Builder, address: Expr<'k>, write: [Expr<'k>; 4]) -> Expr<'k> {
         let (lanes, (narrow, low)) = (4 * self.per_parity, self.narrow);
         let (wide_words, low_words) = self.memory.split_at(self.memory.len() - narrow);
         let file = |name: &str, words| Contents::File { name: name.to_owned(), words };
@@ -234,6 +262,7 @@ impl Shape {
         if narrow == 0 {
             let memory =
                 k.memory("memory", words.len(), lanes * M, file(MEMORY_FILE, words)).holds(Holds::Coefficients);
+            let memory = self.written(memory, write);
             return read("coefficients", memory, k.delay("at", address));
         }
         let zeros = wide_words.len();
@@ -259,6 +288,19 @@ impl Shape {
             own.slice(low, M - low).concat(own.low(low) | (low_bits & shows.repeat(low)))
         };
         k.wire("coefficients", concat(&(0..lanes).rev().map(lane).collect::<Vec<_>>()))
+    }
+
+    /// The memory with its write port, where coefficients are written. Nothing is read during the reset in which they are.
+    fn written<'k>(&self, memory: MemoryPort<'k>, write: [Expr<'k>; 4]) -> MemoryPort<'k> {
+        let [write, address, pair, coefficients] = write;
+        if self.written.words == 0 {
+            return memory;
+        }
+        let memory = memory.unchecked();
+        for own in 0..self.written.pairs {
+            memory.write_part(write & pair.is(own as u64), address, own * PAIR_BITS, coefficients);
+        }
+        memory
     }
 
     /// Rows that leave after the present group; a counter of the groups where there are several.
@@ -347,6 +389,7 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::plan::check::{parity, step};
+    use dermis_golden::fixed::stages::load::COEFFICIENTS_PER_WORD;
 
     use super::*;
     use crate::language::testbench::{check, Reference};
@@ -364,6 +407,7 @@ mod tests {
             last_rows: vec![2, 1],
             memory,
             narrow: (0, 0),
+            written: CoefficientPlaces::default(),
             signatures: Some(vec![0x1234_5678, 0xabcd_ef01]),
             control: Control { layers: false, opens: true },
         }
@@ -420,13 +464,21 @@ mod tests {
                 row(0, false),
                 row(2, false),
                 row(2, true),
-                self.signature.map(|signature| Word::from(Some(signature) != expected)),
+                match expected {
+                    None => Some(Word::default()),
+                    Some(expected) => self.signature.map(|signature| Word::from(signature != expected)),
+                },
                 quad.map(|heads| Word::of_fields(&heads, self.shape.lane_bits)),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             let rst = inputs[0].number() == 1;
+            if inputs[6].number() == 1 {
+                let [word, pair] = [7, 8].map(|k| inputs[k].number() as usize);
+                let lanes = &mut self.shape.memory[word][pair * COEFFICIENTS_PER_WORD..];
+                lanes.iter_mut().zip([0, 1]).for_each(|(lane, k)| *lane = inputs[9].signed(k, M));
+            }
             let per_parity = self.shape.per_parity;
             let [left, added, captured] = self.pipe.clone();
             let ends = |beat: &Beat| beat.valid && beat.control & 1 == 1;
@@ -479,12 +531,16 @@ mod tests {
     fn stimulus(shape: &Shape, cycles: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(9);
         let (mut case, mut first, mut since) = (0u64, true, 0);
+        // Cycles since a write, after which the next address is that of a product.
+        let mut rested = 0;
         let inputs = |cycle: usize| {
             let rst = cycle < 3 || random.u16(..150) == 0;
             if rst {
                 (case, first) = (random.u64(..2), true);
             }
-            let valid = !rst && since > 0 && random.u8(..4) > 0;
+            let write = rst && shape.written.words > 0;
+            rested = if write { 0 } else { rested + 1 };
+            let valid = !rst && since > 0 && rested > 3 && random.u8(..4) > 0;
             let last = since > shape.per_parity && random.u8(..4) == 0;
             let opens = first && random.bool();
             let mut control = u64::from(last);
@@ -496,13 +552,20 @@ mod tests {
                 first = last;
             }
             let operands: Vec<i64> = (0..4).map(|_| random.i64(-(1 << (M - 1))..1 << (M - 1))).collect();
+            let coefficients: Vec<i64> =
+                (0..COEFFICIENTS_PER_WORD).map(|_| random.i64(-(1 << (M - 1))..1 << (M - 1))).collect();
+            let mut place = |count: usize| Word::from(random.u64(..count.max(1) as u64));
             vec![
                 rst.into(),
                 case.into(),
-                random.u64(..shape.memory.len() as u64).into(),
+                place(shape.memory.len()),
                 Word::of_fields(&operands, M),
                 valid.into(),
                 control.into(),
+                write.into(),
+                place(shape.written.words),
+                place(shape.written.pairs),
+                Word::of_fields(&coefficients, M),
             ]
         };
         (0..cycles).map(inputs).collect()
@@ -519,6 +582,14 @@ mod tests {
         shape.narrow = (7, 5);
         shape.memory[13..].iter_mut().flatten().for_each(|coefficient| *coefficient &= 31);
         is_equal(shape);
+    }
+
+    #[test]
+    fn coefficients_are_written_in_a_reset() {
+        let shape = shape();
+        let written =
+            CoefficientPlaces { words: shape.memory.len(), pairs: 4 * shape.per_parity / COEFFICIENTS_PER_WORD };
+        is_equal(Shape { signatures: None, written, ..shape });
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Takes images of tables from the input stream and passes frames on.
 
-use dermis_golden::fixed::stages::load::{Tables, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES};
+use dermis_golden::fixed::stages::load::{Tables, COEFFICIENTS_PER_WORD, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES};
 use dermis_golden::fixed::stages::prepare::GAIN_BITS;
+use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
 use dermis_golden::fixed::Plan;
 use dermis_golden::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -14,7 +16,7 @@ use crate::wire::Wire;
 
 /// ```text
 /// s_axis --> code? --> m_axis
-///               '----> byte --> word of 6 bytes --> zero and gain of a taxel, threshold, noise floor, version
+///               '----> byte --> word of 6 bytes --> zero and gain of a taxel, two coefficients, threshold, noise floor, version
 ///                        '----> CRC-32 ----------> whole
 /// ```
 /// Without writable tables the stream passes through, and all but `restart`, which is `rst`, is constant 0.
@@ -55,6 +57,15 @@ pub struct Load {
     pub taxel: Wire<Out>,
     /// Zero in the low bits, gain above; valid with `write`.
     pub entry: Wire<Out>,
+    /// Writes `coefficient_data` to the lanes `coefficient_pair` of word `coefficient_word` of their memory. Constant 0 where they
+    /// are not written.
+    pub coefficient_write: Signal<Out, Bit>,
+    /// Word of the coefficient memory; valid with `coefficient_write`.
+    pub coefficient_word: Wire<Out>,
+    /// Pair of lanes; valid with `coefficient_write`.
+    pub coefficient_pair: Wire<Out>,
+    /// The coefficients of two lanes, the lower first, 18 bits each; valid with `coefficient_write`.
+    pub coefficient_data: Wire<Out>,
     /// Noise floor in codes, `input_bits` wide, ≥ 0, one bit where it is not written; valid unless `restart`.
     pub noise_floor: Wire<Out>,
     /// Threshold in force LSBs, 32 bits; valid unless `restart`.
@@ -71,8 +82,8 @@ kernel_block!(
     clock clk,
     inputs [rst, idle, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
     outputs [
-        s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, restart, write, taxel, entry, noise_floor, threshold,
-        version, incomplete,
+        s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, restart, write, taxel, entry, coefficient_write,
+        coefficient_word, coefficient_pair, coefficient_data, noise_floor, threshold, version, incomplete,
     ]
 );
 
@@ -88,7 +99,15 @@ impl Load {
     pub fn new(plan: &Plan) -> Self {
         let formats = plan.formats();
         let (code_bits, taxels) = (formats.code_bits as usize, plan.scene.sensor.taxels());
-        let shape = Shape { code_bits, input_bits: formats.input_bits as usize, taxels, layout: plan.table_layout() };
+        let coefficients = CoefficientPlaces::new(plan);
+        let [address_bits, pair_bits] = coefficients.bits();
+        let shape = Shape {
+            code_bits,
+            input_bits: formats.input_bits as usize,
+            taxels,
+            coefficients,
+            layout: plan.table_layout(),
+        };
         let block = Load {
             clk: Default::default(),
             rst: Default::default(),
@@ -105,6 +124,10 @@ impl Load {
             write: Default::default(),
             taxel: Wire::new(count_bits(taxels)),
             entry: Wire::new(code_bits + GAIN_BITS as usize),
+            coefficient_write: Default::default(),
+            coefficient_word: Wire::new(address_bits),
+            coefficient_pair: Wire::new(pair_bits),
+            coefficient_data: Wire::new(PAIR_BITS),
             noise_floor: Wire::new(plan.floor_bits() as usize),
             threshold: Wire::new(THRESHOLD_BITS),
             version: Wire::new(VERSION_WORD_BITS),
@@ -118,11 +141,42 @@ impl Load {
     }
 }
 
+/// Width of two coefficients.
+pub const PAIR_BITS: usize = COEFFICIENTS_PER_WORD * MULTIPLIER_BITS as usize;
+
+/// Places of the coefficients that are written.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CoefficientPlaces {
+    /// Words of the coefficient memory; 0 where it is not written.
+    pub words: usize,
+    /// Pairs of lanes in a word.
+    pub pairs: usize,
+}
+
+impl CoefficientPlaces {
+    /// Those of `plan`.
+    pub fn new(plan: &Plan) -> Self {
+        match plan.scene.hardware.has_writable_coefficients() {
+            false => CoefficientPlaces::default(),
+            true => CoefficientPlaces {
+                words: plan.cases().iter().map(|case| case.storage.words()).sum(),
+                pairs: Quads::LANES * plan.formats().lanes_per_parity / COEFFICIENTS_PER_WORD,
+            },
+        }
+    }
+
+    /// Widths of the index of a word and of a pair.
+    pub fn bits(&self) -> [usize; 2] {
+        [self.words, self.pairs].map(count_bits)
+    }
+}
+
 /// Widths and sizes.
 struct Shape {
     code_bits: usize,
     input_bits: usize,
     taxels: usize,
+    coefficients: CoefficientPlaces,
     layout: u32,
 }
 
@@ -140,10 +194,15 @@ impl Shape {
         let k = wires("load", self.code_bits, "The tables are in the bitstream: the stream passes through.");
         k.input("idle", 1);
         k.wire("restart", k.named("rst"));
+        let [address_bits, pair_bits] = self.coefficients.bits();
         let constants = [
             ("write", 1),
             ("taxel", count_bits(self.taxels)),
             ("entry", self.code_bits + GAIN_BITS as usize),
+            ("coefficient_write", 1),
+            ("coefficient_word", address_bits),
+            ("coefficient_pair", pair_bits),
+            ("coefficient_data", PAIR_BITS),
             ("noise_floor", 1),
             ("threshold", THRESHOLD_BITS),
             ("version", VERSION_WORD_BITS),
@@ -180,7 +239,9 @@ impl Shape {
         let in_frame = k.state("in_frame", bit, rst, 0);
         let rests = k.state("rests", Type::unsigned(count_bits(REST as usize + 1)), rst, 0);
         let place = k.state("place", Type::unsigned(count_bits(WORD_BYTES)), rst, 0);
-        let words = HEAD_WORDS + self.taxels + 1;
+        let CoefficientPlaces { words: memory_words, pairs } = self.coefficients;
+        let first_coefficient = HEAD_WORDS + self.taxels;
+        let words = first_coefficient + memory_words * pairs + 1;
         let index = k.state("index", Type::unsigned(count_bits(words)), rst, 0);
         let (word, crc) = (k.register("word", Type::unsigned(word_bits)), k.register("crc", Type::unsigned(32)));
         let took_last = k.register("took_last", bit);
@@ -254,17 +315,47 @@ impl Shape {
         let new_state = done.mux(k.constant(1, 1).concat(*new_version), k.constant(1 + VERSION_BITS as usize, 0));
         states.write(done | right_head, zero, new_state);
 
-        let first = k.constant(index.bits(), HEAD_WORDS as u64);
-        let is_entry = !index.less(first) & !index.is(words as u64 - 1);
-        k.wire("write", ends_word & is_entry);
+        let [first, after] = [HEAD_WORDS, first_coefficient].map(|number| k.constant(index.bits(), number as u64));
+        k.wire("write", ends_word & !index.less(first) & index.less(after));
         k.wire("taxel", (*index - first).low(count_bits(self.taxels)));
         k.wire("entry", word.low(bits + GAIN_BITS as usize));
+        self.write_coefficients(&k, rst, ends_word & !index.less(after) & !index.is(words as u64 - 1), over, *word);
         k.wire("restart", rst | *writing);
         k.wire("noise_floor", floors.read(zero));
         k.wire("threshold", thresholds.read(zero));
         k.wire("version", (*refused | !whole).concat(state.low(VERSION_BITS as usize)));
         k.wire("incomplete", !whole);
         k.finish()
+    }
+
+    /// Two coefficients of each `word` that `is_pair`, written a cycle later, while the word still stands.
+    fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, over: Expr<'k>, word: Expr<'k>) {
+        let [address_bits, pair_bits] = self.coefficients.bits();
+        let CoefficientPlaces { words, pairs } = self.coefficients;
+        if words == 0 {
+            k.wire("coefficient_write", k.constant(1, 0));
+            k.wire("coefficient_word", k.constant(address_bits, 0));
+            k.wire("coefficient_pair", k.constant(pair_bits, 0));
+            k.wire("coefficient_data", k.constant(PAIR_BITS, 0));
+            return;
+        }
+        let is_written = k.state("is_written", Type::unsigned(1), rst, 0);
+        let address = k.state("address", Type::unsigned(address_bits), rst, 0);
+        let pair = k.state("pair", Type::unsigned(pair_bits), rst, 0);
+        is_written.set(is_pair);
+        let is_last = k.wire("is_last_pair", pair.is(pairs as u64 - 1));
+        k.when(*is_written, || {
+            pair.set(is_last.mux(k.constant(pair_bits, 0), pair.plus(1)));
+            k.when(is_last, || address.set(address.plus(1)));
+        });
+        k.when(over, || {
+            address.set(k.constant(address_bits, 0));
+            pair.set(k.constant(pair_bits, 0));
+        });
+        k.wire("coefficient_write", *is_written & !rst);
+        k.wire("coefficient_word", *address);
+        k.wire("coefficient_pair", *pair);
+        k.wire("coefficient_data", word.low(PAIR_BITS));
     }
 }
 

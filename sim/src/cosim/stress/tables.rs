@@ -10,8 +10,20 @@ use super::testbench::{Burst, Testbench};
 /// Longest reset in cycles.
 const LONGEST_RESET: u64 = 40;
 
-/// Random tables for the hardware of `model`.
-fn random_tables(model: &Model, random: &mut fastrand::Rng) -> Tables {
+/// The coefficients of specimens of the hardware of `model`, with which no word overflows: of its scene, and of its thinnest and
+/// thickest cover if they are written.
+fn coefficients(model: &Model) -> Vec<Vec<i64>> {
+    let covers = model.scene.hardware.table_range.thickness_mm.into_iter().flatten();
+    let specimen = |thickness_mm: f64| {
+        let mut scene = model.scene.clone();
+        scene.sensor.thickness_mm = thickness_mm;
+        model.with_tables(&scene, 1).ok()?.tables()
+    };
+    model.tables().into_iter().chain(covers.filter_map(specimen)).map(|tables| tables.coefficients).collect()
+}
+
+/// Random tables for the hardware of `model`, with some of these coefficients.
+fn random_tables(model: &Model, coefficients: &[Vec<i64>], random: &mut fastrand::Rng) -> Tables {
     let code_bits = model.formats().code_bits;
     let mut entries = |bits: u32| {
         let half = 1i32 << (bits - 1);
@@ -24,20 +36,21 @@ fn random_tables(model: &Model, random: &mut fastrand::Rng) -> Tables {
         noise_floor: (random.u32(..) >> (33 - code_bits)) as i32 >> random.u32(..code_bits),
         zero,
         gain,
+        coefficients: random.choice(coefficients).cloned().unwrap_or_default(),
     }
 }
 
 /// Frames back to back and images between them: of which half are right, and the others damaged, too short, too long, for other
 /// hardware, between the codes of a frame, broken off by a frame or by a reset.
 pub(super) fn tables(bench: &mut Testbench, model: &Model, random: &mut fastrand::Rng, cycles: u64) {
-    let code_bits = model.formats().code_bits;
+    let (code_bits, coefficients) = (model.formats().code_bits, coefficients(model));
     while bench.can_continue() && bench.cycle() < cycles {
         let mut rates = HandshakeRates::random(random);
         for _ in 0..random.usize(..4) {
             let sample = random.usize(..bench.sample_count());
             bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
         }
-        let mut image = random_tables(model, random).image(model.table_layout(), code_bits);
+        let mut image = random_tables(model, &coefficients, random).image(model.table_layout(), code_bits);
         let inner = random.usize(WORD_BYTES..image.len());
         let sample = random.usize(..bench.sample_count());
         let frame = Burst::whole(bench.sample(sample), sample);

@@ -1,5 +1,7 @@
+use std::ops::Range;
+
 use dermis_golden::fixed::stages::load::{beats, Outcome};
-use dermis_golden::fixed::Intake;
+use dermis_golden::fixed::{Intake, Model};
 
 use super::*;
 use crate::language::testbench::{block_subject, check, check_with_defects, random_words, Pipeline, Reference};
@@ -21,6 +23,8 @@ struct Loader {
     /// What stands in the tables, whole or not.
     floor: u64,
     threshold: u64,
+    /// Number and content of a word of coefficients that ended in the cycle before.
+    pair: Option<(usize, u64)>,
     reset: bool,
 }
 
@@ -34,6 +38,7 @@ impl Loader {
             rests: 0,
             floor: plan.noise_floor as u64,
             threshold: plan.threshold as u64,
+            pair: None,
             reset: false,
         }
     }
@@ -53,6 +58,16 @@ impl Loader {
     fn is_byte(&self, inputs: &[Word]) -> bool {
         let bits = self.bits();
         inputs[2].field(bits, 1) != inputs[2].field(bits - 1, 1)
+    }
+
+    fn first_coefficient(&self) -> usize {
+        HEAD_WORDS + self.plan.scene.sensor.taxels()
+    }
+
+    /// Numbers of the words with coefficients.
+    fn coefficient_words(&self) -> Range<usize> {
+        let CoefficientPlaces { words, pairs } = CoefficientPlaces::new(&self.plan);
+        self.first_coefficient()..self.first_coefficient() + words * pairs
     }
 
     /// Tables are written: the image's first word was right.
@@ -80,7 +95,9 @@ impl Reference for Loader {
         let [rst, last, ready] = [0, 4, 5].map(|k| inputs[k].number() == 1);
         let bit = |bit: bool| self.reset.then(|| Word::from(bit));
         let [takes, passes] = self.moves(inputs);
-        let entries = HEAD_WORDS..HEAD_WORDS + self.plan.scene.sensor.taxels();
+        let entries = HEAD_WORDS..self.first_coefficient();
+        let pair = self.pair.filter(|_| !rst);
+        let pairs = CoefficientPlaces::new(&self.plan).pairs;
         let entry = self.written().filter(|(number, _)| entries.contains(number) && !rst);
         // While an image is written the tables are not whole.
         let (outcome, version) = match self.writing() {
@@ -96,6 +113,10 @@ impl Reference for Loader {
             bit(entry.is_some()),
             entry.map(|(number, _)| Word::from((number - HEAD_WORDS) as u64)),
             entry.map(|(_, word)| Word::from(low(word, self.bits() + GAIN_BITS as usize))),
+            bit(pair.is_some()),
+            pair.map(|(number, _)| Word::from((number / pairs) as u64)),
+            pair.map(|(number, _)| Word::from((number % pairs) as u64)),
+            pair.map(|(_, word)| Word::from(low(word, PAIR_BITS))),
             bit(rst || self.writing()),
             Some(Word::from(self.floor)),
             Some(Word::from(self.threshold)),
@@ -108,12 +129,15 @@ impl Reference for Loader {
         let [rst, idle, valid, last, ready] = [0, 1, 3, 4, 5].map(|k| inputs[k].number() == 1);
         let [takes, passes] = self.moves(inputs);
         let written = self.written();
+        let coefficients = self.coefficient_words();
+        self.pair = written.filter(|(number, _)| coefficients.contains(number));
+        self.pair = self.pair.map(|(number, word)| (number - coefficients.start, word));
         let Loader { plan, intake, .. } = self;
         if rst {
             // The byte taken last has not been used.
             intake.reset(plan, 0);
-            let (took, in_frame, rests, reset) = (None, false, 0, true);
-            *self = Loader { took, in_frame, rests, reset, ..self.clone() };
+            let (took, in_frame, rests, pair, reset) = (None, false, 0, None, true);
+            *self = Loader { took, in_frame, rests, pair, reset, ..self.clone() };
             return;
         }
         match self.took.take() {
@@ -174,6 +198,9 @@ fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
                             noise_floor: random.i32(..1 << 8),
                             zero: entries(&mut random, bits),
                             gain: entries(&mut random, GAIN_BITS),
+                            coefficients: (0..COEFFICIENTS_PER_WORD * loader.coefficient_words().len())
+                                .map(|_| random.i64(-(1 << 17)..1 << 17))
+                                .collect(),
                         };
                         let mut image = tables.image(plan.table_layout(), bits);
                         if random.u8(..3) == 0 {
@@ -217,10 +244,14 @@ fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
 
 #[test]
 fn an_image_is_taken_as_the_model_takes_it() {
-    let model = model(2, 3, WRITABLE);
-    let stimulus = stimulus(&model, 40_000);
+    is_taken(&model(2, 3, WRITABLE));
+    is_taken(&model(2, 3, &format!("{WRITABLE}[hardware.table_range]\nthickness_mm = [1.0, 4.0]\n")));
+}
+
+fn is_taken(model: &Model) {
+    let stimulus = stimulus(model, 60_000);
     let mut seen = [false; 3];
-    let mut loader = Loader::new(&model);
+    let mut loader = Loader::new(model);
     for inputs in &stimulus {
         loader.clock(inputs);
         match loader.plan.tables_outcome {
@@ -232,12 +263,12 @@ fn an_image_is_taken_as_the_model_takes_it() {
     assert_eq!(seen, [true; 3], "images are taken, refused and broken");
     let subject = |changes: &[Change]| {
         block_subject!(
-            Load::new(&model),
+            Load::new(model),
             changes,
             inputs [rst, idle, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
             outputs [
-                m_axis_tvalid, m_axis_tdata, m_axis_tlast, s_axis_tready, write, taxel, entry, restart, noise_floor,
-                threshold, version, incomplete,
+                m_axis_tvalid, m_axis_tdata, m_axis_tlast, s_axis_tready, write, taxel, entry, coefficient_write,
+                coefficient_word, coefficient_pair, coefficient_data, restart, noise_floor, threshold, version, incomplete,
             ],
         )
     };
@@ -251,7 +282,12 @@ fn an_image_is_taken_as_the_model_takes_it() {
         // An image may begin in a frame.
         Change::value("", "broken_off", |k| k.constant(1, 0)),
     ];
-    check_with_defects(subject, &stimulus, || Loader::new(&model), &defects);
+    check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
+    if !model.tables().unwrap().coefficients.is_empty() {
+        // The next image begins where a broken one stopped.
+        let defect = Change::value("", "address", |k| k.named("address"));
+        check_with_defects(subject, &stimulus, || Loader::new(model), &[defect]);
+    }
 }
 
 #[test]
@@ -260,7 +296,7 @@ fn without_writable_tables_the_stream_passes() {
     let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1, 1]);
     let of = |inputs: &[Word]| {
         let stream = [1, 2, 3, 4, 0].map(|input| Some(inputs[input]));
-        stream.into_iter().chain([Some(Word::default()); 7]).collect()
+        stream.into_iter().chain([Some(Word::default()); 11]).collect()
     };
-    check(Load::new(&model).kernel.kernel(), &stimulus, &mut Pipeline::new(0, 12, of));
+    check(Load::new(&model).kernel.kernel(), &stimulus, &mut Pipeline::new(0, 16, of));
 }
