@@ -21,11 +21,15 @@
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
 //! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]): what writable tables may hold |
+//! | | `source` ("stream"; "adc-scan"): whether codes come as a stream or the hardware scans the array |
+//! | `[hardware.adc_scan]` | `converter` ("max11125", "ads8688"), `converters` (1), `channels` (cols / converters), `sclk_MHz` |
+//! | | `row_settling_us` (0), `channel_settling_us` (0), `samples` (1; 2, 4 … 256), `period_us` |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | | `plausible_MPa` (10) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
+mod adc_scan;
 mod error;
 pub mod inverse;
 mod inversion;
@@ -39,6 +43,7 @@ mod tests;
 pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
+use crate::adc::AdcScan;
 use crate::input::sliding;
 use crate::link::LinkKind;
 use crate::partition::{subarrays, Case};
@@ -268,6 +273,8 @@ pub struct HardwareSpec {
     pub tables: TableStorage,
     /// What tables that are written may hold.
     pub table_range: TableRange,
+    /// How the hardware scans the array by itself (`source = "adc-scan"`); `None` where codes come as a stream.
+    pub adc_scan: Option<AdcScan>,
 }
 
 impl HardwareSpec {
@@ -456,6 +463,7 @@ impl Default for HardwareSpec {
             search_width: None,
             tables: TableStorage::Rom,
             table_range: TableRange::default(),
+            adc_scan: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Parsing and checking scene text: the schema, and one function per table.
 
+use super::adc_scan::{adc_scan, FIELDS as ADC_SCAN_FIELDS};
 use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 12] = [
+const SCHEMA: [(&str, &[&str]); 13] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
@@ -25,7 +26,8 @@ const SCHEMA: [(&str, &[&str]); 12] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables"]),
+    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables", "source"]),
+    ("hardware.adc_scan", &ADC_SCAN_FIELDS),
     ("hardware.table_range", &["gain"]),
     (
         "input",
@@ -82,7 +84,7 @@ impl Scene {
             inverse: inverse(&reader)?,
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
-            hardware: hardware(&reader, origin)?,
+            hardware: hardware(&reader, origin, &sensor)?,
             input: input(&reader, origin, &sensor)?,
             output: output(&reader)?,
             sensor,
@@ -304,7 +306,7 @@ fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
     Ok(reader.typed("fixed.lanes", read, "a multiple of 4 from 4 to 1024")?.map(|lanes| lanes as u32))
 }
 
-fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
+fn hardware(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<HardwareSpec, SceneError> {
     let tables = [("rom", TableStorage::Rom), ("writable", TableStorage::Writable)];
     let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
     Ok(HardwareSpec {
@@ -314,6 +316,7 @@ fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
         search_width: search_width(reader)?,
         tables: reader.choice("hardware.tables", &tables)?,
         table_range: table_range(reader)?,
+        adc_scan: adc_scan(reader, sensor)?,
     })
 }
 
