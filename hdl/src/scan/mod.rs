@@ -44,6 +44,17 @@ pub struct Shape {
     pub dead: Vec<usize>,
 }
 
+/// Refuses a model whose hardware scans its array for `what`, a module around the engine that is fed with codes.
+///
+/// # Errors
+/// [`HdlError::Unsupported`] for such a model.
+pub(crate) fn require_stream(model: &Model, what: &'static str) -> Result<(), HdlError> {
+    match model.scene.hardware.adc_scan {
+        None => Ok(()),
+        Some(_) => Err(HdlError::Unsupported { field: "hardware.source", value: "adc-scan".to_owned(), what }),
+    }
+}
+
 impl Shape {
     /// The shape of the scan of `model`.
     ///
