@@ -5,7 +5,7 @@
 //! | `no-contact` | no taxel carries a force | [`crate::reconstruct::assemble`] |
 //! | `no-compression` | no candidate μ leaves Σp > 0 | the engine |
 //! | `condition-unmet` | a subarray does not meet the scene's condition and is not searched | `assemble` |
-//! | `saturated` | a reading reached full scale, or a word of the engine saturated | [`frame_flags`], `Checks::flags`, the engine |
+//! | `saturated` | a reading reached full scale, a sample the end of its converter's range, or a word of the engine saturated | [`frame_flags`], `Checks::flags`, the engine, the scan |
 //! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
 //! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
@@ -19,6 +19,7 @@
 //! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |
 //! | `tables-incomplete` | the hardware's tables are not whole: no force is computed from them | the engine |
 //! | `tables-refused` | the last tables sent to the hardware were refused; it has those of before | the engine |
+//! | `wrong-channel` | a converter that the hardware scans named another channel than that asked for | the scan |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -66,11 +67,13 @@ pub enum Flag {
     TablesIncomplete,
     /// The hardware refused the last tables that it was sent.
     TablesRefused,
+    /// A converter that the hardware scans named another channel than that asked for.
+    WrongChannel,
 }
 
 impl Flag {
     /// All flags, in order.
-    pub const ALL: [Flag; 17] = [
+    pub const ALL: [Flag; 18] = [
         Flag::NoContact,
         Flag::NoCompression,
         Flag::ConditionUnmet,
@@ -88,6 +91,7 @@ impl Flag {
         Flag::TooManyContacts,
         Flag::TablesIncomplete,
         Flag::TablesRefused,
+        Flag::WrongChannel,
     ];
 }
 
@@ -177,6 +181,7 @@ mod tests {
             "too-many-contacts",
             "tables-incomplete",
             "tables-refused",
+            "wrong-channel",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

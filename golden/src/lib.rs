@@ -40,6 +40,7 @@
 //! |---|---|
 //! | [`scene`] | sensor, method, number formats and hardware of a run, from TOML |
 //! | [`sensor`], [`partition`] | the taxel array, and its division into subarrays |
+//! | [`adc`] | converters that the hardware reads by itself, and the timing of a scan |
 //! | [`board`] | the device for which hardware is generated |
 //! | [`frame`] | stress on every taxel, with known forces if there are any; JSON, CSV, frames shipped with the crate |
 //! | [`generator`] | frames computed from described or random contacts, with their exact forces |
@@ -72,6 +73,7 @@
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]
 
+pub mod adc;
 pub mod baseline;
 pub mod board;
 pub mod bonded;

@@ -20,13 +20,17 @@
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
+//! | | `source` ("stream"; "adc-scan"): whether codes come as a stream or the hardware scans the array |
 //! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]), `thickness_mm` (the sensor's; \[least, largest\]) |
 //! | | `dead_taxels` (0; fewer than all): what writable tables may hold |
+//! | `[hardware.adc_scan]` | `converter` ("max11125", "ads8688"), `converters` (1), `channels` (cols / converters), `sclk_MHz` |
+//! | | `row_settling_us` (0), `channel_settling_us` (0), `samples` (1; 2, 4 … 256), `period_us` |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | | `plausible_MPa` (10) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
+mod adc_scan;
 mod error;
 pub mod inverse;
 mod inversion;
@@ -40,6 +44,7 @@ mod tests;
 pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
+use crate::adc::AdcScan;
 use crate::input::sliding;
 use crate::link::LinkKind;
 use crate::partition::{subarrays, Case};
@@ -281,6 +286,8 @@ pub struct HardwareSpec {
     pub tables: TableStorage,
     /// What tables that are written may hold.
     pub table_range: TableRange,
+    /// How the hardware scans the array by itself (`source = "adc-scan"`); `None` where codes come as a stream.
+    pub adc_scan: Option<AdcScan>,
 }
 
 impl HardwareSpec {
@@ -481,6 +488,7 @@ impl Default for HardwareSpec {
             search_width: None,
             tables: TableStorage::Rom,
             table_range: TableRange::default(),
+            adc_scan: None,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! codes → prepare → receive → normalise → fold → pass → rescale → unfold → search → forces → send → beats, status
 //! ```
 //! [`engine`] connects the [`stages`], built from [`primitives`]; [`serial`] is the engine for small devices; [`link`]
-//! puts either behind a UART or an SPI, [`bus`] makes it a core for a SoC. All widths come from the formats of the bit-true model.
+//! puts either behind a UART or an SPI, [`bus`] makes it a core for a SoC, [`scan`] reads the converters of its array. All widths come from the formats of the bit-true model.
 //!
 //! What is derived from what:
 //! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
@@ -36,6 +36,7 @@ pub mod language;
 pub mod link;
 pub mod manifest;
 pub mod primitives;
+pub mod scan;
 pub mod serial;
 pub mod stages;
 pub mod state;

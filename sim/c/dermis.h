@@ -143,6 +143,10 @@ typedef enum {
    * `tables-refused`
    */
   DERMIS_FLAG_TABLES_REFUSED = (1 << 16),
+  /**
+   * `wrong-channel`
+   */
+  DERMIS_FLAG_WRONG_CHANNEL = (1 << 17),
 } dermis_flag;
 
 /**

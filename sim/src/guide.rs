@@ -45,6 +45,7 @@ pages! {
     "method.md" method,
     "formats.md" formats,
     "architecture.md" architecture,
+    "architecture/scan.md" scan,
     "architecture/prepare.md" prepare,
     "architecture/receive.md" receive,
     "architecture/choose.md" choose,

@@ -24,6 +24,7 @@
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `tables` | images of tables between frames: equality before, after, and while tables are not whole |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
+//! | `scan` | a scan by the hardware with modelled converters: equality, faults of the wires, seeded defects |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
 //! | `circles` | no two modules of a crate use one another, directly or through others; layers are in order |
 //! | `words` | no file has a phrase of `tests/words.txt` |

@@ -7,8 +7,8 @@ use super::error::FixedError;
 use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::send::{
-    labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
-    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES, FRAMES_SHIFT, STATUS_BEATS, TABLES_REFUSED,
+    labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_CHANNEL, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
+    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, FRAMES_SHIFT, STATUS_BEATS, TABLES_REFUSED,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;
@@ -95,11 +95,14 @@ impl Model {
         let mut shear_spread = None;
         let all: Vec<Status> = status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
         for status in &all {
-            if status.rescale_saturations + status.force_saturations > 0 {
+            if status.rescale_saturations + status.force_saturations > 0 || status.flags & FLAG_RAIL != 0 {
                 flags.push(Flag::Saturated);
             }
             if status.flags & FLAG_COEFFICIENTS != 0 {
                 flags.push(Flag::CoefficientsDamaged);
+            }
+            if status.flags & FLAG_CHANNEL != 0 {
+                flags.push(Flag::WrongChannel);
             }
             if status.flags & FLAG_TABLES != 0 {
                 flags.push(Flag::TablesIncomplete);

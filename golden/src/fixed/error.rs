@@ -4,6 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::adc::timing::TimingError;
 use crate::board::BoardError;
 use crate::deviations::DeviationsError;
 use crate::frame::FrameError;
@@ -44,6 +45,14 @@ pub enum FixedError {
     /// The scene's board is unknown or its file invalid.
     #[error(transparent)]
     Board(#[from] BoardError),
+    /// The scan that the scene asks for is impossible with its converter, its clock or its period.
+    #[error("scene {scene}: {error}")]
+    Scan {
+        /// The scene's name.
+        scene: String,
+        /// The field and what it must be.
+        error: TimingError,
+    },
     /// A word would need more bits than the hardware has.
     #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, input.average, fixed.inverse_bits or search.mu_max")]
     Format {

@@ -1,5 +1,6 @@
 //! Parsing and checking scene text: the schema, and one function per table.
 
+use super::adc_scan::{adc_scan, FIELDS as ADC_SCAN_FIELDS};
 use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 12] = [
+const SCHEMA: [(&str, &[&str]); 13] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
@@ -25,7 +26,8 @@ const SCHEMA: [(&str, &[&str]); 12] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables"]),
+    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables", "source"]),
+    ("hardware.adc_scan", &ADC_SCAN_FIELDS),
     ("hardware.table_range", &["gain", "thickness_mm", "dead_taxels"]),
     (
         "input",
@@ -315,6 +317,7 @@ fn hardware(reader: &Reader, origin: &str, sensor: &Sensor, dead: usize) -> Resu
         search_width: search_width(reader)?,
         tables: reader.choice("hardware.tables", &tables)?,
         table_range: table_range(reader, sensor, dead)?,
+        adc_scan: adc_scan(reader, sensor)?,
     })
 }
 

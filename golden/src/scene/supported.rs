@@ -27,6 +27,8 @@
 //! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
 //! the bitstream; dead taxels with one subarray, as above.
 //!
+//! `hardware.source = "adc-scan"`: no writable tables, no average of frames, `input_bits` for a result and a sign.
+//!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
 
@@ -152,10 +154,33 @@ impl Scene {
                 "at least 9 with hardware.tables = writable, whose bytes are no codes",
             ),
         ])?;
+        self.require_scannable()?;
         match self.for_hardware().estimator() {
             EstimatorKind::Network => self.require_network(),
             _ => Ok(()),
         }
+    }
+
+    /// Checks that a scan by the hardware gives the codes that the scene asks for.
+    fn require_scannable(&self) -> Result<(), SceneError> {
+        let Some(scan) = &self.hardware.adc_scan else { return Ok(()) };
+        let bits = self.fixed.input_bits;
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        self.require([
+            rule(
+                bits < scan.converter.magnitude_bits() + 1,
+                "fixed.input_bits",
+                bits.to_string(),
+                "at least 13 with a max11125, 16 with an ads8688: a code holds a result and a sign",
+            ),
+            rule(
+                self.input.average > 0,
+                "input.average",
+                self.input.average.to_string(),
+                "0 with adc-scan: hardware.adc_scan.samples averages",
+            ),
+            rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adc-scan"),
+        ])
     }
 
     /// What `auto` takes in hardware, `network` or `search`, and why. The network is taken where the scene names one and
@@ -368,6 +393,7 @@ impl Scene {
             ("input.calibration", input.calibration.is_some()),
             ("input.tare", input.tare.is_some()),
             ("hardware.tables", self.hardware.has_writable_tables()),
+            ("hardware.source", self.hardware.adc_scan.is_some()),
         ];
         asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
     }
@@ -377,6 +403,7 @@ impl Scene {
         match field {
             "input.calibration" => path(&self.input.calibration),
             "hardware.tables" => writable(),
+            "hardware.source" => "adc-scan".to_string(),
             _ => path(&self.input.tare),
         }
     }

@@ -10,6 +10,7 @@ use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, W
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::{Dff, Queue};
+use crate::scan::require_stream;
 use crate::wire::Wire;
 use crate::{engine, serial};
 
@@ -237,6 +238,7 @@ cores!(SerialAxiCore, SerialWishboneCore, serial::Engine);
 /// # Errors
 /// [`HdlError::Unsupported`]: a scene with several frames per result; [`HdlError::Check`].
 pub(super) fn hierarchy(model: &Model, shape: CoreShape) -> Result<Hierarchy, HdlError> {
+    require_stream(model, "a core for a SoC around a scan")?;
     if model.scene.input.average > 0 {
         let value = model.scene.input.average.to_string();
         return Err(HdlError::Unsupported {

@@ -10,6 +10,7 @@ use super::{Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::Dff;
+use crate::scan::require_stream;
 use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
@@ -160,6 +161,7 @@ boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine);
 
 /// The board of `model`, after rust-hdl's checks.
 pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
+    require_stream(model, "a board with a link around a scan")?;
     if model.formats().degree == 0 {
         return Err(HdlError::Unsupported {
             field: "search.mu_max",

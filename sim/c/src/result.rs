@@ -50,6 +50,8 @@ pub enum dermis_flag {
     TablesIncomplete = 1 << 15,
     /// `tables-refused`
     TablesRefused = 1 << 16,
+    /// `wrong-channel`
+    WrongChannel = 1 << 17,
 }
 
 /// The bit of a flag.
@@ -72,6 +74,7 @@ pub fn bit(flag: Flag) -> u32 {
         Flag::TooManyContacts => dermis_flag::TooManyContacts,
         Flag::TablesIncomplete => dermis_flag::TablesIncomplete,
         Flag::TablesRefused => dermis_flag::TablesRefused,
+        Flag::WrongChannel => dermis_flag::WrongChannel,
     };
     bit as u32
 }

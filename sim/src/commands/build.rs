@@ -11,6 +11,7 @@ use dermis_hdl::bus::{generate_core, Bus, CoreShape, WIDTHS};
 use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
+use dermis_hdl::scan::generate_scan;
 
 use super::inputs::{note_estimator, BoardOverride};
 use crate::progress::Progress;
@@ -98,11 +99,12 @@ fn build(scene: &Scene, out: &Path, what: What, with_features: bool) -> Result<S
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = match what {
+        What::Engine if model.scan_timing().is_some() => generate_scan(&model)?,
         What::Engine => generate(&model)?,
         What::Board => generate_board(&model)?,
         What::Core(shape) => generate_core(&model, shape)?,
     };
-    if let What::Engine = what {
+    if let (What::Engine, None) = (what, model.scan_timing()) {
         generated.add_integration(&model);
     }
     let explained = explain(&model)?;

@@ -97,6 +97,8 @@ enum Command {
     Block(super::block::Arguments),
     /// Print the register map of a core, as `dermis build --bus` generates one.
     Registers(super::registers::Arguments),
+    /// Print the converters that a scene can scan its array with.
+    Converters(super::converters::Arguments),
     /// Make the image of a specimen's tables for hardware with writable tables.
     Load(super::load::Arguments),
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
@@ -209,6 +211,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
         Command::Registers(arguments) => Ok((super::registers::run(arguments)?, true)),
+        Command::Converters(arguments) => Ok((super::converters::run(arguments)?, true)),
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),
         Command::Stress(arguments) => super::stress::run(arguments, build_dir),

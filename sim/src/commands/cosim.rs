@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{bail, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::scene::Scene;
 
 use super::inputs::{resolve, BoardOverride};
 use crate::cosim::hardware::Simulator;
+use crate::cosim::scan::{verify_scan, Fault};
 use crate::cosim::verify::verify_specimen;
 use crate::cosim::waves::waves;
-use crate::report::{self, CosimReport};
+use crate::report::{self, CosimReport, ScanReport};
 
 /// Arguments of `dermis cosim`.
 #[derive(Args, Debug)]
@@ -20,6 +21,8 @@ use crate::report::{self, CosimReport};
   dermis cosim eight-by-eight --device rust-hdl
   dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
   dermis cosim hand.toml --tables left-hand.toml     hardware of hand.toml that takes the tables of a specimen
+  dermis cosim mat.toml                              a scene with an adc-scan: its converters too
+  dermis cosim mat.toml --wire stuck-high:0          with a fault of the wires
   dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
   dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
 pub struct Arguments {
@@ -40,8 +43,27 @@ pub struct Arguments {
     /// Write pins and stages of the full-speed run to `<build-dir>/<scene>/waves` as VCD, with a GTKWave signal list.
     #[arg(long, conflicts_with = "json")]
     waves: bool,
+    /// Fault of a scan's wires: stuck-low:CONVERTER, stuck-high:CONVERTER, next-channel:CONVERTER, row:ROW, or
+    /// flip:CONVERTER:FRAME:BIT with the number of a frame on the bus.
+    #[arg(long, value_name = "FAULT", value_parser = wire_fault, conflicts_with_all = ["tables", "waves"])]
+    wire: Option<Fault>,
     #[command(flatten)]
     target: BoardOverride,
+}
+
+/// A fault of a scan's wires.
+fn wire_fault(text: &str) -> Result<Fault, String> {
+    let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
+    let numbers: Option<Vec<usize>> = rest.split(':').map(|number| number.parse().ok()).collect();
+    match (kind, numbers.as_deref()) {
+        ("stuck-low", Some(&[converter])) => Ok(Fault::Stuck { converter, level: false }),
+        ("stuck-high", Some(&[converter])) => Ok(Fault::Stuck { converter, level: true }),
+        ("next-channel", Some(&[converter])) => Ok(Fault::NextChannel { converter }),
+        ("row", Some(&[row])) => Ok(Fault::Row { row }),
+        // An answer has at most 32 bits.
+        ("flip", Some(&[converter, frame, bit])) if bit < 32 => Ok(Fault::Flip { converter, frame, bit: bit as u32 }),
+        _ => Err("there are stuck-low:N, stuck-high:N, next-channel:N, row:N, flip:N:FRAME:BIT".to_owned()),
+    }
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -72,9 +94,20 @@ impl DeviceChoice {
 /// # Errors
 /// Wrong input, a scene without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
-    let Arguments { scene, frames, json, tables, device, waves: with_waves, target } = arguments;
+    let Arguments { scene, frames, json, tables, device, waves: with_waves, wire, target } = arguments;
     let (scene, frames) = resolve(scene.as_deref(), frames)?;
     let scene = target.apply(scene);
+    if scene.hardware.adc_scan.is_some() && tables.is_none() && !with_waves {
+        let verified = verify_scan(&scene, &frames, device.simulators(), *wire, build_dir)?;
+        let text = match json {
+            true => serde_json::to_string(&ScanReport::new(&verified))? + "\n",
+            false => report::scan(&verified),
+        };
+        return Ok((text, verified.findings.is_equal()));
+    }
+    if wire.is_some() {
+        bail!("--wire: {}: hardware.source = stream; expected adc-scan, which has wires to converters", scene.name);
+    }
     let specimen = tables.as_deref().map(Scene::load).transpose()?;
     let verified = verify_specimen(&scene, specimen.as_ref(), &frames, device.simulators(), build_dir)?;
     let mut text =

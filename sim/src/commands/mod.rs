@@ -23,6 +23,7 @@
 //! | [`mod@power`] | `dermis power`: the engine's power, estimated |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
+//! | [`mod@converters`] | `dermis converters`: the converters of a scan |
 //! | [`mod@registers`] | `dermis registers`: the register map of a core |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
@@ -39,6 +40,7 @@ pub mod build;
 pub mod calibrate;
 pub mod check;
 mod cli;
+pub mod converters;
 pub mod cosim;
 pub mod deviations;
 pub mod faults;

@@ -17,6 +17,7 @@
 //! | [`VerilatedBoard`] | a board's top module under Verilator |
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`faults`] | flips single bits and classifies the effect |
+//! | [`scan`] | a scan by the hardware with its array and modelled converters |
 //! | [`stress`] | both streams under gaps, wrong `tlast` and resets |
 //! | [`block_timing`] | the cycles of a frame in which a block's handshakes change |
 //! | [`power`] | the engine's power, estimated from the register bits that change |
@@ -32,6 +33,7 @@ pub mod faults;
 mod findings;
 pub mod hardware;
 pub mod power;
+pub mod scan;
 pub mod stress;
 pub mod toggles;
 pub mod verify;

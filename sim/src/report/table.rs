@@ -5,6 +5,7 @@ use dermis_golden::reconstruct::Reconstruction;
 use super::{CosimReport, BUDGET_US};
 use crate::compare::median;
 use crate::cosim::verify::{FrameResult, Verified};
+use crate::cosim::Findings;
 
 /// Number of mismatches printed; `--json` contains more.
 const PRINTED: usize = 16;
@@ -55,11 +56,7 @@ fn summary(verified: &Verified) -> String {
     if findings.is_equal() {
         text.push_str("equal to the bit-true model to the bit: every stage, every beat, every cycle count\n");
     } else {
-        let shown = &findings.kept[..findings.kept.len().min(PRINTED)];
-        text.push_str(&format!("NOT EQUAL: {} mismatches, the first {}:\n", findings.count, shown.len()));
-        for mismatch in shown {
-            text.push_str(&format!("  {mismatch}\n"));
-        }
+        text.push_str(&differences(findings));
     }
     let report = CosimReport::new(verified);
     if let (Some(cycles), Some(time)) = (report.total_cycles.max, report.time_us.max) {
@@ -79,6 +76,14 @@ fn summary(verified: &Verified) -> String {
             clock * 1e6 / interval as f64,
         ));
     }
+    text
+}
+
+/// Number of mismatches, and the first of them.
+pub(super) fn differences(findings: &Findings) -> String {
+    let shown = &findings.kept[..findings.kept.len().min(PRINTED)];
+    let mut text = format!("NOT EQUAL: {} mismatches, the first {}:\n", findings.count, shown.len());
+    shown.iter().for_each(|mismatch| text.push_str(&format!("  {mismatch}\n")));
     text
 }
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 51] = [
+const NOT_RUN: [(&str, &str); 53] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -38,6 +38,8 @@ const NOT_RUN: [(&str, &str); 51] = [
     ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
     ("dermis cosim sensor-1", "equality.rs"),
     ("dermis cosim eight-by-eight --target-board icebreaker", "serial.rs"),
+    ("dermis cosim mat.toml", "scan.rs"),
+    ("dermis cosim mat.toml --wire stuck-high:0", "scan.rs"),
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
     ("dermis noise sensor-1 --frames 1 --medians", "200 draws of five objectives: minutes"),

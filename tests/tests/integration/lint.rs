@@ -3,12 +3,14 @@
 
 use std::process::Command;
 
+use dermis_golden::adc::{AdcScan, CONVERTERS};
 use dermis_golden::fixed::Model;
 use dermis_golden::link::LinkKind;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
+use dermis_hdl::scan::generate_scan;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::tools::folder_of;
 use dermis_tests::{scene, SCENES};
@@ -102,6 +104,25 @@ fn cores_are_clean_with_the_engines_waivers() {
     let shape = CoreShape { bus: Bus::AxiLite, words: 1 };
     let told = generate_core(&Model::new(&averaged).unwrap(), shape).unwrap_err().to_string();
     assert_eq!(told, "input.average = 1: a core with several frames per result is not available yet");
+}
+
+#[test]
+fn a_scan_is_clean_with_the_engines_waivers() {
+    for (converter, converters, dead) in [(0, 1, vec![]), (1, 2, vec![[0, 3]])] {
+        let mut scene = scene("eight-by-eight").0;
+        (scene.input.full_scale_MPa, scene.input.dead) = (Some(1.0), dead);
+        scene.hardware.adc_scan = Some(AdcScan {
+            converter: CONVERTERS[converter],
+            converters,
+            channels: 8 / converters,
+            sclk_MHz: 12.5,
+            row_settling_us: 4.0,
+            channel_settling_us: 0.5,
+            average: 2,
+            period_us: 2000.0,
+        });
+        lint(&generate_scan(&Model::new(&scene).unwrap()).unwrap()).unwrap_or_else(|log| panic!("{converter}: {log}"));
+    }
 }
 
 #[test]

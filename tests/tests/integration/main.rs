@@ -27,6 +27,7 @@ mod power;
 mod proofs;
 mod resources;
 mod scale;
+mod scan;
 mod scenes;
 mod serial;
 mod streams;

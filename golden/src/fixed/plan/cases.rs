@@ -12,6 +12,7 @@ use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::specimens::specimens;
 use super::widths::{widths, Shape};
+use crate::adc::timing::Timing;
 use crate::board::{Board, EngineKind};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::load::Outcome;
@@ -49,6 +50,10 @@ pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Resul
     let board = Board::load(&scene.hardware.board)?;
     if board.engine == EngineKind::Serial {
         scene.require_serial()?;
+    }
+    if let Some(scan) = scene.hardware.adc_scan {
+        let timing = Timing::new(&scan, scene.sensor.rows, board.clock_MHz);
+        timing.map_err(|error| FixedError::Scan { scene: scene.name.clone(), error })?;
     }
     match scene.partition.case {
         Case::Adaptive => several(scene, &scale, degree, &board),

@@ -2,6 +2,7 @@
 
 use super::resources::Resources;
 use super::storage::Storage;
+use crate::adc::timing::Timing;
 use crate::board::{Board, EngineKind};
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::load::Outcome;
@@ -255,6 +256,13 @@ impl Plan {
             Some(_) if !self.sends_resultants() => label_beats(self.scene.sensor.taxels()),
             _ => 0,
         }
+    }
+
+    /// Timing of the scan by the hardware; `None` where codes come as a stream.
+    pub fn scan_timing(&self) -> Option<Timing> {
+        // Checked when the plan was made.
+        let scan = self.scene.hardware.adc_scan?;
+        Timing::new(&scan, self.scene.sensor.rows, self.board.clock_MHz).ok()
     }
 
     /// Number of output beats of a frame before its status: forces and labels, or resultants.

@@ -12,6 +12,7 @@ pub mod receive;
 pub mod relax;
 pub mod rescale;
 pub mod resultants;
+pub mod scan;
 pub mod search;
 pub mod segment;
 pub mod send;

@@ -40,6 +40,11 @@ pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
 /// Flag bit: the tables are not whole, and every stress is taken as 0; only with `hardware.tables = "writable"`
 /// ([`load`](super::load)).
 pub const FLAG_TABLES: u32 = 1 << 6;
+/// Flag bit: a sample of the frame was at an end of the converter's range; only with `hardware.source = "adc-scan"`, as the next
+/// ([`scan`](super::scan)).
+pub const FLAG_RAIL: u32 = 1 << 7;
+/// Flag bit: a sample of the frame named another channel than that asked for.
+pub const FLAG_CHANNEL: u32 = 1 << 10;
 /// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
 /// Position of the version of the tables beside the shift of `normalise`.

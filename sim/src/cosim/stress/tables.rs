@@ -36,7 +36,10 @@ fn random_tables(model: &Model, coefficients: &[Vec<i64>], random: &mut fastrand
         noise_floor: (random.u32(..) >> (33 - code_bits)) as i32 >> random.u32(..code_bits),
         zero,
         gain,
-        coefficients: random.choice(coefficients).cloned().unwrap_or_default(),
+        coefficients: match coefficients {
+            [only] => only.clone(),
+            several => random.choice(several).cloned().unwrap_or_default(),
+        },
     }
 }
 

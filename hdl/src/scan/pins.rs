@@ -1,0 +1,49 @@
+//! The pins of a scan, independent of the simulator.
+
+use rust_hdl::prelude::*;
+
+/// Input pins of a scan in one clock cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanInputs {
+    /// Synchronous reset, active high.
+    pub rst: bool,
+    /// Outputs of the converters, bit k that of converter k.
+    pub miso: u64,
+    /// `m_axis_tready`: the receiver accepts a beat in this cycle.
+    pub m_ready: bool,
+}
+
+/// Output pins of a scan in one clock cycle, sampled just before the rising edge, and the code that the engine takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanOutputs {
+    /// Address of the row that is driven.
+    pub row: u64,
+    /// Serial clock.
+    pub sclk: bool,
+    /// Chip select, active low.
+    pub cs_n: bool,
+    /// Commands.
+    pub mosi: bool,
+    /// `m_axis_tvalid`: `m_data` holds a beat.
+    pub m_valid: bool,
+    /// `m_axis_tlast`: the beat is the last of its frame.
+    pub m_last: bool,
+    /// `m_axis_tdata` as `[fx, fy, fz]`, each a 32-bit signed word.
+    pub m_data: [i32; 3],
+    /// The code that the engine takes in this cycle; observation only, no pin.
+    pub code: Option<i32>,
+}
+
+/// A simulated scan, advanced one clock cycle at a time.
+pub trait ScanDevice {
+    /// Applies `inputs`, samples the outputs before the rising edge, then clocks.
+    fn cycle(&mut self, inputs: &ScanInputs) -> ScanOutputs;
+}
+
+/// Operations on a top module that simulation and generation need, the same for all engines.
+pub(super) trait Scanner: Block {
+    /// Applies `inputs` and the clock level to the pins.
+    fn drive(&mut self, inputs: &ScanInputs, clock: bool);
+    /// Samples the output pins.
+    fn pins(&self) -> ScanOutputs;
+}

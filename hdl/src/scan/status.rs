@@ -1,0 +1,226 @@
+//! Marks of a scan in the status of its frame.
+
+use dermis_golden::fixed::stages::send::{FLAG_CHANNEL, FLAG_RAIL, STATUS_BEATS};
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::primitives::count_bits;
+use crate::wire::Wire;
+
+/// The engine's beats pass through; in the first beat of every status the flags word gets the marks of its scan, which
+/// wait in a queue while the engine computes. Frames leave in the order in which they came.
+#[derive(LogicBlock)]
+pub struct ScanStatus {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// A scan has given its last code to the engine in this cycle.
+    pub complete: Signal<In, Bit>,
+    /// A sample of it was at an end of the range; valid with `complete`.
+    pub rail: Signal<In, Bit>,
+    /// A sample of it named another channel; valid with `complete`.
+    pub other: Signal<In, Bit>,
+    /// There is room for the marks of one more scan.
+    pub room: Signal<Out, Bit>,
+    /// A beat of the engine, three words; valid with `s_axis_tvalid`.
+    pub s_axis_tdata: Wire<In>,
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// The block accepts a beat in this cycle.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// The beat with its marks; valid with `m_axis_tvalid`.
+    pub m_axis_tdata: Wire<Out>,
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// The receiver accepts a beat in this cycle.
+    pub m_axis_tready: Signal<In, Bit>,
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    ScanStatus,
+    clock clk,
+    inputs [rst, complete, rail, other, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [room, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
+
+/// Width of a word of a beat, and of a beat.
+const WORD: usize = 32;
+const BEAT: usize = 3 * WORD;
+/// Scans whose marks can wait: more than the frames that an engine holds.
+const PLACES: usize = 8;
+/// Marks of a scan.
+const MARKS: usize = 2;
+
+impl ScanStatus {
+    /// For frames of `forces` beats before the status.
+    pub fn new(forces: usize) -> Self {
+        let block = ScanStatus {
+            clk: Default::default(),
+            rst: Default::default(),
+            complete: Default::default(),
+            rail: Default::default(),
+            other: Default::default(),
+            room: Default::default(),
+            s_axis_tdata: Wire::new(BEAT),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(BEAT),
+            m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
+            m_axis_tlast: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(forces))
+    }
+}
+
+fn kernel(forces: usize) -> Kernel {
+    let k = Builder::new("scan_status");
+    let [rst, complete, rail, other] = ["rst", "complete", "rail", "other"].map(|name| k.input(name, 1));
+    let (data, given) = (k.input("s_axis_tdata", BEAT), k.input("s_axis_tvalid", 1));
+    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    let marks =
+        k.state("marks", Type::unsigned(MARKS * PLACES), rst, 0).comment("Marks that wait, the next in the low bits.");
+    let waiting = k.state("waiting", Type::unsigned(count_bits(PLACES + 1)), rst, 0);
+    let beat = k.state("beat", Type::unsigned(count_bits(forces + 1)), rst, 0);
+    let word = k.state("word", Type::unsigned(count_bits(STATUS_BEATS)), rst, 0);
+
+    k.wire("room", !waiting.is(PLACES as u64));
+    k.wire("s_axis_tready", ready);
+    k.wire("m_axis_tvalid", given);
+    k.wire("m_axis_tlast", last);
+    let moves = k.wire("moves", given & ready);
+    let leaves = k.wire("leaves", moves & last);
+    let in_status = k.wire("in_status", beat.is(forces as u64));
+    let marked = k.wire("marked", in_status & word.is(0));
+    k.when(moves, || {
+        k.when(!in_status, || beat.set(beat.plus(1)));
+        let at_end = word.is(STATUS_BEATS as u64 - 1);
+        k.when(in_status, || word.set(at_end.mux(k.constant(word.bits(), 0), word.plus(1))));
+        k.when(last, || {
+            beat.set(k.constant(beat.bits(), 0));
+            word.set(k.constant(word.bits(), 0));
+        });
+    });
+    let rest = k.wire("rest", leaves.mux(marks.shift_right(MARKS).extend(marks.bits()), *marks));
+    let place = k.wire("place", (*waiting - leaves.extend(waiting.bits())).low(waiting.bits()));
+    let added = other.concat(rail).extend(marks.bits()).shift_left_by(place.concat(k.constant(1, 0)));
+    marks.set(complete.mux(rest | added, rest));
+    waiting.set((place + complete.extend(place.bits())).low(place.bits()));
+
+    // The flags are the beat's third word.
+    let flag = |at: usize| -> Expr {
+        let of = |flag: u32| at == 2 * WORD + flag.trailing_zeros() as usize;
+        match at {
+            _ if of(FLAG_RAIL) => marked & marks.at(0),
+            _ if of(FLAG_CHANNEL) => marked & marks.at(1),
+            _ => k.constant(1, 0),
+        }
+    };
+    let flags: Vec<Expr> = (0..BEAT).rev().map(flag).collect();
+    k.wire("m_axis_tdata", data | concat(&flags));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::wire::Word;
+    use std::collections::VecDeque;
+
+    const FORCES: usize = 4;
+
+    #[derive(Default)]
+    struct Marks {
+        waiting: VecDeque<u32>,
+        beat: usize,
+        reset: bool,
+    }
+
+    impl Reference for Marks {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 5];
+            }
+            let bit = |k: usize| Some(Word::from(inputs[k].number() == 1));
+            let mut data = inputs[4];
+            if self.beat >= FORCES && (self.beat - FORCES).is_multiple_of(STATUS_BEATS) {
+                let flags = data.field(2 * WORD, WORD) as u32 | self.waiting.front().copied().unwrap_or(0);
+                data.set(2 * WORD, WORD, flags.into());
+            }
+            vec![Some(Word::from(self.waiting.len() < PLACES)), bit(7), Some(data), bit(5), bit(6)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let of = |k: usize| inputs[k].number() == 1;
+            if of(5) && of(7) {
+                self.beat += 1;
+                if of(6) {
+                    self.beat = 0;
+                    self.waiting.pop_front();
+                }
+            }
+            if of(1) {
+                self.waiting.push_back(if of(2) { FLAG_RAIL } else { 0 } | if of(3) { FLAG_CHANNEL } else { 0 });
+            }
+            if of(0) {
+                *self = Marks { reset: true, ..Marks::default() };
+            }
+        }
+    }
+
+    /// Frames of one or two statuses, up to eight under way.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(3);
+        let (mut under_way, mut beat, mut length) = (0, 0, FORCES + STATUS_BEATS);
+        let of = |cycle: usize| {
+            let rst = cycle < 2;
+            let complete = !rst && under_way < PLACES && random.u8(..9) == 0;
+            let given = !rst && under_way > 0 && random.u8(..3) > 0;
+            let ready = random.u8(..4) > 0;
+            let last = beat + 1 == length;
+            let mut data = Word::default();
+            data.set(0, 64, random.u64(..));
+            data.set(64, 32, u64::from(random.u32(..) & !(FLAG_RAIL | FLAG_CHANNEL)));
+            under_way += usize::from(complete);
+            if given && ready {
+                beat += 1;
+                if last {
+                    (under_way, beat) = (under_way - 1, 0);
+                    length = FORCES + STATUS_BEATS * random.usize(1..3);
+                }
+            }
+            let bits = [rst, complete, random.bool(), random.bool()].map(Word::from);
+            [&bits[..], &[data], &[given, last, ready].map(Word::from)].concat()
+        };
+        (0..cycles).map(of).collect()
+    }
+
+    #[test]
+    fn marks_come_with_their_frame() {
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                ScanStatus::new(FORCES),
+                changes,
+                inputs [rst, complete, rail, other, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+                outputs [room, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast],
+            )
+        };
+        let defects = [
+            // Marks of the frame before.
+            Change::value("", "rest", |k| k.named("marks")),
+            Change::value("", "marked", |k| k.named("in_status")),
+        ];
+        check_with_defects(subject, &stimulus(4000), Marks::default, &defects);
+    }
+}

@@ -1,0 +1,120 @@
+//! The array before its converters: a voltage per taxel, and faults of its wires.
+
+use dermis_golden::adc::AdcScan;
+
+/// A fault of the wires between array, converters and hardware, for the whole run but for `Flip`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The output of a converter is always at this level.
+    Stuck {
+        /// The converter.
+        converter: usize,
+        /// The level.
+        level: bool,
+    },
+    /// A bit of one answer is inverted on the wire.
+    Flip {
+        /// The converter.
+        converter: usize,
+        /// Number of the frame on the bus, from 0.
+        frame: usize,
+        /// Bit of the answer, 0 is the last.
+        bit: u32,
+    },
+    /// A converter takes each command for that of the channel after it.
+    NextChannel {
+        /// The converter.
+        converter: usize,
+    },
+    /// The row lines do not switch: this row is always driven.
+    Row {
+        /// The row.
+        row: usize,
+    },
+}
+
+/// Voltages of an array, as shares of the converters' full range.
+#[derive(Clone, Debug)]
+pub struct Array {
+    scan: AdcScan,
+    rows: usize,
+    /// Voltages of each scan, row-major: 1 is the upper end of the range.
+    volts: Vec<Vec<f64>>,
+    /// Largest noise of a sample, in LSBs of the converter.
+    noise_lsb: f64,
+    fault: Option<Fault>,
+}
+
+impl Array {
+    /// An array of so many rows that shows one list of voltages per scan, the last one for ever.
+    pub fn new(scan: AdcScan, rows: usize, volts: Vec<Vec<f64>>, noise_lsb: f64, fault: Option<Fault>) -> Self {
+        Array { scan, rows, volts, noise_lsb, fault }
+    }
+
+    /// Frames on the bus for each row: one that chooses the first channel, and one per sample.
+    pub fn frames_of_row(&self) -> usize {
+        1 + self.scan.channels * self.scan.samples()
+    }
+
+    /// The scan of a frame on the bus.
+    pub fn scan_of(&self, frame: usize) -> usize {
+        frame / (self.rows * self.frames_of_row())
+    }
+
+    /// What converter `converter` answers in the frame of this number about a channel of a row: tag above result, as it
+    /// arrives.
+    pub fn answer(&self, row: usize, channel: usize, converter: usize, frame: usize) -> u32 {
+        let own = &self.scan.converter;
+        let row = match self.fault {
+            Some(Fault::Row { row }) => row,
+            _ => row,
+        };
+        let channel = match self.fault {
+            Some(Fault::NextChannel { converter: of }) if of == converter => (channel + 1) % own.channels,
+            _ => channel,
+        };
+        let volts = self.volts.get(self.scan_of(frame)).or(self.volts.last());
+        let at = row * self.scan.cols() + channel * self.scan.converters + converter;
+        // Channels that are not used are open.
+        let level = volts.filter(|_| channel < self.scan.channels).and_then(|volts| volts.get(at)).map_or(0.0, |v| *v);
+        let steps = (1u64 << own.bits) as f64;
+        let middle = if own.bipolar { steps / 2.0 } else { 0.0 };
+        let lsb = (level * own.full_steps() + middle + self.noise(frame, converter)).floor();
+        let result = lsb.clamp(0.0, steps - 1.0) as u32;
+        let tag = if own.tag_bits > 0 { channel as u32 } else { 0 };
+        let answer = tag << own.bits | result;
+        match self.fault {
+            Some(Fault::Stuck { converter: of, level }) if of == converter => {
+                if level {
+                    (1u64 << own.answer_bits()).wrapping_sub(1) as u32
+                } else {
+                    0
+                }
+            }
+            Some(Fault::Flip { converter: of, frame: at, bit }) if of == converter && at == frame => answer ^ 1 << bit,
+            _ => answer,
+        }
+    }
+
+    /// The answers of a scan by plan, in the order of the wire: by row, channel, sample, converter.
+    pub fn answers(&self, number: usize) -> Vec<u32> {
+        let (samples, of_row) = (self.scan.samples(), self.frames_of_row());
+        let mut answers = Vec::new();
+        for row in 0..self.rows {
+            for index in 0..self.scan.channels * samples {
+                let frame = (number * self.rows + row) * of_row + 1 + index;
+                let own = |converter| self.answer(row, index / samples, converter, frame);
+                answers.extend((0..self.scan.converters).map(own));
+            }
+        }
+        answers
+    }
+
+    /// Noise of a sample in LSBs, from −`noise_lsb` to it: of the frame's and the converter's number alone, so that the plan
+    /// and the simulation have the same.
+    fn noise(&self, frame: usize, converter: usize) -> f64 {
+        let seed = (frame * 64 + converter) as u64;
+        let share = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)).f64();
+        self.noise_lsb * (2.0 * share - 1.0)
+    }
+}

@@ -1,0 +1,276 @@
+//! Runs a scan and compares it with the bit-true model.
+
+use std::path::Path;
+
+use anyhow::{anyhow, Result};
+use dermis_golden::fixed::stages::scan::{scan as codes_of, Scanned};
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::frame::Frame;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::Scene;
+use dermis_hdl::scan::{generate_scan, scan_simulator, ScanDevice, ScanInputs};
+use serde::Serialize;
+
+use super::array::{Array, Fault};
+use super::converters::Converters;
+use super::device::VerilatedScan;
+use crate::cosim::findings::{Findings, Mismatch, KEPT_PER_FRAME};
+use crate::cosim::hardware::Simulator;
+use crate::progress::Progress;
+
+/// Cycles of reset before a run.
+const RESET: u64 = 4;
+/// Scans beyond the expected ones after which a run is given up.
+const SPARE_SCANS: u64 = 3;
+/// Seed of the stalls.
+const SEED: u64 = 1;
+/// Largest noise of a sample in the co-simulation, in LSBs of the converter.
+const NOISE_LSB: f64 = 3.0;
+
+/// What the model expects of a scan.
+#[derive(Clone, Debug)]
+pub struct Expected {
+    /// Codes and flags.
+    pub scanned: Scanned,
+    /// Beats of the frame, status with its flags at the end.
+    pub beats: Vec<[i32; 3]>,
+    /// Cycles of the engine.
+    pub cycles: Cycles,
+}
+
+/// When a scan happened, in cycles after the first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ScanTimes {
+    /// Its first frame on the bus begins.
+    pub begins: u64,
+    /// The engine takes its last code.
+    pub last_code: u64,
+    /// The last beat of its forces and status leaves.
+    pub last_beat: u64,
+}
+
+/// Codes and beats by plan of so many scans of `array`.
+pub fn expected(model: &Model, array: &Array, scans: usize) -> Vec<Expected> {
+    let Some(scan) = model.scene.hardware.adc_scan else { return Vec::new() };
+    let code_bits = model.formats().code_bits;
+    let of = |number| {
+        let scanned = codes_of(&scan, code_bits, &model.dead, &array.answers(number));
+        let trace = model.run(&scanned.codes);
+        let mut status = trace.status;
+        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] |= scanned.flags as i32);
+        Expected { scanned, beats: [trace.beats, status].concat(), cycles: trace.cycles }
+    };
+    (0..scans).map(of).collect()
+}
+
+/// Runs `device` from a reset until it has answered all `expected` scans of `array`; the receiver stalls at random if `stalls`.
+/// Returns what differs, violations of the data sheet among it, and the times of each scan.
+pub fn simulate(
+    device: &mut dyn ScanDevice,
+    label: &str,
+    model: &Model,
+    array: &Array,
+    expected: &[Expected],
+    stalls: bool,
+) -> (Findings, Vec<ScanTimes>) {
+    let (Some(scan), Some(timing)) = (model.scene.hardware.adc_scan, model.scan_timing()) else {
+        return Default::default();
+    };
+    let mut converters = Converters::new(scan, array.clone(), model.board.clock_MHz);
+    let mut random = fastrand::Rng::with_seed(SEED);
+    let mut codes = Vec::new();
+    let mut beats = Vec::new();
+    let mut times = vec![ScanTimes::default(); expected.len()];
+    let (taxels, wanted) = (model.scene.sensor.taxels(), expected.iter().map(|of| of.beats.len()).sum::<usize>());
+    let longest = expected.iter().map(|of| of.cycles.total).max().unwrap_or(0);
+    let most = RESET + (expected.len() as u64 + SPARE_SCANS) * (timing.period + 4 * longest);
+    let mut ends: Vec<usize> = Vec::new();
+    let mut begun = None;
+    for cycle in 0..most {
+        let m_ready = !stalls || random.u8(..4) > 0;
+        let inputs = ScanInputs { rst: cycle < RESET, miso: converters.outputs(), m_ready };
+        let outputs = device.cycle(&inputs);
+        // Registers are undefined until the second edge of a reset.
+        if cycle < RESET {
+            continue;
+        }
+        converters.cycle(&outputs);
+        let scan_now = array.scan_of(converters.frames());
+        if !outputs.cs_n && begun != Some(scan_now) && scan_now < times.len() {
+            begun = Some(scan_now);
+            times[scan_now].begins = cycle - RESET;
+        }
+        if let Some(code) = outputs.code {
+            if let (true, Some(own)) = ((codes.len() + 1).is_multiple_of(taxels), times.get_mut(codes.len() / taxels)) {
+                own.last_code = cycle - RESET;
+            }
+            codes.push(code);
+        }
+        if outputs.m_valid && m_ready {
+            beats.push(outputs.m_data);
+            if outputs.m_last {
+                if let Some(own) = times.get_mut(ends.len()) {
+                    own.last_beat = cycle - RESET;
+                }
+                ends.push(beats.len());
+            }
+        }
+        if beats.len() >= wanted {
+            break;
+        }
+    }
+    let mut compared = Comparison { run: label, findings: Findings::default() };
+    // First in the list: a broken time explains what is wrong after it.
+    let (violations, count) = converters.violations();
+    violations.iter().for_each(|text| compared.rule(0, "converter", text.clone()));
+    compared.findings.count += count - violations.len();
+    let (mut code, mut beat) = (codes.iter(), beats.iter());
+    for (number, own) in expected.iter().enumerate() {
+        for (index, &wanted) in own.scanned.codes.iter().enumerate() {
+            let got = code.next().map(|code| vec![i64::from(*code)]);
+            let cols = model.scene.sensor.cols;
+            compared.word(number, "scan", index, Some([index / cols, index % cols]), vec![wanted.into()], got);
+        }
+        for (index, wanted) in own.beats.iter().enumerate() {
+            let got = beat.next().map(|beat| beat.map(i64::from).to_vec());
+            compared.word(number, "beats", index, None, wanted.map(i64::from).to_vec(), got);
+        }
+        let end = expected[..=number].iter().map(|of| of.beats.len()).sum::<usize>();
+        if ends.get(number) != Some(&end) {
+            compared.rule(number, "beats", format!("tlast is not on beat {end} of the run"));
+        }
+    }
+    (compared.findings, times)
+}
+
+struct Comparison<'a> {
+    run: &'a str,
+    findings: Findings,
+}
+
+impl Comparison<'_> {
+    fn add(&mut self, number: usize, mismatch: Mismatch) {
+        self.findings.count += 1;
+        self.findings.unequal.insert(number);
+        if self.findings.kept.len() < KEPT_PER_FRAME {
+            self.findings.kept.push(mismatch);
+        }
+    }
+
+    fn of(&self, number: usize, stage: &str, index: usize) -> Mismatch {
+        Mismatch {
+            run: self.run.to_owned(),
+            frame: format!("scan {number}"),
+            stage: stage.to_owned(),
+            index,
+            taxel: None,
+            cycle: None,
+            expected: None,
+            got: None,
+            rule: None,
+        }
+    }
+
+    fn word(
+        &mut self,
+        number: usize,
+        stage: &str,
+        index: usize,
+        taxel: Option<[usize; 2]>,
+        expected: Vec<i64>,
+        got: Option<Vec<i64>>,
+    ) {
+        if got.as_ref() != Some(&expected) {
+            let mismatch = Mismatch { taxel, expected: Some(expected), got, ..self.of(number, stage, index) };
+            self.add(number, mismatch);
+        }
+    }
+
+    fn rule(&mut self, number: usize, stage: &str, rule: String) {
+        let mismatch = Mismatch { rule: Some(rule), ..self.of(number, stage, 0) };
+        self.add(number, mismatch);
+    }
+}
+
+/// A scanned frame.
+#[derive(Clone, Debug)]
+pub struct ScannedFrame {
+    /// Name of the frame whose stress the array had.
+    pub frame: String,
+    /// The result from the scanned codes; the hardware's as well where `equal` is set.
+    pub result: Reconstruction,
+    /// Whether every run equalled the model on this frame.
+    pub equal: bool,
+    /// When it happened in the first run.
+    pub times: ScanTimes,
+}
+
+/// The co-simulation of a scan.
+#[derive(Clone, Debug)]
+pub struct VerifiedScan {
+    /// The model.
+    pub model: Model,
+    /// Results, one per frame.
+    pub rows: Vec<ScannedFrame>,
+    /// Mismatches and broken times of all runs.
+    pub findings: Findings,
+    /// Labels of the runs.
+    pub runs: Vec<String>,
+}
+
+/// Co-simulates the scan of `scene` over an array that shows `frames` (at least one), one per scan, on the given simulators,
+/// with a fault of the wires if there is one.
+///
+/// # Errors
+/// A scene that cannot be built, a frame of another sensor, no Verilator, a netlist, which a scan does not have.
+pub fn verify_scan(
+    scene: &Scene,
+    frames: &[Frame],
+    simulators: &[Simulator],
+    fault: Option<Fault>,
+    build: &Path,
+) -> Result<VerifiedScan> {
+    let model = Model::new(scene)?;
+    let scan = model.scene.hardware.adc_scan.ok_or_else(|| anyhow!("hardware.source = stream: there is no scan"))?;
+    let full = f64::from(1u32 << (model.formats().code_bits - 1));
+    let volts = |frame: &Frame| -> Result<Vec<f64>> {
+        let codes = model.readings(std::slice::from_ref(frame))?;
+        Ok(codes.into_iter().map(|code| f64::from(code) / full).collect())
+    };
+    let volts = frames.iter().map(volts).collect::<Result<Vec<_>>>()?;
+    let array = Array::new(scan, scene.sensor.rows, volts, NOISE_LSB, fault);
+    let expected = expected(&model, &array, frames.len());
+    let mut verified =
+        VerifiedScan { model: model.clone(), rows: Vec::new(), findings: Findings::default(), runs: Vec::new() };
+    let mut first = Vec::new();
+    for &simulator in simulators {
+        let stimuli: &[bool] = if simulator == Simulator::Verilator { &[false, true] } else { &[false] };
+        for &stalls in stimuli {
+            let label = format!("{}, {}", simulator.name(), if stalls { "with stalls" } else { "full speed" });
+            let _progress = Progress::start(&format!("{}: {label}", scene.name));
+            let mut device: Box<dyn ScanDevice> = match simulator {
+                Simulator::Verilator => {
+                    Box::new(VerilatedScan::new(&generate_scan(&model)?, &model, &build.join("verilator"))?)
+                }
+                Simulator::RustHdl => scan_simulator(&model)?,
+                Simulator::Netlist => {
+                    return Err(anyhow!("a scan is not simulated as netlist: take verilator or rust-hdl"))
+                }
+            };
+            let (findings, times) = simulate(&mut *device, &label, &model, &array, &expected, stalls);
+            verified.findings.extend(findings);
+            verified.runs.push(label);
+            if first.is_empty() {
+                first = times;
+            }
+        }
+    }
+    for (index, ((frame, own), times)) in frames.iter().zip(&expected).zip(first).enumerate() {
+        let (beats, status) = own.beats.split_at(model.force_beats());
+        let result = model.decode(std::slice::from_ref(frame), "scan", beats, status)?;
+        let equal = !verified.findings.unequal.contains(&index);
+        verified.rows.push(ScannedFrame { frame: frame.id.clone(), result, equal, times });
+    }
+    Ok(verified)
+}
