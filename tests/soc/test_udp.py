@@ -2,11 +2,22 @@
 
 import os
 import random
+import struct
+import zlib
 from collections import Counter
 
 import pytest
 from dermis_litex.core import ID_BITS
-from dermis_litex.packets import FRAGMENT_WORDS, KIND_FRAME, LATE, Results, code_words, fragment_words, frame_packets
+from dermis_litex.packets import (
+    FRAGMENT_WORDS,
+    KIND_FRAME,
+    LATE,
+    Results,
+    code_words,
+    fragment_words,
+    frame_packets,
+    unchecked,
+)
 from dermis_litex.udp import FrameReceiver, Requesters, ResultSender
 from gateware import Packets, write_verilog
 from litex.gen import LiteXModule
@@ -24,11 +35,22 @@ class Received:
         self.newest, self.collected, self.come = None, None, {}
         self.counters = Counter()
 
-    def add(self, head, sequence, payload, length, damaged, waits):
-        """Takes a packet; the payload of a frame that is whole now. `waits`: a whole frame waits for the one that leaves."""
+    def add(self, words, length, damaged, waits):
+        """Takes a packet; the payload of a frame that is whole now.
+
+        `waits` tells, once for each packet of which it matters, whether a whole frame waits for the one that leaves.
+        """
+        packet = unchecked(struct.pack(f"<{len(words)}I", *words))
+        if not packet or damaged or length != 4 * len(words):
+            return self.tell("damaged")
+        head, *rest = words[:-1]
+        if not rest:
+            return self.tell("refused")
+        waits = next(waits)
+        sequence, *payload = rest
         kind, index, count = head & 255, head >> 16 & 255, head >> 24
         expected = self.counts[index] if index < len(self.counts) else 0
-        if sequence is None or kind != KIND_FRAME or count != len(self.counts) or not expected or length != 4 * (2 + expected):
+        if kind != KIND_FRAME or count != len(self.counts) or not expected or len(payload) != expected:
             return self.tell("refused")
         if sequence != self.collected or waits or index in self.come:
             late = self.newest is not None and (self.newest - sequence) % 2**32 <= LATE
@@ -39,11 +61,8 @@ class Received:
             if self.collected is not None and self.come:
                 self.tell("cut")
             self.newest, self.collected, self.come = sequence, sequence, {}
-        if len(payload) < expected or damaged:
-            return self.tell("refused")
         self.tell("taken")
-        # Ethernet pads short packets.
-        self.come[index] = payload[:expected]
+        self.come[index] = payload
         if len(self.come) < len(self.counts):
             return None
         whole = [word for index in range(len(self.counts)) for word in self.come[index]]
@@ -80,8 +99,14 @@ def traffic(draw, taxels, code_bytes):
                 words = words[: draw.randrange(1, len(words))]
             elif form < 0.10:
                 words = words + [draw.randrange(2**32)] * draw.randrange(1, 4)
-            elif form < 0.12:
-                words[0] ^= 1 << draw.randrange(32) & 0xFFFF00FF
+            elif form < 0.11:
+                words[draw.randrange(len(words))] ^= 1 << draw.randrange(32)
+            elif form < 0.13:
+                # Whole, of another kind, number of fragments or length.
+                words[0] ^= draw.choice([1 << draw.randrange(32), 0]) & 0xFF0000FF
+                words = words[: draw.randrange(1, len(words))]
+                words.append(zlib.crc32(struct.pack(f"<{len(words)}I", *words)))
+                length = 4 * len(words)
             elif form < 0.14:
                 length += draw.choice([-4, 4])
             waiting += [(words, length, damaged)] * (2 if draw.random() < 0.05 else 1)
@@ -107,7 +132,7 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
     dut = FrameReceiver(taxels, code_bits, code_bytes)
     draw = random.Random(taxels)
     reference = Received(code_words(taxels, code_bytes))
-    expected, left, requesters, counters = [], [], [], {}
+    expected, left, requesters, counters, packets, waits = [], [], [], {}, [], []
     sent = 0
 
     def send():
@@ -118,8 +143,6 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                 break
             sent += len(words)
             yield dut.sink.length.eq(length)
-            # A frame that is whole waits while another leaves.
-            waits = None
             for at, word in enumerate(words):
                 yield dut.sink.valid.eq(1)
                 yield dut.sink.data.eq(word)
@@ -129,12 +152,8 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                 yield
                 while not (yield dut.sink.ready):
                     yield
-                if at == 1:
-                    waits = (yield dut.waits)
             yield dut.sink.valid.eq(0)
-            whole = reference.add(words[0], words[1] if len(words) > 2 else None, words[2:], length, damaged, waits)
-            if whole:
-                expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+            packets.append((words, length, damaged))
             for _ in range(draw.choice([0, 0, 1, taxels])):
                 yield
         # What has come whole leaves.
@@ -158,7 +177,19 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                     left.append((frame, (yield dut.source.id)))
                     frame, pace = [], draw.choice([1.0, 0.5, 0.3])
 
-    run_simulation(dut, [send(), take()])
+    @passive
+    def decide():
+        while True:
+            yield
+            if (yield dut.decides):
+                waits.append((yield dut.waits))
+
+    run_simulation(dut, [send(), take(), decide()])
+    waits = iter(waits)
+    for words, length, damaged in packets:
+        if whole := reference.add(words, length, damaged, waits):
+            expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+    assert next(waits, None) is None
     assert [(frame, number) for frame, number in left] == [
         (frame, (k + 1) % 2**ID_BITS) for k, (frame, _) in enumerate(expected)
     ]
@@ -166,7 +197,7 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
     assert counters == {name: reference.counters[name] for name in counters}
     # Only a frame of several packets can lack one.
     rare = "overrun" if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else "cut"
-    assert len(left) > 3 and min(counters[name] for name in ("taken", "refused", "ignored", rare)) > 0, counters
+    assert len(left) > 3 and min(counters[name] for name in ("taken", "refused", "ignored", "damaged", rare)) > 0, counters
 
 
 class Sending(LiteXModule):

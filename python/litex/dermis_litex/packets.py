@@ -10,21 +10,31 @@ All numbers are little-endian.
 | | 31:24 | number of fragments of the frame or result |
 | 1 | | sequence number, chosen by the host; a result has that of its frame |
 | 2 … | | `FRAGMENT_WORDS` words of the payload; of the last fragment the rest |
+| last | | CRC-32 of the words before it, as of Ethernet |
 
 Fragments of a frame may come in any order and more than once. Of a frame that lacks one when the next begins, nothing is
-solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored.
+solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored. A packet whose
+CRC-32 is wrong counts as lost: LiteEth does not compare UDP's checksum, and Ethernet's guards one cable only.
+
+The numbers of the format are in `packets.json`, which `dermis` reads too.
 """
 
+import json
 import struct
+import zlib
+from pathlib import Path
 
-HEADER_WORDS = 2
+LAYOUT = json.loads(Path(__file__).with_name("packets.json").read_text(encoding="utf-8"))
+UDP_PORT = LAYOUT["udp_port"]
+KIND_FRAME = LAYOUT["kind_frame"]
+KIND_RESULT = LAYOUT["kind_result"]
+HEADER_WORDS = LAYOUT["header_words"]
+CHECK_WORDS = LAYOUT["check_words"]
 # 1440 bytes: with the headers of UDP, IP and Ethernet less than 1500.
-FRAGMENT_WORDS = 360
-KIND_FRAME = 0xD1
-KIND_RESULT = 0xD2
+FRAGMENT_WORDS = LAYOUT["fragment_words"]
+LATE = LAYOUT["late"]
 FLAG_CLIPPED = 1
-LATE = 256
-UDP_PORT = 0xDE12
+WORD_BYTES = 4
 
 
 def fragment_words(words):
@@ -46,8 +56,19 @@ def packets(kind, sequence, words, flags=0):
     for index, count in enumerate(counts):
         payload = words[index * FRAGMENT_WORDS :][:count]
         head = kind | flags << 8 | index << 16 | len(counts) << 24
-        result.append(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload))
+        result.append(checked(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload)))
     return result
+
+
+def checked(packet):
+    """A packet with its CRC-32."""
+    return packet + zlib.crc32(packet).to_bytes(CHECK_WORDS * WORD_BYTES, "little")
+
+
+def unchecked(packet):
+    """A packet without its CRC-32, None if that is wrong."""
+    end = len(packet) - CHECK_WORDS * WORD_BYTES
+    return packet[:end] if end >= 0 and checked(packet[:end]) == packet else None
 
 
 def frame_packets(sequence, codes, code_bytes=2):
@@ -65,10 +86,11 @@ class Results:
         self.fragments = {}
 
     def add(self, packet):
-        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other packets are ignored."""
-        if len(packet) < 4 * HEADER_WORDS or len(packet) % 4:
+        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other and damaged packets are ignored."""
+        packet = unchecked(packet)
+        if packet is None or len(packet) < WORD_BYTES * HEADER_WORDS or len(packet) % WORD_BYTES:
             return None
-        head, sequence, *words = struct.unpack(f"<{len(packet) // 4}I", packet)
+        head, sequence, *words = struct.unpack(f"<{len(packet) // WORD_BYTES}I", packet)
         kind, flags, index, count = head.to_bytes(4, "little")
         if kind != KIND_RESULT or index >= count:
             return None

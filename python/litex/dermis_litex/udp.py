@@ -2,7 +2,7 @@
 
 ```text
  UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
-              two frame buffers          a packet at a time
+        PacketCheck, two frame buffers   a packet at a time
                     └── who asked, by id ──┘
 ```
 """
@@ -11,23 +11,25 @@ from functools import reduce
 from operator import and_
 
 from liteeth.common import eth_udp_user_description
+from liteeth.mac.crc import LiteEthMACCRC32, LiteEthMACCRCEngine
 from litex.gen import Case, Cat, FSM, If, LiteXModule, Memory, NextState, NextValue, Replicate, Signal
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.csr import CSRStatus
 
 from dermis_litex.core import ID_BITS, WORD_BITS, require_width
 from dermis_litex.packets import (
+    CHECK_WORDS,
     FRAGMENT_WORDS,
     HEADER_WORDS,
     KIND_FRAME,
     KIND_RESULT,
     LATE,
     UDP_PORT,
+    WORD_BYTES,
     code_words,
     fragment_words,
 )
 
-WORD_BYTES = WORD_BITS // 8
 SEQUENCE_BITS = 32
 REQUESTER = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
 BYTE = 8
@@ -61,24 +63,128 @@ class Requesters(LiteXModule):
         ]
 
 
+class CRC32(LiteXModule):
+    """CRC-32 of the words of a packet, as of Ethernet.
+
+    `ce`: the packet's next word is `data`, its last one with `last`. `value` is the CRC-32 of the words before; `is_right`: `data`
+    is the CRC-32 of the words before.
+    """
+
+    def __init__(self):
+        self.data, self.ce, self.last = Signal(WORD_BITS), Signal(), Signal()
+        self.value, self.is_right = Signal(WORD_BITS), Signal()
+
+        # # #
+
+        form = LiteEthMACCRC32
+        state = Signal(form.width, reset=form.init)
+        self.engine = engine = LiteEthMACCRCEngine(WORD_BITS, form.width, form.polynom)
+        self.comb += [
+            engine.data.eq(self.data),
+            engine.crc_prev.eq(state),
+            self.value.eq(state[::-1] ^ form.init),
+            self.is_right.eq(self.data == self.value),
+        ]
+        self.sync += If(self.ce, state.eq(engine.crc_next), If(self.last, state.eq(form.init)))
+
+
+class PacketCheck(LiteXModule):
+    """Packets of the network in; those that are whole leave, without their CRC-32, a word per cycle.
+
+    A packet is whole if its CRC-32 is right, no layer below has found an error, and its length is that of its words. Others, and
+    those for which there is no room, have no effect but a cycle of `damaged`. The network cannot wait: `sink` is always ready.
+    """
+
+    def __init__(self, words):
+        layout = eth_udp_user_description(WORD_BITS)
+        self.sink = sink = stream.Endpoint(layout)
+        self.source = source = stream.Endpoint(layout)
+        self.damaged = Signal()
+
+        # # #
+
+        # Two of the longest packets: one comes while the other leaves.
+        bits = (2 * words).bit_length()
+        memory = Memory(WORD_BITS, 2**bits)
+        write, read = memory.get_port(write_capable=True), memory.get_port()
+        self.specials += memory, write, read
+        self.params = params = stream.SyncFIFO(layout.param_layout, 4)
+        self.crc = crc = CRC32()
+
+        # Places of the next word, of the packet's first, and of the word that leaves; one bit more tells full from empty.
+        place, begin, leaves = Signal(bits + 1), Signal(bits + 1), Signal(bits + 1)
+        has_room, had_room, is_whole, count = Signal(), Signal(reset=1), Signal(), Signal(bits + 1)
+        self.comb += [
+            sink.ready.eq(1),
+            crc.data.eq(sink.data),
+            crc.ce.eq(sink.valid),
+            crc.last.eq(sink.last),
+            count.eq(place - begin),
+            has_room.eq((place - leaves)[: bits + 1] != 2**bits),
+            write.adr.eq(place[:bits]),
+            write.dat_w.eq(sink.data),
+            write.we.eq(sink.valid & has_room),
+            is_whole.eq(
+                had_room
+                & has_room
+                & params.sink.ready
+                & crc.is_right
+                & (sink.error == 0)
+                & (count != 0)
+                & (sink.length == WORD_BYTES * (count + CHECK_WORDS))
+            ),
+            params.sink.valid.eq(sink.valid & sink.last & is_whole),
+            params.sink.payload.raw_bits().eq(sink.param.raw_bits()),
+            self.damaged.eq(sink.valid & sink.last & ~is_whole),
+        ]
+        self.sync += If(
+            sink.valid,
+            place.eq(place + has_room),
+            had_room.eq(had_room & has_room),
+            If(
+                sink.last,
+                had_room.eq(1),
+                # The CRC-32 does not leave.
+                If(is_whole, place.eq(place), begin.eq(place)).Else(place.eq(begin)),
+            ),
+        )
+
+        at, steps, next_leaves = Signal(bits + 1), Signal(), Signal(bits + 1)
+        self.comb += [
+            steps.eq(source.valid & source.ready),
+            next_leaves.eq(leaves + steps),
+            read.adr.eq(next_leaves[:bits]),
+            source.valid.eq(params.source.valid),
+            source.param.raw_bits().eq(params.source.payload.raw_bits()),
+            source.length.eq(params.source.length - WORD_BYTES * CHECK_WORDS),
+            source.data.eq(read.dat_r),
+            source.last.eq(WORD_BYTES * (at + 1) == source.length),
+            params.source.ready.eq(steps & source.last),
+        ]
+        self.sync += [leaves.eq(next_leaves), If(steps, at.eq(at + 1), If(source.last, at.eq(0)))]
+
+
 class FrameReceiver(LiteXModule):
     """Packets in, whole frames out: `source` has a code of 32 bits per beat.
 
     A frame leaves only when all its packets have come; the next is collected meanwhile. Codes of 16 bits are those of the
     converter: they are shifted up to the `code_bits` of the engine. Five numbers count packets: `taken`, `ignored` (late, or come
-    before), `refused` (another kind, number of fragments or length, or damaged), `overrun` (two frames wait already), and
-    frames: `cut` (given up without a packet).
+    before), `refused` (another kind, number of fragments or length), `damaged` (`PacketCheck`), `overrun` (two frames wait already),
+    and one frames: `cut` (given up without a packet).
     """
 
     def __init__(self, taxels, code_bits, code_bytes):
         words = code_words(taxels, code_bytes)
         counts = fragment_words(words)
-        self.sink = sink = stream.Endpoint(eth_udp_user_description(WORD_BITS))
+        self.check = check = PacketCheck(HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS)
+        self.sink, sink = check.sink, check.source
         self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
         self.requester = requester = stream.Endpoint(REQUESTER)
         # A whole frame waits until the one before has left.
         self.waits = full = Signal()
-        self.counters = {name: Signal(32) for name in ("taken", "ignored", "refused", "overrun", "cut")}
+        # What becomes of a packet is decided now.
+        self.decides = Signal()
+        self.counters = {name: Signal(32) for name in ("taken", "ignored", "refused", "damaged", "overrun", "cut")}
 
         # # #
 
@@ -153,21 +259,14 @@ class FrameReceiver(LiteXModule):
                 .Else(*begins),
             ),
         )
-        # Behind the length that UDP states, Ethernet pads short packets.
-        whole = Signal()
-        self.comb += whole.eq((at + 1 >= expected) & (sink.error == 0))
         fsm.act(
             "PAYLOAD",
             sink.ready.eq(1),
-            write.we.eq(sink.valid & (at < expected)),
+            write.we.eq(sink.valid),
             If(
                 sink.valid,
-                If(at < expected, NextValue(at, at + 1)),
-                If(
-                    sink.last,
-                    If(whole, count("taken"), NextValue(come, come | (1 << index))).Else(count("refused")),
-                    NextState("HEAD"),
-                ),
+                NextValue(at, at + 1),
+                If(sink.last, count("taken"), NextValue(come, come | (1 << index)), NextState("HEAD")),
             ),
         )
         fsm.act("SKIP", sink.ready.eq(1), If(sink.valid & sink.last, NextState("HEAD")))
@@ -175,7 +274,9 @@ class FrameReceiver(LiteXModule):
             write.adr.eq(Cat((base + at)[: depth.bit_length() - 1], bank)),
             write.dat_w.eq(sink.data),
             full.eq(collects & reduce(and_, list(come))),
+            self.decides.eq(fsm.ongoing("SEQUENCE") & sink.valid),
         ]
+        self.sync += If(check.damaged, self.counters["damaged"].eq(self.counters["damaged"] + 1))
 
         # The other bank leaves, a code per beat.
         per_word = WORD_BYTES // code_bytes
@@ -255,20 +356,27 @@ class ResultSender(LiteXModule):
         # # #
 
         layout = eth_udp_user_description(WORD_BITS)
-        self.packets = fifo = PacketQueue(layout, 2 ** (FRAGMENT_WORDS + HEADER_WORDS - 1).bit_length())
+        self.packets = fifo = PacketQueue(layout, 2 ** (HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS - 1).bit_length())
         self.source = fifo.source
         packet = fifo.sink
         fragment, at = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
         count = Signal(max=FRAGMENT_WORDS + 1)
         ends = Signal()
+        self.crc = crc = CRC32()
+        is_over = Signal()
+        # The next result can be on `sink` when the CRC-32 of this one leaves.
+        to = stream.Endpoint(REQUESTER)
         self.comb += [
             choose(count, fragment, counts),
             ends.eq((at + 1 == count) | sink.last),
+            crc.data.eq(packet.data),
+            crc.ce.eq(packet.valid & packet.ready),
+            crc.last.eq(packet.last),
             requesters.read_id.eq(sink.id),
             packet.src_port.eq(udp_port),
-            packet.dst_port.eq(requesters.read.port),
-            packet.ip_address.eq(requesters.read.ip_address),
-            packet.length.eq(WORD_BYTES * (HEADER_WORDS + count)),
+            packet.dst_port.eq(to.port),
+            packet.ip_address.eq(to.ip_address),
+            packet.length.eq(WORD_BYTES * (HEADER_WORDS + count + CHECK_WORDS)),
         ]
         self.fsm = fsm = FSM(reset_state="WAIT")
         fsm.act("WAIT", NextValue(fragment, 0), NextValue(at, 0), If(sink.valid, NextState("HEAD")))
@@ -282,6 +390,7 @@ class ResultSender(LiteXModule):
             "SEQUENCE",
             packet.valid.eq(1),
             packet.data.eq(requesters.read.sequence),
+            NextValue(to.payload.raw_bits(), requesters.read.payload.raw_bits()),
             If(packet.ready, NextState("PAYLOAD")),
         )
         fsm.act(
@@ -289,15 +398,20 @@ class ResultSender(LiteXModule):
             packet.valid.eq(sink.valid),
             sink.ready.eq(packet.ready),
             packet.data.eq(sink.data),
-            packet.last.eq(ends),
-            If(ends, packet.last_be.eq(1 << (WORD_BYTES - 1))),
             If(
                 sink.valid & packet.ready,
                 NextValue(at, at + 1),
-                If(sink.last, NextState("WAIT")).Elif(
-                    ends, NextValue(at, 0), NextValue(fragment, fragment + 1), NextState("NEXT")
-                ),
+                If(ends, NextValue(is_over, sink.last), NextState("CHECK")),
             ),
+        )
+        fsm.act(
+            "CHECK",
+            packet.valid.eq(1),
+            packet.data.eq(crc.value),
+            packet.last.eq(1),
+            packet.last_be.eq(1 << (WORD_BYTES - 1)),
+            NextValue(at, 0),
+            If(packet.ready, If(is_over, NextState("WAIT")).Else(NextValue(fragment, fragment + 1), NextState("NEXT"))),
         )
         # The next fragment's id is on `sink` once its first word is offered.
         fsm.act("NEXT", If(sink.valid, NextState("HEAD")))
