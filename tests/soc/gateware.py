@@ -62,7 +62,7 @@ class Phy(LiteXModule):
 class Network(LiteXModule):
     """A core behind LiteEth, from the bytes of the PHY on."""
 
-    def __init__(self, folder, code_bytes, clock_Hz):
+    def __init__(self, folder, code_bytes, force_bits, clock_Hz):
         self.cd_sys = ClockDomain()
         self.cd_eth_rx = ClockDomain()
         self.cd_eth_tx = ClockDomain()
@@ -70,7 +70,7 @@ class Network(LiteXModule):
         self.platform, self.phy = Sources(), Phy()
         self.core = Dermis(self.platform, folder)
         self.network = LiteEthUDPIPCore(self.phy, MAC_ADDRESS, IP_ADDRESS, clock_Hz, dw=32)
-        self.udp = DermisUDP(self.core, self.network.udp.crossbar.get_port(UDP_PORT, dw=32), code_bytes)
+        self.udp = DermisUDP(self.core, self.network.udp.crossbar.get_port(UDP_PORT, dw=32), code_bytes, force_bits)
         counters = self.udp.receiver.counters
         self.counter_names = list(counters)
         self.counters = Signal(32 * len(counters))

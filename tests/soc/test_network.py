@@ -9,7 +9,7 @@ from collections import Counter
 
 import dermis_litex.packets
 import pytest
-from dermis_litex.packets import LATE, UDP_PORT, Results, checked, frame_packets
+from dermis_litex.packets import LATE, UDP_PORT, Results, checked, exponent_of, frame_packets, mantissa_of, short_counts
 from gateware import IP_ADDRESS, MAC_ADDRESS, Network, verilate
 from scapy.layers.inet import IP, UDP
 from scapy.layers.l2 import ARP, Ether
@@ -70,10 +70,10 @@ def flipped(data, at, bit):
 class Wire:
     """A simulation, and the frame and result of its core's testbench."""
 
-    def __init__(self, folder, clock_Hz=CLOCK_HZ):
-        network = Network(folder, 4, clock_Hz)
+    def __init__(self, folder, force_bits=32, clock_Hz=CLOCK_HZ):
+        network = Network(folder, 4, force_bits, clock_Hz)
         self.folder, self.half_period_ps = folder, round(1e12 / clock_Hz / 2)
-        self.counter_names, self.code_bits = network.counter_names, network.core.code_bits
+        self.counter_names, self.force_words = network.counter_names, network.core.force_words
         self.program = verilate(network, network.pins(), folder, "network", HERE / "wire.cpp", OPTIMISATION)
         words = lambda kind: [int(line, 16) for line in next(folder.glob(f"*_tb_{kind}.hex")).read_text().split()]
         signed = lambda word: word - (1 << 32) if word >> 31 else word
@@ -141,10 +141,10 @@ def wire(short_packets):
     return built("wire")
 
 
-def built(name, scene=None):
+def built(name, **options):
     folder = BUILD / name
-    generate(folder, "--bus", "wishbone", "--stream-bits", "32", **({"scene": scene} if scene else {}))
-    return Wire(folder)
+    generate(folder, "--bus", "wishbone", "--stream-bits", "32")
+    return Wire(folder, **options)
 
 
 def packets_of(words):
@@ -179,6 +179,30 @@ def test_another_coefficient_is_found(wire):
         memory.write_text(right)
     ((sequence, words, _),) = results_of(back)
     assert sequence == 7 and words != wire.result
+
+
+def rounded(wire):
+    """The words of the model's result as a host has them from short forces."""
+    forces = [word - 2**32 if word >> 31 else word for word in wire.result[: wire.force_words]]
+    words = []
+    for begin in range(0, len(forces), 2 * FRAGMENT_WORDS):
+        block = forces[begin : begin + 2 * FRAGMENT_WORDS]
+        exponent = exponent_of(block)
+        words += [(mantissa_of(force, exponent) << exponent) % 2**32 for force in block]
+    return words + wire.result[wire.force_words :]
+
+
+def test_short_forces_over_ethernet_are_those_of_the_model_rounded(short_packets):
+    wire = built("wire-short", force_bits=16, clock_Hz=62_500_000)
+    counts, _ = short_counts(wire.force_words, len(wire.result) - wire.force_words)
+    frames = [
+        (len(counts) * number, 0, on_the_wire(datagram(packet)))
+        for number in range(2)
+        for packet in frame_packets(number, wire.codes, 4)
+    ]
+    back, *_ = wire.play_after_arp(frames, packets_of(len(wire.codes)))
+    assert results_of(back) == [(sequence, rounded(wire), 0) for sequence in range(2)]
+    assert rounded(wire) != wire.result
 
 
 # What is done to a frame on its way: a name, and what becomes of its packets.

@@ -2,7 +2,7 @@
 
 ```text
  UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
-        PacketCheck, two frame buffers   a packet at a time
+        PacketCheck, two frame buffers   a packet at a time, ShortForces before it
                     └── who asked, by id ──┘
 ```
 """
@@ -12,27 +12,42 @@ from operator import and_
 
 from liteeth.common import eth_udp_user_description
 from liteeth.mac.crc import LiteEthMACCRC32, LiteEthMACCRCEngine
-from litex.gen import Case, Cat, FSM, If, LiteXModule, Memory, NextState, NextValue, Replicate, Signal
+from litex.gen import Case, Cat, Constant, FSM, If, LiteXModule, Memory, Mux, NextState, NextValue, Replicate, Signal
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.csr import CSRStatus
 
-from dermis_litex.core import ID_BITS, WORD_BITS, require_width
+from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_width
 from dermis_litex.packets import (
     CHECK_WORDS,
+    EXPONENT_AT,
     FRAGMENT_WORDS,
     HEADER_WORDS,
     KIND_FRAME,
     KIND_RESULT,
+    KIND_SHORT_RESULT,
     LATE,
+    MANTISSA_BITS,
     UDP_PORT,
     WORD_BYTES,
     code_words,
     fragment_words,
+    short_counts,
 )
 
 SEQUENCE_BITS = 32
 REQUESTER = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
 BYTE = 8
+# Exponents are 0 to 17.
+EXPONENT_BITS = 5
+# The words of results: each with what the packet says that begins with it.
+RESULT = [
+    ("data", WORD_BITS),
+    ("clipped", 1),
+    ("short", 1),
+    ("padded", 1),
+    ("exponent", EXPONENT_BITS),
+    ("id", ID_BITS),
+]
 
 
 def choose(target, index, values):
@@ -346,12 +361,124 @@ class PacketQueue(LiteXModule):
         ]
 
 
-class ResultSender(LiteXModule):
-    """The words of results in, packets out, each as a whole: a network has no pauses within a packet."""
+class Mantissa(LiteXModule):
+    """`mantissa_of` for the exponents that `exponent_of` gives."""
 
-    def __init__(self, words, requesters, udp_port):
-        counts = fragment_words(words)
+    def __init__(self):
+        self.force, self.exponent, self.mantissa = Signal((WORD_BITS, True)), Signal(EXPONENT_BITS), Signal(MANTISSA_BITS)
+
+        # # #
+
+        # Without the bit that rounds, and with it below.
+        shifted = Signal((WORD_BITS + 1, True))
+        doubled = Signal((WORD_BITS + 1, True))
+        self.comb += [
+            doubled.eq(Cat(0, self.force)),
+            shifted.eq(doubled >> self.exponent),
+            self.mantissa.eq(shifted[1:] + shifted[0]),
+        ]
+
+
+class ShortForces(LiteXModule):
+    """The words of results in, forces as mantissas of 16 bits with an exponent per packet out, then the other words.
+
+    The forces of a packet wait until the largest is known; `source` is what `ResultSender` takes.
+    """
+
+    def __init__(self, force_words, fragment):
+        most = 2 * fragment
+        counts = [most] * (force_words // most) + ([force_words % most] if force_words % most else [])
         self.sink = sink = stream.Endpoint([("data", WORD_BITS), ("user", 2), ("id", ID_BITS)])
+        self.source = source = stream.Endpoint(RESULT)
+
+        # # #
+
+        memory = Memory(WORD_BITS, 2 ** (most - 1).bit_length())
+        write, read = memory.get_port(write_capable=True), memory.get_port()
+        self.specials += memory, write, read
+        at, count, block = Signal(max=most + 2), Signal(max=most + 1), Signal(max=len(counts) + 1)
+        size, grown, sizes = Signal(WORD_BITS), Signal(WORD_BITS), Signal(WORD_BITS)
+        exponent, clipped, identifier = Signal(EXPONENT_BITS), Signal(), Signal(ID_BITS)
+        self.mantissa = mantissa = Mantissa()
+        halves = [Signal(MANTISSA_BITS), Signal(MANTISSA_BITS)]
+        is_last_block = Signal()
+        self.comb += [
+            choose(count, block, counts),
+            is_last_block.eq(block == len(counts) - 1),
+            size.eq(sink.data ^ Replicate(sink.data[-1], WORD_BITS)),
+            grown.eq(size + (size >> MANTISSA_BITS - 1)),
+            write.adr.eq(at),
+            write.dat_w.eq(sink.data),
+            read.adr.eq(at),
+            mantissa.force.eq(read.dat_r),
+            mantissa.exponent.eq(exponent),
+        ]
+        self.fsm = fsm = FSM(reset_state="FILL")
+        fsm.act(
+            "FILL",
+            sink.ready.eq(1),
+            write.we.eq(sink.valid),
+            If(
+                sink.valid,
+                NextValue(clipped, sink.user[1]),
+                NextValue(identifier, sink.id),
+                NextValue(sizes, sizes | grown),
+                NextValue(at, at + 1),
+                If(at + 1 == count, NextValue(at, 0), NextState("SCALE")),
+            ),
+        )
+        # The largest size decides: the last assignment holds.
+        scale = [If(sizes[bit], NextValue(exponent, bit + 2 - MANTISSA_BITS)) for bit in range(MANTISSA_BITS - 1, WORD_BITS)]
+        fsm.act("SCALE", NextValue(exponent, 0), *scale, NextValue(sizes, 0), NextValue(at, 1), NextState("LOW"))
+        # `read` has the word before `at`.
+        fsm.act("LOW", NextValue(halves[0], mantissa.mantissa), NextState("HIGH"))
+        fsm.act(
+            "HIGH",
+            NextValue(halves[1], Mux(at == count, 0, mantissa.mantissa)),
+            NextValue(at, at + 1),
+            NextState("PUT"),
+        )
+        fsm.act(
+            "PUT",
+            source.valid.eq(1),
+            source.short.eq(1),
+            source.padded.eq(count[0]),
+            source.data.eq(Cat(*halves)),
+            source.clipped.eq(clipped),
+            source.exponent.eq(exponent),
+            source.id.eq(identifier),
+            If(
+                source.ready,
+                NextValue(at, at + 1),
+                NextState("LOW"),
+                If(
+                    at >= count,
+                    NextValue(at, 0),
+                    NextValue(block, block + 1),
+                    If(is_last_block, NextValue(block, 0), NextState("PASS")).Else(NextState("FILL")),
+                ),
+            ),
+        )
+        fsm.act(
+            "PASS",
+            source.valid.eq(sink.valid),
+            sink.ready.eq(source.ready),
+            source.data.eq(sink.data),
+            source.clipped.eq(sink.user[1]),
+            source.id.eq(sink.id),
+            source.last.eq(sink.last),
+            If(sink.valid & source.ready & sink.last, NextState("FILL")),
+        )
+
+
+class ResultSender(LiteXModule):
+    """The words of results in, packets out, each as a whole: a network has no pauses within a packet.
+
+    `counts` has the words of each packet of a result.
+    """
+
+    def __init__(self, counts, requesters, udp_port):
+        self.sink = sink = stream.Endpoint(RESULT)
 
         # # #
 
@@ -361,7 +488,7 @@ class ResultSender(LiteXModule):
         packet = fifo.sink
         fragment, at = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
         count = Signal(max=FRAGMENT_WORDS + 1)
-        ends = Signal()
+        kind, flags, ends = Signal(BYTE), Signal(BYTE), Signal()
         self.crc = crc = CRC32()
         is_over = Signal()
         # The next result can be on `sink` when the CRC-32 of this one leaves.
@@ -369,6 +496,9 @@ class ResultSender(LiteXModule):
         self.comb += [
             choose(count, fragment, counts),
             ends.eq((at + 1 == count) | sink.last),
+            kind.eq(Mux(sink.short, KIND_SHORT_RESULT, KIND_RESULT)),
+            flags.eq(Cat(sink.clipped, sink.padded)),
+            flags[EXPONENT_AT:].eq(sink.exponent),
             crc.data.eq(packet.data),
             crc.ce.eq(packet.valid & packet.ready),
             crc.last.eq(packet.last),
@@ -383,7 +513,7 @@ class ResultSender(LiteXModule):
         fsm.act(
             "HEAD",
             packet.valid.eq(1),
-            packet.data.eq(Cat(Signal(8, reset=KIND_RESULT), sink.user[1], Signal(7), fragment, Signal(8, reset=len(counts)))),
+            packet.data.eq(Cat(kind, flags, fragment, Constant(len(counts), BYTE))),
             If(packet.ready, NextState("SEQUENCE")),
         )
         fsm.act(
@@ -420,23 +550,42 @@ class ResultSender(LiteXModule):
 class DermisUDP(LiteXModule):
     """A core between the two directions of a UDP port of LiteEth with words of 32 bits.
 
-    The counters of `FrameReceiver` are CSRs.
+    Codes in packets have 2 or 4 bytes, forces 32 bits, or 16 with an exponent per packet. The counters of `FrameReceiver` are CSRs.
+
+    Raises `CoreError` for what the core has not, with field, value and what would be right.
     """
 
-    def __init__(self, core, port, code_bytes=2, udp_port=UDP_PORT):
+    def __init__(self, core, port, code_bytes=2, force_bits=WORD_BITS, udp_port=UDP_PORT):
         require_width(core, WORD_BITS)
+        require_choice("code_bytes", code_bytes, (2, 4))
+        require_choice("force_bits", force_bits, (MANTISSA_BITS, WORD_BITS))
         self.requesters = Requesters()
         self.receiver = FrameReceiver(core.taxels, core.code_bits, code_bytes)
-        self.sender = ResultSender(core.words, self.requesters, udp_port)
+        if force_bits == MANTISSA_BITS:
+            require_forces(core)
+            counts, _ = short_counts(core.force_words, core.words - core.force_words)
+            self.short_forces = ShortForces(core.force_words, FRAGMENT_WORDS)
+        else:
+            counts = fragment_words(core.words)
+        self.sender = ResultSender(counts, self.requesters, udp_port)
 
         # # #
 
+        if force_bits == MANTISSA_BITS:
+            self.comb += [
+                core.source.connect(self.short_forces.sink, omit={"keep"}),
+                self.short_forces.source.connect(self.sender.sink),
+            ]
+        else:
+            self.comb += [
+                core.source.connect(self.sender.sink, keep={"valid", "ready", "last", "data", "id"}),
+                self.sender.sink.clipped.eq(core.source.user[1]),
+            ]
         self.comb += [
             port.source.connect(self.receiver.sink),
             self.receiver.source.connect(core.sink),
             self.receiver.requester.connect(self.requesters.written, omit={"ready"}),
             self.requesters.write_id.eq(self.receiver.next_id),
-            core.source.connect(self.sender.sink, omit={"keep"}),
             self.sender.source.connect(port.sink),
         ]
         for name, counter in self.receiver.counters.items():
