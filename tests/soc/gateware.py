@@ -1,12 +1,18 @@
-"""Gateware of LiteX around a core, as Verilog for an event-driven simulator."""
+"""Gateware of LiteX around a core, as Verilog for simulators."""
 
 import re
+import shutil
+import subprocess
 
 from dermis_litex import Dermis, DermisUDP
-from litex.gen import ClockDomain, LiteXModule
+from dermis_litex.packets import UDP_PORT
+from litex.gen import Cat, ClockDomain, LiteXModule, Signal
 from litex.gen.fhdl import verilog
 from litex.soc.interconnect import stream
-from liteeth.common import eth_udp_user_description
+from liteeth.common import eth_phy_description, eth_udp_user_description
+from liteeth.core import LiteEthUDPIPCore
+
+MAC_ADDRESS, IP_ADDRESS = 0x10E2D5000001, "192.168.1.50"
 
 
 class Sources:
@@ -43,11 +49,77 @@ class Packets(LiteXModule):
         }
 
 
-def write_verilog(module, pins, folder, name):
-    """Writes `module` with these pins as `name` into a folder; all Verilog files of the design."""
+class Phy(LiteXModule):
+    """In the place of a PHY of LiteEth: a byte per cycle in each direction."""
+
+    dw = 8
+
+    def __init__(self):
+        self.sink, self.source = [stream.Endpoint(eth_phy_description(self.dw)) for _ in range(2)]
+        self.comb += self.sink.ready.eq(1)
+
+
+class Network(LiteXModule):
+    """A core behind LiteEth, from the bytes of the PHY on."""
+
+    def __init__(self, folder, code_bytes, force_bits, clock_Hz):
+        self.cd_sys = ClockDomain()
+        self.cd_eth_rx = ClockDomain()
+        self.cd_eth_tx = ClockDomain()
+        self.rst = Signal()
+        self.platform, self.phy = Sources(), Phy()
+        self.core = Dermis(self.platform, folder)
+        self.network = LiteEthUDPIPCore(self.phy, MAC_ADDRESS, IP_ADDRESS, clock_Hz, dw=32)
+        self.udp = DermisUDP(self.core, self.network.udp.crossbar.get_port(UDP_PORT, dw=32), code_bytes, force_bits)
+        counters = self.udp.receiver.counters
+        self.counter_names = list(counters)
+        self.counters = Signal(32 * len(counters))
+        self.comb += [
+            *(domain.rst.eq(self.rst) for domain in (self.cd_sys, self.cd_eth_rx, self.cd_eth_tx)),
+            self.counters.eq(Cat(*counters.values())),
+        ]
+
+    def pins(self):
+        clocks = {f"{name}_clk": getattr(self, f"cd_{name}").clk for name in ("sys", "eth_rx", "eth_tx")}
+        wires = {
+            f"{side}_{name}": getattr(end, name)
+            for side, end in (("rx", self.phy.source), ("tx", self.phy.sink))
+            for name in ("valid", "data", "last")
+        }
+        return clocks | wires | {"rst": self.rst, "counters": self.counters}
+
+
+def as_verilog(module, pins, name):
+    """The Verilog of `module` with these pins."""
     for pin, signal in pins.items():
         signal.name_override = pin
-    text = str(verilog.convert(module, ios=set(pins.values()), name=name))
+    return str(verilog.convert(module, ios=set(pins.values()), name=name))
+
+
+def engine_sources(module):
+    return [source for source in module.platform.files if source.endswith(".v")]
+
+
+def verilate(module, pins, folder, name, driver, optimisation):
+    """The simulation of `module` that the C++ of `driver` drives, in a folder with its memory files."""
+    work = folder / "verilated"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    (work / f"{name}.v").write_text(as_verilog(module, pins, name))
+    for memory in folder.glob("*.hex"):
+        shutil.copy(memory, work)
+    # What LiteX writes is not free of lint.
+    options = ["--cc", "--exe", "--build", "-Wno-lint", "-Wno-style", "-Wno-UNOPTFLAT", "-Wno-fatal", "--top-module", name]
+    options += ["-CFLAGS", f"-std=c++17 {optimisation}", "--Mdir", "."]
+    sources = [f"{name}.v", *engine_sources(module), str(driver)]
+    done = subprocess.run(["verilator", *options, *sources], cwd=work, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return work / f"V{name}"
+
+
+def write_verilog(module, pins, folder, name):
+    """Writes `module` with these pins as `name` into a folder, for an event-driven simulator; all Verilog files of the design."""
+    text = as_verilog(module, pins, name)
     # An event-driven simulator does not run `always @(*)` before an input changes: what is assigned begins undefined, until the
     # reset.
     assigned = set(re.findall(r"^\s+(\w+)\S* <= ", text, flags=re.MULTILINE))
@@ -55,4 +127,4 @@ def write_verilog(module, pins, folder, name):
     text = re.sub(r"^(reg [^=;]*?(\w+)) = [^;]*;", first, text, flags=re.MULTILINE)
     path = folder / f"{name}.v"
     path.write_text(text)
-    return [path, *(source for source in module.platform.files if source.endswith(".v"))]
+    return [path, *engine_sources(module)]

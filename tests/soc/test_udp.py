@@ -2,18 +2,57 @@
 
 import os
 import random
+import struct
+import zlib
+from bisect import bisect_left
 from collections import Counter
 
 import pytest
+from dermis_litex import CoreError
 from dermis_litex.core import ID_BITS
-from dermis_litex.packets import FRAGMENT_WORDS, KIND_FRAME, LATE, Results, code_words, fragment_words, frame_packets
-from dermis_litex.udp import FrameReceiver, Requesters, ResultSender
-from gateware import Packets, write_verilog
-from litex.gen import LiteXModule
+from dermis_litex.packets import (
+    FRAGMENT_WORDS,
+    KIND_FRAME,
+    LATE,
+    Results,
+    code_words,
+    exponent_of,
+    forces_of,
+    fragment_words,
+    frame_packets,
+    mantissa_of,
+    unchecked,
+)
+from dermis_litex.udp import DermisUDP, FrameReceiver, Requesters, ResultSender, ShortForces
+from gateware import Packets, Port, write_verilog
+from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
 from test_cores import BUILD, environment, generate, icarus
 
 CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
+
+
+class CRC32InPython(LiteXModule):
+    """In the place of `CRC32`, whose gates take Migen's simulator 20 ms per cycle; they are in the tests with other simulators."""
+
+    def __init__(self):
+        self.data, self.ce, self.last = Signal(32), Signal(), Signal()
+        self.value, self.is_right = Signal(32), Signal()
+        self.comb += self.is_right.eq(self.data == self.value)
+
+    @passive
+    def run(self):
+        crc = 0
+        while True:
+            yield
+            if (yield self.ce):
+                crc = 0 if (yield self.last) else zlib.crc32((yield self.data).to_bytes(4, "little"), crc)
+            yield self.value.eq(crc)
+
+
+@pytest.fixture
+def crc_in_python(monkeypatch):
+    monkeypatch.setattr("dermis_litex.udp.CRC32", CRC32InPython)
 
 
 class Received:
@@ -24,11 +63,22 @@ class Received:
         self.newest, self.collected, self.come = None, None, {}
         self.counters = Counter()
 
-    def add(self, head, sequence, payload, length, damaged, waits):
-        """Takes a packet; the payload of a frame that is whole now. `waits`: a whole frame waits for the one that leaves."""
+    def add(self, words, length, damaged, waits):
+        """Takes a packet; the payload of a frame that is whole now.
+
+        `waits` tells, once for each packet of which it matters, whether a whole frame waits for the one that leaves.
+        """
+        packet = unchecked(struct.pack(f"<{len(words)}I", *words))
+        if not packet or damaged or length != 4 * len(words):
+            return self.tell("damaged")
+        head, *rest = words[:-1]
+        if not rest:
+            return self.tell("refused")
+        waits = next(waits)
+        sequence, *payload = rest
         kind, index, count = head & 255, head >> 16 & 255, head >> 24
         expected = self.counts[index] if index < len(self.counts) else 0
-        if sequence is None or kind != KIND_FRAME or count != len(self.counts) or not expected or length != 4 * (2 + expected):
+        if kind != KIND_FRAME or count != len(self.counts) or not expected or len(payload) != expected:
             return self.tell("refused")
         if sequence != self.collected or waits or index in self.come:
             late = self.newest is not None and (self.newest - sequence) % 2**32 <= LATE
@@ -39,11 +89,8 @@ class Received:
             if self.collected is not None and self.come:
                 self.tell("cut")
             self.newest, self.collected, self.come = sequence, sequence, {}
-        if len(payload) < expected or damaged:
-            return self.tell("refused")
         self.tell("taken")
-        # Ethernet pads short packets.
-        self.come[index] = payload[:expected]
+        self.come[index] = payload
         if len(self.come) < len(self.counts):
             return None
         whole = [word for index in range(len(self.counts)) for word in self.come[index]]
@@ -80,8 +127,14 @@ def traffic(draw, taxels, code_bytes):
                 words = words[: draw.randrange(1, len(words))]
             elif form < 0.10:
                 words = words + [draw.randrange(2**32)] * draw.randrange(1, 4)
-            elif form < 0.12:
-                words[0] ^= 1 << draw.randrange(32) & 0xFFFF00FF
+            elif form < 0.11:
+                words[draw.randrange(len(words))] ^= 1 << draw.randrange(32)
+            elif form < 0.13:
+                # Whole, of another kind, number of fragments or length.
+                words[0] ^= draw.choice([1 << draw.randrange(32), 0]) & 0xFF0000FF
+                words = words[: draw.randrange(1, len(words))]
+                words.append(zlib.crc32(struct.pack(f"<{len(words)}I", *words)))
+                length = 4 * len(words)
             elif form < 0.14:
                 length += draw.choice([-4, 4])
             waiting += [(words, length, damaged)] * (2 if draw.random() < 0.05 else 1)
@@ -93,11 +146,11 @@ def traffic(draw, taxels, code_bytes):
 
 
 @pytest.mark.parametrize("taxels, code_bits, code_bytes", [(12, 20, 2), (15, 14, 2), (730, 20, 2), (7, 20, 4)])
-def test_only_whole_frames_leave(taxels, code_bits, code_bytes):
+def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes):
     only_whole_frames_leave(taxels, code_bits, code_bytes)
 
 
-def test_a_receiver_that_takes_late_packets_is_found(monkeypatch):
+def test_a_receiver_that_takes_late_packets_is_found(crc_in_python, monkeypatch):
     monkeypatch.setattr("dermis_litex.udp.LATE", 0)
     with pytest.raises(AssertionError):
         only_whole_frames_leave(12, 20, 2)
@@ -107,7 +160,7 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
     dut = FrameReceiver(taxels, code_bits, code_bytes)
     draw = random.Random(taxels)
     reference = Received(code_words(taxels, code_bytes))
-    expected, left, requesters, counters = [], [], [], {}
+    expected, left, requesters, counters, packets, waits = [], [], [], {}, [], []
     sent = 0
 
     def send():
@@ -118,8 +171,6 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                 break
             sent += len(words)
             yield dut.sink.length.eq(length)
-            # A frame that is whole waits while another leaves.
-            waits = None
             for at, word in enumerate(words):
                 yield dut.sink.valid.eq(1)
                 yield dut.sink.data.eq(word)
@@ -129,12 +180,8 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                 yield
                 while not (yield dut.sink.ready):
                     yield
-                if at == 1:
-                    waits = (yield dut.waits)
             yield dut.sink.valid.eq(0)
-            whole = reference.add(words[0], words[1] if len(words) > 2 else None, words[2:], length, damaged, waits)
-            if whole:
-                expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+            packets.append((words, length, damaged))
             for _ in range(draw.choice([0, 0, 1, taxels])):
                 yield
         # What has come whole leaves.
@@ -158,15 +205,27 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
                     left.append((frame, (yield dut.source.id)))
                     frame, pace = [], draw.choice([1.0, 0.5, 0.3])
 
-    run_simulation(dut, [send(), take()])
+    @passive
+    def decide():
+        while True:
+            yield
+            if (yield dut.decides):
+                waits.append((yield dut.waits))
+
+    run_simulation(dut, [send(), take(), decide(), dut.check.crc.run()])
+    waits = iter(waits)
+    for words, length, damaged in packets:
+        if whole := reference.add(words, length, damaged, waits):
+            expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+    assert next(waits, None) is None
     assert [(frame, number) for frame, number in left] == [
         (frame, (k + 1) % 2**ID_BITS) for k, (frame, _) in enumerate(expected)
     ]
     assert requesters == [sequence for _, sequence in expected]
     assert counters == {name: reference.counters[name] for name in counters}
-    # Only a frame of several packets can lack one.
-    rare = "overrun" if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else "cut"
-    assert len(left) > 3 and min(counters[name] for name in ("taken", "refused", "ignored", rare)) > 0, counters
+    # Only a frame of several packets can lack one; of the long ones few are sent.
+    rare = ["overrun", "refused"] if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else ["cut"]
+    assert len(left) > 3 and min(counters[name] for name in ["taken", "ignored", "damaged", *rare]) > 0, counters
 
 
 class Sending(LiteXModule):
@@ -174,11 +233,11 @@ class Sending(LiteXModule):
 
     def __init__(self, words):
         self.requesters = Requesters()
-        self.sender = ResultSender(words, self.requesters, 7)
+        self.sender = ResultSender(fragment_words(words), self.requesters, 7)
 
 
 @pytest.mark.parametrize("words", [9, 2 * FRAGMENT_WORDS + 5])
-def test_results_leave_in_whole_packets(words):
+def test_results_leave_in_whole_packets(crc_in_python, words):
     dut = Sending(words)
     draw = random.Random(words)
     frames = [[draw.randrange(2**32) for _ in range(words)] for _ in range(max(3, 400 // words))]
@@ -199,7 +258,7 @@ def test_results_leave_in_whole_packets(words):
                 yield sink.valid.eq(1)
                 yield sink.data.eq(word)
                 yield sink.id.eq(number % 2**ID_BITS)
-                yield sink.user.eq(clipped[number] << 1)
+                yield sink.clipped.eq(clipped[number])
                 yield sink.last.eq(at == words - 1)
                 yield
                 while not (yield sink.ready):
@@ -231,7 +290,7 @@ def test_results_leave_in_whole_packets(words):
                 packets.append((where, b"".join(word.to_bytes(4, "little") for word in own)))
                 own = []
 
-    run_simulation(dut, [send(), take()])
+    run_simulation(dut, [send(), take(), dut.sender.crc.run()])
     host = Results()
     for (ip_address, port, own_port), data in packets:
         assert (ip_address + 99, own_port) == (port, 7)
@@ -239,6 +298,119 @@ def test_results_leave_in_whole_packets(words):
         if result:
             results.append((ip_address, *result))
     assert results == [(k + 1, 3 * k, frame, clipped[k]) for k, frame in enumerate(frames)]
+
+
+def extremes(exponent):
+    """The forces of the largest and smallest size with an exponent: sizes with one exponent are an interval."""
+    grown = lambda size: size + (size >> 15)
+    bound = lambda bits: bisect_left(range(2**31), 2**bits, key=grown) - 1
+    low, high = bound(14 + exponent) + 1 if exponent else 0, bound(15 + exponent)
+    return [force for size in (low, high) for force in (size, ~size)]
+
+
+def test_no_mantissa_saturates_and_the_error_is_bounded():
+    # A mantissa grows with its force: with the extremes of each exponent all forces are proved.
+    assert extremes(17)[2] == 2**31 - 1
+    for exponent in range(18):
+        least, _, most, negative = extremes(exponent)
+        for force in extremes(exponent):
+            assert exponent_of([force]) == exponent
+            assert -(2**15) <= mantissa_of(force, exponent) < 2**15
+            # Without the next exponent it would not fit, or its error could be the same.
+            assert exponent == 0 or mantissa_of(least, exponent - 1) >= 2**15 - 1
+        assert exponent == 0 or 2 ** (exponent - 1) < least * (2**-15 + 2**-29)
+        draw = random.Random(exponent)
+        forces = [draw.choice([-1, 1]) * draw.randrange(most + 1) for _ in range(2000)] + [most, negative]
+        decoded = roundtrip(forces)
+        assert max(abs(was - now) for was, now in zip(forces, decoded, strict=True)) <= 2**exponent / 2
+
+
+def roundtrip(forces):
+    exponent = exponent_of(forces)
+    mantissas = [mantissa_of(force, exponent) for force in forces] + [0] * (len(forces) % 2)
+    words = struct.unpack(f"<{len(mantissas) // 2}I", struct.pack(f"<{len(mantissas)}h", *mantissas))
+    decoded = forces_of(words, exponent << 3 | len(forces) % 2 << 1)
+    return [word - 2**32 if word >> 31 else word for word in decoded]
+
+
+def test_an_exponent_that_ignores_rounding_saturates():
+    # The largest force that has a bit less without rounding.
+    force = 2**16 - 1
+    assert force.bit_length() - 15 == 1 and mantissa_of(force, 1) == 2**15
+    assert exponent_of([force]) == 2
+
+
+@pytest.mark.parametrize("force_words, fragment", [(45, 8), (16, 8), (9, 360), (1, 1)])
+def test_short_forces_are_those_of_the_model(force_words, fragment):
+    dut = ShortForces(force_words, fragment)
+    draw = random.Random(force_words)
+    others, frames, left = 6, [], []
+    for number in range(40):
+        sizes = [draw.randrange(32) for _ in range(4)]
+        force = lambda: draw.choice(extremes(draw.randrange(18)) + [draw.randrange(-(2**bits), 2**bits) for bits in sizes])
+        frames.append(([force() for _ in range(force_words)], [draw.randrange(2**32) for _ in range(others)], draw.randrange(2), number % 16))
+
+    def send():
+        for forces, rest, clipped, identifier in frames:
+            for at, word in enumerate(forces + rest):
+                yield dut.sink.valid.eq(1)
+                yield dut.sink.data.eq(word)
+                yield dut.sink.user.eq((at >= force_words) | clipped << 1)
+                yield dut.sink.id.eq(identifier)
+                yield dut.sink.last.eq(at + 1 == force_words + others)
+                yield
+                while not (yield dut.sink.ready):
+                    yield
+                yield dut.sink.valid.eq(0)
+                for _ in range(draw.choice([0, 0, 0, 2])):
+                    yield
+        for _ in range(8 * force_words + 40):
+            yield
+
+    @passive
+    def take():
+        while True:
+            yield dut.source.ready.eq(draw.random() < 0.7)
+            yield
+            if (yield dut.source.valid) and (yield dut.source.ready):
+                names = ("data", "short", "padded", "exponent", "clipped", "id", "last")
+                own = []
+                for name in names:
+                    own.append((yield getattr(dut.source, name)))
+                left.append(tuple(own))
+
+    run_simulation(dut, [send(), take()])
+    expected = []
+    for forces, rest, clipped, identifier in frames:
+        for begin in range(0, force_words, 2 * fragment):
+            block = forces[begin : begin + 2 * fragment]
+            exponent, padded = exponent_of(block), len(block) % 2
+            mantissas = [mantissa_of(force, exponent) % 2**16 for force in block] + [0] * padded
+            for low, high in zip(mantissas[::2], mantissas[1::2]):
+                expected.append((low | high << 16, 1, padded, exponent, clipped, identifier, 0))
+        expected += [(word, 0, 0, 0, clipped, identifier, at + 1 == others) for at, word in enumerate(rest)]
+    assert left == expected
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [({"force_bits": 24}, "force_bits = 24, not 16 or 32"), ({"code_bytes": 3}, "code_bytes = 3, not 2 or 4")],
+)
+def test_another_choice_is_refused(options, message):
+    class Core:
+        manifest = {"core": {"stream_bits": 32}}
+
+    with pytest.raises(CoreError, match=message):
+        DermisUDP(Core(), Port(), **options)
+
+
+def test_short_resultants_are_refused():
+    class Core:
+        manifest = {"core": {"stream_bits": 32}}
+        taxels, code_bits, force_words, words = 12, 20, 12, 21
+
+    with pytest.raises(CoreError, match="force_bits = 16, with 4 triples of resultants, not 12 of forces"):
+        DermisUDP(Core(), Port(), force_bits=16)
 
 
 def test_a_core_on_the_network(monkeypatch):

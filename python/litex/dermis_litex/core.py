@@ -49,6 +49,27 @@ def require_width(core, bits):
         )
 
 
+def require_choice(name, value, choices):
+    """An argument that is one of `choices`.
+
+    Raises `CoreError` with name, value and what would be right.
+    """
+    if value not in choices:
+        raise CoreError(f"{name} = {value!r}, not {' or '.join(map(str, choices))}")
+
+
+def require_forces(core):
+    """A core that sends the force of every taxel.
+
+    Raises `CoreError` with field, value and what would be right.
+    """
+    if core.force_words != 3 * core.taxels:
+        raise CoreError(
+            f"force_bits = 16, with {core.force_words // 3} triples of resultants, not {core.taxels} of forces: an exponent would be that "
+            'of the largest moment; take force_bits = 32, or build with output.forces = "taxels"'
+        )
+
+
 class Dermis(LiteXModule):
     """A core between two streams.
 
@@ -57,6 +78,7 @@ class Dermis(LiteXModule):
     - `bus`: the register map on Wishbone, addresses of words, 64 registers.
     - `manifest`: scales and counts, as in `manifest.json`.
     - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
+    - `force_words`: how many of those are forces, or resultants.
 
     The Verilog and its memory files are added to `platform`.
     """
@@ -67,7 +89,8 @@ class Dermis(LiteXModule):
         constants = read_json(folder / "registers.json")["constants"]
         rows, cols, self.code_bits, _ = constants["array"].to_bytes(4, "little")
         self.taxels = rows * cols
-        self.words = 3 * (constants["force_triples"] + constants["status_triples"])
+        self.force_words = 3 * constants["force_triples"]
+        self.words = self.force_words + 3 * constants["status_triples"]
         bits = self.manifest["core"]["stream_bits"]
         words = bits // WORD_BITS
         self.sink = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])

@@ -4,27 +4,45 @@ All numbers are little-endian.
 
 | word of 32 bits | bits | meaning |
 |---|---|---|
-| 0 | 7:0 | `KIND_FRAME` from the host, `KIND_RESULT` from the core |
-| | 15:8 | flags of a result: bit 0 a code was clipped |
+| 0 | 7:0 | `KIND_FRAME` from the host, `KIND_RESULT` or `KIND_SHORT_RESULT` from the core |
+| | 15:8 | flags of a result: bit 0 a code was clipped; of a short one bit 1 the last mantissa is none, bits 7:3 exponent |
 | | 23:16 | index of the fragment |
 | | 31:24 | number of fragments of the frame or result |
 | 1 | | sequence number, chosen by the host; a result has that of its frame |
 | 2 … | | `FRAGMENT_WORDS` words of the payload; of the last fragment the rest |
+| last | | CRC-32 of the words before it, as of Ethernet |
 
 Fragments of a frame may come in any order and more than once. Of a frame that lacks one when the next begins, nothing is
-solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored.
+solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored. A packet whose
+CRC-32 is wrong counts as lost: LiteEth does not compare UDP's checksum, and Ethernet's guards one cable only.
+
+A core of short forces sends them as mantissas of 16 bits, two in a word, the first in its low half, with one exponent per packet:
+a force is about mantissa · 2^exponent. The packets of status are `KIND_RESULT`. With the largest force F of the packet, by its
+absolute value, the error is at most 2^(exponent − 1), and less than F · (2^-15 + 2^-29). No mantissa saturates.
+
+The numbers of the format are in `packets.json`, which `dermis` reads too.
 """
 
+import json
 import struct
+import zlib
+from pathlib import Path
 
-HEADER_WORDS = 2
+LAYOUT = json.loads(Path(__file__).with_name("packets.json").read_text(encoding="utf-8"))
+UDP_PORT = LAYOUT["udp_port"]
+KIND_FRAME = LAYOUT["kind_frame"]
+KIND_RESULT = LAYOUT["kind_result"]
+KIND_SHORT_RESULT = LAYOUT["kind_short_result"]
+HEADER_WORDS = LAYOUT["header_words"]
+CHECK_WORDS = LAYOUT["check_words"]
 # 1440 bytes: with the headers of UDP, IP and Ethernet less than 1500.
-FRAGMENT_WORDS = 360
-KIND_FRAME = 0xD1
-KIND_RESULT = 0xD2
+FRAGMENT_WORDS = LAYOUT["fragment_words"]
+LATE = LAYOUT["late"]
 FLAG_CLIPPED = 1
-LATE = 256
-UDP_PORT = 0xDE12
+FLAG_PADDED = 2
+EXPONENT_AT = 3
+MANTISSA_BITS = 16
+WORD_BYTES = 4
 
 
 def fragment_words(words):
@@ -46,8 +64,19 @@ def packets(kind, sequence, words, flags=0):
     for index, count in enumerate(counts):
         payload = words[index * FRAGMENT_WORDS :][:count]
         head = kind | flags << 8 | index << 16 | len(counts) << 24
-        result.append(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload))
+        result.append(checked(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload)))
     return result
+
+
+def checked(packet):
+    """A packet with its CRC-32."""
+    return packet + zlib.crc32(packet).to_bytes(CHECK_WORDS * WORD_BYTES, "little")
+
+
+def unchecked(packet):
+    """A packet without its CRC-32, None if that is wrong."""
+    end = len(packet) - CHECK_WORDS * WORD_BYTES
+    return packet[:end] if end >= 0 and checked(packet[:end]) == packet else None
 
 
 def frame_packets(sequence, codes, code_bytes=2):
@@ -58,20 +87,55 @@ def frame_packets(sequence, codes, code_bytes=2):
     return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data))
 
 
+def exponent_of(forces):
+    """The exponent of a packet with these forces, signed integers of 32 bits.
+
+    The smallest with which the largest force fits, and still does when it is rounded up: what is added to it is at least half of 2^exponent.
+    """
+    sizes = 0
+    for force in forces:
+        size = force if force >= 0 else ~force
+        sizes |= size + (size >> MANTISSA_BITS - 1)
+    return max(sizes.bit_length() - (MANTISSA_BITS - 1), 0)
+
+
+def mantissa_of(force, exponent):
+    """The nearest mantissa; of two the upper one."""
+    return (force + (1 << exponent >> 1)) >> exponent
+
+
+def short_counts(force_words, other_words):
+    """Words of each fragment of a short result, and how many of the fragments have mantissas."""
+    short = fragment_words(-(-force_words // 2))
+    return short + fragment_words(other_words), len(short)
+
+
+def forces_of(words, flags):
+    """The forces of a packet of mantissas, as words of 32 bits."""
+    exponent = flags >> EXPONENT_AT
+    mantissas = struct.unpack(f"<{2 * len(words)}h", struct.pack(f"<{len(words)}I", *words))
+    # A force near 2^31 that was rounded up.
+    forces = [min(mantissa << exponent, 2**31 - 1) % 2**32 for mantissa in mantissas]
+    return forces[:-1] if flags & FLAG_PADDED else forces
+
+
 class Results:
-    """Puts results together from their packets, in any order."""
+    """Puts results together from their packets, in any order; short forces are words of 32 bits again."""
 
     def __init__(self):
         self.fragments = {}
 
     def add(self, packet):
-        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other packets are ignored."""
-        if len(packet) < 4 * HEADER_WORDS or len(packet) % 4:
+        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other and damaged packets are ignored."""
+        packet = unchecked(packet)
+        if packet is None or len(packet) < WORD_BYTES * HEADER_WORDS or len(packet) % WORD_BYTES:
             return None
-        head, sequence, *words = struct.unpack(f"<{len(packet) // 4}I", packet)
+        head, sequence, *words = struct.unpack(f"<{len(packet) // WORD_BYTES}I", packet)
         kind, flags, index, count = head.to_bytes(4, "little")
-        if kind != KIND_RESULT or index >= count:
+        if kind not in (KIND_RESULT, KIND_SHORT_RESULT) or index >= count:
             return None
+        if kind == KIND_SHORT_RESULT:
+            words = forces_of(words, flags)
         # A result that lacks a packet is given up once it is old.
         self.fragments = {key: own for key, own in self.fragments.items() if (sequence - key) % 2**32 <= LATE}
         own = self.fragments.setdefault(sequence, {})
@@ -79,4 +143,4 @@ class Results:
         if len(own) < count:
             return None
         del self.fragments[sequence]
-        return sequence, [word for index in range(count) for word in own[index]], flags
+        return sequence, [word for index in range(count) for word in own[index]], flags & FLAG_CLIPPED
