@@ -52,9 +52,11 @@ pub struct Converter {
     pub output_delay_ns: f64,
 }
 
-/// The converters that a scene can name.
+/// The converters that a scene can name. Commands and the order of the bits are those of public drivers of these parts; the
+/// times must be compared with the data sheet of the part that is soldered in, since the model of the converter has the same.
 pub const CONVERTERS: [Converter; 2] = [
-    // Sections Timing Characteristics, ADC Mode Control Register and Manual Mode. Manual mode with the external clock: bits 14 to 11 are SCAN = 0001, 10 to 7 the channel, 2 CHAN_ID, 1 SWCNV.
+    // Sections Timing Characteristics, ADC Mode Control Register and Manual Mode. Manual mode with the external clock: bits 14
+    // to 11 are SCAN = 0001, 10 to 7 the channel, 2 CHAN_ID, 1 SWCNV.
     Converter {
         name: "max11125",
         source: "Maxim MAX11120–MAX11128",
@@ -74,7 +76,8 @@ pub const CONVERTERS: [Converter; 2] = [
         input_hold_ns: 1.0,
         output_delay_ns: 16.5,
     },
-    // Sections Timing Requirements: Serial Interface and Command Register Map. Commands MAN_Ch_n, in the range after a reset, ±2.5 · 4.096 V. The result follows 16 bits of zeros.
+    // Sections Timing Requirements: Serial Interface and Command Register Map. Commands MAN_Ch_n, in the range after a reset,
+    // ±2.5 · 4.096 V. The result follows 16 bits of zeros.
     Converter {
         name: "ads8688",
         source: "TI ADS8688, SBAS582",

@@ -134,8 +134,8 @@ fn kernel(shape: &Shape) -> Kernel {
         let raw = answer.low(bits);
         let value = match converter.bipolar {
             // Less the middle of the range.
-            true => (!raw.top()).concat(raw.low(bits - 1)).signed().extend(value_bits), // value_bits.0
-            false => raw.extend(value_bits).signed(),                                   // value_bits.0
+            true => (!raw.top()).concat(raw.low(bits - 1)).signed().extend(value_bits),
+            false => raw.extend(value_bits).signed(),
         };
         let sum = k.register(&name("sum"), Type::signed(sum_bits));
         let zero = k.constant(1, 0);
@@ -154,7 +154,7 @@ fn kernel(shape: &Shape) -> Kernel {
         });
         let before = opens.mux(k.signed_constant(sum_bits, 0), *sum);
         k.when(*ended, || sum.set((before + value.extend(sum_bits)).resize(sum_bits)));
-        let mean = sum.shift_left(shift).round_shift(power).low(code); // code_bits.0
+        let mean = sum.shift_left(shift).round_shift(power).low(code);
         let [top, bottom] =
             [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
         let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
