@@ -192,6 +192,7 @@ def rounded(wire):
     return words + wire.result[wire.force_words :]
 
 
+@NIGHTLY
 def test_short_forces_over_ethernet_are_those_of_the_model_rounded(short_packets):
     wire = built("wire-short", force_bits=16, clock_Hz=62_500_000)
     counts, _ = short_counts(wire.force_words, len(wire.result) - wire.force_words)

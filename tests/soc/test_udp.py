@@ -28,6 +28,7 @@ from gateware import Packets, Port, write_verilog
 from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
 from test_cores import BUILD, environment, generate, icarus
+from test_litex import NIGHTLY
 
 CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
 
@@ -145,7 +146,10 @@ def traffic(draw, taxels, code_bytes):
             yield waiting.pop(0)
 
 
-@pytest.mark.parametrize("taxels, code_bits, code_bytes", [(12, 20, 2), (15, 14, 2), (730, 20, 2), (7, 20, 4)])
+@pytest.mark.parametrize(
+    "taxels, code_bits, code_bytes",
+    [(12, 20, 2), (15, 14, 2), pytest.param(730, 20, 2, marks=NIGHTLY), (7, 20, 4)],
+)
 def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes):
     only_whole_frames_leave(taxels, code_bits, code_bytes)
 
