@@ -127,7 +127,7 @@ fn kernel(shape: &Shape) -> Kernel {
         held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
     });
     let (mut at_end, mut at_other) = (Vec::new(), Vec::new());
-    for own in 0..count {
+    for (own, to) in held.iter().enumerate() {
         let name = |of: &str| format!("{of}_{own}");
         let answer = k.register(&name("answer"), Type::unsigned(bits + tag_bits));
         k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(own))));
@@ -158,7 +158,7 @@ fn kernel(shape: &Shape) -> Kernel {
         let [top, bottom] =
             [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
         let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
-        k.when(*closing, || held[own].set(own_code));
+        k.when(*closing, || to.set(own_code));
         at_end.push((high | low) & alive.at(own));
         at_other.push(wrong & alive.at(own));
     }

@@ -228,13 +228,17 @@ pub(super) mod tests {
         Shape { scan, timing, rows: 2, code_bits: 17, dead: dead.to_vec() }
     }
 
+    /// What belongs to the end of a frame: `result` to `alive`.
+    type Told = [u64; 6];
+    /// Row, CS low, SCLK away from idle, MOSI where it is defined; for the end of a frame what belongs to it.
+    type Pins = (u64, bool, bool, Option<u64>, Option<Told>);
+
     /// The pins of a scan, cycle by cycle, written down as the documentation of [`Timing`] says.
     struct Schedule {
         shape: Shape,
-        /// Row, CS low, SCLK away from idle, MOSI where it is defined; for the end of a frame what belongs to it.
-        pins: Vec<(u64, bool, bool, Option<u64>, Option<[u64; 6]>)>,
+        pins: Vec<Pins>,
         at: Option<usize>,
-        told: Vec<Option<[u64; 6]>>,
+        told: Vec<Option<Told>>,
         took: bool,
     }
 
