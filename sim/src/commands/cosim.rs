@@ -95,7 +95,13 @@ impl DeviceChoice {
 /// Wrong input, a scene without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let Arguments { scene, frames, json, tables, device, waves: with_waves, wire, target } = arguments;
-    let (scene, frames) = resolve(scene.as_deref(), frames)?;
+    // Frames are of the array that is simulated: that of the specimen, if there is one.
+    let (array, frames) = resolve(tables.as_deref().or(scene.as_deref()), frames)?;
+    let (scene, specimen) = match (tables, scene) {
+        (None, _) => (array, None),
+        (Some(_), Some(hardware)) => (Scene::load(hardware)?, Some(array)),
+        (Some(tables), None) => bail!("--tables {tables}: name the scene of the hardware before it"),
+    };
     let scene = target.apply(scene);
     if scene.hardware.adc_scan.is_some() && tables.is_none() && !with_waves {
         let verified = verify_scan(&scene, &frames, device.simulators(), *wire, build_dir)?;
@@ -108,7 +114,6 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     if wire.is_some() {
         bail!("--wire: {}: hardware.source = stream; expected adc-scan, which has wires to converters", scene.name);
     }
-    let specimen = tables.as_deref().map(Scene::load).transpose()?;
     let verified = verify_specimen(&scene, specimen.as_ref(), &frames, device.simulators(), build_dir)?;
     let mut text =
         if *json { serde_json::to_string(&CosimReport::new(&verified))? + "\n" } else { report::cosim(&verified) };

@@ -10,8 +10,8 @@
 //!
 //! The sum keeps all its bits and is shifted before the one rounding. A mean alone would hide a sample at the end of the
 //! range among others that are not: one such sample makes the code the end of its own range, and raises
-//! [`FLAG_RAIL`](super::send::FLAG_RAIL). The lower end of a unipolar converter is no stress and raises nothing. A sample
-//! whose tag names another channel makes the code the upper end, and raises [`FLAG_CHANNEL`](super::send::FLAG_CHANNEL).
+//! [`FLAG_RAIL`]. The lower end of a unipolar converter is no stress and raises nothing. A sample
+//! whose tag names another channel makes the code the upper end, and raises [`FLAG_CHANNEL`].
 //! Dead taxels raise nothing.
 
 use super::send::{FLAG_CHANNEL, FLAG_RAIL};
