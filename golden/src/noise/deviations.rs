@@ -161,6 +161,7 @@ fn errors(
 fn bare(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.hardware.fix_tables();
+    scene.hardware.adc_scan = None;
     scene.input = InputSpec { dead: scene.input.dead.clone(), unipolar: scene.input.unipolar, ..InputSpec::default() };
     scene.threshold = ThresholdSpec::default();
     scene.output.forces = ForceOutput::Taxels;

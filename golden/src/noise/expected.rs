@@ -85,6 +85,7 @@ pub fn expected(
     let mut bare = scene.clone();
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.hardware.fix_tables();
+    bare.hardware.adc_scan = None;
     bare.input = InputSpec { dead, unipolar, gain_spread, plausible_MPa, ..InputSpec::default() };
     bare.search.noise_floor_MPa = 0.0;
     bare.threshold = ThresholdSpec::default();

@@ -1,5 +1,6 @@
 //! The array before its converters: a voltage per taxel, and faults of its wires.
 
+use anyhow::{ensure, Result};
 use dermis_golden::adc::AdcScan;
 
 /// A fault of the wires between array, converters and hardware, for the whole run but for `Flip`.
@@ -31,6 +32,31 @@ pub enum Fault {
         /// The row.
         row: usize,
     },
+}
+
+impl Fault {
+    /// Checks that `array` has what the fault names, in a run of so many scans.
+    ///
+    /// # Errors
+    /// The part, its number, and how many there are.
+    pub fn check(self, array: &Array, scans: usize) -> Result<()> {
+        let converters = array.scan.converters;
+        let parts = match self {
+            Fault::Stuck { converter, .. } | Fault::NextChannel { converter } => {
+                vec![("converter", converter, converters)]
+            }
+            Fault::Flip { converter, frame, bit } => vec![
+                ("converter", converter, converters),
+                ("frame on the bus", frame, scans * array.rows * array.frames_of_row()),
+                ("bit of an answer", bit as usize, array.scan.converter.answer_bits() as usize),
+            ],
+            Fault::Row { row } => vec![("row", row, array.rows)],
+        };
+        for (part, number, count) in parts {
+            ensure!(number < count, "--wire: {part} {number} is not possible; it must be 0 to {}", count - 1);
+        }
+        Ok(())
+    }
 }
 
 /// Voltages of an array, as shares of the converters' full range.
@@ -116,5 +142,43 @@ impl Array {
         let seed = (frame * 64 + converter) as u64;
         let share = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)).f64();
         self.noise_lsb * (2.0 * share - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::adc::CONVERTERS;
+
+    #[test]
+    fn a_fault_of_what_is_not_there_is_refused() {
+        let scan = AdcScan {
+            converter: CONVERTERS[0],
+            converters: 2,
+            channels: 3,
+            sclk_MHz: 10.0,
+            row_settling_us: 0.0,
+            channel_settling_us: 0.0,
+            average: 1,
+            period_us: 1000.0,
+        };
+        let array = Array::new(scan, 4, Vec::new(), 0.0, None);
+        let told = |fault: Fault| fault.check(&array, 2).map_err(|error| error.to_string());
+        assert_eq!(told(Fault::Flip { converter: 1, frame: 55, bit: 15 }), Ok(()));
+        let cases = [
+            (Fault::Stuck { converter: 2, level: true }, "--wire: converter 2 is not possible; it must be 0 to 1"),
+            (Fault::Row { row: 4 }, "--wire: row 4 is not possible; it must be 0 to 3"),
+            (
+                Fault::Flip { converter: 0, frame: 56, bit: 0 },
+                "--wire: frame on the bus 56 is not possible; it must be 0 to 55",
+            ),
+            (
+                Fault::Flip { converter: 0, frame: 0, bit: 40 },
+                "--wire: bit of an answer 40 is not possible; it must be 0 to 15",
+            ),
+        ];
+        for (fault, message) in cases {
+            assert_eq!(told(fault), Err(message.to_owned()));
+        }
     }
 }

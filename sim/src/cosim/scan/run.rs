@@ -223,7 +223,8 @@ pub struct VerifiedScan {
 /// with a fault of the wires if there is one.
 ///
 /// # Errors
-/// A scene that cannot be built, a frame of another sensor, no Verilator, a netlist, which a scan does not have.
+/// A scene that cannot be built, a frame of another sensor, a fault of what the array does not have, no Verilator, a netlist,
+/// which a scan does not have.
 pub fn verify_scan(
     scene: &Scene,
     frames: &[Frame],
@@ -240,6 +241,9 @@ pub fn verify_scan(
     };
     let volts = frames.iter().map(volts).collect::<Result<Vec<_>>>()?;
     let array = Array::new(scan, scene.sensor.rows, volts, NOISE_LSB, fault);
+    if let Some(fault) = fault {
+        fault.check(&array, frames.len())?;
+    }
     let expected = expected(&model, &array, frames.len());
     let mut verified =
         VerifiedScan { model: model.clone(), rows: Vec::new(), findings: Findings::default(), runs: Vec::new() };
