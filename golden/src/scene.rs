@@ -306,11 +306,12 @@ impl HardwareSpec {
         self.has_writable_tables() && self.table_range.dead_taxels > 0
     }
 
-    /// Puts the tables into the bitstream, as for frames that need no calibration. The formats remain those of
-    /// [`TableRange`]'s coefficients, so that a frame has the same forces.
-    pub fn fix_tables(&mut self) {
+    /// Takes frames of stress, which need neither calibration nor converters: the tables are in the bitstream, codes come as a
+    /// stream. The formats remain those of [`TableRange`]'s coefficients, so that a frame has the same forces.
+    pub fn take_stress(&mut self) {
         self.tables = TableStorage::Rom;
         self.table_range.gain = None;
+        self.adc_scan = None;
     }
 }
 

@@ -160,8 +160,7 @@ fn errors(
 /// The scene with its search, without what changes readings or forces and needs a full scale.
 fn bare(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.hardware.fix_tables();
-    scene.hardware.adc_scan = None;
+    scene.hardware.take_stress();
     scene.input = InputSpec { dead: scene.input.dead.clone(), unipolar: scene.input.unipolar, ..InputSpec::default() };
     scene.threshold = ThresholdSpec::default();
     scene.output.forces = ForceOutput::Taxels;

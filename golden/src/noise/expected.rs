@@ -84,8 +84,7 @@ pub fn expected(
 ) -> Result<Vec<ShapeRow>, StudyError> {
     let mut bare = scene.clone();
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
-    bare.hardware.fix_tables();
-    bare.hardware.adc_scan = None;
+    bare.hardware.take_stress();
     bare.input = InputSpec { dead, unipolar, gain_spread, plausible_MPa, ..InputSpec::default() };
     bare.search.noise_floor_MPa = 0.0;
     bare.threshold = ThresholdSpec::default();

@@ -194,15 +194,11 @@ impl Shape {
         let k = wires("load", self.code_bits, "The tables are in the bitstream: the stream passes through.");
         k.input("idle", 1);
         k.wire("restart", k.named("rst"));
-        let [address_bits, pair_bits] = self.coefficients.bits();
+        self.no_coefficients(&k);
         let constants = [
             ("write", 1),
             ("taxel", count_bits(self.taxels)),
             ("entry", self.code_bits + GAIN_BITS as usize),
-            ("coefficient_write", 1),
-            ("coefficient_word", address_bits),
-            ("coefficient_pair", pair_bits),
-            ("coefficient_data", PAIR_BITS),
             ("noise_floor", 1),
             ("threshold", THRESHOLD_BITS),
             ("version", VERSION_WORD_BITS),
@@ -328,16 +324,27 @@ impl Shape {
         k.finish()
     }
 
-    /// Two coefficients of each `word` that `is_pair`, written a cycle later, while the word still stands.
+    /// The coefficients are in the bitstream: nothing is written.
+    fn no_coefficients(&self, k: &Builder) {
+        let [word_bits, pair_bits] = self.coefficients.bits();
+        let outputs = [
+            ("coefficient_write", 1),
+            ("coefficient_word", word_bits),
+            ("coefficient_pair", pair_bits),
+            ("coefficient_data", PAIR_BITS),
+        ];
+        for (name, bits) in outputs {
+            k.wire(name, k.constant(bits, 0));
+        }
+    }
+
+    /// Writes the two coefficients of `word` where `is_pair` says that it holds some: a cycle later, before the next byte
+    /// changes the register.
     fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, over: Expr<'k>, word: Expr<'k>) {
         let [address_bits, pair_bits] = self.coefficients.bits();
         let CoefficientPlaces { words, pairs } = self.coefficients;
         if words == 0 {
-            k.wire("coefficient_write", k.constant(1, 0));
-            k.wire("coefficient_word", k.constant(address_bits, 0));
-            k.wire("coefficient_pair", k.constant(pair_bits, 0));
-            k.wire("coefficient_data", k.constant(PAIR_BITS, 0));
-            return;
+            return self.no_coefficients(k);
         }
         let is_written = k.state("is_written", Type::unsigned(1), rst, 0);
         let address = k.state("address", Type::unsigned(address_bits), rst, 0);
