@@ -22,18 +22,18 @@ pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT
 pub use error::LinkError;
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{payloads, scene_hash, supports};
+pub use identity::{image_bytes, payloads, scene_hash, supports};
 pub use link_kind::LinkKind;
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 
 /// Version of the packet format; a host rejects any other.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// Bytes of a packet besides its payload: [`Header`] and CRC.
 pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
 /// Bytes of the CRC-32 after the payload.
 pub const CRC_BYTES: usize = 4;
-/// Bit that is set in the type of an answer, which is otherwise that of its request.
+/// Bit that is set in the type of an answer, which is otherwise that of its request; of tables that of the counters.
 pub const ANSWER: u8 = 0x80;
 /// Polynomial of CRC-32, reflected.
 pub const CRC_POLYNOMIAL: u32 = 0xedb8_8320;
@@ -52,9 +52,11 @@ pub enum Kind {
     FrameForResultants = 0x03,
     /// A frame; requests its forces.
     FrameForForces = 0x04,
+    /// An image of tables ([`load`](crate::fixed::stages::load)) for a board with `hardware.tables = "writable"`.
+    Tables = 0x05,
     /// Answers `Identify`.
     Identity = 0x81,
-    /// Answers `ReadCounters`.
+    /// Answers `ReadCounters`, and `Tables` once they are in the engine.
     Counters = 0x82,
     /// Answers `FrameForResultants`.
     Resultants = 0x83,
@@ -64,11 +66,12 @@ pub enum Kind {
 
 impl Kind {
     /// All types, requests first.
-    pub const ALL: [Kind; 8] = [
+    pub const ALL: [Kind; 9] = [
         Kind::Identify,
         Kind::ReadCounters,
         Kind::FrameForResultants,
         Kind::FrameForForces,
+        Kind::Tables,
         Kind::Identity,
         Kind::Counters,
         Kind::Resultants,
@@ -82,7 +85,10 @@ impl Kind {
 
     /// The type of the answer to a request; an answer is returned unchanged.
     pub fn answer(self) -> Kind {
-        Kind::of(self as u8 | ANSWER).unwrap_or(self)
+        match self {
+            Kind::Tables => Kind::Counters,
+            _ => Kind::of(self as u8 | ANSWER).unwrap_or(self),
+        }
     }
 
     /// Name in the documentation and the C header.
@@ -92,6 +98,7 @@ impl Kind {
             Kind::ReadCounters => "read_counters",
             Kind::FrameForResultants => "frame_for_resultants",
             Kind::FrameForForces => "frame_for_forces",
+            Kind::Tables => "tables",
             Kind::Identity => "identity",
             Kind::Counters => "counters",
             Kind::Resultants => "resultants",

@@ -115,7 +115,7 @@ impl Board {
             let model = Model::new(spec).map_err(fixed)?;
             let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok).map_err(input)?;
             let client = open(port, baud, timeout).map_err(|error| failure(error.into()))?;
-            Session::new(client, model, tare.map(|tare| tare.0.as_ref()), true, check).map_err(failure)
+            Session::new(client, model, None, tare.map(|tare| tare.0.as_ref()), true, check).map_err(failure)
         })?;
         Ok(Board { session: Mutex::new(Some(session)), scene })
     }

@@ -7,8 +7,8 @@ use thiserror::Error;
 pub enum LinkError {
     /// The engine of the scene does not send a fixed number of beats for each frame.
     #[error(
-        "{field} = {value}: a board's link does not support it; it needs one frame per answer, the same subarrays in every \
-         frame, and tables in the bitstream"
+        "{field} = {value}: a board's link does not support it; it needs one frame per answer and the same subarrays in \
+         every frame"
     )]
     Unsupported {
         /// The scene's field.

@@ -12,6 +12,7 @@ pub(super) fn contents(kind: Kind) -> &'static str {
         Kind::FrameForResultants | Kind::FrameForForces => {
             "one code per taxel, row-major: two's complement in as many bytes as `input_bits` needs"
         }
+        Kind::Tables => "an image of tables, for a board with `hardware.tables = \"writable\"`; answered with counters",
         Kind::Identity => "identity",
         Kind::Counters => "counters",
         Kind::Resultants => {
@@ -75,7 +76,7 @@ frames may be in flight at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants).\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants), images in stage [`load`](crate::fixed::stages::load). The answer to an\nimage says that the engine has it; the status of the next frame says whether it is whole, and its version. A board\nwhose engine is not idle for the image drops it, and counts an overrun.\n"
 }
 
 /// How a special byte is escaped in a packet.

@@ -12,14 +12,15 @@ use crate::fixed::Plan;
 use crate::scene::Condition;
 
 /// All requests.
-const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
+const REQUESTS: [Kind; 5] =
+    [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces, Kind::Tables];
 
 impl Identity {
     /// The identity of the hardware of `plan`.
     ///
     /// # Errors
-    /// [`LinkError`]: the scene averages, chooses its case per frame or has writable tables, for which there is no packet; a payload is too long; the board lacks the link or its
-    /// clock is too slow for the bit rate.
+    /// [`LinkError`]: the scene averages or chooses its case per frame, for which there is no packet; a payload is too long; the
+    /// board lacks the link or its clock is too slow for the bit rate.
     pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
         let scene = &plan.scene;
@@ -27,13 +28,10 @@ impl Identity {
         if scene.input.average > 0 {
             return refuse("input.average", scene.input.average.to_string());
         }
-        if plan.has_writable_tables() {
-            return refuse("hardware.tables", "writable".to_owned());
-        }
         if plan.chooses() {
             return refuse("partition.case", scene.partition.case.to_string());
         }
-        let payloads = payloads(plan);
+        let payloads = payloads(plan).into_iter().chain(image_bytes(plan).map(|bytes| ("tables", bytes)));
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
             return Err(LinkError::TooLong { scene: plan.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
         }
@@ -65,6 +63,7 @@ pub fn supports(plan: &Plan, kind: Kind) -> bool {
     match kind {
         Kind::FrameForResultants => plan.board.engine == EngineKind::Parallel,
         Kind::FrameForForces => !plan.sends_resultants(),
+        Kind::Tables => plan.has_writable_tables(),
         _ => true,
     }
 }
@@ -87,6 +86,11 @@ pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
         ("resultants", resultants + others),
         ("forces", BEAT_BYTES * taxels + others),
     ]
+}
+
+/// Length in bytes of an image of tables; none where they are in the bitstream.
+pub fn image_bytes(plan: &Plan) -> Option<usize> {
+    plan.tables().map(|tables| tables.image_bytes())
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,

@@ -14,7 +14,7 @@ proptest! {
         garbage in prop::collection::vec(any::<u8>(), 0..40),
         payload in prop::collection::vec(any::<u8>(), 0..300),
         sequence in any::<u8>(),
-        kind in 0usize..8,
+        kind in 0..Kind::ALL.len(),
     ) {
         let packet = Packet { kind: Kind::ALL[kind], sequence, payload };
         let found = decode(&[garbage, packet.to_wire(), packet.to_wire()].concat());

@@ -1,10 +1,10 @@
 //! Puts the bytes of images of tables, which come from a register, between the frames of the engine's input.
 
-use dermis_golden::fixed::stages::load;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel, Type};
+use crate::primitives::table_beat;
 use crate::wire::Wire;
 
 /// ```text
@@ -100,9 +100,10 @@ fn kernel(code_bits: usize, writable: bool) -> Kernel {
     let code_taken = k.wire("s_axis_tready", ready & !is_byte);
     let octet_taken = k.wire("octet_taken", ready & is_byte & octet_valid);
     let offered = k.wire("m_axis_tvalid", is_byte.mux(octet_valid, given));
-    let table =
-        octet.low(8).extend(code_bits + 1) | k.constant(code_bits + 1, load::beats(&[0], code_bits as u32)[0] as u64);
-    k.wire("m_axis_tdata", is_byte.mux(table, data.signed().extend(code_bits + 1).unsigned()));
+    k.wire(
+        "m_axis_tdata",
+        is_byte.mux(table_beat(&k, octet.low(8), code_bits), data.signed().extend(code_bits + 1).unsigned()),
+    );
     k.wire("m_axis_tlast", is_byte.mux(octet.top(), last));
     held.set(offered & !is_byte & !ready);
     k.when(given & code_taken, || in_frame.set(!last));
@@ -112,6 +113,8 @@ fn kernel(code_bits: usize, writable: bool) -> Kernel {
 
 #[cfg(test)]
 mod tests {
+    use dermis_golden::fixed::stages::load;
+
     use super::*;
     use crate::language::testbench::{check, random_word, random_words, Pipeline, Reference};
     use crate::wire::Word;

@@ -3,9 +3,10 @@
 use dermis_golden::link::code_bytes;
 use rust_hdl::prelude::*;
 
+use super::Shape;
 use crate::kernel_block;
 use crate::language::{Body, Builder, Expr, Kernel, Type};
-use crate::primitives::count_bits;
+use crate::primitives::{count_bits, table_beat};
 use crate::wire::Wire;
 
 /// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
@@ -14,7 +15,10 @@ use crate::wire::Wire;
 /// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
 /// it.
 ///
-/// The engine accepts no code while its buffer is full. A frame that loses a code because of that, or that starts while
+/// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their packet's end as
+/// well: an image that is not whole ends early.
+///
+/// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. A frame that loses a code because of that, or that starts while
 /// the previous one is still held, is dropped too, and counts as an `overrun` if its packet is good.
 #[derive(LogicBlock)]
 pub struct FrameIngress {
@@ -22,8 +26,10 @@ pub struct FrameIngress {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// The header of a frame's packet is complete; high for one cycle.
+    /// The header of a packet with a frame or an image is complete; high for one cycle.
     pub frame_begin: Signal<In, Bit>,
+    /// The packet holds an image; valid with `frame_begin`.
+    pub image: Signal<In, Bit>,
     /// `content` is a byte of the payload.
     pub payload: Signal<In, Bit>,
     /// A byte of the packet, 8 bits; valid with `payload`.
@@ -36,7 +42,7 @@ pub struct FrameIngress {
     pub taken: Signal<Out, Bit>,
     /// The frame is dropped although its packet is good; with `good`.
     pub overrun: Signal<Out, Bit>,
-    /// A taxel's code, two's complement; valid with `valid`.
+    /// A taxel's code, two's complement, or a byte of an image, `stream_bits` wide; valid with `valid`.
     pub code: Wire<Out>,
     /// `code` is offered to the engine; held until `ready`.
     pub valid: Signal<Out, Bit>,
@@ -50,7 +56,7 @@ pub struct FrameIngress {
 kernel_block!(
     FrameIngress,
     clock clk,
-    inputs [rst, frame_begin, payload, content, good, bad, ready],
+    inputs [rst, frame_begin, image, payload, content, good, bad, ready],
     outputs [taken, overrun, code, valid, last]
 );
 
@@ -58,25 +64,26 @@ kernel_block!(
 const HELD: usize = 2;
 
 impl FrameIngress {
-    /// For frames of `taxels` codes of `bits` bits each.
-    pub fn new(taxels: usize, bits: u32) -> Self {
+    /// For the frames and images of `shape`.
+    pub fn new(shape: &Shape) -> Self {
         let block = FrameIngress {
             clk: Default::default(),
             rst: Default::default(),
             frame_begin: Default::default(),
+            image: Default::default(),
             payload: Default::default(),
             content: Wire::new(8),
             good: Default::default(),
             bad: Default::default(),
             taken: Default::default(),
             overrun: Default::default(),
-            code: Wire::new(bits as usize),
+            code: Wire::new(shape.stream_bits()),
             valid: Default::default(),
             last: Default::default(),
             ready: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(kernel(taxels, bits as usize, code_bytes(bits)))
+        block.bind(kernel(shape.rows * shape.cols, shape.input_bits as usize, shape.image_bytes))
     }
 }
 
@@ -92,17 +99,19 @@ fn assemble<'k>(k: &'k Builder, content: Expr<'k>, enable: Expr<'k>, bits: usize
     content.low(bits - before).concat(*raw)
 }
 
-fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
+fn kernel(taxels: usize, bits: usize, image_bytes: Option<usize>) -> Kernel {
     let k = Builder::new("frame_ingress");
-    let (rst, frame_begin, payload) = (k.input("rst", 1), k.input("frame_begin", 1), k.input("payload", 1));
+    let (rst, frame_begin, image) = (k.input("rst", 1), k.input("frame_begin", 1), k.input("image", 1));
+    let (payload, bytes) = (k.input("payload", 1), code_bytes(bits as u32));
     let (content, good, bad, ready) =
         (k.input("content", 8), k.input("good", 1), k.input("bad", 1), k.input("ready", 1));
     let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
-    let (b, d) = (count_bits(bytes), count_bits(taxels));
+    let (b, d) = (count_bits(bytes), count_bits(taxels.max(image_bytes.unwrap_or_default())));
+    let beat_bits = bits + usize::from(image_bytes.is_some());
     // Codes that leave before the end of the packet.
     let early_codes = taxels.saturating_sub(HELD);
     let byte_index = k.state("byte_index", Type::unsigned(b), rst, 0);
-    let [code, second] = ["code", "second"].map(|name| k.register(name, Type::unsigned(bits)));
+    let [code, second] = ["code", "second"].map(|name| k.register(name, Type::unsigned(beat_bits)));
     let fill = k.state("fill", Type::unsigned(2), rst, 0);
     let delivered = k.state("delivered", Type::unsigned(d), rst, 0);
     let flag = |name| k.state(name, bit, rst, 0);
@@ -113,8 +122,15 @@ fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
     let ahead = ahead.comment("Codes that may leave before the end of the packet are left.");
 
     let refused = k.wire("refused", *deaf | *lost);
-    let at_last = k.wire("at_last", delivered.is(taxels as u64 - 1));
     let empty = fill.is(0);
+    let in_image = image_bytes.map(|bytes| (bytes, flag("in_image")));
+    // Of the packet's beats all but `left` are delivered.
+    let all_but = |left: usize| {
+        let frame = delivered.is(taxels.saturating_sub(left) as u64);
+        let of_image = |bytes: usize| delivered.is((bytes - left) as u64);
+        in_image.as_ref().map_or(frame, |(bytes, within)| within.mux(of_image(*bytes), frame))
+    };
+    let at_last = k.wire("at_last", all_but(1));
     let early = k.wire("early", *aborting & empty);
     let accepted = good & *within_frame;
     let taken = k.wire("taken", accepted & !refused);
@@ -125,8 +141,17 @@ fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
     let aborts = k.wire("aborts", early & ready);
     let waits = k.wire("waits", valid & !ready);
     let hears = k.wire("hears", payload & !*deaf);
-    let arrived = k.wire("arrived", assemble(&k, content, hears, bits, bytes));
-    let complete = k.wire("complete", hears & byte_index.is(bytes as u64 - 1));
+    let arrived = assemble(&k, content, hears, bits, bytes);
+    let ends_code = byte_index.is(bytes as u64 - 1);
+    let (arrived, ends_code) = match &in_image {
+        None => (arrived, ends_code),
+        Some((_, within)) => {
+            let code = arrived.signed().extend(beat_bits).unsigned();
+            (within.mux(table_beat(&k, content, bits), code), **within | ends_code)
+        }
+    };
+    let arrived = k.wire("arrived", arrived);
+    let complete = k.wire("complete", hears & ends_code);
     let left = k.wire("left", (*fill - moves).low(2));
     let full = left.is(HELD as u64);
     let push = k.wire("push", complete & !full);
@@ -139,8 +164,7 @@ fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
     fill.set(drop.mux(waits.extend(2), push.mux(left.plus(1), left)));
     k.when(moves, || {
         delivered.set(at_last.mux(k.constant(d, 0), delivered.plus(1)));
-        let last_ahead = early_codes.saturating_sub(1) as u64;
-        ahead.set(at_last.mux(k.constant(1, some_ahead), *ahead & !delivered.is(last_ahead)));
+        ahead.set(at_last.mux(k.constant(1, some_ahead), *ahead & !all_but(HELD + 1)));
         k.when(at_last, || released.set(zero));
     });
     k.when(aborts, || {
@@ -158,11 +182,23 @@ fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
         lost.set(zero);
         byte_index.set(k.constant(b, 0));
     });
+    if let Some((_, within)) = &in_image {
+        let heard = k.wire("heard", frame_begin & empty & !*aborting);
+        k.when(heard, || {
+            within.set(image);
+            ahead.set(image | k.constant(1, some_ahead));
+        });
+        k.comment("What is held at an early end is a byte too.");
+        let no_byte = table_beat(&k, k.constant(8, 0), bits);
+        k.when(heard & image, || [code, second].iter().for_each(|held| held.set(no_byte)));
+    }
     k.finish()
 }
 
 #[cfg(test)]
 mod tests {
+    use dermis_golden::fixed::stages::load;
+
     use super::*;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
@@ -172,9 +208,12 @@ mod tests {
     struct Frames {
         taxels: usize,
         bits: usize,
-        bytes: usize,
+        image_bytes: Option<usize>,
+        in_image: bool,
         code: Vec<u8>,
         held: Vec<u64>,
+        /// What is in the places of the held ones.
+        registers: [u64; HELD],
         delivered: usize,
         within_frame: bool,
         deaf: bool,
@@ -185,12 +224,26 @@ mod tests {
     }
 
     impl Frames {
-        fn new(taxels: usize, bits: usize) -> Self {
-            Frames { taxels, bits, bytes: code_bytes(bits as u32), ..Frames::default() }
+        fn new(taxels: usize, bits: usize, image_bytes: Option<usize>) -> Self {
+            Frames { taxels, bits, image_bytes, ..Frames::default() }
+        }
+
+        /// Beats of the frame or image.
+        fn beats(&self) -> usize {
+            self.image_bytes.filter(|_| self.in_image).unwrap_or(self.taxels)
+        }
+
+        /// Bytes of a beat.
+        fn bytes(&self) -> usize {
+            if self.in_image {
+                1
+            } else {
+                code_bytes(self.bits as u32)
+            }
         }
 
         fn offers(&self) -> bool {
-            let ahead = self.delivered < self.taxels.saturating_sub(HELD);
+            let ahead = self.delivered < self.beats().saturating_sub(HELD);
             self.aborting || (!self.held.is_empty() && (self.released || ahead))
         }
 
@@ -199,8 +252,14 @@ mod tests {
         }
 
         fn code_of(&self) -> u64 {
-            let number = self.code.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte));
-            number & ((1 << self.bits) - 1)
+            let beat = match self.in_image {
+                true => load::beats(&self.code, self.bits as u32)[0],
+                false => {
+                    let number = self.code.iter().rev().fold(0, |number, &byte| number << 8 | i32::from(byte));
+                    number << (32 - self.bits) >> (32 - self.bits)
+                }
+            };
+            beat as u32 as u64 & ((1 << (self.bits + usize::from(self.image_bytes.is_some()))) - 1)
         }
     }
 
@@ -209,17 +268,20 @@ mod tests {
             if !self.reset {
                 return vec![None; 5];
             }
-            let accepted = inputs[4].number() == 1 && self.within_frame;
+            let accepted = inputs[5].number() == 1 && self.within_frame;
             let refused = self.deaf || self.lost;
-            let code = self.held.first().filter(|_| self.offers()).map(|&code| Word::from(code));
-            let last = self.ends_early() || self.delivered + 1 == self.taxels;
+            // At its early end an image has one more byte.
+            let end = Some(&self.registers[0]).filter(|_| self.ends_early() && self.in_image);
+            let code = self.held.first().filter(|_| self.offers()).or(end).map(|&code| Word::from(code));
+            let last = self.ends_early() || self.delivered + 1 == self.beats();
             let bits =
                 [accepted && !refused, accepted && refused, self.offers(), last].map(|bit| Some(Word::from(bit)));
             [code].into_iter().chain(bits).collect()
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, begin, payload, _, good, bad, ready] = [0, 1, 2, 3, 4, 5, 6].map(|k| inputs[k].number() == 1);
+            let [rst, begin, image, payload, _, good, bad, ready] =
+                [0, 1, 2, 3, 4, 5, 6, 7].map(|k| inputs[k].number() == 1);
             let before = self.clone();
             let waits = self.offers() && !ready;
             if self.offers() && ready {
@@ -227,16 +289,20 @@ mod tests {
                     (self.aborting, self.delivered) = (false, 0);
                 } else {
                     self.held.remove(0);
-                    self.delivered = (self.delivered + 1) % self.taxels;
+                    self.registers[0] = self.registers[1];
+                    self.delivered = (self.delivered + 1) % self.beats();
                     self.released &= self.delivered != 0;
                 }
             }
             if payload && !before.deaf {
-                self.code.push(inputs[3].number() as u8);
-                if self.code.len() == self.bytes {
+                self.code.push(inputs[4].number() as u8);
+                if self.code.len() == self.bytes() {
                     match self.held.len() {
                         HELD => self.lost = true,
-                        _ => self.held.push(self.code_of()),
+                        place => {
+                            self.registers[place] = self.code_of();
+                            self.held.push(self.registers[place]);
+                        }
                     }
                     self.code.clear();
                 }
@@ -253,9 +319,15 @@ mod tests {
             if begin {
                 (self.within_frame, self.deaf, self.lost) = (true, !before.held.is_empty() || before.aborting, false);
                 self.code.clear();
+                if !self.deaf {
+                    self.in_image = image && self.image_bytes.is_some();
+                }
+                if !self.deaf && self.in_image {
+                    self.registers = [load::beats(&[0], self.bits as u32)[0] as u64; HELD];
+                }
             }
             if rst {
-                *self = Frames { reset: true, ..Frames::new(self.taxels, self.bits) };
+                *self = Frames { reset: true, ..Frames::new(self.taxels, self.bits, self.image_bytes) };
             }
         }
     }
@@ -271,10 +343,14 @@ mod tests {
             let rst = cycle < 2 || random.u16(..900) == 0;
             let acts = !rst && random.u8(..8) < speed[0];
             let [mut begin, mut payload, mut good, mut bad] = [false; 4];
+            let image = frames.image_bytes.is_some() && random.u8(..3) == 0;
             match left {
                 _ if !acts => {}
                 None if pause > 0 => pause -= 1,
-                None => (begin, left) = (true, Some(frames.taxels * frames.bytes)),
+                None => {
+                    let of_frame = frames.taxels * code_bytes(frames.bits as u32);
+                    (begin, left) = (true, frames.image_bytes.filter(|_| image).or(Some(of_frame)));
+                }
                 Some(bytes) if bytes > 0 && random.u8(..40) > 0 => {
                     (payload, left) = (true, Some(bytes - 1));
                 }
@@ -289,17 +365,29 @@ mod tests {
             let bits = |bits: [bool; 3]| bits.map(Word::from);
             let ready = random.u8(..8) < speed[1];
             let content = Word::from(u64::from(random.u8(..)));
-            [&bits([rst, begin, payload])[..], &[content], &bits([good, bad, ready])[..]].concat()
+            [&bits([rst, begin, image])[..], &[payload.into(), content], &bits([good, bad, ready])[..]].concat()
         };
         (0..cycles).map(inputs).collect()
     }
 
     #[test]
     fn good_packets_and_no_others_become_whole_frames() {
-        for (taxels, bits) in [(5, 12), (2, 8), (7, 8), (4, 20)] {
-            let mut frames = Frames::new(taxels, bits);
-            let block = FrameIngress::new(taxels, bits as u32);
-            check(block.kernel.kernel(), &stimulus(8000, &frames), &mut frames);
+        for (taxels, bits, image) in
+            [(5, 12, None), (2, 8, None), (7, 8, None), (4, 20, None), (2, 12, Some(20)), (7, 16, Some(9))]
+        {
+            let mut frames = Frames::new(taxels, bits, image);
+            let body = Body::new(
+                kernel(taxels, bits, image),
+                &[],
+                &[
+                    ("taken", 1),
+                    ("overrun", 1),
+                    ("code", bits + usize::from(image.is_some())),
+                    ("valid", 1),
+                    ("last", 1),
+                ],
+            );
+            check(body.kernel(), &stimulus(8000, &frames), &mut frames);
         }
     }
 }

@@ -59,7 +59,7 @@ pub use uart_transmitter::UartTransmitter;
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, supports, Counters, Identity, Kind};
+use dermis_golden::link::{image_bytes, payloads, supports, Counters, Identity, Kind};
 
 /// Properties of a scene on which its packets depend.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,6 +72,8 @@ pub struct Shape {
     pub input_bits: u32,
     /// Bytes of the payload of an answer with resultants, and of one with forces.
     pub answer_bytes: [usize; 2],
+    /// Bytes of an image of tables; none where they are in the bitstream.
+    pub image_bytes: Option<usize>,
     /// What the board answers a frame with.
     pub answers: Answers,
     /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
@@ -120,7 +122,20 @@ impl Shape {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,
         };
-        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, answer_bytes: [resultants, forces], answers, frames }
+        Shape {
+            rows: sensor.rows,
+            cols: sensor.cols,
+            input_bits,
+            answer_bytes: [resultants, forces],
+            image_bytes: image_bytes(model),
+            answers,
+            frames,
+        }
+    }
+
+    /// Width of a beat to the engine: a code, or a byte of an image.
+    pub fn stream_bits(&self) -> usize {
+        self.input_bits as usize + usize::from(self.image_bytes.is_some())
     }
 
     /// Bytes of the payload of an answer, by source.

@@ -34,13 +34,13 @@ pub struct PacketLink {
     pub send_valid: Signal<Out, Bit>,
     /// The link accepts the byte in this cycle.
     pub send_ready: Signal<In, Bit>,
-    /// A taxel's code, `input_bits` wide; to the engine.
+    /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
     pub s_axis_tdata: Wire<Out>,
     /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
     pub s_axis_tvalid: Signal<Out, Bit>,
     /// The engine accepts the beat in this cycle.
     pub s_axis_tready: Signal<In, Bit>,
-    /// The code is the frame's last; valid with `s_axis_tvalid`.
+    /// The beat is the last of its frame or image; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<Out, Bit>,
     /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
     pub m_axis_tdata: Wire<In>,
@@ -83,7 +83,7 @@ impl PacketLink {
             send_data: Wire::new(8),
             send_valid: Default::default(),
             send_ready: Default::default(),
-            s_axis_tdata: Wire::new(shape.input_bits as usize),
+            s_axis_tdata: Wire::new(shape.stream_bits()),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -95,10 +95,10 @@ impl PacketLink {
             dropped: Default::default(),
             decoder: SlipDecoder::default(),
             parser: Parser::new(shape),
-            ingress: FrameIngress::new(shape.rows * shape.cols, shape.input_bits),
-            towards: RegisterSlice::new(shape.input_bits as usize, shape.answers.are_fast()),
+            ingress: FrameIngress::new(shape),
+            towards: RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast()),
             back: RegisterSlice::new(96, shape.answers.are_fast()),
-            requests: Requests::new(shape.frames),
+            requests: Requests::new(shape.frames, shape.image_bytes.is_some()),
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.answers.are_fast()),
             packer: Packer::new(shape.payloads()),
@@ -154,6 +154,7 @@ impl Logic for PacketLink {
 
         comment!("Packets to the engine");
         self.ingress.frame_begin.next = self.parser.frame_begin.val();
+        self.ingress.image.next = self.parser.image.val();
         self.ingress.payload.next = self.parser.payload.val();
         self.ingress.content.next = self.decoder.content.val();
         self.ingress.good.next = self.parser.good.val();

@@ -1,19 +1,19 @@
 //! From the bytes of packets to requests: checks header, length and CRC.
 
-use dermis_golden::link::{code_bytes, Kind, OVERHEAD};
+use dermis_golden::link::{code_bytes, Header, Kind, OVERHEAD};
 use rust_hdl::prelude::*;
 
 use super::Shape;
 use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::language::{Body, Builder, Expr, Kernel, Net, Type};
 use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
 /// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
 ///
-/// The payload of a frame is passed on while it arrives: `frame_begin` when its header is complete and correct, then
-/// `payload` with each byte, in the same cycle.
+/// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header is complete
+/// and correct, then `payload` with each byte, in the same cycle.
 #[derive(LogicBlock)]
 pub struct Parser {
     /// Clock; registers change on its rising edge.
@@ -30,9 +30,11 @@ pub struct Parser {
     pub spoiled: Signal<In, Bit>,
     /// The packet's bytes so far end with their correct CRC.
     pub crc_right: Signal<In, Bit>,
-    /// The header of a frame with the right length is complete.
+    /// The header of a frame or image with the right length is complete.
     pub frame_begin: Signal<Out, Bit>,
-    /// `content` is a byte of the payload of a frame.
+    /// The packet is an image of tables; valid with `frame_begin`.
+    pub image: Signal<Out, Bit>,
+    /// `content` is a byte of the payload of a frame or image.
     pub payload: Signal<Out, Bit>,
     /// The packet is correct.
     pub good: Signal<Out, Bit>,
@@ -51,7 +53,7 @@ kernel_block!(
     Parser,
     clock clk,
     inputs [rst, content, content_valid, packet_end, spoiled, crc_right],
-    outputs [frame_begin, payload, good, bad, fault, kind, number]
+    outputs [frame_begin, image, payload, good, bad, fault, kind, number]
 );
 
 const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
@@ -62,7 +64,7 @@ const UNKNOWN: u64 = 4;
 const LENGTH: u64 = 8;
 
 impl Parser {
-    /// For the frames of `shape`, whose payload has at most 65535 bytes.
+    /// For the frames and images of `shape`, whose payloads have at most 65535 bytes.
     pub fn new(shape: &Shape) -> Self {
         let block = Parser {
             clk: Default::default(),
@@ -73,6 +75,7 @@ impl Parser {
             spoiled: Default::default(),
             crc_right: Default::default(),
             frame_begin: Default::default(),
+            image: Default::default(),
             payload: Default::default(),
             good: Default::default(),
             bad: Default::default(),
@@ -82,23 +85,57 @@ impl Parser {
             kernel: Body::default(),
         };
         let frame_kinds: Vec<u8> = shape.answers.requests().iter().map(|kind| *kind as u8).collect();
-        block.bind(kernel(shape.rows * shape.cols * code_bytes(shape.input_bits), &frame_kinds))
+        block.bind(kernel(shape.rows * shape.cols * code_bytes(shape.input_bits), &frame_kinds, shape.image_bytes))
     }
 }
 
-/// For frames of `frame_bytes` bytes of payload in packets of the types `frame_kinds`.
-fn kernel(frame_bytes: usize, frame_kinds: &[u8]) -> Kernel {
+/// What the length bytes of a packet must be, and a register: those so far are.
+struct Length<'k> {
+    /// Bytes of the payload.
+    bytes: usize,
+    right: Net<'k>,
+}
+
+impl<'k> Length<'k> {
+    /// A packet of `count` bytes has another length.
+    fn is_wrong(&self, count: Expr<'k>) -> Expr<'k> {
+        !count.is((self.bytes + OVERHEAD) as u64) | !*self.right
+    }
+
+    /// `content` is right as the second length byte.
+    fn ends_with(&self, content: Expr<'k>) -> Expr<'k> {
+        *self.right & content.is((self.bytes >> 8) as u64)
+    }
+
+    /// The byte of index `count` is the payload's last.
+    fn ends_payload(&self, count: Expr<'k>) -> Expr<'k> {
+        count.is((self.bytes + Header::BYTES - 1) as u64)
+    }
+
+    /// Takes the first length byte, or the `second`.
+    fn take(&self, content: Expr<'k>, second: Expr<'k>) {
+        self.right.set(second.mux(self.ends_with(content), content.is((self.bytes & 0xff) as u64)));
+    }
+}
+
+/// For frames of `frame_bytes` bytes of payload in packets of the types `frame_kinds`, and images of `image_bytes`.
+fn kernel(frame_bytes: usize, frame_kinds: &[u8], image_bytes: Option<usize>) -> Kernel {
     let k = Builder::new("parser");
     let (rst, content, content_valid) = (k.input("rst", 1), k.input("content", 8), k.input("content_valid", 1));
     let (packet_end, spoiled, crc_right) = (k.input("packet_end", 1), k.input("spoiled", 1), k.input("crc_right", 1));
-    // The count stops at one more byte than a frame's packet has.
-    let most = frame_bytes + OVERHEAD + 1;
+    // The count stops at one more byte than the longest packet has.
+    let most = frame_bytes.max(image_bytes.unwrap_or_default()) + OVERHEAD + 1;
     let (bit, byte, c) = (Type::unsigned(1), Type::unsigned(8), count_bits(most + 1));
     let clears = k.wire("clears", rst | packet_end);
     let count = k.state("count", Type::unsigned(c), clears, 0);
-    let frame_length = k.register("frame_length", bit);
-    let frame_length = frame_length.comment("The length bytes so far match a frame's length, or zero.");
-    let no_length = k.register("no_length", bit);
+    let length = |name, bytes| Length { bytes, right: k.register(name, bit) };
+    let of_frame = length("frame_length", frame_bytes);
+    let of_frame = Length {
+        right: of_frame.right.comment("The length bytes so far are those of a frame, of nothing, or of an image."),
+        ..of_frame
+    };
+    let of_plain = length("no_length", 0);
+    let of_image = image_bytes.map(|bytes| length("image_length", bytes));
     let [lost, streaming] = ["lost", "streaming"].map(|name| k.state(name, bit, clears, 0));
     let good = k.state("good", bit, rst, 0);
     let fault = k.state("fault", Type::unsigned(4), rst, 0);
@@ -109,12 +146,14 @@ fn kernel(frame_bytes: usize, frame_kinds: &[u8]) -> Kernel {
     let never = k.constant(1, 0);
     let frame = k.wire("frame", kind_is(frame_kinds).unwrap_or(never));
     let plain = k.wire("plain", kind_is(&PLAIN_KINDS).unwrap_or(never));
+    let image = k.wire("image", if of_image.is_some() { kind.is(Kind::Tables as u64) } else { never });
     let too_short = count.less(k.constant(c, OVERHEAD as u64));
     let wrong_crc = k.wire("wrong_crc", too_short | !crc_right);
-    let wrong_frame = !at(frame_bytes + OVERHEAD) | !*frame_length;
-    let wrong_length = k.wire("wrong_length", frame.mux(wrong_frame, !at(OVERHEAD) | !*no_length));
+    let wrong_plain = of_plain.is_wrong(*count);
+    let wrong_other = of_image.as_ref().map_or(wrong_plain, |of| image.mux(of.is_wrong(*count), wrong_plain));
+    let wrong_length = k.wire("wrong_length", frame.mux(of_frame.is_wrong(*count), wrong_other));
     let empty = k.wire("empty", at(0) & !*lost);
-    let known = frame | plain;
+    let known = if of_image.is_some() { frame | plain | image } else { frame | plain };
     let cause = |cause: u64| k.constant(4, cause);
     let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
     let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
@@ -122,21 +161,25 @@ fn kernel(frame_bytes: usize, frame_kinds: &[u8]) -> Kernel {
     good.set(packet_end & !empty & !*lost & !wrong_crc & known & !wrong_length);
     k.wire("bad", fault.any());
 
-    let (high, low) = ((frame_bytes >> 8) as u64, (frame_bytes & 0xff) as u64);
-    let begins = at(3) & frame & *frame_length & content.is(high);
-    let frame_begin = k.wire("frame_begin", content_valid & begins);
+    let (mut begins, mut ends) = (frame & of_frame.ends_with(content), of_frame.ends_payload(*count));
+    if let Some(of_image) = &of_image {
+        begins = begins | (image & of_image.ends_with(content));
+        ends = image.mux(of_image.ends_payload(*count), ends);
+    }
+    let frame_begin = k.wire("frame_begin", content_valid & at(Header::BYTES - 1) & begins);
     k.wire("payload", content_valid & *streaming);
     k.when(spoiled, || lost.set(k.constant(1, 1)));
     k.when(content_valid & !at(most), || count.set(count.plus(1)));
-    k.when(content_valid & at(frame_bytes + 3), || streaming.set(never));
+    k.when(content_valid & ends, || streaming.set(never));
     k.when(frame_begin, || streaming.set(k.constant(1, 1)));
     let takes = k.wire("takes", content_valid & !clears);
     k.when(takes & at(0), || kind.set(content));
     k.when(takes & at(1), || number.set(content));
     k.when(takes & (at(2) | at(3)), || {
-        let second = count.at(0);
-        frame_length.set(second.mux(*frame_length & content.is(high), content.is(low)));
-        no_length.set((*no_length | !second) & content.is(0));
+        [Some(&of_frame), Some(&of_plain), of_image.as_ref()]
+            .into_iter()
+            .flatten()
+            .for_each(|of| of.take(content, count.at(0)));
     });
     k.finish()
 }
@@ -151,6 +194,7 @@ mod tests {
     #[derive(Default)]
     struct Packet {
         frame_bytes: usize,
+        image_bytes: Option<usize>,
         bytes: Vec<u8>,
         lost: bool,
         /// Type and number of the packet last begun.
@@ -159,17 +203,29 @@ mod tests {
         reset: bool,
     }
 
+    const TABLES: u8 = Kind::Tables as u8;
     const FRAMES: [u8; 2] = [Kind::FrameForResultants as u8, Kind::FrameForForces as u8];
 
     impl Packet {
-        fn of(frame_bytes: usize) -> Self {
-            Packet { frame_bytes, ..Packet::default() }
+        fn of(frame_bytes: usize, image_bytes: Option<usize>) -> Self {
+            Packet { frame_bytes, image_bytes, ..Packet::default() }
         }
 
-        /// The byte `content` completes the header of a frame of the right length.
-        fn begins(&self, content: u8) -> bool {
-            let length = |low| usize::from(u16::from_le_bytes([low, content]));
-            matches!(self.bytes[..], [kind, _, low] if FRAMES.contains(&kind) && length(low) == self.frame_bytes)
+        /// Bytes of the payload of a packet of this type; none if there is no such.
+        fn payload_of(&self, kind: u8) -> Option<usize> {
+            match kind {
+                kind if FRAMES.contains(&kind) => Some(self.frame_bytes),
+                kind if PLAIN_KINDS.contains(&kind) => Some(0),
+                TABLES => self.image_bytes,
+                _ => None,
+            }
+        }
+
+        /// The payload that the byte `content`, the last of its header, begins; none if there is none.
+        fn begins(&self, content: u8) -> Option<usize> {
+            let &[kind, _, low] = &self.bytes[..] else { return None };
+            let length = usize::from(u16::from_le_bytes([low, content]));
+            self.payload_of(kind).filter(|&bytes| bytes == length && bytes > 0)
         }
 
         /// 0 if the packet is correct, else the bit of its fault; none without a packet.
@@ -182,11 +238,7 @@ mod tests {
             if whole < OVERHEAD || !crc_right {
                 return Some(CRC);
             }
-            let wanted = match (FRAMES.contains(&kind), PLAIN_KINDS.contains(&kind)) {
-                (true, _) => self.frame_bytes,
-                (_, true) => 0,
-                _ => return Some(UNKNOWN),
-            };
+            let Some(wanted) = self.payload_of(kind) else { return Some(UNKNOWN) };
             let right = whole == wanted + OVERHEAD && usize::from(u16::from_le_bytes([low, high])) == wanted;
             Some(if right { 0 } else { LENGTH })
         }
@@ -195,20 +247,25 @@ mod tests {
     impl Reference for Packet {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             if !self.reset {
-                return vec![None; 7];
+                return vec![None; 8];
             }
             let (content, valid) = (inputs[1].number() as u8, inputs[2].number() == 1);
-            let streams = self.bytes.len() >= 4 && self.bytes.len() < self.frame_bytes + 4;
-            let payload = valid && streams && Packet { bytes: self.bytes[..3].to_vec(), ..*self }.begins(self.bytes[3]);
+            let count = self.bytes.len();
+            let begun = (count >= 4).then(|| Packet { bytes: self.bytes[..3].to_vec(), ..*self }.begins(self.bytes[3]));
+            let payload = valid && begun.flatten().is_some_and(|bytes| count < bytes + 4);
             let header = self.header.map(|byte| byte.map(|byte| Word::from(u64::from(byte))));
+            let image = self.header[0].map(|kind| Word::from(kind == TABLES && self.image_bytes.is_some()));
+            // Without images it is constant.
+            let image = if self.image_bytes.is_some() { image } else { Some(Word::default()) };
             let fault = self.verdict.unwrap_or(0);
             vec![
                 Some(Word::from(self.verdict == Some(0))),
                 Some(Word::from(fault)),
                 header[0],
                 header[1],
+                image,
                 Some(Word::from(fault != 0)),
-                Some(Word::from(valid && self.begins(content))),
+                Some(Word::from(valid && self.begins(content).is_some())),
                 Some(Word::from(payload)),
             ]
         }
@@ -237,7 +294,7 @@ mod tests {
     }
 
     /// Packets that are mostly right: of any type, length, with lost bytes, wrong CRCs, two ENDs in a row, resets.
-    fn stimulus(packets: usize, frame_bytes: usize) -> Vec<Vec<Word>> {
+    fn stimulus(packets: usize, of: &Packet) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(16);
         let cycle = |bits: [bool; 5], content: u8| {
             let [rst, valid, ends, spoiled, right] = bits.map(Word::from);
@@ -247,10 +304,11 @@ mod tests {
         for _ in 0..packets {
             let kind = match random.u8(..8) {
                 0 => random.u8(..),
-                1..=3 => PLAIN_KINDS[random.usize(..2)],
+                1 => TABLES,
+                2..=3 => PLAIN_KINDS[random.usize(..2)],
                 _ => FRAMES[random.usize(..2)],
             };
-            let own = if FRAMES.contains(&kind) { frame_bytes } else { 0 };
+            let own = of.payload_of(kind).unwrap_or_default();
             let named = if random.u8(..8) == 0 { random.usize(..0x10000) } else { own };
             let count = own + OVERHEAD;
             let count = match random.u8(..8) {
@@ -277,13 +335,15 @@ mod tests {
 
     #[test]
     fn packets_are_checked_as_a_whole() {
-        for frame_bytes in [6, 300] {
-            let all = stimulus(if frame_bytes > 100 { 60 } else { 800 }, frame_bytes);
+        for (frame_bytes, image_bytes) in [(6, None), (300, None), (6, Some(14)), (300, Some(270))] {
+            let mut packet = Packet::of(frame_bytes, image_bytes);
+            let all = stimulus(if frame_bytes > 100 { 80 } else { 800 }, &packet);
             let block = Body::new(
-                kernel(frame_bytes, &FRAMES),
+                kernel(frame_bytes, &FRAMES, image_bytes),
                 &[],
                 &[
                     ("frame_begin", 1),
+                    ("image", 1),
                     ("payload", 1),
                     ("good", 1),
                     ("bad", 1),
@@ -292,7 +352,7 @@ mod tests {
                     ("number", 8),
                 ],
             );
-            check(block.kernel(), &all, &mut Packet::of(frame_bytes));
+            check(block.kernel(), &all, &mut packet);
             let faults: Vec<u64> =
                 Subject::from(block.kernel()).simulated(&all).iter().map(|outputs| outputs[1].number()).collect();
             assert!([FRAMING, CRC, UNKNOWN, LENGTH].iter().all(|fault| faults.contains(fault)));

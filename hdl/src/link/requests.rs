@@ -10,7 +10,8 @@ use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
-/// the engine, in order. `offer` is high when one can be answered, with the number of the request and the source of the
+/// the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one that comes
+/// before such a reading is answered has no answer of its own. `offer` is high when one can be answered, with the number of the request and the source of the
 /// answer; `begun` removes it.
 ///
 /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
@@ -27,7 +28,7 @@ pub struct Requests {
     pub kind: Wire<In>,
     /// Its sequence number; valid with `good`.
     pub number: Wire<In>,
-    /// It is a frame, and the engine gets it; with `good`.
+    /// It is a frame or an image, and the engine gets it; with `good`.
     pub taken: Signal<In, Bit>,
     /// A request without payload is accepted; with `good`.
     pub noted: Signal<Out, Bit>,
@@ -56,8 +57,8 @@ kernel_block!(
 );
 
 impl Requests {
-    /// With a queue of `depth` frames, a power of two.
-    pub fn new(depth: usize) -> Self {
+    /// With a queue of `depth` frames, a power of two, and `images` of tables.
+    pub fn new(depth: usize, images: bool) -> Self {
         let block = Requests {
             clk: Default::default(),
             rst: Default::default(),
@@ -75,11 +76,11 @@ impl Requests {
             waiting: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(kernel(depth))
+        block.bind(kernel(depth, images))
     }
 }
 
-fn kernel(depth: usize) -> Kernel {
+fn kernel(depth: usize, images: bool) -> Kernel {
     let k = Builder::new("requests");
     let (rst, good, kind) = (k.input("rst", 1), k.input("good", 1), k.input("kind", 8));
     let (number, taken) = (k.input("number", 8), k.input("taken", 1));
@@ -94,6 +95,9 @@ fn kernel(depth: usize) -> Kernel {
     let asks = |name, of: Kind| k.wire(name, good & kind.is(of as u64));
     let asked = [asks("asks_identity", Kind::Identify), asks("asks_counters", Kind::ReadCounters)];
     let pending = [*identity, *counters];
+    let image = images.then(|| k.wire("image", taken & kind.is(Kind::Tables as u64)));
+    let queued = image.map_or(taken, |image| k.wire("queued", taken & !image));
+    let to_answer = [asked[0], image.map_or(asked[1], |image| k.wire("asked_counters", asked[1] | image))];
     let frame = k.wire("frame", frames.read(*head));
     let waiting = k.wire("waiting", fill.any());
     k.wire("noted", (asked[0] & !pending[0]) | (asked[1] & !pending[1]));
@@ -104,16 +108,16 @@ fn kernel(depth: usize) -> Kernel {
     k.wire("source", identity.mux(from(IDENTITY), counters.mux(from(COUNTERS), of_frame)));
     k.wire("answer_number", identity.mux(*numbers[0], counters.mux(*numbers[1], frame.low(8))));
 
-    for ((kept, asked), pending) in numbers.iter().zip(asked).zip(pending) {
+    for ((kept, asked), pending) in numbers.iter().zip(to_answer).zip(pending) {
         k.when(asked & !pending, || kept.set(number));
     }
-    frames.write(taken, *tail, kind.is(Kind::FrameForForces as u64).concat(number));
-    identity.set(identity.mux(!begun, asked[0]));
-    counters.set(counters.mux(!begun | *identity, asked[1]));
+    frames.write(queued, *tail, kind.is(Kind::FrameForForces as u64).concat(number));
+    identity.set(identity.mux(!begun, to_answer[0]));
+    counters.set(counters.mux(!begun | *identity, to_answer[1]));
     let pop = k.wire("pop", begun & !*identity & !*counters);
     k.when(pop, || head.set(head.plus(1)));
-    k.when(taken, || tail.set(tail.plus(1)));
-    k.when(taken.differs(pop), || fill.set(taken.mux(fill.plus(1), fill.minus(1))));
+    k.when(queued, || tail.set(tail.plus(1)));
+    k.when(queued.differs(pop), || fill.set(queued.mux(fill.plus(1), fill.minus(1))));
     k.finish()
 }
 
@@ -131,6 +135,7 @@ mod tests {
     /// Requests in lists.
     #[derive(Default)]
     struct Lists {
+        images: bool,
         /// Numbers of a pending identification and of a pending reading of the counters.
         plain: [Option<u8>; 2],
         /// Numbers of the frames, and whether all forces are requested.
@@ -176,7 +181,8 @@ mod tests {
 
         fn clock(&mut self, inputs: &[Word]) {
             let number = inputs[3].number() as u8;
-            let asked = self.asked(inputs).filter(|&asked| self.plain[asked].is_none());
+            let image = self.images && inputs[2].number() as u8 == Kind::Tables as u8 && inputs[4].number() == 1;
+            let asked = self.asked(inputs).or(image.then_some(COUNTERS)).filter(|&asked| self.plain[asked].is_none());
             match self.next().filter(|_| inputs[6].number() == 1) {
                 Some((source @ (IDENTITY | COUNTERS), _)) => self.plain[source] = None,
                 Some(_) => drop(self.frames.pop_front()),
@@ -185,20 +191,21 @@ mod tests {
             if let Some(asked) = asked {
                 self.plain[asked] = Some(number);
             }
-            if inputs[4].number() == 1 {
+            if inputs[4].number() == 1 && !image {
                 self.frames.push_back((number, inputs[2].number() as u8 == Kind::FrameForForces as u8));
             }
             if inputs[0].number() == 1 {
-                *self = Lists { reset: true, ..Lists::default() };
+                *self = Lists { reset: true, images: self.images, ..Lists::default() };
             }
         }
     }
 
     /// Requests of all types, frames only where the queue has room; answers at any time; resets.
-    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+    fn stimulus(cycles: usize, images: bool) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(18);
-        let mut lists = Lists::default();
-        let kinds = [PLAIN[0], PLAIN[1], Kind::FrameForForces as u8, Kind::FrameForResultants as u8];
+        let mut lists = Lists { images, ..Lists::default() };
+        let kinds = [Kind::Identify, Kind::ReadCounters, Kind::FrameForForces, Kind::FrameForResultants, Kind::Tables];
+        let kinds = &kinds.map(|kind| kind as u8)[..if images { 5 } else { 4 }];
         let mut speed = 4;
         let inputs = |cycle: usize| {
             if cycle.is_multiple_of(100) {
@@ -206,7 +213,7 @@ mod tests {
             }
             let rst = cycle < 2 || random.u16(..500) == 0;
             let good = !rst && random.u8(..4) == 0;
-            let kind = kinds[random.usize(..4)];
+            let kind = kinds[random.usize(..kinds.len())];
             let taken = good && !PLAIN.contains(&kind) && lists.frames.len() < DEPTH;
             let mut inputs = vec![Word::from(rst), Word::from(good), Word::from(u64::from(kind))];
             inputs.extend([Word::from(u64::from(random.u8(..))), Word::from(taken), Word::from(random.bool())]);
@@ -220,6 +227,9 @@ mod tests {
 
     #[test]
     fn requests_are_answered_in_order() {
-        check(Requests::new(DEPTH).kernel.kernel(), &stimulus(8000), &mut Lists::default());
+        for images in [false, true] {
+            let mut lists = Lists { images, ..Lists::default() };
+            check(Requests::new(DEPTH, images).kernel.kernel(), &stimulus(8000, images), &mut lists);
+        }
     }
 }

@@ -335,7 +335,15 @@ mod tests {
     #[test]
     fn the_sums_are_those_of_the_model() {
         for (rows, cols) in [(3, 5), (6, 2)] {
-            let shape = Shape { rows, cols, input_bits: 12, answer_bytes: [0; 2], answers: Answers::Both, frames: 4 };
+            let shape = Shape {
+                rows,
+                cols,
+                input_bits: 12,
+                answer_bytes: [0; 2],
+                image_bytes: None,
+                answers: Answers::Both,
+                frames: 4,
+            };
             let mut answers = Expected { rows, cols, ..Expected::default() };
             check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);
         }

@@ -43,6 +43,7 @@ pub use frame::calibrate::{Calibrate, CALIBRATION_FILE};
 pub use frame::frame_stats::FrameStats;
 pub(crate) use frame::frame_stats::{beyond, magnitude_of};
 pub use frame::input_mask::InputMask;
+pub(crate) use frame::load::table_beat;
 pub use frame::load::{CoefficientPlaces, Load, PAIR_BITS, REST, THRESHOLD_BITS, VERSION_WORD_BITS};
 pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;

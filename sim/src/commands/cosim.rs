@@ -4,9 +4,8 @@ use std::path::Path;
 
 use anyhow::{bail, Result};
 use clap::{Args, ValueEnum};
-use dermis_golden::scene::Scene;
 
-use super::inputs::{resolve, BoardOverride};
+use super::inputs::{resolve_specimen, BoardOverride};
 use crate::cosim::hardware::Simulator;
 use crate::cosim::scan::{verify_scan, Fault};
 use crate::cosim::verify::verify_specimen;
@@ -95,13 +94,7 @@ impl DeviceChoice {
 /// Wrong input, a scene without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let Arguments { scene, frames, json, tables, device, waves: with_waves, wire, target } = arguments;
-    // Frames are of the array that is simulated: that of the specimen, if there is one.
-    let (array, frames) = resolve(tables.as_deref().or(scene.as_deref()), frames)?;
-    let (scene, specimen) = match (tables, scene) {
-        (None, _) => (array, None),
-        (Some(_), Some(hardware)) => (Scene::load(hardware)?, Some(array)),
-        (Some(tables), None) => bail!("--tables {tables}: name the scene of the hardware before it"),
-    };
+    let (scene, specimen, frames) = resolve_specimen(scene.as_deref(), tables.as_deref(), frames)?;
     let scene = target.apply(scene);
     if scene.hardware.adc_scan.is_some() && tables.is_none() && !with_waves {
         let verified = verify_scan(&scene, &frames, device.simulators(), *wire, build_dir)?;

@@ -11,7 +11,7 @@ use dermis_golden::link::{Counters, Identity, Kind, LinkKind};
 use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
 
-use super::inputs::{resolve, BoardOverride};
+use super::inputs::{resolve_specimen, BoardOverride};
 use crate::link::stream::{self, FramesSent};
 use crate::link::{open, require_uart, LinkErrors, PhysicalAnswer, Session};
 use crate::progress::Progress;
@@ -30,6 +30,12 @@ pub struct Arguments {
     /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
     #[arg(long, required_if_eq("stream", "true"))]
     scene: Option<String>,
+    /// Scene of a specimen: its tables are loaded first, as `dermis load` does; frames are the specimen's.
+    #[arg(long, value_name = "SPECIMEN", requires = "scene")]
+    tables: Option<String>,
+    /// Version of these tables, 1 to 32767.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "tables")]
+    tables_version: u16,
     /// Bit rate; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S")]
     baud: Option<u32>,
@@ -58,6 +64,7 @@ const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB0 --forces --check press.json
   dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
+  dermis host --port /dev/ttyUSB0 --scene hand.toml --tables left-hand.toml press.json
 
 Input line: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
 Output line: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": [x, y, normal], \"centre_mm\": [x, y], ...}";
@@ -67,13 +74,19 @@ Output line: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": 
 /// # Errors
 /// Wrong input, a port that cannot be opened, a board of another scene, no answer.
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
-    let (scene, frames) = match arguments.stream {
-        true => (Scene::load(arguments.scene.as_deref().unwrap_or_default())?, Vec::new()),
-        false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
+    let (hardware, tables) = (arguments.scene.as_deref(), arguments.tables.as_deref());
+    let (scene, specimen, frames) = match arguments.stream {
+        true => {
+            let specimen = tables.map(Scene::load).transpose()?;
+            (Scene::load(hardware.unwrap_or_default())?, specimen, Vec::new())
+        }
+        false => resolve_specimen(hardware, tables, &arguments.frames)?,
     };
     let scene = arguments.target.apply(scene);
     require_uart(&scene, "host")?;
     let model = Model::new(&scene)?;
+    let version = arguments.tables_version;
+    let specimen = specimen.map(|specimen| model.with_tables(&specimen, version)).transpose()?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
     let baud = match arguments.baud {
@@ -85,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         eprintln!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
     }
     let client = open(&arguments.port, baud, Duration::from_millis(arguments.timeout))?;
-    let mut session = Session::new(client, model, tare.as_ref(), arguments.forces, arguments.check)?;
+    let mut session = Session::new(client, model, specimen, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
     let begun = Instant::now();
     let sent = match arguments.stream {

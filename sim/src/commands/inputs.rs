@@ -84,6 +84,24 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     Ok((scene, frames))
 }
 
+/// The scene of the hardware, that of the specimen whose tables are loaded into it, if `tables` names one, and frames for what is
+/// there then.
+///
+/// # Errors
+/// As [`resolve`]; a specimen without hardware.
+pub(super) fn resolve_specimen(
+    hardware: Option<&str>,
+    tables: Option<&str>,
+    frames: &[String],
+) -> Result<(Scene, Option<Scene>, Vec<Frame>)> {
+    let (scene, frames) = resolve(tables.or(hardware), frames)?;
+    match (tables, hardware) {
+        (None, _) => Ok((scene, None, frames)),
+        (Some(_), Some(hardware)) => Ok((Scene::load(hardware)?, Some(scene), frames)),
+        (Some(tables), None) => bail!("--tables {tables}: name the scene of the hardware as well"),
+    }
+}
+
 /// Loads the scene and the frames of one reconstruction, 2^k or all of a sliding mean; without `--frame`, where one frame
 /// gives a result, the first shipped frame.
 ///

@@ -103,7 +103,7 @@ impl Arguments {
         require_uart(scene, "live --board")?;
         let model = Model::new(scene)?;
         let client = connect(port, LinkKind::Uart.bit_rate(&model.board)?, BOARD_TIMEOUT)?;
-        Ok(Session::new(client, model, None, true, false)?.into())
+        Ok(Session::new(client, model, None, None, true, false)?.into())
     }
 }
 

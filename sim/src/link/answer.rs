@@ -7,7 +7,7 @@ use anyhow::Result;
 use dermis_golden::checks::Checks;
 use dermis_golden::fixed::stages::send::{
     labels_of_beats, Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT,
-    STATUS_BEATS,
+    FLAG_TABLES, STATUS_BEATS, TABLES_REFUSED,
 };
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
@@ -106,6 +106,15 @@ impl Answer {
         self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
     }
 
+    /// The version of the tables in each status, or `refused`, `not whole`.
+    pub(super) fn tables(&self) -> impl Iterator<Item = String> + '_ {
+        self.statuses().map(|status| match status.tables {
+            _ if status.flags & FLAG_TABLES != 0 => "not whole".to_owned(),
+            tables if tables & TABLES_REFUSED != 0 => "refused".to_owned(),
+            version => version.to_string(),
+        })
+    }
+
     /// |μ| over `search.mu_max`; none with several subarrays or contacts, whose loads the resultants do not tell.
     fn mu_share(&self) -> Option<f64> {
         let mut all = self.statuses();
@@ -137,6 +146,8 @@ impl Answer {
             let has = |bit: u32| status.flags & bit != 0;
             let saturated = status.rescale_saturations + status.force_saturations > 0;
             let all = [
+                (has(FLAG_TABLES), Flag::TablesIncomplete),
+                (status.tables & TABLES_REFUSED != 0, Flag::TablesRefused),
                 (has(FLAG_NO_CONTACT), Flag::NoContact),
                 (has(FLAG_MORE_CONTACTS), Flag::TooManyContacts),
                 (of_taxels(slot) && !has(FLAG_CONDITION), Flag::ConditionUnmet),

@@ -69,6 +69,19 @@ impl<P: Read + Write> Client<P> {
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
+    /// Writes the tables of `model` into the board, `forces` being what it answers a frame with, and asks with a frame of zeros
+    /// whether they are whole.
+    ///
+    /// # Errors
+    /// No answer; other tables than those of `model` afterwards.
+    pub fn load(&mut self, model: &Model, forces: bool) -> Result<(), HostError> {
+        self.request(Kind::Tables, model.image())?;
+        let answer = self.frame(model, &vec![0; model.scene.sensor.taxels()], forces)?;
+        let wants = model.tables_version;
+        let has = answer.tables().find(|tables| *tables != wants.to_string());
+        has.map_or(Ok(()), |has| Err(HostError::Tables { port: self.name.clone(), has, wants }))
+    }
+
     /// Sends a request, repeatedly if necessary, until it is answered.
     fn request(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
         let mut packet = Packet { kind, sequence: self.sequence, payload };
@@ -77,7 +90,7 @@ impl<P: Read + Write> Client<P> {
             // A new number per attempt, so that a late answer to an earlier attempt is not taken for this one's.
             self.sequence = self.sequence.wrapping_add(1);
             packet.sequence = self.sequence;
-            self.port.write_all(&packet.to_wire()).map_err(|error| self.port_error(&error))?;
+            self.send(&packet.to_wire())?;
             self.port.flush().map_err(|error| self.port_error(&error))?;
             if let Some(payload) = self.wait(kind.answer())? {
                 return Ok(payload);
@@ -87,6 +100,27 @@ impl<P: Read + Write> Client<P> {
         Err(HostError::NoAnswer { port: self.name.clone(), what: kind.name(), attempts: ATTEMPTS, milliseconds })
     }
 
+    /// Writes all bytes; a port takes no more at a time than its driver has room for.
+    fn send(&mut self, mut bytes: &[u8]) -> Result<(), HostError> {
+        let mut last_taken = Instant::now();
+        while !bytes.is_empty() {
+            match self.port.write(bytes) {
+                Ok(count) if count > 0 => {
+                    bytes = &bytes[count..];
+                    last_taken = Instant::now();
+                }
+                Err(error) if !waits(&error) || last_taken.elapsed() >= self.timeout => {
+                    return Err(self.port_error(&error));
+                }
+                Ok(_) if last_taken.elapsed() >= self.timeout => {
+                    return Err(self.port_error(&ErrorKind::WriteZero.into()));
+                }
+                _ => (),
+            }
+        }
+        Ok(())
+    }
+
     /// The answer's payload; `None` after the timeout or a damaged answer.
     fn wait(&mut self, kind: Kind) -> Result<Option<Vec<u8>>, HostError> {
         let mut buffer = [0; 4096];
@@ -94,8 +128,7 @@ impl<P: Read + Write> Client<P> {
         while last_heard.elapsed() < self.timeout {
             let count = match self.port.read(&mut buffer) {
                 Ok(count) => count,
-                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
-                Err(error) if error.kind() == ErrorKind::Interrupted => 0,
+                Err(error) if waits(&error) => 0,
                 Err(error) => return Err(self.port_error(&error)),
             };
             if count > 0 {
@@ -125,6 +158,11 @@ impl<P: Read + Write> Client<P> {
     fn port_error(&self, error: &std::io::Error) -> HostError {
         HostError::Port { port: self.name.clone(), reason: error.to_string() }
     }
+}
+
+/// Whether a port only has nothing to read, or no room, yet.
+fn waits(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
 /// The identity in an answer of a board, if the board was built for `model`.

@@ -36,6 +36,16 @@ pub enum HostError {
         /// What is another.
         reason: IdentityError,
     },
+    /// The board's tables are not those that were written.
+    #[error("port {port}: after tables of version {wants} the board's are {has}")]
+    Tables {
+        /// The port.
+        port: String,
+        /// Version of its tables, or what is wrong with them.
+        has: String,
+        /// Version of the tables written.
+        wants: u16,
+    },
     /// An answer has the wrong length: a defect of the board or of this program.
     #[error("port {port}: {what} answer has a wrong length: {bytes} bytes")]
     Answer {

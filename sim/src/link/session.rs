@@ -33,12 +33,24 @@ pub struct Session<P> {
 }
 
 impl<P: std::io::Read + std::io::Write> Session<P> {
-    /// Identifies the board and checks that it was built for `model`.
+    /// Identifies the board and checks that it was built for `hardware`. With `specimen`, the model of that hardware with other
+    /// tables, writes these into the board.
     ///
     /// # Errors
-    /// No answer, another packet version, another scene.
-    pub fn new(mut client: Client<P>, model: Model, tare: Option<&Frame>, forces: bool, check: bool) -> Result<Self> {
-        let identity = client.identify(&model)?;
+    /// No answer, another packet version, another scene, tables that are not whole afterwards.
+    pub fn new(
+        mut client: Client<P>,
+        hardware: Model,
+        specimen: Option<Model>,
+        tare: Option<&Frame>,
+        forces: bool,
+        check: bool,
+    ) -> Result<Self> {
+        let identity = client.identify(&hardware)?;
+        if let Some(specimen) = &specimen {
+            client.load(specimen, !identity.supports(Kind::FrameForResultants))?;
+        }
+        let model = specimen.unwrap_or(hardware);
         let input = Input::new(&model.scene)?;
         let offset = tare.map(|tare| offset(&input, tare));
         Ok(Session { client, model, identity, offset, forces, check })

@@ -3,6 +3,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, supports, Kind, LinkKind};
 
+use super::network;
 use super::table::{aligned, significant_digits};
 use crate::link::{Answer, PhysicalAnswer};
 
@@ -43,7 +44,7 @@ pub fn wire_times(model: &Model) -> String {
     times(model).into_iter().map(line).collect()
 }
 
-/// The same of several scenes as a table, a row per link.
+/// The same of several scenes as a table, a row per link of the board and per width of forces on a network.
 pub fn link_times(models: &[Model]) -> String {
     let head = ["scene", "link", "codes to the board", "resultants back", "all forces back"];
     let rows = |model: &Model| {
@@ -51,11 +52,25 @@ pub fn link_times(models: &[Model]) -> String {
         times(model).into_iter().map(move |link| {
             let unit = if link.kind.clock().is_some() { "MHz" } else { "Mbit/s" };
             let rate = format!("{}, {} {unit}", link.name(), f64::from(link.bit_rate) / 1e6);
-            let times = link.packets.iter().map(|(_, ms)| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
-            [scene.clone(), rate].into_iter().chain(times).collect()
+            row(scene.clone(), rate, link.packets.into_iter().map(|(_, ms)| ms))
         })
     };
+    let of_network = |model: &Model| {
+        let scene = model.scene.name.clone();
+        let rate = f64::from(network::BIT_RATE) / 1e6;
+        network::times(model).into_iter().map(move |(bits, times)| {
+            let link = format!("UDP, {rate} Mbit/s, forces of {bits} bits");
+            row(scene.clone(), link, times.into_iter())
+        })
+    };
+    let rows = |model: &Model| rows(model).chain(of_network(model)).collect::<Vec<_>>();
     aligned(2, &head, models.iter().flat_map(rows).collect())
+}
+
+/// A line of the table: a time in ms, or none, for each packet.
+fn row(scene: String, link: String, times: impl Iterator<Item = Option<f64>>) -> Vec<String> {
+    let times = times.map(|ms| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
+    [scene, link].into_iter().chain(times).collect()
 }
 
 /// A link with the transfer times of a frame's packets.

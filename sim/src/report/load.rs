@@ -22,11 +22,14 @@ pub struct LoadReport {
     pub threshold_lsb: i64,
     /// Noise floor in codes.
     pub noise_floor_codes: i32,
+    /// Port of the board that holds the tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub port: Option<String>,
 }
 
 impl LoadReport {
-    /// Of the image of `model`, in file `path`.
-    pub fn new(model: &Model, image: &[u8], path: &Path) -> LoadReport {
+    /// Of the image of `model`, in file `path`, and in the board at `port`.
+    pub fn new(model: &Model, image: &[u8], path: &Path, port: Option<&str>) -> LoadReport {
         LoadReport {
             specimen: model.scene.name.clone(),
             file: path.to_owned(),
@@ -35,17 +38,19 @@ impl LoadReport {
             layout: model.table_layout(),
             threshold_lsb: model.threshold,
             noise_floor_codes: model.noise_floor,
+            port: port.map(str::to_owned),
         }
     }
 }
 
 /// The report in words.
 pub fn load(report: &LoadReport) -> String {
-    let LoadReport { specimen, file, bytes, version, layout, threshold_lsb, noise_floor_codes } = report;
+    let LoadReport { specimen, file, bytes, version, layout, threshold_lsb, noise_floor_codes, port } = report;
+    let board = port.as_ref().map_or(String::new(), |port| format!("board        {port} holds them\n"));
     format!(
         "{}: {bytes} bytes, tables of {specimen}, version {version}, layout 0x{layout:08x}\n\
          threshold    {threshold_lsb} LSB\n\
-         noise floor  {noise_floor_codes} codes\n",
+         noise floor  {noise_floor_codes} codes\n{board}",
         file.display()
     )
 }

@@ -28,6 +28,7 @@ pub(crate) mod host;
 mod html;
 mod load;
 pub(crate) mod measure;
+mod network;
 mod noise;
 mod noise_shapes;
 mod pictures;

@@ -38,7 +38,7 @@ fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
     let client = open(&terminal.path().to_string_lossy(), BAUD, Duration::from_millis(1000)).unwrap();
     let model = model();
     let frames = Frame::shipped(&model.scene);
-    let mut session = Session::new(client, model, None, false, true).unwrap();
+    let mut session = Session::new(client, model, None, None, false, true).unwrap();
     let mut dropped = 0;
     for round in 0..2 {
         for frame in &frames {
@@ -137,8 +137,56 @@ fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let terminal = PseudoTerminal::of(&Hardware::new(model.clone(), &build).unwrap()).unwrap();
     let baud = LinkKind::Uart.bit_rate(&model.board).unwrap();
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
-    let mut session = Session::new(client, model, None, false, true).unwrap();
+    let mut session = Session::new(client, model, None, None, false, true).unwrap();
     let (_, answer) = session.request(&Frame::shipped(&scene)[0]).unwrap();
     assert_eq!((answer.difference, answer.forces), (Some(None), None));
     assert_ne!(answer.sums.map_or(0, |sums| sums.fz), 0);
+}
+
+/// Tables of another specimen, over a channel that loses and alters bytes: the board holds them, and every answer is that of the
+/// model with them.
+#[test]
+fn tables_are_written_over_a_noisy_channel() {
+    let folder = tempfile::tempdir().unwrap();
+    let sensor = "rows = 3\ncols = 4\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n";
+    let hand = format!(
+        "name = \"hand\"\n[sensor]\n{sensor}[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n"
+    );
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    std::fs::write(path("hand.toml"), &hand).unwrap();
+    std::fs::write(path("left.toml"), format!("{hand}[search]\nnoise_floor_MPa = 0.05\n")).unwrap();
+    std::fs::write(path("press.csv"), "0.5,0.4,0.04,0\n0.4,0.3,0.04,0\n0,0.04,0,0\n").unwrap();
+
+    let mut model = Model::new(&Scene::load(&path("hand.toml")).unwrap()).unwrap();
+    model.board.uart_baud = Some(BAUD);
+    let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let faults =
+        |seed| NoisyChannel::new(ChannelFaults { lost: 1200, flipped: 1200, seed, ..ChannelFaults::default() });
+    let hardware = Hardware::new(model.clone(), &build).unwrap();
+    let terminal = PseudoTerminal::with_channels(&hardware, faults(1), faults(2)).unwrap();
+    let port = terminal.path().to_string_lossy().into_owned();
+    let left = Scene::load(&path("left.toml")).unwrap();
+    let press = Frame::load(std::path::Path::new(&path("press.csv")), Some(&left)).unwrap();
+    let mut repeated = 0;
+    for version in 1..6 {
+        let client = open(&port, BAUD, Duration::from_millis(1000)).unwrap();
+        let own = model.with_tables(&left, version).unwrap();
+        let mut session = Session::new(client, model.clone(), Some(own), None, true, true).unwrap();
+        let (_, answer) = session.request(&press).unwrap();
+        assert_eq!(answer.difference, Some(None), "version {version}");
+        repeated += session.client.link_errors.repeated;
+    }
+    assert!(repeated > 0);
+
+    // The program, as its user would.
+    let run = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_dermis")).current_dir(folder.path()).args(arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let loaded = run(&["load", "hand.toml", "left.toml", "--tables-version", "9", "--port", &port]);
+    assert!(loaded.ends_with(&format!("board        {port} holds them\n")), "{loaded}");
+    let sent = run(&["host", "--port", &port, "--scene", "hand.toml", "--tables", "left.toml", "--check", "press.csv"]);
+    assert!(sent.contains("against model   equal, every bit\n"), "{sent}");
 }

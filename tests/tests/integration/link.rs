@@ -17,6 +17,7 @@ use dermis_sim::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
 use dermis_tests::{build_dir, scene, variants, with_network};
 
 mod spi;
+mod tables;
 
 /// Clock cycles per bit, the minimum of the link; the rest of the design runs at full speed.
 const CYCLES_PER_BIT: u32 = 8;
@@ -194,6 +195,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
         (vec![slip::ESC, 7, slip::END], |c| &mut c.framing),
         // Incomplete: the END of the next packet ends it.
         ([&frame[..frame.len() / 2], &[slip::END]].concat(), |c| &mut c.crc),
+        // This board's tables are in the bitstream.
         (sealed(0x05, 0, &[]), |c| &mut c.unknown_type),
         (sealed(0x00, 0, &[]), |c| &mut c.unknown_type),
         (sealed(0x83, 0, &[]), |c| &mut c.unknown_type),

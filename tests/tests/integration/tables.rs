@@ -15,17 +15,17 @@ use dermis_sim::cosim::Vector;
 use dermis_tests::{assert_equal, build_dir, compare, with_network};
 use tempfile::TempDir;
 
-const SCENE: &str = "name = \"writable\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
+pub const SCENE: &str = "name = \"writable\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
                      thickness_mm = 2.0\n[hardware]\ntables = \"writable\"\n[hardware.table_range]\ngain = [0.5, 2.0]\n";
 
 /// Coefficients are written.
-const COVERS: &str = "thickness_mm = [1.5, 2.5]\ndead_taxels = 3\n[input]\nfull_scale_MPa = 1.0\n";
+pub const COVERS: &str = "thickness_mm = [1.5, 2.5]\ndead_taxels = 3\n[input]\nfull_scale_MPa = 1.0\n";
 /// The same with two subarrays, which share them.
 const PARTS: &str = "thickness_mm = [2.0, 2.5]\n[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\n";
 
 /// A specimen of the array of `scene`: another zero and gain for each taxel, a noise floor, a threshold; another cover and dead
 /// taxels if its hardware has them.
-fn specimen(scene: &Scene) -> (TempDir, Scene) {
+pub fn specimen(scene: &Scene) -> (TempDir, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let mut random = fastrand::Rng::with_seed(5);
     let mut table = Calibration::identity(scene.sensor.taxels());

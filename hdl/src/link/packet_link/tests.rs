@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use dermis_golden::fixed::stages::load;
 use dermis_golden::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
 
 use super::*;
@@ -18,10 +19,12 @@ const SHAPE: Shape = Shape {
     cols: 4,
     input_bits: 12,
     answer_bytes: [Sums::BYTES + OTHER_BEATS * BEAT_BYTES, (TAXELS + OTHER_BEATS) * BEAT_BYTES],
+    image_bytes: Some(IMAGE_BYTES),
     answers: Answers::Both,
     frames: 4,
 };
 const TAXELS: usize = 12;
+const IMAGE_BYTES: usize = 18;
 /// Packets between two resets.
 const PACKETS: usize = 12;
 
@@ -105,11 +108,16 @@ impl Around {
             self.answers.extend(self.decoder.next(outputs[0].number() as u8).map(|packet| packet.unwrap()));
         }
         if is_high(3) && takes_code {
-            self.codes.push(outputs[2].signed(0, SHAPE.input_bits as usize) as i32);
-            match (is_high(4), self.codes.len() == TAXELS) {
-                // The engine drops a frame whose last code is early.
+            let beat = outputs[2].signed(0, SHAPE.stream_bits()) as i32;
+            self.codes.push(beat);
+            // An image's bytes are no codes, and come between frames.
+            let is_byte = |beat: i32| beat >= 1 << (SHAPE.input_bits - 1);
+            assert!(self.codes.iter().all(|&other| is_byte(other) == is_byte(beat)), "{:?}", self.codes);
+            let count = if is_byte(beat) { IMAGE_BYTES } else { TAXELS };
+            match (is_high(4), self.codes.len() == count) {
+                // The engine drops a frame or an image whose last beat is early.
                 (true, false) => self.codes.clear(),
-                (last, whole) => assert_eq!(last, whole, "the last code of a frame"),
+                (last, whole) => assert_eq!(last, whole, "the last beat"),
             }
         }
         if is_high(5) && !self.beats.is_empty() {
@@ -168,12 +176,25 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
             (0..8).for_each(|_| around.cycle(true));
             around.counters = Counters::default();
         }
-        let kind =
-            [Kind::Identify, Kind::FrameForForces, Kind::FrameForResultants, Kind::ReadCounters][number as usize % 4];
+        let kind = [
+            Kind::Identify,
+            Kind::FrameForForces,
+            Kind::Tables,
+            Kind::FrameForResultants,
+            Kind::ReadCounters,
+            Kind::Tables,
+        ][number as usize % 6];
         let is_frame = [Kind::FrameForForces, Kind::FrameForResultants].contains(&kind);
         let half = 1 << (SHAPE.input_bits - 1);
-        let codes: Vec<i32> = (0..if is_frame { TAXELS } else { 0 }).map(|_| random.i32(-half..half)).collect();
-        let packet = Packet { kind, sequence: number, payload: codes_to_bytes(&codes, SHAPE.input_bits) };
+        let (codes, payload) = if kind == Kind::Tables {
+            let image: Vec<u8> = (0..IMAGE_BYTES).map(|_| random.u8(..)).collect();
+            (load::beats(&image, SHAPE.input_bits), image)
+        } else {
+            let codes: Vec<i32> = (0..if is_frame { TAXELS } else { 0 }).map(|_| random.i32(-half..half)).collect();
+            let payload = codes_to_bytes(&codes, SHAPE.input_bits);
+            (codes, payload)
+        };
+        let packet = Packet { kind, sequence: number, payload };
         let mut wire = packet.to_wire();
         if number % 5 == 3 {
             // Then the CRC is wrong; bytes below 0x80 mean nothing to SLIP.
@@ -202,6 +223,9 @@ fn packets_are_answered_and_the_verilog_does_the_same() {
         assert_eq!(around.exchange(&wire, &beats, 1), (codes, vec![answer]), "{kind:?}");
     }
     let recorded = || Recorded { outputs: around.outputs.clone().into(), reset: false };
-    let defects = [Change::value("", "requests__taken", |k| k.constant(1, 0))];
+    let defects = [
+        Change::value("", "requests__taken", |k| k.constant(1, 0)),
+        Change::value("", "ingress__image", |k| k.constant(1, 0)),
+    ];
     check_with_defects(subject, &around.stimulus, recorded, &defects);
 }

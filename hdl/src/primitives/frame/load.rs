@@ -1,6 +1,8 @@
 //! Takes images of tables from the input stream and passes frames on.
 
-use dermis_golden::fixed::stages::load::{Tables, COEFFICIENTS_PER_WORD, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES};
+use dermis_golden::fixed::stages::load::{
+    beats, Tables, COEFFICIENTS_PER_WORD, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES,
+};
 use dermis_golden::fixed::stages::prepare::GAIN_BITS;
 use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
 use dermis_golden::fixed::Plan;
@@ -93,6 +95,12 @@ pub const REST: u64 = 31;
 pub const THRESHOLD_BITS: usize = 32;
 /// Width of the version with the bit above it.
 pub const VERSION_WORD_BITS: usize = VERSION_BITS as usize + 1;
+
+/// The beat of the byte `octet` of an image on a stream of codes of `code_bits`.
+pub(crate) fn table_beat<'k>(k: &'k Builder, octet: Expr<'k>, code_bits: usize) -> Expr<'k> {
+    let bits = code_bits + 1;
+    octet.extend(bits) | k.constant(bits, beats(&[0], code_bits as u32)[0] as u64)
+}
 
 impl Load {
     /// For the tables of `plan`.
