@@ -119,10 +119,11 @@ fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through b
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
-nightly: fuzz ## run all variants of the tests, those too that `make test` leaves out
+nightly: fuzz program ## run all variants of the tests, those too that `make test` leaves out
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
 	$(CARGO) test --release -p dermis-sim --test program -- --include-ignored bitstream::
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
+	$(DERMIS) --build-dir $(BUILD) guide --check
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
 	mkdir -p $(BUILD)

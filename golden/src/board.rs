@@ -349,7 +349,8 @@ impl Board {
 
     /// Number of block RAMs for a memory of `words` words of `bits` bits, in the configuration that takes the fewest. A
     /// memory deeper than a configuration is split into parts side by side, as Yosys does: several parts may share the
-    /// word of a block RAM.
+    /// word of a block RAM. Of a memory of more than sixteen parts Yosys also counts what selects between them, and may take
+    /// a few block RAMs more.
     pub fn block_rams_for(&self, words: usize, bits: usize) -> usize {
         let of = |&[w, b]: &[usize; 2]| (words.div_ceil(w) * bits).div_ceil(b);
         self.block_ram_shapes.iter().map(of).min().unwrap_or(0)

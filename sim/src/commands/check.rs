@@ -43,7 +43,7 @@ pub struct Arguments {
 
 const EXAMPLES: &str = "Examples:
   dermis check my-scene.toml                         degree, expected errors, whether the board holds it
-  dermis check my-scene.toml --peak 0.1 --draws 50   presses of 0.1 MPa
+  dermis check my-scene.toml --peak 0.1 --draws 10   presses of 0.1 MPa
   dermis check eight-by-eight --target-board icebreaker --json
   dermis check build/sensor-1/rtl                    the files of a build against manifest.json
 

@@ -57,7 +57,7 @@ const EXAMPLES: &str = "Examples:
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
   dermis import walk.asf                             scene and frames of a recording of a real array
-  dermis stability --plot stability.svg              error against the condition number
+  dermis stability --group thickness --plot out.svg  error against the condition number
   dermis stress                                      gaps, wrong tlast and resets on sensor-1
   dermis power sensor-1                              the engine's power, estimated from simulated register bits
   dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";

@@ -35,7 +35,7 @@ pub struct Arguments {
 
 const EXAMPLES: &str = "Examples:
   dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1
-  dermis faults eight-by-eight --count 60 --json";
+  dermis faults eight-by-eight --count 20 --json";
 
 /// The counts of a class for the run log.
 fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -> TargetCounts {

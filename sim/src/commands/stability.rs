@@ -46,7 +46,7 @@ const EXAMPLES: &str = "Examples:
   dermis stability                                   thickness/pitch 0.1 to 10, Poisson ratios, sizes, pitches
   dermis stability --group thickness --inverse tsvd
   dermis stability my-scene.toml --format json
-  dermis stability --plot stability.svg
+  dermis stability --group thickness --plot out.svg
   dermis stability --extreme eight-by-eight          zero, saturated, 1e-9 to 1e9 of full scale, …";
 
 /// Runs the command: the table as text; writes the plot if asked for.

@@ -32,14 +32,14 @@ fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
 }
 
 fn small(name: &str, more: &str) -> Model {
-    let sensor = "[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let sensor = "[sensor]\nrows = 8\ncols = 12\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     Model::new(&Scene::parse(&format!("name = \"{name}\"\n{sensor}{more}"), name).unwrap()).unwrap()
 }
 
 /// A scene with a network of a few steps that finds contacts and sends a record of each.
 fn contacts(lanes: usize) -> Model {
     let text = format!(
-        "name = \"contacts\"\n[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+        "name = \"contacts\"\n[sensor]\nrows = 8\ncols = 12\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
          [partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n[output]\nforces = \"resultants\"\n"
     );
     Model::new(&with_network(&text, &[20, 10]).0).unwrap()
@@ -49,23 +49,23 @@ fn contacts(lanes: usize) -> Model {
 fn block_rams_and_multipliers_are_those_of_yosys() {
     let models = [
         // Six subarrays, groups of rows, a list of columns, a sliding mean.
-        small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n[input]\naverage = 3\nmean = \"sliding\"\n"),
+        small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 8\nprune_bits = 10\n[input]\naverage = 3\nmean = \"sliding\"\n"),
         // Three flips more of every matrix; coefficients, zero and gain in memories that are written.
         small(
             "dead",
-            "[search]\nmu_max = 0.1\ndegree = 1\n[input]\ndead = [[4, 7], [0, 2]]\nfull_scale_MPa = 1.0\n[fixed]\nlanes = 16\n\
+            "[search]\nmu_max = 0.1\ndegree = 1\n[input]\ndead = [[4, 7], [0, 2]]\nfull_scale_MPa = 1.0\n[fixed]\nlanes = 8\n\
              [hardware]\ntables = \"writable\"\n[hardware.table_range]\nthickness_mm = [2.5, 3.5]\n",
         ),
+        // Contacts: segmentation, window, the mask of the window, moments of the records.
+        contacts(8),
         // All of the paper's cases, chosen per frame.
-        small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\n"),
+        small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 8\n"),
         // A network: its layers, the scale of operands, the size of μ.
         {
             let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
             scene.fixed.lanes = Some(16);
             Model::new(&scene).unwrap()
         },
-        // Contacts: segmentation, window, the mask of the window, moments of the records.
-        contacts(16),
         // ROMs of the input options, sums of frames, no search.
         small("no-search", "[search]\nmu_max = 0\n[fixed]\nlanes = 16\n[input]\naverage = 2\n"),
         // A lane word that is no multiple of a block RAM's; deep coefficients.
@@ -79,7 +79,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         assert_eq!(cells("MULT18X18D"), model.resources.multipliers(), "{name}: multipliers");
     };
     // Yosys uses one processor, so two run at a time.
-    let models = variants(&models, 5);
+    let models = variants(&models, 3);
     let (some, others) = models.split_at(models.len() / 2);
     scope(|scope| {
         for half in [some, others] {
