@@ -14,11 +14,11 @@ from typing import NamedTuple
 from litex.gen import ClockDomain, LiteXModule
 from litex.soc.cores.clock import ECP5PLL
 from litex_boards.platforms import colorlight_i5, lambdaconcept_ecpix5
-from liteeth.core import LiteEthUDPIPCore
 from liteeth.phy.ecp5rgmii import LiteEthPHYRGMII
 
 from dermis_litex import route
 from dermis_litex.core import WORD_BITS, CoreError, Dermis
+from dermis_litex.network import Network
 from dermis_litex.packets import UDP_PORT
 from dermis_litex.udp import DermisUDP
 
@@ -99,7 +99,7 @@ class Gateware(LiteXModule):
             )
         self.clocks = Clocks(board, platform, clock_Hz)
         self.phy = LiteEthPHYRGMII(platform.request("eth_clocks", 0), platform.request("eth", 0), **board.delays)
-        self.network = LiteEthUDPIPCore(self.phy, mac, ip, clock_Hz, dw=WORD_BITS)
+        self.network = Network(self.phy, mac, ip, clock_Hz)
         port = self.network.udp.crossbar.get_port(UDP_PORT, dw=WORD_BITS)
         self.udp = DermisUDP(self.core, port, code_bytes, force_bits)
 
@@ -107,8 +107,8 @@ class Gateware(LiteXModule):
 def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force_bits=WORD_BITS):
     """Writes the gateware of board `name` with the core of `folder` into the folder `out`.
 
-    Returns what `route` needs: what the gateware is, with the MHz of its clocks by a part of their nets' names, and the arguments
-    of nextpnr for device and pins.
+    Returns what `route` needs: what the gateware is, with a part of the name of each clock's net and the MHz that it must reach,
+    and the arguments of nextpnr for device and pins.
 
     Raises `CoreError` as `Gateware` and `DermisUDP` do.
     """
@@ -133,7 +133,10 @@ def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force
         "array": f"{sensor['rows']}×{sensor['cols']}",
         "lanes": manifest["sizes"]["lanes"],
         "force_bits": force_bits,
-        "clocks": {"sys_clk": manifest["clock_MHz"], "eth_clocks0_rx": gateware.phy.rx_clk_freq / 1e6},
+        "clocks": {
+            "core": {"net": "pll_clkout", "wanted_MHz": manifest["clock_MHz"]},
+            "Ethernet": {"net": "eth_clocks0_rx", "wanted_MHz": gateware.phy.rx_clk_freq / 1e6},
+        },
     }
     return design, [device, "--package", package, "--speed", speed, "--lpf", f"{NAME}.lpf"]
 

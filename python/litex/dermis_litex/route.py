@@ -91,27 +91,28 @@ def longest_path(paths, net):
 def read_report(report, clocks):
     """Cells and clocks of a report of nextpnr.
 
-    `clocks` are the MHz that each clock must reach, by a part of its net's name.
+    `clocks` are those that must be there: of each a part of its net's name, and the MHz that it must reach.
 
     Raises `RouteError` if a clock is missing, has another constraint, or is not known.
     """
-    fmax, rest = report["fmax"], dict(report["fmax"])
+    fmax, known = report["fmax"], set()
     figures = {}
-    for name, wanted in clocks.items():
-        nets = [net for net in fmax if name in net]
+    for name, clock in clocks.items():
+        nets = [net for net in fmax if clock["net"] in net]
         if len(nets) != 1:
-            raise RouteError(f"clock {name}: nextpnr has {', '.join(nets) or 'none'} of this name, among {', '.join(fmax)}")
-        clock = rest.pop(nets[0])
-        if abs(clock["constraint"] / wanted - 1) > ROUNDING:
-            raise RouteError(f"clock {name}: nextpnr was told {clock['constraint']:.3f} MHz, not {wanted:g}")
-        figures[name] = {
-            "wanted_MHz": wanted,
+            found = f"{len(nets)} of nextpnr's clocks have this in their names: {', '.join(fmax)}"
+            raise RouteError(f"clock {name}, {clock['net']}: {found}")
+        (net,) = nets
+        known.add(net)
+        if abs(fmax[net]["constraint"] / clock["wanted_MHz"] - 1) > ROUNDING:
+            raise RouteError(f"clock {name}: nextpnr was told {fmax[net]['constraint']:.3f} MHz, not {clock['wanted_MHz']:g}")
+        figures[name] = clock | {
             # Rounded down: a clock that is just missed is missed.
-            "reached_MHz": math.floor(clock["achieved"] * 100) / 100,
-            "longest_path": longest_path(report["critical_paths"], nets[0]),
+            "reached_MHz": math.floor(fmax[net]["achieved"] * 100) / 100,
+            "longest_path": longest_path(report["critical_paths"], net),
         }
-    if rest:
-        raise RouteError(f"clock {', '.join(rest)}: known are {', '.join(clocks)}")
+    if others := fmax.keys() - known:
+        raise RouteError(f"clocks {', '.join(others)}: known are {', '.join(clock['net'] for clock in clocks.values())}")
     used = report["utilization"]
     cells = {name: {"used": used[cell]["used"], "available": used[cell]["available"]} for name, cell in CELLS.items()}
     return {"cells": cells, "clocks": figures}
@@ -147,8 +148,8 @@ def place(folder, tool, arguments, seed, minutes):
 def route(folder, design, arguments, seeds, minutes):
     """Makes the gateware that `dermis_litex.gateware` wrote into a folder; the figures, which `gateware.json` there has too.
 
-    `design` says what it is, and its `clocks` the MHz of each; `arguments` are nextpnr's for device and pins. Seeds from 1 on are
-    tried until one reaches all clocks; of `seeds` ones that miss them the best is taken, and there is no bitstream.
+    `design` says what it is, with `clocks` as `read_report` takes them; `arguments` are nextpnr's for device and pins. Seeds from 1 on
+    are tried until one reaches all clocks; of `seeds` ones that miss them the best is taken, and there is no bitstream.
 
     Raises `RouteError`: a tool is missing or failed.
     """
