@@ -11,6 +11,7 @@ from litex.soc.interconnect import stream
 from liteeth.common import eth_phy_description, icmp_protocol
 from liteeth.core import LiteEthUDPIPCore
 from liteeth.core.icmp import LiteEthICMP
+from liteeth.mac.crc import LiteEthMACCRC32Inserter
 from liteeth.mac.last_be import LiteEthMACRXLastBE
 from liteeth.mac.padding import LiteEthMACPaddingInserter
 
@@ -18,14 +19,8 @@ from dermis_litex.core import WORD_BITS
 
 
 def buffer(layout):
-    """A stage whose `valid`, data and `ready` all come from registers."""
+    """A stage that cuts the paths of data and of `ready`."""
     return stream.Buffer(layout, pipe_valid=True, pipe_ready=True)
-
-
-def place_of(kind, stages):
-    """Where in a list the only stage of a kind is."""
-    (place,) = (at for at, stage in enumerate(stages) if isinstance(stage, kind))
-    return place
 
 
 class Ping(LiteXModule):
@@ -48,11 +43,15 @@ class Network(LiteXModule):
         self.core = core = LiteEthUDPIPCore(phy, mac_address, ip_address, clock_Hz, dw=WORD_BITS, with_icmp=False)
         self.ping = Ping(core.ip, ip_address)
         self.udp = core.udp
-        # LiteEth connects the stages of these lists when it is finalised.
         sent, received = (getattr(core.mac.core, name).pipeline for name in ("tx_datapath", "rx_datapath"))
-        self.sent = ClockDomainsRenamer("eth_tx")(buffer(eth_phy_description(phy.dw)))
-        self.received = ClockDomainsRenamer("eth_rx")(buffer(eth_phy_description(phy.dw)))
-        self.words = buffer(eth_phy_description(WORD_BITS))
-        sent.insert(place_of(LiteEthMACPaddingInserter, sent), self.sent)
-        received.insert(place_of(LiteEthMACRXLastBE, received), self.received)
-        received.insert(-1, self.words)
+        self.cut(sent, LiteEthMACPaddingInserter, "eth_tx", phy.dw)
+        self.cut(sent, LiteEthMACCRC32Inserter, "eth_tx", phy.dw)
+        self.cut(received, LiteEthMACRXLastBE, "eth_rx", phy.dw)
+        self.cut(received, stream.Endpoint, "sys", WORD_BITS)
+
+    def cut(self, stages, kind, domain, bits):
+        """Puts a buffer before the only stage of a kind; LiteEth connects the stages when it is finalised."""
+        (place,) = (at for at, stage in enumerate(stages) if isinstance(stage, kind))
+        stage = ClockDomainsRenamer(domain)(buffer(eth_phy_description(bits)))
+        self.submodules += stage
+        stages.insert(place, stage)

@@ -148,8 +148,8 @@ def place(folder, tool, arguments, seed, minutes):
 def route(folder, design, arguments, seeds, minutes):
     """Makes the gateware that `dermis_litex.gateware` wrote into a folder; the figures, which `gateware.json` there has too.
 
-    `design` says what it is, with `clocks` as `read_report` takes them; `arguments` are nextpnr's for device and pins. Seeds from 1 on
-    are tried until one reaches all clocks; of `seeds` ones that miss them the best is taken, and there is no bitstream.
+    `design` says what it is, with `clocks` as `read_report` takes them; `arguments` are nextpnr's for device and pins. Seeds from
+    1 on are tried until one reaches all clocks; of `seeds` that miss them the best is taken, and there is no bitstream.
 
     Raises `RouteError`: a tool is missing or failed.
     """
