@@ -170,7 +170,7 @@ def route(folder, design, arguments, seeds, minutes):
         run(ecppack, ["--compress", f"seed{best['seed']}.config", BITSTREAM], folder, "pack.log", minutes)
     tools = {"yosys": version_of(yosys), "nextpnr-ecp5": version_of(nextpnr)}
     figures = design | best | {"is_met": is_met, "bitstream": BITSTREAM if is_met else None, "tools": tools}
-    (folder / FIGURES).write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    (folder / FIGURES).write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     return figures
 
 
