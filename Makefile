@@ -19,7 +19,7 @@ VENV       = $(BUILD)/python
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick python buses c docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick python buses c docs bench build cosim bitstream gateware report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -75,8 +75,9 @@ buses: setup ## test the cores for a SoC with cocotb's models of the buses, unde
 	@echo '== buses'
 	$(CARGO) build --quiet --bin dermis
 	python3 -m venv --clear $(BUILD)/soc-tools
-	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt ./python/litex
-	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc $(BUILD)/soc-tools/bin/python -m pytest -q tests/soc
+	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt './python/litex[gateware]'
+	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
+	    $(BUILD)/soc-tools/bin/python -m pytest -q tests/soc
 
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
 	$(CARGO) build --release --package dermis-c
@@ -102,6 +103,15 @@ cosim: program ## co-simulate SCENE on its shipped frames
 bitstream: program tools ## make the bitstream of SCENE for BOARD, by default the scene's (minutes to hours)
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(DERMIS) --build-dir $(BUILD) bitstream $(SCENE) $(if $(BOARD),--board $(BOARD))
 
+# The file of python/litex/boards takes the place of the scene's board.
+gateware: NETWORK = $(or $(BOARD),colorlight-i9)
+gateware: OUT = $(BUILD)/gateware/$(NETWORK)/$(notdir $(basename $(SCENE)))
+gateware: program tools ## put SCENE behind the Ethernet of BOARD, by default colorlight-i9: bitstream and figures (half an hour)
+	@test -x $(BUILD)/gateware-tools/bin/pip || python3 -m venv $(BUILD)/gateware-tools
+	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check -c tests/soc/requirements.txt './python/litex[gateware]'
+	$(DERMIS) build $(SCENE) --bus wishbone --target-board python/litex/boards/$(NETWORK).toml --out $(OUT)/core
+	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(BUILD)/gateware-tools/bin/python -m dermis_litex.gateware $(NETWORK) $(OUT)/core $(OUT) --run
+
 report: program ## write build/report/report.html and paper.html; QUICK=1 takes two minutes
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
 	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
@@ -119,7 +129,7 @@ fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through b
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
-nightly: fuzz program ## run all variants of the tests, those too that `make test` leaves out
+nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
 	$(CARGO) test --release -p dermis-sim --test program -- --include-ignored bitstream::
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses

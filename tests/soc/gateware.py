@@ -5,12 +5,12 @@ import shutil
 import subprocess
 
 from dermis_litex import Dermis, DermisUDP
+from dermis_litex.network import Network as LiteEth
 from dermis_litex.packets import UDP_PORT
 from litex.gen import Cat, ClockDomain, LiteXModule, Signal
 from litex.gen.fhdl import verilog
 from litex.soc.interconnect import stream
 from liteeth.common import eth_phy_description, eth_udp_user_description
-from liteeth.core import LiteEthUDPIPCore
 
 MAC_ADDRESS, IP_ADDRESS = 0x10E2D5000001, "192.168.1.50"
 
@@ -69,7 +69,7 @@ class Network(LiteXModule):
         self.rst = Signal()
         self.platform, self.phy = Sources(), Phy()
         self.core = Dermis(self.platform, folder)
-        self.network = LiteEthUDPIPCore(self.phy, MAC_ADDRESS, IP_ADDRESS, clock_Hz, dw=32)
+        self.network = LiteEth(self.phy, MAC_ADDRESS, IP_ADDRESS, clock_Hz)
         self.udp = DermisUDP(self.core, self.network.udp.crossbar.get_port(UDP_PORT, dw=32), code_bytes, force_bits)
         counters = self.udp.receiver.counters
         self.counter_names = list(counters)

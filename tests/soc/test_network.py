@@ -11,7 +11,7 @@ import dermis_litex.packets
 import pytest
 from dermis_litex.packets import LATE, UDP_PORT, Results, checked, exponent_of, frame_packets, mantissa_of, short_counts
 from gateware import IP_ADDRESS, MAC_ADDRESS, Network, verilate
-from scapy.layers.inet import IP, UDP
+from scapy.layers.inet import ICMP, IP, UDP
 from scapy.layers.l2 import ARP, Ether
 from scapy.packet import Raw
 from test_cores import BUILD, HERE, SCENE, generate
@@ -169,6 +169,18 @@ def test_frames_over_ethernet_are_answered_with_the_words_of_the_model(wire):
     back, counters, _ = wire.play_after_arp(right_frames(wire, sequences), first)
     assert results_of(back) == [(sequence, wire.result, 0) for sequence in sequences]
     assert counters == {name: first * len(sequences) if name == "taken" else 0 for name in wire.counter_names}
+
+
+def test_a_ping_is_answered(wire):
+    data = bytes(range(40))
+    request = Ether(src=HOST_MAC, dst=CORE_MAC) / IP(src=HOST_IP, dst=IP_ADDRESS) / ICMP(id=7, seq=3) / Raw(data)
+    back, *_ = wire.play_after_arp([(0, 0, on_the_wire(padded(bytes(request))))], 1)
+    _, _, (_, frame) = back
+    reply = Ether(frame[8:-4])[ICMP]
+    assert (reply.type, reply.id, reply.seq, bytes(reply[Raw])) == (0, 7, 3, data)
+    right = reply.copy()
+    del right.chksum
+    assert ICMP(bytes(right)).chksum == reply.chksum
 
 
 def test_another_coefficient_is_found(wire):

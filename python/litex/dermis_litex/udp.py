@@ -12,7 +12,7 @@ from operator import and_
 
 from liteeth.common import eth_udp_user_description
 from liteeth.mac.crc import LiteEthMACCRC32, LiteEthMACCRCEngine
-from litex.gen import Case, Cat, Constant, FSM, If, LiteXModule, Memory, Mux, NextState, NextValue, Replicate, Signal
+from litex.gen import Case, Cat, Constant, FSM, If, LiteXModule, Memory, Mux, NextState, NextValue, READ_FIRST, Replicate, Signal
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.csr import CSRStatus
 
@@ -121,7 +121,7 @@ class PacketCheck(LiteXModule):
         # Two of the longest packets: one comes while the other leaves.
         bits = (2 * words).bit_length()
         memory = Memory(WORD_BITS, 2**bits)
-        write, read = memory.get_port(write_capable=True), memory.get_port()
+        write, read = memory.get_port(write_capable=True), memory.get_port(mode=READ_FIRST)
         self.specials += memory, write, read
         self.params = params = stream.SyncFIFO(layout.param_layout, 4)
         self.crc = crc = CRC32()
@@ -192,7 +192,10 @@ class FrameReceiver(LiteXModule):
         words = code_words(taxels, code_bytes)
         counts = fragment_words(words)
         self.check = check = PacketCheck(HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS)
-        self.sink, sink = check.sink, check.source
+        # What comes from a block RAM comes late in a cycle. Its port is READ_FIRST: of another one the address has the register, and
+        # Yosys would take this one into the block RAM.
+        self.words = checked = stream.Buffer(check.source.description)
+        self.sink, sink = check.sink, checked.source
         self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
         self.requester = requester = stream.Endpoint(REQUESTER)
         # A whole frame waits until the one before has left.
@@ -203,9 +206,10 @@ class FrameReceiver(LiteXModule):
 
         # # #
 
+        self.comb += check.source.connect(checked.sink)
         depth = 2 ** (words - 1).bit_length()
         memory = Memory(WORD_BITS, 2 * depth)
-        write, read = memory.get_port(write_capable=True), memory.get_port()
+        write, read = memory.get_port(write_capable=True), memory.get_port(mode=READ_FIRST)
         self.specials += memory, write, read
 
         # The frame that is collected, and the newest before it.
@@ -344,7 +348,9 @@ class PacketQueue(LiteXModule):
 
         # # #
 
-        self.payload = payload = stream.SyncFIFO(stream.EndpointDescription(layout.payload_layout), words)
+        # `buffered` is block RAM with a register behind it: when a packet of three words or more is whole, its first one is there.
+        words_layout = stream.EndpointDescription(layout.payload_layout)
+        self.payload = payload = stream.SyncFIFO(words_layout, words, buffered=True)
         self.params = params = stream.SyncFIFO(layout.param_layout, 2)
         names = {name for name, *_ in layout.payload_layout} | {"last"}
         self.comb += [
@@ -355,7 +361,7 @@ class PacketQueue(LiteXModule):
             sink.ready.eq(payload.sink.ready & params.sink.ready),
             payload.source.connect(source, keep=names),
             source.param.raw_bits().eq(params.source.payload.raw_bits()),
-            source.valid.eq(params.source.valid),
+            source.valid.eq(params.source.valid & payload.source.valid),
             payload.source.ready.eq(source.valid & source.ready),
             params.source.ready.eq(source.valid & source.last & source.ready),
         ]
@@ -568,6 +574,10 @@ class DermisUDP(LiteXModule):
         else:
             counts = fragment_words(core.words)
         self.sender = ResultSender(counts, self.requesters, udp_port)
+        # The longest paths of LiteEth and of block RAMs end here.
+        self.arriving = stream.Buffer(self.receiver.sink.description)
+        self.codes = stream.Buffer(self.receiver.source.description)
+        self.leaving = stream.Buffer(self.sender.source.description, pipe_ready=True)
 
         # # #
 
@@ -582,11 +592,14 @@ class DermisUDP(LiteXModule):
                 self.sender.sink.clipped.eq(core.source.user[1]),
             ]
         self.comb += [
-            port.source.connect(self.receiver.sink),
-            self.receiver.source.connect(core.sink),
+            port.source.connect(self.arriving.sink),
+            self.arriving.source.connect(self.receiver.sink),
+            self.receiver.source.connect(self.codes.sink),
+            self.codes.source.connect(core.sink),
             self.receiver.requester.connect(self.requesters.written, omit={"ready"}),
             self.requesters.write_id.eq(self.receiver.next_id),
-            self.sender.source.connect(port.sink),
+            self.sender.source.connect(self.leaving.sink),
+            self.leaving.source.connect(port.sink),
         ]
         for name, counter in self.receiver.counters.items():
             status = CSRStatus(32, name=name, description=f"Packets or frames: {name}.")
