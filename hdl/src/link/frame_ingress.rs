@@ -18,8 +18,9 @@ use crate::wire::Wire;
 /// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their packet's end as
 /// well: an image that is not whole ends early.
 ///
-/// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. A frame that loses a code because of that, or that starts while
-/// the previous one is still held, is dropped too, and counts as an `overrun` if its packet is good.
+/// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses a code
+/// or byte because of that, or starts while the frame or image before is still held, is dropped too, and counts as an
+/// `overrun` if its packet is good.
 #[derive(LogicBlock)]
 pub struct FrameIngress {
     /// Clock; registers change on its rising edge.

@@ -89,33 +89,41 @@ impl Parser {
     }
 }
 
-/// What the length bytes of a packet must be, and a register: those so far are.
-struct Length<'k> {
+/// The packets of some types: their payload, and a register.
+struct Payload<'k> {
+    /// The packet is of these types.
+    is: Expr<'k>,
     /// Bytes of the payload.
     bytes: usize,
+    /// The length bytes so far are right for it.
     right: Net<'k>,
 }
 
-impl<'k> Length<'k> {
-    /// A packet of `count` bytes has another length.
-    fn is_wrong(&self, count: Expr<'k>) -> Expr<'k> {
-        !count.is((self.bytes + OVERHEAD) as u64) | !*self.right
+impl<'k> Payload<'k> {
+    /// A packet of `count` bytes has this length.
+    fn is_right(&self, count: Expr<'k>) -> Expr<'k> {
+        self.is & count.is((self.bytes + OVERHEAD) as u64) & *self.right
     }
 
     /// `content` is right as the second length byte.
-    fn ends_with(&self, content: Expr<'k>) -> Expr<'k> {
+    fn ends_header(&self, content: Expr<'k>) -> Expr<'k> {
         *self.right & content.is((self.bytes >> 8) as u64)
     }
 
     /// The byte of index `count` is the payload's last.
-    fn ends_payload(&self, count: Expr<'k>) -> Expr<'k> {
-        count.is((self.bytes + Header::BYTES - 1) as u64)
+    fn ends(&self, count: Expr<'k>) -> Expr<'k> {
+        self.is & count.is((self.bytes + Header::BYTES - 1) as u64)
     }
 
     /// Takes the first length byte, or the `second`.
     fn take(&self, content: Expr<'k>, second: Expr<'k>) {
-        self.right.set(second.mux(self.ends_with(content), content.is((self.bytes & 0xff) as u64)));
+        self.right.set(second.mux(self.ends_header(content), content.is((self.bytes & 0xff) as u64)));
     }
+}
+
+/// Whether one of these holds; `none` without any.
+fn any<'k>(none: Expr<'k>, conditions: impl Iterator<Item = Expr<'k>>) -> Expr<'k> {
+    conditions.reduce(|a, b| a | b).unwrap_or(none)
 }
 
 /// For frames of `frame_bytes` bytes of payload in packets of the types `frame_kinds`, and images of `image_bytes`.
@@ -128,44 +136,44 @@ fn kernel(frame_bytes: usize, frame_kinds: &[u8], image_bytes: Option<usize>) ->
     let (bit, byte, c) = (Type::unsigned(1), Type::unsigned(8), count_bits(most + 1));
     let clears = k.wire("clears", rst | packet_end);
     let count = k.state("count", Type::unsigned(c), clears, 0);
-    let length = |name, bytes| Length { bytes, right: k.register(name, bit) };
-    let of_frame = length("frame_length", frame_bytes);
-    let of_frame = Length {
-        right: of_frame.right.comment("The length bytes so far are those of a frame, of nothing, or of an image."),
-        ..of_frame
-    };
-    let of_plain = length("no_length", 0);
-    let of_image = image_bytes.map(|bytes| length("image_length", bytes));
     let [lost, streaming] = ["lost", "streaming"].map(|name| k.state(name, bit, clears, 0));
     let good = k.state("good", bit, rst, 0);
     let fault = k.state("fault", Type::unsigned(4), rst, 0);
     let [kind, number] = ["kind", "number"].map(|name| k.register(name, byte));
 
     let at = |index: usize| count.is(index as u64);
-    let kind_is = |kinds: &[u8]| kinds.iter().map(|&of| kind.is(of.into())).reduce(|a, b| a | b);
     let never = k.constant(1, 0);
-    let frame = k.wire("frame", kind_is(frame_kinds).unwrap_or(never));
-    let plain = k.wire("plain", kind_is(&PLAIN_KINDS).unwrap_or(never));
-    let image = k.wire("image", if of_image.is_some() { kind.is(Kind::Tables as u64) } else { never });
+    let payload = |name: &str, kinds: &[u8], bytes: usize| {
+        let is = any(never, kinds.iter().map(|&of| kind.is(of.into())));
+        let right = k.register(&format!("{name}_length"), bit);
+        Payload {
+            is: k.wire(name, is),
+            bytes,
+            right: right.comment("The length bytes so far are right for such a packet."),
+        }
+    };
+    let of_image = image_bytes.map(|bytes| payload("tables", &[Kind::Tables as u8], bytes));
+    k.wire("image", of_image.as_ref().map_or(never, |of| of.is));
+    let payloads = [payload("frame", frame_kinds, frame_bytes), payload("plain", &PLAIN_KINDS, 0)];
+    let payloads: Vec<Payload<'_>> = payloads.into_iter().chain(of_image).collect();
     let too_short = count.less(k.constant(c, OVERHEAD as u64));
     let wrong_crc = k.wire("wrong_crc", too_short | !crc_right);
-    let wrong_plain = of_plain.is_wrong(*count);
-    let wrong_other = of_image.as_ref().map_or(wrong_plain, |of| image.mux(of.is_wrong(*count), wrong_plain));
-    let wrong_length = k.wire("wrong_length", frame.mux(of_frame.is_wrong(*count), wrong_other));
+    let all = || payloads.iter();
+    // Those of which the bytes are passed on.
+    let passed = || all().filter(|of| of.bytes > 0);
+    let right_length = any(never, all().map(|of| of.is_right(*count)));
+    let wrong_length = k.wire("wrong_length", !right_length);
     let empty = k.wire("empty", at(0) & !*lost);
-    let known = if of_image.is_some() { frame | plain | image } else { frame | plain };
+    let known = any(never, all().map(|of| of.is));
     let cause = |cause: u64| k.constant(4, cause);
     let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
     let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
     fault.set((packet_end & !empty).mux(found, cause(0)));
-    good.set(packet_end & !empty & !*lost & !wrong_crc & known & !wrong_length);
+    good.set(packet_end & !empty & !*lost & !wrong_crc & !wrong_length);
     k.wire("bad", fault.any());
 
-    let (mut begins, mut ends) = (frame & of_frame.ends_with(content), of_frame.ends_payload(*count));
-    if let Some(of_image) = &of_image {
-        begins = begins | (image & of_image.ends_with(content));
-        ends = image.mux(of_image.ends_payload(*count), ends);
-    }
+    let begins = any(never, passed().map(|of| of.is & of.ends_header(content)));
+    let ends = any(never, passed().map(|of| of.ends(*count)));
     let frame_begin = k.wire("frame_begin", content_valid & at(Header::BYTES - 1) & begins);
     k.wire("payload", content_valid & *streaming);
     k.when(spoiled, || lost.set(k.constant(1, 1)));
@@ -175,12 +183,7 @@ fn kernel(frame_bytes: usize, frame_kinds: &[u8], image_bytes: Option<usize>) ->
     let takes = k.wire("takes", content_valid & !clears);
     k.when(takes & at(0), || kind.set(content));
     k.when(takes & at(1), || number.set(content));
-    k.when(takes & (at(2) | at(3)), || {
-        [Some(&of_frame), Some(&of_plain), of_image.as_ref()]
-            .into_iter()
-            .flatten()
-            .for_each(|of| of.take(content, count.at(0)));
-    });
+    k.when(takes & (at(2) | at(3)), || all().for_each(|of| of.take(content, count.at(0))));
     k.finish()
 }
 
