@@ -77,7 +77,7 @@ buses: setup ## test the cores for a SoC with cocotb's models of the buses, unde
 	python3 -m venv --clear $(BUILD)/soc-tools
 	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt './python/litex[gateware]'
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
-	    $(BUILD)/soc-tools/bin/python -m pytest -q tests/soc
+	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
 	$(CARGO) build --release --package dermis-c

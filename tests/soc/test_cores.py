@@ -13,7 +13,8 @@ from systemrdl.node import FieldNode
 
 HERE = Path(__file__).resolve().parent
 DERMIS = os.environ.get("DERMIS", "dermis")
-BUILD = Path(os.environ.get("DERMIS_BUILD", HERE.parent.parent / "build/soc"))
+# Tests that run side by side each have a folder of their own.
+BUILD = Path(os.environ.get("DERMIS_BUILD", HERE.parent.parent / "build/soc")) / os.environ.get("PYTEST_XDIST_WORKER", "")
 SCENE = HERE / "press.toml"
 
 
