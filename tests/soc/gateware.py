@@ -5,14 +5,13 @@ import shutil
 import subprocess
 
 from dermis_litex import Dermis, DermisUDP
+from dermis_litex.network import IP_ADDRESS, MAC_ADDRESS
 from dermis_litex.network import Network as LiteEth
 from dermis_litex.packets import UDP_PORT
 from litex.gen import Cat, ClockDomain, LiteXModule, Signal
 from litex.gen.fhdl import verilog
 from litex.soc.interconnect import stream
 from liteeth.common import eth_phy_description, eth_udp_user_description
-
-MAC_ADDRESS, IP_ADDRESS = 0x10E2D5000001, "192.168.1.50"
 
 
 class Sources:

@@ -9,8 +9,9 @@ from collections import Counter
 
 import dermis_litex.packets
 import pytest
+from dermis_litex.network import IP_ADDRESS, MAC_ADDRESS
 from dermis_litex.packets import LATE, UDP_PORT, Results, checked, exponent_of, frame_packets, mantissa_of, short_counts
-from gateware import IP_ADDRESS, MAC_ADDRESS, Network, verilate
+from gateware import Network, verilate
 from scapy.layers.inet import ICMP, IP, UDP
 from scapy.layers.l2 import ARP, Ether
 from scapy.packet import Raw
@@ -29,8 +30,6 @@ CHECK_BYTES = 4
 GUIDE = HERE.parent.parent / "sim/guide/robustness.md"
 # So few words that a frame and its result have several packets, whose last Ethernet pads.
 FRAGMENT_WORDS = 11
-# Of 125 MHz in a millisecond; what separates two frames of Ethernet.
-RATE_CYCLES, IDLE_BYTES = 125_000, 12
 # Bytes of the headers of Ethernet and IP, and where UDP has its length and its checksum.
 IP_AT, UDP_AT = 14, 34
 LENGTH_AT, CHECKSUM_AT, PAYLOAD_AT = UDP_AT + 4, UDP_AT + 6, UDP_AT + 8
@@ -218,34 +217,6 @@ def test_short_forces_over_ethernet_are_those_of_the_model_rounded(short_packets
     back, *_ = wire.play_after_arp(frames, packets_of(len(wire.codes)))
     assert results_of(back) == [(sequence, rounded(wire), 0) for sequence in range(2)]
     assert rounded(wire) != wire.result
-
-
-@NIGHTLY
-def test_48_by_48_taxels_are_answered_at_a_sustained_kilohertz():
-    frames, clock_Hz = 12, 62_500_000
-    wire = built("wire-48", scene="sensor-4", clock_Hz=clock_Hz)
-    assert len(wire.codes) == 48 * 48
-    payloads = [on_the_wire(datagram(packet)) for packet in frame_packets(0, wire.codes, 4)]
-    # Each frame comes a millisecond after the one before, whatever has been answered.
-    pause = RATE_CYCLES - sum(len(packet) + IDLE_BYTES for packet in payloads)
-    assert pause > 0
-    played = []
-    for sequence in range(frames):
-        packets = [on_the_wire(datagram(packet)) for packet in frame_packets(sequence, wire.codes, 4)]
-        played += [(0, 0 if at else pause, packet) for at, packet in enumerate(packets)]
-    back, counters, cycles = wire.play_after_arp(played, len(payloads))
-    host, ends = Results(), []
-    for time_ps, frame in back[2:]:
-        if result := host.add(payload_of(frame)):
-            assert result == (len(ends), wire.result, 0)
-            ends.append(time_ps)
-    assert len(ends) == frames
-    assert counters == {name: frames * len(payloads) if name == "taken" else 0 for name in wire.counter_names}
-    # Results come at the rate of the frames: none waits for longer than the one before. Behind the first frame the answer to the
-    # core's question has come.
-    periods = [(after - before) / 1e9 for before, after in zip(ends[1:], ends[2:])]
-    assert all(abs(period - 1.0) < 0.01 for period in periods), periods
-    assert cycles > (frames - 1) * clock_Hz // 1000
 
 
 # What is done to a frame on its way: a name, and what becomes of its packets.

@@ -11,7 +11,9 @@ use crate::wire::Wire;
 
 /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
 /// the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one that comes
-/// before such a reading is answered has no answer of its own. `offer` is high when one can be answered, with the number of the request and the source of the
+/// before such a reading is answered has no answer of its own.
+///
+/// `offer` is high when a request can be answered, with the number of the request and the source of the
 /// answer; `begun` removes it.
 ///
 /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four

@@ -18,11 +18,10 @@ from liteeth.phy.ecp5rgmii import LiteEthPHYRGMII
 
 from dermis_litex import route
 from dermis_litex.core import WORD_BITS, CoreError, Dermis
-from dermis_litex.network import Network
+from dermis_litex.network import IP_ADDRESS, MAC_ADDRESS, Network
 from dermis_litex.packets import UDP_PORT
 from dermis_litex.udp import DermisUDP
 
-MAC_ADDRESS, IP_ADDRESS = 0x10E2D5000001, "192.168.1.50"
 MAC_BYTES = 6
 # Files and top module.
 NAME = "board"

@@ -17,6 +17,9 @@ from liteeth.mac.padding import LiteEthMACPaddingInserter
 
 from dermis_litex.core import WORD_BITS
 
+# Of a core, if nothing else is said.
+MAC_ADDRESS, IP_ADDRESS = 0x10E2D5000001, "192.168.1.50"
+
 
 def buffer(layout):
     """A stage that cuts the paths of data and of `ready`."""

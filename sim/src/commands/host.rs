@@ -7,13 +7,13 @@ use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::link::{Counters, Identity, Kind, LinkKind};
+use dermis_golden::link::{Counters, Identity, Kind};
 use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
 
 use super::inputs::{resolve_specimen, BoardOverride};
 use crate::link::stream::{self, FramesSent};
-use crate::link::{open, require_uart, LinkErrors, PhysicalAnswer, Session};
+use crate::link::{open_board, LinkErrors, PhysicalAnswer, Session};
 use crate::progress::Progress;
 use crate::report;
 
@@ -83,21 +83,17 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         false => resolve_specimen(hardware, tables, &arguments.frames)?,
     };
     let scene = arguments.target.apply(scene);
-    require_uart(&scene, "host")?;
     let model = Model::new(&scene)?;
     let version = arguments.tables_version;
     let specimen = specimen.map(|specimen| model.with_tables(&specimen, version)).transpose()?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
-    let baud = match arguments.baud {
-        Some(baud) => baud,
-        None => LinkKind::Uart.bit_rate(&model.board)?,
-    };
     let simulated = is_pseudo_terminal(&arguments.port);
     if simulated && arguments.baud.is_some() {
         eprintln!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
     }
-    let client = open(&arguments.port, baud, Duration::from_millis(arguments.timeout))?;
+    let timeout = Duration::from_millis(arguments.timeout);
+    let client = open_board(&arguments.port, &model, arguments.baud, timeout, "host")?;
     let mut session = Session::new(client, model, specimen, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
     let begun = Instant::now();

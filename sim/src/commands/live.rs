@@ -9,12 +9,11 @@ use std::time::Duration;
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
 use dermis_golden::fixed::Model;
-use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 
 use super::inputs::{note_estimator, BoardOverride};
 use super::reconstruct_stream::{open, SoftwareEngine};
-use crate::link::{open as connect, require_uart, Session};
+use crate::link::{open_board, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
 use crate::recording::{Lines, Pace};
@@ -100,9 +99,8 @@ impl Arguments {
             note_estimator(scene);
         }
         let Some(port) = &self.board else { return Engine::new(scene, fixed) };
-        require_uart(scene, "live --board")?;
         let model = Model::new(scene)?;
-        let client = connect(port, LinkKind::Uart.bit_rate(&model.board)?, BOARD_TIMEOUT)?;
+        let client = open_board(port, &model, None, BOARD_TIMEOUT, "live --board")?;
         Ok(Session::new(client, model, None, None, true, false)?.into())
     }
 }

@@ -7,12 +7,11 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 
 use super::inputs::BoardOverride;
-use crate::link::{open, require_uart, Session};
+use crate::link::{open_board, Session};
 use crate::report::{self, LoadReport};
 
 /// Arguments of `dermis load`.
@@ -72,9 +71,8 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
     write(&path, &image)?;
     let report = LoadReport::new(&model, &image, &path, port.as_deref());
     if let Some(port) = port {
-        require_uart(&hardware.scene, "load --port")?;
-        let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&hardware.board), Ok)?;
-        Session::new(open(port, baud, TIMEOUT)?, hardware, Some(model), None, false, false)?;
+        let client = open_board(port, &hardware, *baud, TIMEOUT, "load --port")?;
+        Session::new(client, hardware, Some(model), None, false, false)?;
     }
     Ok(if *json { serde_json::to_string(&report)? + "\n" } else { report::load(&report) })
 }

@@ -27,5 +27,6 @@ pub use controller::SpiController;
 pub use error::{HostError, IdentityError};
 pub use host_uart::{require_uart, HostUart, UartSymbol};
 pub use noisy_channel::{ChannelFaults, NoisyChannel};
+pub(crate) use session::open_board;
 pub use session::{open, Session};
 pub use terminal::PseudoTerminal;

@@ -7,12 +7,13 @@ use anyhow::{anyhow, bail, Result};
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::input::Input;
-use dermis_golden::link::{Identity, Kind};
+use dermis_golden::link::{Identity, Kind, LinkKind};
 use serialport::SerialPort;
 
 use super::answer::Answer;
 use super::client::Client;
 use super::error::HostError;
+use super::host_uart::require_uart;
 use crate::stream::Engine;
 
 /// Longest wait of a read of the port for a byte.
@@ -107,6 +108,23 @@ fn less(frame: &Frame, offset: &[f64]) -> Frame {
     let mut frame = frame.clone();
     frame.stress_MPa.iter_mut().zip(offset).for_each(|(reading, offset)| *reading -= offset);
     frame
+}
+
+/// Opens the port of a board with the hardware of `model`, at its bit rate unless `baud` gives another; `command` is that of
+/// the user.
+///
+/// # Errors
+/// A link that is no serial port, a board without one, and as [`open`].
+pub(crate) fn open_board(
+    port: &str,
+    model: &Model,
+    baud: Option<u32>,
+    timeout: Duration,
+    command: &str,
+) -> Result<Client<Box<dyn SerialPort>>> {
+    require_uart(&model.scene, command)?;
+    let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok)?;
+    Ok(open(port, baud, timeout)?)
 }
 
 /// Opens a serial port at `baud` bit/s; requests are repeated after `timeout` without an answer.

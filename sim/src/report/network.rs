@@ -9,13 +9,13 @@ const LAYOUT: &str = include_str!("../../../python/litex/dermis_litex/packets.js
 
 /// Bit rate in bit/s.
 pub(super) const BIT_RATE: u32 = 1_000_000_000;
-/// Bytes on the wire besides the payload of UDP: preamble 8, header 14, CRC 4 and gap 12 of Ethernet (IEEE 802.3), header 20 of
-/// IP (RFC 791), 8 of UDP (RFC 768).
-const OVERHEAD_BYTES: usize = 8 + 14 + 4 + 12 + 20 + 8;
-/// Ethernet fills up its own payload to so many bytes.
-const LEAST_BYTES: usize = 46;
-/// Of that payload the headers of IP and UDP.
+/// Bytes of the headers of IP (RFC 791) and UDP (RFC 768).
 const HEADER_BYTES: usize = 20 + 8;
+/// Bytes on the wire besides the payload of UDP: these headers, and preamble 8, header 14, CRC 4 and gap 12 of Ethernet
+/// (IEEE 802.3).
+const OVERHEAD_BYTES: usize = HEADER_BYTES + 8 + 14 + 4 + 12;
+/// Ethernet pads its payload, which begins with those headers, to so many bytes.
+const LEAST_BYTES: usize = 46;
 /// Bytes of a code in a packet, and of a word of a packet.
 const CODE_BYTES: usize = 2;
 const WORD_BYTES: usize = 4;

@@ -346,8 +346,8 @@ impl Shape {
         }
     }
 
-    /// Writes the two coefficients of `word` where `is_pair` says that it holds some: a cycle later, before the next byte
-    /// changes the register.
+    /// The write port of the coefficient memory: with `is_pair` the register `word` holds two coefficients, which are written in
+    /// the next cycle, before another byte is taken.
     fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, over: Expr<'k>, word: Expr<'k>) {
         let [address_bits, pair_bits] = self.coefficients.bits();
         let CoefficientPlaces { words, pairs } = self.coefficients;
