@@ -13,6 +13,7 @@
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | clock of the engine: a design target until place and route has measured it |
 //! | `uart_baud` | bit/s | bit rate of the UART; absent if the board has no pins for it |
+//! | `converters` | | converters on the pins `adc_*` of its Verilog, for a scene that scans its array; none if absent |
 //! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; absent if the board has no pins for it |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the widths of their operands, the wider first |
 //! | `multiplier_part_bits` | bits | width of each further part of an operand that is wider |
@@ -43,6 +44,7 @@ use files::Folder;
 pub use power::Power;
 use reader::Reader;
 
+use crate::adc::CONVERTERS;
 use crate::symmetry::quads::Quads;
 
 /// The engine of a board; both do the same arithmetic with different schedules.
@@ -93,6 +95,9 @@ pub struct Board {
     pub uart_baud: Option<u32>,
     /// Highest clock of the SPI, MHz, > 0; `None` where the board has no pins for it.
     pub spi_MHz: Option<f64>,
+    /// Names of the converters on the pins `adc_*`, in the order of `adc_miso`, all of one type.
+    #[serde(default)]
+    pub converters: Vec<String>,
     /// Number of multipliers.
     pub multipliers: u32,
     /// Widths of a multiplier's signed operands in bits, the wider first.
@@ -316,12 +321,15 @@ impl Board {
         let needed = |there: bool| there || self.pins.is_none();
         let in_device = |field: &str, count: u32| device.is_none_or(|device| i64::from(count) <= device.count(field));
         let [wide, narrow] = self.multiplier_bits;
+        let converter =
+            |name: &String| CONVERTERS.iter().any(|known| known.name == name) && *name == self.converters[0];
         let blocks = self.multiplier_blocks.as_ref().map(MultiplierBlocks::multipliers);
         let rules = [
             ("clock_MHz", positive(self.clock_MHz)),
             ("input_clock_MHz", self.input_clock_MHz.is_none_or(positive)),
             ("uart_baud", self.uart_baud != Some(0)),
             ("spi_MHz", self.spi_MHz.is_none_or(positive)),
+            ("converters", self.converters.iter().all(converter)),
             ("pins", self.pins.as_ref().is_none_or(|name| is_name(name) && is_pin_file(name))),
             ("verilog", self.verilog.iter().all(|name| is_name(name)) && needed(!self.verilog.is_empty())),
             ("size", needed(self.size.is_some())),

@@ -8,7 +8,7 @@ use super::error::BoardError;
 use crate::suggest::{distance, nearest};
 
 /// Fields of a board's file, and their allowed values in words.
-pub(super) const FIELDS: [(&str, &str); 28] = [
+pub(super) const FIELDS: [(&str, &str); 29] = [
     ("description", "a text"),
     ("engine", "\"parallel\" or \"serial\""),
     ("device", "a device that `dermis boards` lists; or left out, with family and the device's counts in this file"),
@@ -22,6 +22,7 @@ pub(super) const FIELDS: [(&str, &str); 28] = [
     ("clock_MHz", "a number above 0, the clock of the engine in MHz"),
     ("uart_baud", "a whole number above 0, in bit/s"),
     ("spi_MHz", "a number above 0"),
+    ("converters", "a list of converters of one type that `dermis converters` lists, in the order of adc_miso"),
     ("multipliers", "a whole number of at least 0, and no more than the device has"),
     ("multiplier_bits", "the widths of a multiplier's signed operands, the wider first, each of at least 2"),
     ("multiplier_part_bits", "a whole number from 1 to the narrower of multiplier_bits"),

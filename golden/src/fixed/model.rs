@@ -132,6 +132,15 @@ impl Model {
         Ok(frames.iter().flat_map(codes).collect())
     }
 
+    /// The readings that have these codes, as a frame named `id`: the other way round than [`Model::readings`], for codes that the
+    /// hardware has scanned. `None` where full scale follows the frame, or for another number of codes.
+    pub fn readings_of(&self, id: &str, codes: &[i32]) -> Option<Frame> {
+        let lsb = self.scene.input.full_scale_MPa? * self.prepare.reading_per_MPa
+            / f64::from(largest_code(self.formats().code_bits));
+        let readings = codes.iter().map(|code| f64::from(*code) * lsb).collect();
+        Frame::from_stress(id, &self.scene.sensor, readings).ok()
+    }
+
     /// The codes of a frame of stress, from a converter without input options.
     ///
     /// # Errors

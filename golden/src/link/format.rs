@@ -10,15 +10,15 @@ pub(super) fn contents(kind: Kind) -> &'static str {
     match kind {
         Kind::Identify | Kind::ReadCounters => "none",
         Kind::FrameForResultants | Kind::FrameForForces => {
-            "one code per taxel, row-major: two's complement in as many bytes as `input_bits` needs"
+            "one code per taxel, row-major: two's complement in as many bytes as `input_bits` needs; none where the board scans"
         }
         Kind::Tables => "an image of tables, for a board with `hardware.tables = \"writable\"`; answered with counters",
         Kind::Identity => "identity",
         Kind::Counters => "counters",
         Kind::Resultants => {
-            "sums, or the records of a board that answers no request for forces; then labels and status beats"
+            "sums, or the records of a board that answers no request for forces; then labels, status and code beats"
         }
-        Kind::Forces => "one beat per taxel, row-major, then labels and status beats",
+        Kind::Forces => "one beat per taxel, row-major, then labels, status and code beats",
     }
 }
 
@@ -76,7 +76,7 @@ frames may be in flight at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants), images in stage [`load`](crate::fixed::stages::load). The answer to an\nimage says that the engine has it; the status of the next frame says whether it is whole, and its version. A board\nwhose engine is not idle for the image drops it, and counts an overrun.\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0,\ncodes only where the board scans\nits array: then a request for a frame is answered with the next scan, and the answer ends with its codes, three in a beat.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants), images in stage [`load`](crate::fixed::stages::load). The answer to an\nimage says that the engine has it; the status of the next frame says whether it is whole, and its version. A board\nwhose engine is not idle for the image drops it, and counts an overrun.\n"
 }
 
 /// How a special byte is escaped in a packet.

@@ -15,6 +15,9 @@ use crate::scene::Condition;
 const REQUESTS: [Kind; 5] =
     [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces, Kind::Tables];
 
+/// Bit of [`Identity::left_out`]: the board scans its array.
+const SCANS: u8 = 0x80;
+
 impl Identity {
     /// The identity of the hardware of `plan`.
     ///
@@ -46,9 +49,15 @@ impl Identity {
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             bit_rate: scene.hardware.link.bit_rate(board)?,
             statuses: (plan.status_beats() / STATUS_BEATS) as u16,
-            left_out: REQUESTS.into_iter().filter(|&kind| !supports(plan, kind)).map(bit).sum(),
+            left_out: REQUESTS.into_iter().filter(|&kind| !supports(plan, kind)).map(bit).sum::<u8>()
+                | if scene.hardware.adc_scan.is_some() { SCANS } else { 0 },
             label_bits: if plan.label_beats() > 0 { LABEL_BITS as u8 } else { 0 },
         })
+    }
+
+    /// Whether the board scans its array.
+    pub fn scans(&self) -> bool {
+        self.left_out & SCANS != 0
     }
 
     /// Whether the board answers requests of this type.
@@ -76,13 +85,14 @@ fn bit(kind: Kind) -> u8 {
     }
 }
 
-/// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.
+/// Length in bytes of a frame's codes to the board, of its resultants and of its forces, each with a name.
 pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
     let taxels = plan.scene.sensor.taxels();
-    let others = (plan.label_beats() + plan.status_beats()) * BEAT_BYTES;
+    let others = (plan.label_beats() + plan.status_beats() + plan.code_beats()) * BEAT_BYTES;
+    let sent = if plan.scene.hardware.adc_scan.is_some() { 0 } else { taxels };
     let resultants = if plan.sends_resultants() { BEAT_BYTES * plan.force_beats() } else { Sums::BYTES };
     [
-        ("codes", code_bytes(plan.formats().code_bits) * taxels),
+        ("codes", code_bytes(plan.formats().code_bits) * sent),
         ("resultants", resultants + others),
         ("forces", BEAT_BYTES * taxels + others),
     ]
@@ -95,10 +105,10 @@ pub fn image_bytes(plan: &Plan) -> Option<usize> {
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
 /// whether records take the place of forces, condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, the quantised matrices with
-/// the columns kept, the network, and what finds the contacts. The names of scene and board and the clock are not included.
+/// the columns kept, the network, what finds the contacts, and the scan. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
-    let sensor = &plan.scene.sensor;
-    let text = json!({
+    let (scene, sensor) = (&plan.scene, &plan.scene.sensor);
+    let mut text = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "array": [sensor.rows, sensor.cols],
         "subarrays": plan.grid(),
@@ -112,6 +122,9 @@ pub fn scene_hash(plan: &Plan) -> u32 {
         "gain": plan.prepare.gain,
         "contacts": plan.by_contact.as_ref().map(|contacts| (plan.contacts(), sensor, contacts.window)),
     });
+    if let (Some(scan), Some(timing)) = (scene.hardware.adc_scan, plan.scan_timing()) {
+        text["scan"] = json!([scan.converter.name, scan.converters, scan.average, timing.period]);
+    }
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());
     plan.dead.iter().for_each(|taxel| hash.update(&(*taxel as u64).to_le_bytes()));

@@ -85,7 +85,7 @@ payload! {
         bit_rate: u32,
         /// Statuses of a frame: one per subarray, or one per contact that may have a μ of its own.
         statuses: u16,
-        /// Requests that the board does not support and counts as of unknown type: bit k − 1 for type k.
+        /// Requests that the board does not support and counts as of unknown type: bit k − 1 for type k. Bit 7: the board scans its array, so a request for a frame has no payload, and its answer ends with the codes.
         left_out: u8,
         /// Width of the label of a taxel's contact in the labels before the statuses; 0: there are no labels.
         label_bits: u8,

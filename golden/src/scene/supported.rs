@@ -27,7 +27,8 @@
 //! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
 //! the bitstream; dead taxels with one subarray, as above.
 //!
-//! `hardware.source = "adc-scan"`: no writable tables, no average of frames, `input_bits` for a result and a sign.
+//! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
+//! are taken, no average of frames, `input_bits` for a result and a sign.
 //!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
@@ -179,7 +180,12 @@ impl Scene {
                 self.input.average.to_string(),
                 "0 with adc-scan: hardware.adc_scan.samples averages",
             ),
-            rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adc-scan"),
+            rule(
+                self.hardware.has_writable_dead_taxels(),
+                "hardware.table_range.dead_taxels",
+                self.hardware.table_range.dead_taxels.to_string(),
+                "0, with adc-scan",
+            ),
         ])
     }
 

@@ -4,6 +4,8 @@
 use dermis_golden::link::LinkKind;
 use rust_hdl::prelude::*;
 
+use crate::scan::ScanPins;
+
 /// A board's output pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardOutputs {
@@ -15,9 +17,12 @@ pub struct BoardOutputs {
     pub busy: bool,
     /// LED: lit after a packet was dropped.
     pub error: bool,
+    /// Pins of a scan; none move where codes come over the link.
+    pub scan: ScanPins,
 }
 
-/// A simulated board. The input pins of its link are bits, from bit 0 in the order of [`LinkKind::inputs`].
+/// A simulated board. Its input pins are bits: those of the link, from bit 0 in the order of [`LinkKind::inputs`], then the
+/// outputs of the converters of a scan.
 pub trait BoardDevice: Send {
     /// Applies the link's inputs and the clock level, settles all signals and returns the outputs. The order of two
     /// clocks that change in the same call is undefined.

@@ -84,7 +84,7 @@ impl FrameIngress {
             ready: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(kernel(shape.rows * shape.cols, shape.input_bits as usize, shape.image_bytes))
+        block.bind(kernel(shape.codes(), shape.input_bits as usize, shape.image_bytes))
     }
 }
 

@@ -31,6 +31,20 @@ fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
     }
 }
 
+/// The pins of a scan in the header comment of the top module; empty where codes come over the link.
+fn scan_text(model: &Model) -> String {
+    let Some(scan) = model.scene.hardware.adc_scan else { return String::new() };
+    format!(
+        "\
+//   row                 address of the row that is driven
+//   adc_sclk, adc_cs_n, adc_mosi, adc_miso
+//                       {count} {converter} on one bus with an output each; a request is answered with the next scan
+",
+        count = scan.converters,
+        converter = scan.converter.name,
+    )
+}
+
 /// Generates the hardware of `model` behind its board's link: the files of [`crate::generate()`] with the board's top
 /// module in place of the engine's, without taps.
 ///
@@ -61,13 +75,14 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
 //   clk                 {clock} MHz
 //   button              reset while high
 {pins}
-//   alive, busy, error  status LEDs, high when lit
+{scan}//   alive, busy, error  status LEDs, high when lit
 //
 ",
         engine_top = engine.top,
         sensor = model.scene.sensor,
         name = model.scene.name,
         clock = model.board.clock_MHz,
+        scan = scan_text(model),
     );
     let around = Around { top, hierarchy, sources: &[include_str!("board_top.rs")], header, row: "link" };
     let mut board = around.generated(model, engine)?;

@@ -6,6 +6,9 @@
 //!           or spi_slave |                     '-> requests                            engine
 //! pins <--- of the link <- slip_encoder <- packer <- sources <- resultants, counter_ram <- m_axis
 //! ```
+//! Of an engine that scans its array itself, `s_axis` has images of tables only, and a `frame_gate` before `m_axis` passes the
+//! frames that are asked for.
+//!
 //! The packets are those of [`dermis_golden::link`]. Any block that carries bytes both ways can replace the UART or the
 //! SPI slave; a board has one of them.
 //!
@@ -16,6 +19,7 @@ mod board;
 mod board_top;
 mod counter_ram;
 mod crc;
+mod frame_gate;
 mod frame_ingress;
 mod generate;
 mod lamps;
@@ -36,9 +40,10 @@ mod uart_receiver;
 mod uart_transmitter;
 
 pub use board::{Board, BoardDevice, BoardOutputs};
-pub use board_top::{BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
+pub use board_top::{BoardTop, ScanBoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop, SpiScanBoardTop};
 pub use counter_ram::CounterRam;
 pub use crc::Crc;
+pub use frame_gate::FrameGate;
 pub use frame_ingress::FrameIngress;
 pub use generate::{generate_board, generate_board_changed};
 pub use lamps::Lamps;
@@ -76,6 +81,8 @@ pub struct Shape {
     pub image_bytes: Option<usize>,
     /// What the board answers a frame with.
     pub answers: Answers,
+    /// The hardware scans its array: a request for a frame has no payload.
+    pub scans: bool,
     /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
     pub frames: usize,
 }
@@ -129,7 +136,24 @@ impl Shape {
             answer_bytes: [resultants, forces],
             image_bytes: image_bytes(model),
             answers,
+            scans: model.scene.hardware.adc_scan.is_some(),
             frames,
+        }
+    }
+
+    /// Codes in a request for a frame.
+    fn codes(&self) -> usize {
+        match self.scans {
+            true => 0,
+            false => self.rows * self.cols,
+        }
+    }
+
+    /// Types of the requests for frames that the hardware scans.
+    fn scanned(&self) -> &'static [Kind] {
+        match self.scans {
+            true => self.answers.requests(),
+            false => &[],
         }
     }
 

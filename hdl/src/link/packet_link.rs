@@ -50,6 +50,8 @@ pub struct PacketLink {
     pub m_axis_tready: Signal<Out, Bit>,
     /// The beat is the frame's last; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<In, Bit>,
+    /// A frame is asked for and its answer not begun.
+    pub requested: Signal<Out, Bit>,
     /// A packet is being received, computed or sent.
     pub activity: Signal<Out, Bit>,
     /// A packet is dropped in this cycle.
@@ -91,6 +93,7 @@ impl PacketLink {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
+            requested: Default::default(),
             activity: Default::default(),
             dropped: Default::default(),
             decoder: SlipDecoder::default(),
@@ -98,7 +101,7 @@ impl PacketLink {
             ingress: FrameIngress::new(shape),
             towards: RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast()),
             back: RegisterSlice::new(96, shape.answers.are_fast()),
-            requests: Requests::new(shape.frames, shape.image_bytes.is_some()),
+            requests: Requests::new(shape),
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.answers.are_fast()),
             packer: Packer::new(shape.payloads()),
@@ -228,6 +231,7 @@ impl Logic for PacketLink {
         self.send_data.next = self.encoder.data.val();
         self.send_valid.next = self.encoder.valid.val();
 
+        self.requested.next = self.requests.waiting.val();
         self.activity.next = self.receive_valid.val() | self.requests.waiting.val() | self.encoder.valid.val();
         self.dropped.next = self.parser.bad.val() | self.ingress.overrun.val() | self.requests.overrun.val();
     }

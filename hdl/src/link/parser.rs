@@ -85,7 +85,7 @@ impl Parser {
             kernel: Body::default(),
         };
         let frame_kinds: Vec<u8> = shape.answers.requests().iter().map(|kind| *kind as u8).collect();
-        block.bind(kernel(shape.rows * shape.cols * code_bytes(shape.input_bits), &frame_kinds, shape.image_bytes))
+        block.bind(kernel(shape.codes() * code_bytes(shape.input_bits), &frame_kinds, shape.image_bytes))
     }
 }
 
@@ -338,7 +338,7 @@ mod tests {
 
     #[test]
     fn packets_are_checked_as_a_whole() {
-        for (frame_bytes, image_bytes) in [(6, None), (300, None), (6, Some(14)), (300, Some(270))] {
+        for (frame_bytes, image_bytes) in [(6, None), (300, None), (6, Some(14)), (300, Some(270)), (0, Some(20))] {
             let mut packet = Packet::of(frame_bytes, image_bytes);
             let all = stimulus(if frame_bytes > 100 { 80 } else { 800 }, &packet);
             let block = Body::new(

@@ -3,7 +3,7 @@
 use dermis_golden::link::Kind;
 use rust_hdl::prelude::*;
 
-use super::{COUNTERS, FORCES, IDENTITY, RESULTANTS};
+use super::{Shape, COUNTERS, FORCES, IDENTITY, RESULTANTS};
 use crate::kernel_block;
 use crate::language::{Body, Builder, Contents, Kernel, Type};
 use crate::primitives::count_bits;
@@ -17,7 +17,8 @@ use crate::wire::Wire;
 /// answer; `begun` removes it.
 ///
 /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
-/// never overflows; the serial one holds two.
+/// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a payload, and
+/// the request is dropped while the queue is full.
 #[derive(LogicBlock)]
 pub struct Requests {
     /// Clock; registers change on its rising edge.
@@ -34,7 +35,7 @@ pub struct Requests {
     pub taken: Signal<In, Bit>,
     /// A request without payload is accepted; with `good`.
     pub noted: Signal<Out, Bit>,
-    /// A request without payload is dropped, because one of its type is not answered yet; with `good`.
+    /// A request without payload is dropped, because one of its type is not answered yet, or the queue is full; with `good`.
     pub overrun: Signal<Out, Bit>,
     /// The engine offers a beat of an answer.
     pub answered: Signal<In, Bit>,
@@ -46,7 +47,7 @@ pub struct Requests {
     pub answer_number: Wire<Out>,
     /// Source of its payload, 2 bits; valid with `offer`.
     pub source: Wire<Out>,
-    /// Frames are in the engine.
+    /// Requests for frames are not answered yet.
     pub waiting: Signal<Out, Bit>,
     kernel: Body,
 }
@@ -59,8 +60,8 @@ kernel_block!(
 );
 
 impl Requests {
-    /// With a queue of `depth` frames, a power of two, and `images` of tables.
-    pub fn new(depth: usize, images: bool) -> Self {
+    /// For the requests of `shape`.
+    pub fn new(shape: &Shape) -> Self {
         let block = Requests {
             clk: Default::default(),
             rst: Default::default(),
@@ -78,11 +79,13 @@ impl Requests {
             waiting: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(kernel(depth, images))
+        block.bind(kernel(shape.frames, shape.image_bytes.is_some(), shape.scanned()))
     }
 }
 
-fn kernel(depth: usize, images: bool) -> Kernel {
+/// With a queue of `depth` frames, a power of two, `images` of tables, and requests of the types `scanned` for frames that the
+/// hardware scans.
+fn kernel(depth: usize, images: bool, scanned: &[Kind]) -> Kernel {
     let k = Builder::new("requests");
     let (rst, good, kind) = (k.input("rst", 1), k.input("good", 1), k.input("kind", 8));
     let (number, taken) = (k.input("number", 8), k.input("taken", 1));
@@ -95,15 +98,26 @@ fn kernel(depth: usize, images: bool) -> Kernel {
     let fill = k.state("fill", Type::unsigned(at + 1), rst, 0);
 
     let asks = |name, of: Kind| k.wire(name, good & kind.is(of as u64));
+    let is_scanned = scanned.iter().map(|of| kind.is(*of as u64)).reduce(|a, b| a | b);
+    let scan = is_scanned.map(|is| {
+        let asks = k.wire("asks_scan", good & is);
+        (asks, k.wire("room", !fill.is(depth as u64)))
+    });
     let asked = [asks("asks_identity", Kind::Identify), asks("asks_counters", Kind::ReadCounters)];
     let pending = [*identity, *counters];
     let image = images.then(|| k.wire("image", taken & kind.is(Kind::Tables as u64)));
-    let queued = image.map_or(taken, |image| k.wire("queued", taken & !image));
+    let queued = match (&scan, image) {
+        (Some((asks, room)), _) => k.wire("queued", *asks & *room),
+        (None, Some(image)) => k.wire("queued", taken & !image),
+        (None, None) => taken,
+    };
     let to_answer = [asked[0], image.map_or(asked[1], |image| k.wire("asked_counters", asked[1] | image))];
     let frame = k.wire("frame", frames.read(*head));
     let waiting = k.wire("waiting", fill.any());
-    k.wire("noted", (asked[0] & !pending[0]) | (asked[1] & !pending[1]));
-    k.wire("overrun", (asked[0] & pending[0]) | (asked[1] & pending[1]));
+    let noted = (asked[0] & !pending[0]) | (asked[1] & !pending[1]);
+    let overrun = (asked[0] & pending[0]) | (asked[1] & pending[1]);
+    k.wire("noted", scan.as_ref().map_or(noted, |(asks, room)| noted | (*asks & *room)));
+    k.wire("overrun", scan.as_ref().map_or(overrun, |(asks, room)| overrun | (*asks & !*room)));
     k.wire("offer", *identity | *counters | (waiting & answered));
     let from = |source: usize| k.constant(2, source as u64);
     let of_frame = (waiting & frame.top()).mux(from(FORCES), from(RESULTANTS));
@@ -132,12 +146,15 @@ mod tests {
     use crate::wire::Word;
 
     const DEPTH: usize = 4;
+    const FRAMES: [Kind; 2] = [Kind::FrameForResultants, Kind::FrameForForces];
     const PLAIN: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
 
     /// Requests in lists.
     #[derive(Default)]
     struct Lists {
         images: bool,
+        /// Frames are requested without payload.
+        scans: bool,
         /// Numbers of a pending identification and of a pending reading of the counters.
         plain: [Option<u8>; 2],
         /// Numbers of the frames, and whether all forces are requested.
@@ -157,6 +174,11 @@ mod tests {
             self.plain.iter().any(Option::is_some) || (!self.frames.is_empty() && inputs[5].number() == 1)
         }
 
+        /// Whether a scanned frame is asked for.
+        fn asks_scan(&self, inputs: &[Word]) -> bool {
+            self.scans && inputs[1].number() == 1 && FRAMES.iter().any(|of| inputs[2].number() == *of as u64)
+        }
+
         fn asked(&self, inputs: &[Word]) -> Option<usize> {
             let kind = inputs[2].number() as u8;
             PLAIN.iter().position(|&plain| plain == kind).filter(|_| inputs[1].number() == 1)
@@ -171,10 +193,11 @@ mod tests {
             let bit = |bit: bool| Some(Word::from(bit));
             let asked = self.asked(inputs).map(|asked| self.plain[asked].is_none());
             let next = self.next().filter(|_| self.offers(inputs));
+            let scan = self.asks_scan(inputs).then_some(self.frames.len() < DEPTH);
             vec![
                 bit(!self.frames.is_empty()),
-                bit(asked == Some(true)),
-                bit(asked == Some(false)),
+                bit(asked == Some(true) || scan == Some(true)),
+                bit(asked == Some(false) || scan == Some(false)),
                 bit(self.offers(inputs)),
                 next.map(|(source, _)| Word::from(source as u64)),
                 next.map(|(_, number)| Word::from(u64::from(number))),
@@ -185,6 +208,10 @@ mod tests {
             let number = inputs[3].number() as u8;
             let image = self.images && inputs[2].number() as u8 == Kind::Tables as u8 && inputs[4].number() == 1;
             let asked = self.asked(inputs).or(image.then_some(COUNTERS)).filter(|&asked| self.plain[asked].is_none());
+            let queued = match self.scans {
+                true => self.asks_scan(inputs) && self.frames.len() < DEPTH,
+                false => inputs[4].number() == 1 && !image,
+            };
             match self.next().filter(|_| inputs[6].number() == 1) {
                 Some((source @ (IDENTITY | COUNTERS), _)) => self.plain[source] = None,
                 Some(_) => drop(self.frames.pop_front()),
@@ -193,19 +220,19 @@ mod tests {
             if let Some(asked) = asked {
                 self.plain[asked] = Some(number);
             }
-            if inputs[4].number() == 1 && !image {
+            if queued {
                 self.frames.push_back((number, inputs[2].number() as u8 == Kind::FrameForForces as u8));
             }
             if inputs[0].number() == 1 {
-                *self = Lists { reset: true, images: self.images, ..Lists::default() };
+                *self = Lists { reset: true, images: self.images, scans: self.scans, ..Lists::default() };
             }
         }
     }
 
-    /// Requests of all types, frames only where the queue has room; answers at any time; resets.
-    fn stimulus(cycles: usize, images: bool) -> Vec<Vec<Word>> {
+    /// Requests of all types, frames with payload only where the queue has room; answers at any time; resets.
+    fn stimulus(cycles: usize, images: bool, scans: bool) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(18);
-        let mut lists = Lists { images, ..Lists::default() };
+        let mut lists = Lists { images, scans, ..Lists::default() };
         let kinds = [Kind::Identify, Kind::ReadCounters, Kind::FrameForForces, Kind::FrameForResultants, Kind::Tables];
         let kinds = &kinds.map(|kind| kind as u8)[..if images { 5 } else { 4 }];
         let mut speed = 4;
@@ -216,7 +243,8 @@ mod tests {
             let rst = cycle < 2 || random.u16(..500) == 0;
             let good = !rst && random.u8(..4) == 0;
             let kind = kinds[random.usize(..kinds.len())];
-            let taken = good && !PLAIN.contains(&kind) && lists.frames.len() < DEPTH;
+            let image = kind == Kind::Tables as u8;
+            let taken = good && !PLAIN.contains(&kind) && if scans { image } else { lists.frames.len() < DEPTH };
             let mut inputs = vec![Word::from(rst), Word::from(good), Word::from(u64::from(kind))];
             inputs.extend([Word::from(u64::from(random.u8(..))), Word::from(taken), Word::from(random.bool())]);
             inputs.push(Word::default());
@@ -229,9 +257,10 @@ mod tests {
 
     #[test]
     fn requests_are_answered_in_order() {
-        for images in [false, true] {
-            let mut lists = Lists { images, ..Lists::default() };
-            check(Requests::new(DEPTH, images).kernel.kernel(), &stimulus(8000, images), &mut lists);
+        for (images, scans) in [(false, false), (true, false), (true, true)] {
+            let mut lists = Lists { images, scans, ..Lists::default() };
+            let kernel = kernel(DEPTH, images, if scans { &FRAMES } else { &[] });
+            check(&kernel, &stimulus(8000, images, scans), &mut lists);
         }
     }
 }

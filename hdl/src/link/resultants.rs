@@ -343,6 +343,7 @@ mod tests {
                 image_bytes: None,
                 answers: Answers::Both,
                 frames: 4,
+                scans: false,
             };
             let mut answers = Expected { rows, cols, ..Expected::default() };
             check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);

@@ -1,12 +1,13 @@
-//! Top module of a scan: sequencer, capture, engine, status.
+//! Top module of a scan: sequencer, capture, engine, status; with writable tables, the way of their images, and codes behind the
+//! forces.
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use super::pins::{ScanInputs, ScanOutputs, Scanner};
-use super::{ScanCapture, ScanSequencer, ScanStatus, Shape};
+use super::pins::{Beat, ScanInputs, ScanOutputs, ScanPins, Scanner};
+use super::{ScanCapture, ScanCodes, ScanSequencer, ScanStatus, ScanTables, Shape};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::Dff;
@@ -17,9 +18,10 @@ use crate::{engine, serial};
 const BEAT: usize = 96;
 
 /// Top module `$name` with engine `$engine`. A macro, because rust-hdl connects blocks by their fields and does not support
-/// type parameters for them.
+/// type parameters for them. `$source` is the block from which the engine gets its beats: `capture`, or `tables`, which
+/// lets images in between, with their stream. `$output` is the last block: `told`, or `codes`, which adds the codes.
 macro_rules! scan_core {
-    ($name:ident, $engine:ty) => {
+    ($name:ident, $engine:ty, $source:ident, $output:ident, [$($tables:ident, $codes:ident)?]) => {
         /// An engine that reads the converters of its array by itself; ports as of the fields.
         #[derive(LogicBlock)]
         pub struct $name {
@@ -27,6 +29,20 @@ macro_rules! scan_core {
             pub clk: Signal<In, Clock>,
             /// Synchronous reset, active high.
             pub rst: Signal<In, Bit>,
+            /// A scan may begin; high to scan all the time.
+            pub enable: Signal<In, Bit>,
+            $(
+                /// A byte of an image of tables, as a beat of the engine's stream; valid with `s_axis_tvalid`.
+                pub s_axis_tdata: Wire<In>,
+                /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+                pub s_axis_tvalid: Signal<In, Bit>,
+                /// A beat is accepted in this cycle.
+                pub s_axis_tready: Signal<Out, Bit>,
+                /// The beat is the last of its image; valid with `s_axis_tvalid`.
+                pub s_axis_tlast: Signal<In, Bit>,
+                $tables: ScanTables,
+                $codes: ScanCodes,
+            )?
             /// Address of the row that is driven, unsigned; valid after the reset.
             pub row: Wire<Out>,
             /// Serial clock of all converters.
@@ -63,6 +79,15 @@ macro_rules! scan_core {
                 let mut core = $name {
                     clk: Default::default(),
                     rst: Default::default(),
+                    enable: Default::default(),
+                    $(
+                        s_axis_tdata: Wire::new(model.stream_bits() as usize),
+                        s_axis_tvalid: Default::default(),
+                        s_axis_tready: Default::default(),
+                        s_axis_tlast: Default::default(),
+                        $tables: ScanTables::new(shape.code_bits as usize),
+                        $codes: ScanCodes::new(model.scene.sensor.taxels(), shape.code_bits as usize),
+                    )?
                     row: Wire::new(count_bits(shape.rows)),
                     adc_sclk: Default::default(),
                     adc_cs_n: Default::default(),
@@ -99,7 +124,7 @@ macro_rules! scan_core {
 
                 comment!("Scan");
                 self.sequencer.clear.next = self.capture.clear.val();
-                self.sequencer.room.next = self.told.room.val();
+                self.sequencer.room.next = self.told.room.val() & self.enable.val() $(& self.$codes.room.val())?;
                 self.row.next = self.sequencer.row.val();
                 self.adc_sclk.next = self.sequencer.sclk.val();
                 self.adc_cs_n.next = self.sequencer.cs_n.val();
@@ -115,60 +140,101 @@ macro_rules! scan_core {
                 self.capture.alive.next = self.sequencer.alive.val();
 
                 comment!("Codes to the engine");
-                self.engine.s_axis_tdata.next = self.capture.m_axis_tdata.val();
-                self.engine.s_axis_tvalid.next = self.capture.m_axis_tvalid.val();
-                self.engine.s_axis_tlast.next = self.capture.m_axis_tlast.val();
-                self.capture.m_axis_tready.next = self.engine.s_axis_tready.val();
+                $(
+                    self.$tables.clk.next = self.clk.val();
+                    self.$tables.rst.next = self.restart.q.val();
+                    self.$tables.code.next = self.capture.m_axis_tdata.val();
+                    self.$tables.code_valid.next = self.capture.m_axis_tvalid.val();
+                    self.$tables.code_last.next = self.capture.m_axis_tlast.val();
+                    self.capture.m_axis_tready.next = self.$tables.code_ready.val();
+                    self.$tables.s_axis_tdata.next = self.s_axis_tdata.val();
+                    self.$tables.s_axis_tvalid.next = self.s_axis_tvalid.val();
+                    self.$tables.s_axis_tlast.next = self.s_axis_tlast.val();
+                    self.s_axis_tready.next = self.$tables.s_axis_tready.val();
+                )?
+                self.engine.s_axis_tdata.next = self.$source.m_axis_tdata.val();
+                self.engine.s_axis_tvalid.next = self.$source.m_axis_tvalid.val();
+                self.engine.s_axis_tlast.next = self.$source.m_axis_tlast.val();
+                self.$source.m_axis_tready.next = self.engine.s_axis_tready.val();
 
                 comment!("Forces, and marks in the status");
-                self.told.complete.next = self.capture.complete.val();
+                self.told.complete.next = self.$source.complete.val();
                 self.told.rail.next = self.capture.rail.val();
                 self.told.other.next = self.capture.other.val();
                 self.told.s_axis_tdata.next = self.engine.m_axis_tdata.val();
                 self.told.s_axis_tvalid.next = self.engine.m_axis_tvalid.val();
                 self.told.s_axis_tlast.next = self.engine.m_axis_tlast.val();
                 self.engine.m_axis_tready.next = self.told.s_axis_tready.val();
-                self.m_axis_tdata.next = self.told.m_axis_tdata.val();
-                self.m_axis_tvalid.next = self.told.m_axis_tvalid.val();
-                self.told.m_axis_tready.next = self.m_axis_tready.val();
-                self.m_axis_tlast.next = self.told.m_axis_tlast.val();
+                $(
+                    self.$codes.clk.next = self.clk.val();
+                    self.$codes.rst.next = self.restart.q.val();
+                    self.$codes.code.next = self.capture.m_axis_tdata.val();
+                    self.$codes.passed.next = self.$tables.passed.val();
+                    self.$codes.complete.next = self.$tables.complete.val();
+                    self.$codes.broken.next = self.$tables.broken.val();
+                    self.$codes.s_axis_tdata.next = self.told.m_axis_tdata.val();
+                    self.$codes.s_axis_tvalid.next = self.told.m_axis_tvalid.val();
+                    self.$codes.s_axis_tlast.next = self.told.m_axis_tlast.val();
+                    self.told.m_axis_tready.next = self.$codes.s_axis_tready.val();
+                )?
+                self.m_axis_tdata.next = self.$output.m_axis_tdata.val();
+                self.m_axis_tvalid.next = self.$output.m_axis_tvalid.val();
+                self.$output.m_axis_tready.next = self.m_axis_tready.val();
+                self.m_axis_tlast.next = self.$output.m_axis_tlast.val();
             }
         }
 
         impl Scanner for $name {
             fn drive(&mut self, inputs: &ScanInputs, clock: bool) {
                 self.rst.next = inputs.rst;
+                self.enable.next = inputs.enable;
                 self.adc_miso.next = Word::from(inputs.miso);
+                $(
+                    self.s_axis_tdata.next = Word::of_fields(&[inputs.s_data.into()], self.$tables.s_axis_tdata.width());
+                    self.s_axis_tvalid.next = inputs.s_valid;
+                    self.s_axis_tlast.next = inputs.s_last;
+                )?
                 self.m_axis_tready.next = inputs.m_ready;
                 self.clk.next = clock.into();
             }
 
             fn pins(&self) -> ScanOutputs {
-                let (data, code) = (self.m_axis_tdata.val(), self.capture.m_axis_tdata.val());
-                let taken = self.capture.m_axis_tvalid.val() & self.engine.s_axis_tready.val();
+                let (data, beat) = (self.m_axis_tdata.val(), self.$source.m_axis_tdata.val());
+                let taken = self.$source.m_axis_tvalid.val() & self.engine.s_axis_tready.val();
+                let beat = Beat {
+                    data: beat.signed(0, self.$source.m_axis_tdata.width()) as i32,
+                    last: self.$source.m_axis_tlast.val(),
+                };
+                let s_ready = false;
+                $(let s_ready = s_ready | self.$tables.s_axis_tready.val();)?
                 ScanOutputs {
-                    row: self.row.val().number(),
-                    sclk: self.adc_sclk.val(),
-                    cs_n: self.adc_cs_n.val(),
-                    mosi: self.adc_mosi.val(),
+                    pins: ScanPins {
+                        row: self.row.val().number(),
+                        sclk: self.adc_sclk.val(),
+                        cs_n: self.adc_cs_n.val(),
+                        mosi: self.adc_mosi.val(),
+                    },
                     m_valid: self.m_axis_tvalid.val(),
                     m_last: self.m_axis_tlast.val(),
                     m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
-                    code: taken.then(|| code.signed(0, self.capture.m_axis_tdata.width()) as i32),
+                    s_ready,
+                    taken: taken.then_some(beat),
                 }
             }
         }
     };
 }
 
-scan_core!(ScanCore, engine::Engine);
-scan_core!(SerialScanCore, serial::Engine);
+scan_core!(ScanCore, engine::Engine, capture, told, []);
+scan_core!(WritableScanCore, engine::Engine, tables, codes, [tables, codes]);
+scan_core!(SerialScanCore, serial::Engine, capture, told, []);
 
 /// The top module of `model`, after rust-hdl's checks.
 pub(super) fn scanner(model: &Model) -> Result<Box<dyn Scanner>, HdlError> {
-    let core: Box<dyn Scanner> = match model.board.engine {
-        EngineKind::Parallel => Box::new(ScanCore::new(model)?),
-        EngineKind::Serial => Box::new(SerialScanCore::new(model)?),
+    let core: Box<dyn Scanner> = match (model.board.engine, model.has_writable_tables()) {
+        (EngineKind::Parallel, false) => Box::new(ScanCore::new(model)?),
+        (EngineKind::Parallel, true) => Box::new(WritableScanCore::new(model)?),
+        (EngineKind::Serial, _) => Box::new(SerialScanCore::new(model)?),
     };
     Hierarchy::of(&*core).check()?;
     check_all(&*core).map_err(|error| HdlError::Check(format!("{error:?}")))?;

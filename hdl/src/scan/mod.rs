@@ -4,24 +4,31 @@
 //!  row, sclk, cs_n, mosi <── scan_sequencer ── take, done ──> scan_capture ── codes ──> engine ──> scan_status ──> m_axis
 //!                                                miso ───────────^  '───── rail, other: a queue ──────^
 //! ```
+//! With writable tables, `scan_tables` stands before the engine and lets their images in, and `scan_codes` behind
+//! `scan_status` lets the codes follow the forces.
+//!
 //! Nothing of it is in a scene whose codes come as a stream. The converters are [`dermis_golden::adc`], the arithmetic is
 //! [`dermis_golden::fixed::stages::scan`].
 
 mod capture;
+mod codes;
 mod core;
 mod generate;
 mod pins;
 mod sequencer;
 mod simulate;
 mod status;
+mod tables;
 
-pub use self::core::{ScanCore, SerialScanCore};
+pub use self::core::{ScanCore, SerialScanCore, WritableScanCore};
 pub use capture::ScanCapture;
+pub use codes::ScanCodes;
 pub use generate::{generate_scan, generate_scan_changed};
-pub use pins::{ScanDevice, ScanInputs, ScanOutputs};
+pub use pins::{Beat, ScanDevice, ScanInputs, ScanOutputs, ScanPins};
 pub use sequencer::ScanSequencer;
 pub use simulate::scan_simulator;
 pub use status::ScanStatus;
+pub use tables::ScanTables;
 
 use dermis_golden::adc::timing::Timing;
 use dermis_golden::adc::AdcScan;

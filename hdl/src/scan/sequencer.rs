@@ -123,7 +123,7 @@ fn kernel(shape: &Shape) -> Kernel {
     let slot = state("slot", bits(half), half - 1).comment("Cycles of the half period that are left, less one.");
     let step = state("step", bits(steps + 1), 0).comment("Half periods of the frame so far.");
     let clocked = state("clocked", 1, 0).comment("SCLK is not at its idle level.");
-    let command = k.register("command", Type::unsigned(converter.frame_bits as usize));
+    let command = state("command", converter.frame_bits as usize, 0);
     let primed = state("primed", 1, 0).comment("Channel 0 of the row has been chosen.");
     let row = state("row", count_bits(*rows), 0);
     let asked = state("asked", count_bits(scan.channels), 0).comment("Channel that the frame converts.");

@@ -116,7 +116,11 @@ pub unsafe extern "C" fn dermis_link_new(scene: *const dermis_scene, link: *mut 
         link.write(std::ptr::null_mut());
         let scene = unsafe { reference("scene", scene) }?;
         let model = Model::new(&scene.spec)?;
-        Identity::of(&model).map_err(Error::input)?;
+        let identity = Identity::of(&model).map_err(Error::input)?;
+        if identity.scans() {
+            let text = "hardware.source = adc-scan: a link sends frames, which such a board does not take".to_owned();
+            return Err(Error { status: dermis_status::Input, text });
+        }
         let sent = vec![None; usize::from(u8::MAX) + 1];
         let made = dermis_link { model, decoder: Decoder::default(), sequence: 0, sent };
         link.write(Box::into_raw(Box::new(made)));

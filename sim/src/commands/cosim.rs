@@ -96,8 +96,8 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let Arguments { scene, frames, json, tables, device, waves: with_waves, wire, target } = arguments;
     let (scene, specimen, frames) = resolve_specimen(scene.as_deref(), tables.as_deref(), frames)?;
     let scene = target.apply(scene);
-    if scene.hardware.adc_scan.is_some() && tables.is_none() && !with_waves {
-        let verified = verify_scan(&scene, &frames, device.simulators(), *wire, build_dir)?;
+    if scene.hardware.adc_scan.is_some() && !with_waves {
+        let verified = verify_scan(&scene, specimen.as_ref(), &frames, device.simulators(), *wire, build_dir)?;
         let text = match json {
             true => serde_json::to_string(&ScanReport::new(&verified))? + "\n",
             false => report::scan(&verified),

@@ -1,19 +1,22 @@
 //! `dermis host`: sends frames to a board over a serial port and reads back forces.
 
-use std::path::PathBuf;
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{bail, Result};
+use anyhow::{bail, Context, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::link::{Counters, Identity, Kind};
 use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
+use dermis_golden::write::write;
 
 use super::inputs::{resolve_specimen, BoardOverride};
 use crate::link::stream::{self, FramesSent};
-use crate::link::{open_board, LinkErrors, PhysicalAnswer, Session};
+use crate::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
 use crate::progress::Progress;
 use crate::report;
 
@@ -49,9 +52,17 @@ pub struct Arguments {
     /// Frame recorded without contact; it takes the place of the scene's tare frame or offsets.
     #[arg(long, value_name = "FILE")]
     tare: Option<PathBuf>,
-    /// Read frames from standard input and write answers to standard output, one JSON object per line.
+    /// Read frames from standard input and write answers to standard output, one JSON object per line. Of a board that scans its
+    /// array, nothing is read, and a line has the readings too.
     #[arg(long)]
     stream: bool,
+    /// Of a board that scans its array: number of scans to ask for [default: 1].
+    #[arg(long, value_name = "N", conflicts_with = "frames", value_parser = clap::value_parser!(u64).range(1..))]
+    scans: Option<u64>,
+    /// Of a board that scans its array: folder for the readings of each scan as scan-<n>.json, frames for `--tare`,
+    /// `dermis calibrate` and the like.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "frames")]
+    save: Option<PathBuf>,
     /// Time without an answer, in ms, after which a request is sent again.
     #[arg(long, value_name = "MS", default_value_t = 1000)]
     timeout: u64,
@@ -65,6 +76,8 @@ const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
   dermis host --port /dev/ttyUSB0 --scene hand.toml --tables left-hand.toml press.json
+  dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 10 --save readings     a board that scans its array
+  dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 1000 --stream >answers
 
 Input line: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
 Output line: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": [x, y, normal], \"centre_mm\": [x, y], ...}";
@@ -75,7 +88,10 @@ Output line: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": 
 /// Wrong input, a port that cannot be opened, a board of another scene, no answer.
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let (hardware, tables) = (arguments.scene.as_deref(), arguments.tables.as_deref());
-    let (scene, specimen, frames) = match arguments.stream {
+    let named = hardware.map(Scene::load).transpose()?;
+    let scans = named.as_ref().is_some_and(|scene| scene.hardware.adc_scan.is_some());
+    refuse(arguments, scans, named.as_ref())?;
+    let (scene, specimen, frames) = match arguments.stream || scans {
         true => {
             let specimen = tables.map(Scene::load).transpose()?;
             (Scene::load(hardware.unwrap_or_default())?, specimen, Vec::new())
@@ -97,9 +113,17 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let mut session = Session::new(client, model, specimen, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
     let begun = Instant::now();
-    let sent = match arguments.stream {
-        true => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
-        false => send_frames(&mut session, &frames)?,
+    let ids = (1..=arguments.scans.unwrap_or(1)).map(|number| format!("scan-{number}"));
+    let sent = match (arguments.stream, scans) {
+        (true, false) => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
+        (true, true) => stream::run_scans(&mut session, ids, &mut std::io::stdout().lock())?,
+        (false, false) => send(&mut session, &frames, |session, frame| session.request(frame))?,
+        (false, true) => {
+            let ids: Vec<String> = ids.collect();
+            let save = arguments.save.as_deref();
+            save.map_or(Ok(()), |folder| fs::create_dir_all(folder).with_context(|| folder.display().to_string()))?;
+            send(&mut session, &ids, |session, id| scanned(session, id, save))?
+        }
     };
     let rate = sent.answered as f64 / begun.elapsed().as_secs_f64();
     let after = session.client.counters()?;
@@ -115,12 +139,50 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     }
 }
 
-/// Sends frames from files one after the other.
-fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<FramesSent> {
-    let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), frames.len() as u64);
+/// Refuses options of the other kind of board.
+///
+/// # Errors
+/// The option, and the scene's source of codes.
+fn refuse(arguments: &Arguments, scans: bool, scene: Option<&Scene>) -> Result<()> {
+    let Arguments { frames, tare, save, stream, .. } = arguments;
+    let name = scene.map_or_else(String::new, |scene| scene.name.clone() + ": ");
+    let unfit = match scans {
+        true => [
+            ("a frame", !frames.is_empty()),
+            ("--tare", tare.is_some()),
+            ("--save with --stream", save.is_some() && *stream),
+        ],
+        false => [("--scans", arguments.scans.is_some()), ("--save", save.is_some()), ("", false)],
+    };
+    let why = match scans {
+        true => "adc-scan: the board scans its array; its zero is a table (--tables), its readings are in the lines of --stream",
+        false => "stream: the board takes frames and scans no array",
+    };
+    match unfit.iter().find(|(_, unfit)| *unfit) {
+        Some((what, _)) => bail!("{name}{what} is not possible with hardware.source = {why}"),
+        None => Ok(()),
+    }
+}
+
+/// Asks for a scan and saves its readings.
+fn scanned<P: Read + Write>(session: &mut Session<P>, id: &str, save: Option<&Path>) -> Result<(Frame, Answer)> {
+    let (readings, answer) = session.scan(id)?;
+    if let Some(folder) = save {
+        write(&folder.join(format!("{id}.json")), readings.to_json().as_bytes())?;
+    }
+    Ok((readings, answer))
+}
+
+/// Asks for one result after the other.
+fn send<P: Read + Write, R>(
+    session: &mut Session<P>,
+    requests: &[R],
+    mut ask: impl FnMut(&mut Session<P>, &R) -> Result<(Frame, Answer)>,
+) -> Result<FramesSent> {
+    let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
-    for (index, frame) in frames.iter().enumerate() {
-        let (readings, answer) = session.request(frame)?;
+    for (index, request) in requests.iter().enumerate() {
+        let (readings, answer) = ask(session, request)?;
         if let Some(result) = answer.decode(&session.model, &readings)? {
             let sensor = &session.model.scene.sensor;
             let stress = session.model.stress(std::slice::from_ref(&readings))?;
@@ -129,7 +191,7 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
             text.push_str(&report::equality(&answer));
         } else {
             text.push_str(&report::resultants(
-                &frame.id,
+                &readings.id,
                 &PhysicalAnswer::new(&session.model, &readings, &answer)?,
                 &answer,
             ));
@@ -137,7 +199,7 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
         equal &= !matches!(answer.difference, Some(Some(_)));
         bar.set(index as u64 + 1);
     }
-    Ok(FramesSent { text, equal, answered: frames.len(), refused: 0 })
+    Ok(FramesSent { text, equal, answered: requests.len(), refused: 0 })
 }
 
 /// Whether a port is a pseudo-terminal, as `dermis board` opens one.

@@ -21,6 +21,7 @@ use thiserror::Error;
 use super::against_model::Vector;
 use super::board::VerilatedBoard;
 use super::drive::{record, InputFrame, Stimulus};
+use super::scan::ScannedBoard;
 use super::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use crate::flow::netlist::netlist;
 
@@ -151,18 +152,20 @@ impl Hardware {
         Verilated::new(&design, &self.cache)
     }
 
-    /// Starts a simulation of the whole board; [`Simulator::Netlist`] simulates its Verilog.
+    /// Starts a simulation of the whole board; [`Simulator::Netlist`] simulates its Verilog. A board that scans its array has the
+    /// frames shipped for the sensor in front of its converters, one per scan, again and again.
     ///
     /// # Errors
-    /// As [`Hardware::device`]; a scene whose board has no link.
+    /// As [`Hardware::device`]; a scene whose board has no link; a scan of a sensor without shipped frames.
     pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
-        Ok(match simulator {
+        let board: Box<dyn BoardDevice> = match simulator {
             Simulator::RustHdl => board_simulator(&self.built)?,
-            _ => {
-                let link = self.model.scene.hardware.link;
-                Box::new(VerilatedBoard::new(&generate_board(&self.built)?, link, &self.cache)?)
-            }
-        })
+            _ => Box::new(VerilatedBoard::new(&generate_board(&self.built)?, &self.built, &self.cache)?),
+        };
+        match self.built.scene.hardware.adc_scan {
+            None => Ok(board),
+            Some(_) => Ok(Box::new(ScannedBoard::new(board, &self.built, &Frame::shipped(&self.built.scene))?)),
+        }
     }
 
     /// The taps that a simulator has; a netlist has none.

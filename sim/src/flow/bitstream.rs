@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::board::Board;
+use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
@@ -68,6 +69,7 @@ struct Design<'a> {
 pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     let (scene, board) = (&model.scene, &model.board);
     let (pins, _) = board.pin_file()?;
+    require_converters(model)?;
     let Some(routing) = &flow(board.family).routing else {
         bail!("{}: no place and route of {}", board.file(), board.family.name())
     };
@@ -96,6 +98,24 @@ pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     }
     failures.extend(compare_or_update_baselines(effort.update_baselines && met, board, scene, &achieved)?);
     Ok(Made { achieved, packed, link_clock: best.link, bitstream: met.then(|| folder.join(product)), failures })
+}
+
+/// Checks that the converters of a scan are on the board.
+///
+/// # Errors
+/// [`BoardError`](dermis_golden::board::BoardError) with those of the board and of the scene.
+fn require_converters(model: &Model) -> Result<()> {
+    let Some(scan) = model.scene.hardware.adc_scan else { return Ok(()) };
+    let wants = vec![scan.converter.name; scan.converters];
+    if model.board.converters == wants {
+        return Ok(());
+    }
+    let reason = format!(
+        "converters = {has:?}, but hardware.adc_scan of scene {scene} has {wants:?}",
+        has = model.board.converters,
+        scene = model.scene.name,
+    );
+    Err(model.board.invalid("converters", reason).into())
 }
 
 /// Checks that the clock constraints seen by place and route are those of the board's file.
@@ -134,7 +154,9 @@ fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     }
     let link = model.scene.hardware.link.name().to_uppercase();
     let (top, names) = (&generated.top, verilog.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" "));
-    let of_board = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {names}");
+    let row_bits = count_bits(model.scene.sensor.rows);
+    let scan = model.scene.hardware.adc_scan.map_or(String::new(), |_| format!("-D DERMIS_ROW_BITS={row_bits} "));
+    let of_board = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {scan}{names}");
     check_pins(board, folder, &of_board, TOP, &pins.1)?;
     let packed = synthesis::synthesise(folder, board.family, &format!("{of_board} {top}.v"), TOP)?;
     if let Some(blocks) = &board.multiplier_blocks {

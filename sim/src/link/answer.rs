@@ -6,8 +6,8 @@ use std::time::SystemTime;
 use anyhow::Result;
 use dermis_golden::checks::Checks;
 use dermis_golden::fixed::stages::send::{
-    labels_of_beats, Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT,
-    FLAG_TABLES, STATUS_BEATS, TABLES_REFUSED,
+    labels_of_beats, Status, FLAG_CHANNEL, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS,
+    FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, STATUS_BEATS, TABLES_REFUSED,
 };
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
@@ -29,6 +29,8 @@ pub struct Answer {
     pub labels: Vec<[i32; 3]>,
     /// Status beats.
     pub status: Vec<[i32; 3]>,
+    /// Codes that the board has scanned, row-major; none where they were sent to it.
+    pub codes: Vec<i32>,
     /// Comparison with the bit-true model: `None` if not requested, else the first difference or `Some(None)`.
     pub difference: Option<Option<String>>,
     /// Time at which the answer was complete.
@@ -38,11 +40,13 @@ pub struct Answer {
 impl Answer {
     /// Parses the payload of a forces or resultants packet; `None` if its length is wrong.
     pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
-        let others = (model.label_beats() + model.status_beats()) * BEAT_BYTES;
+        let others = (model.label_beats() + model.status_beats() + model.code_beats()) * BEAT_BYTES;
         let (front, others) = bytes.split_at_checked(bytes.len().checked_sub(others)?)?;
         let mut labels = beats_of_bytes(others)?;
-        let status = labels.split_off(model.label_beats());
+        let mut status = labels.split_off(model.label_beats());
         let sensor = &model.scene.sensor;
+        // Places of the last beat beyond the array are empty.
+        let codes = status.split_off(model.status_beats()).concat().into_iter().take(sensor.taxels()).collect();
         let records = model.sends_resultants();
         let forces = if forces || records { Some(beats_of_bytes(front)?) } else { None };
         let sums = match &forces {
@@ -51,11 +55,11 @@ impl Answer {
             Some(forces) => Some(Sums::of(forces, sensor.cols)),
             None => Some(Sums::of_bytes(front)?),
         };
-        Some(Answer { sums, forces, labels, status, difference: None, received_at: SystemTime::now() })
+        Some(Answer { sums, forces, labels, status, codes, difference: None, received_at: SystemTime::now() })
     }
 
-    /// The first difference from the bit-true model's result for `codes`, `None` if equal. The framing flag is ignored:
-    /// it depends on packets dropped earlier, which the model does not see.
+    /// The first difference from the bit-true model's result for `codes`, `None` if equal. What the model does not see is
+    /// ignored: flags of packets dropped earlier, and of single samples of a scan.
     pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
@@ -81,7 +85,8 @@ impl Answer {
             return Some(format!("row {}, column {}: label {got}, model {expected}", index / cols, index % cols));
         }
         let mut status = self.status.clone();
-        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(FLAG_FRAMING as i32));
+        let unseen = FLAG_FRAMING | FLAG_RAIL | FLAG_CHANNEL;
+        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(unseen as i32));
         (status != trace.status).then(|| format!("status {status:?}, model {:?}", trace.status))
     }
 
@@ -152,7 +157,8 @@ impl Answer {
                 (has(FLAG_MORE_CONTACTS), Flag::TooManyContacts),
                 (of_taxels(slot) && !has(FLAG_CONDITION), Flag::ConditionUnmet),
                 (has(FLAG_CONDITION) && !has(FLAG_FOUND), Flag::NoCompression),
-                (saturated, Flag::Saturated),
+                (saturated || has(FLAG_RAIL), Flag::Saturated),
+                (has(FLAG_CHANNEL), Flag::WrongChannel),
             ];
             flags.extend(all.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag));
         }
@@ -188,7 +194,7 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
-    /// The answer to the `readings` sent, in physical units.
+    /// The answer to `readings`, in physical units.
     ///
     /// # Errors
     /// A frame of another sensor; an answer that the model cannot decode.

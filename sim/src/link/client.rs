@@ -58,7 +58,7 @@ impl<P: Read + Write> Client<P> {
         Counters::of_bytes(&bytes).ok_or(wrong)
     }
 
-    /// Sends a frame and waits for its forces or resultants.
+    /// Sends a frame and waits for its forces or resultants; to a board that scans its array, a request without `codes`.
     ///
     /// # Errors
     /// No answer.
@@ -69,14 +69,15 @@ impl<P: Read + Write> Client<P> {
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
-    /// Writes the tables of `model` into the board, `forces` being what it answers a frame with, and asks with a frame of zeros
-    /// whether they are whole.
+    /// Writes the tables of `model` into the board, `forces` being what it answers a frame with, and asks with a frame of zeros,
+    /// or of the next scan, whether they are whole.
     ///
     /// # Errors
     /// No answer; other tables than those of `model` afterwards.
     pub fn load(&mut self, model: &Model, forces: bool) -> Result<(), HostError> {
         self.request(Kind::Tables, model.image())?;
-        let answer = self.frame(model, &vec![0; model.scene.sensor.taxels()], forces)?;
+        let codes = if model.code_beats() > 0 { 0 } else { model.scene.sensor.taxels() };
+        let answer = self.frame(model, &vec![0; codes], forces)?;
         let wants = model.tables_version;
         let has = answer.tables().find(|tables| *tables != wants.to_string());
         has.map_or(Ok(()), |has| Err(HostError::Tables { port: self.name.clone(), has, wants }))

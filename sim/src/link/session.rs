@@ -66,21 +66,56 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     /// Sends a frame; returns the readings sent, and the answer, compared with the model if requested.
     ///
     /// # Errors
-    /// A frame of another sensor, no answer.
+    /// A frame of another sensor, a board that scans its array, no answer.
     pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+        if self.identity.scans() {
+            bail!("hardware.source = adc-scan: the board scans its array and takes no frames");
+        }
         let frame = self.subtract_tare(frame);
         let codes = self.model.readings(std::slice::from_ref(&frame))?;
-        // A board that cannot sum forces sends them all, and the host sums them. One that sends records has no forces.
-        let forces = match self.forces {
+        let answer = self.ask(&codes)?;
+        let answer = self.checked(answer, &codes);
+        Ok((frame, answer))
+    }
+
+    /// Asks a board that scans its array for the next scan; returns its readings as a frame named `id`, and the answer, compared
+    /// with the model if requested.
+    ///
+    /// # Errors
+    /// A board that does not scan, no answer.
+    pub fn scan(&mut self, id: &str) -> Result<(Frame, Answer)> {
+        if !self.identity.scans() {
+            bail!("hardware.source = stream: the board takes frames and scans no array");
+        }
+        let answer = self.ask(&[])?;
+        let readings = self.model.readings_of(id, &answer.codes);
+        let readings = readings.ok_or_else(|| anyhow!("the answer has {} codes", answer.codes.len()))?;
+        let codes = answer.codes.clone();
+        let answer = self.checked(answer, &codes);
+        Ok((readings, answer))
+    }
+
+    /// Whether all forces are asked for: a board that cannot sum them sends them all, and the host sums them. One that sends
+    /// records has no forces.
+    fn asks_forces(&self) -> bool {
+        match self.forces {
             true => self.identity.supports(Kind::FrameForForces),
             false => !self.identity.supports(Kind::FrameForResultants),
-        };
-        let mut answer = self.client.frame(&self.model, &codes, forces)?;
-        if self.check {
-            answer.difference = Some(answer.compare_with_model(&self.model, &codes));
         }
-        answer.forces = answer.forces.filter(|_| self.forces || !forces);
-        Ok((frame, answer))
+    }
+
+    fn ask(&mut self, codes: &[i32]) -> Result<Answer, HostError> {
+        let forces = self.asks_forces();
+        self.client.frame(&self.model, codes, forces)
+    }
+
+    /// The answer compared with the model if requested, with the forces that the user wants.
+    fn checked(&self, mut answer: Answer, codes: &[i32]) -> Answer {
+        if self.check {
+            answer.difference = Some(answer.compare_with_model(&self.model, codes));
+        }
+        answer.forces = answer.forces.filter(|_| self.forces || !self.asks_forces());
+        answer
     }
 }
 

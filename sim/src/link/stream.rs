@@ -1,4 +1,4 @@
-//! `dermis host --stream`: frames and answers as lines of JSON.
+//! `dermis host --stream`: frames and answers as lines of JSON; of a board that scans its array, answers alone.
 
 use std::io::{BufRead, ErrorKind, Read, Write};
 use std::time::SystemTime;
@@ -21,6 +21,9 @@ struct Reply {
     /// Seconds since 1970 when the frame was sent, and when its answer was complete.
     sent_s: f64,
     answered_s: f64,
+    /// What the board has scanned, row-major, in the unit of the readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    readings: Option<Vec<f64>>,
     #[serde(flatten)]
     answer: PhysicalAnswer,
 }
@@ -77,10 +80,8 @@ pub(crate) fn run<P: Read + Write>(
                 serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
             }
         };
-        match writeln!(output, "{text}").and_then(|()| output.flush()) {
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => break,
-            Err(error) => return Err(anyhow!("standard output: {error}")),
-            Ok(()) => (),
+        if !write_line(output, &text)? {
+            break;
         }
     }
     Ok(sent)
@@ -102,5 +103,40 @@ fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -
     let sent_s = seconds(SystemTime::now());
     let (frame, answer) = session.request(frame)?;
     let physical = PhysicalAnswer::new(&session.model, &frame, &answer)?;
-    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.received_at), answer: physical })
+    let answered_s = seconds(answer.received_at);
+    Ok(Reply { id: id.clone(), sent_s, answered_s, readings: None, answer: physical })
+}
+
+/// Writes a line for each of so many scans of a board that scans its array.
+///
+/// # Errors
+/// A board that does not answer, a stream that fails.
+pub(crate) fn run_scans<P: Read + Write>(
+    session: &mut Session<P>,
+    scans: impl Iterator<Item = String>,
+    output: &mut dyn Write,
+) -> Result<FramesSent> {
+    let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
+    for id in scans {
+        let sent_s = seconds(SystemTime::now());
+        let (readings, answer) = session.scan(&id)?;
+        let physical = PhysicalAnswer::new(&session.model, &readings, &answer)?;
+        sent.equal &= physical.equal != Some(false);
+        sent.answered += 1;
+        let answered_s = seconds(answer.received_at);
+        let reply = Reply { id: id.into(), sent_s, answered_s, readings: Some(readings.stress_MPa), answer: physical };
+        if !write_line(output, &serde_json::to_string(&reply)?)? {
+            break;
+        }
+    }
+    Ok(sent)
+}
+
+/// Writes a line at once; whether somebody reads on.
+fn write_line(output: &mut dyn Write, text: &str) -> Result<bool> {
+    match writeln!(output, "{text}").and_then(|()| output.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(anyhow!("standard output: {error}")),
+        Ok(()) => Ok(true),
+    }
 }

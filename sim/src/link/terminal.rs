@@ -50,14 +50,17 @@ impl PseudoTerminal {
         require_uart(&hardware.model.scene, "board")?;
         let identity = Identity::of(&hardware.model)?;
         let uart = HostUart::new(hardware.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
-        Ok(PseudoTerminal::start(uart, to_board, to_host)?)
+        // A scan waits for its period, then comes after two scans at most.
+        let scan = hardware.model.scan_timing().map_or(0, |timing| timing.period + 2 * timing.scan);
+        Ok(PseudoTerminal::start(uart, QUIET + scan, to_board, to_host)?)
     }
 
-    /// Runs the board behind `uart` in its own thread; bytes pass through the given channels.
+    /// Runs the board behind `uart` in its own thread, until `quiet` cycles have passed without activity on the line, then
+    /// again when a byte comes; bytes pass through the given channels.
     ///
     /// # Errors
     /// No pseudo-terminal.
-    pub fn start(uart: HostUart, to_board: NoisyChannel, to_host: NoisyChannel) -> io::Result<Self> {
+    pub fn start(uart: HostUart, quiet: u64, to_board: NoisyChannel, to_host: NoisyChannel) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
         grantpt(&master)?;
         unlockpt(&master)?;
@@ -73,7 +76,7 @@ impl PseudoTerminal {
         let seen = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
             let _slave = slave;
-            run(uart, File::from(master), to_board, to_host, &seen)
+            run(uart, quiet, File::from(master), to_board, to_host, &seen)
         });
         Ok(PseudoTerminal { path, stop, thread: Some(thread) })
     }
@@ -107,6 +110,7 @@ impl Drop for PseudoTerminal {
 
 fn run(
     mut uart: HostUart,
+    quiet: u64,
     mut master: File,
     mut to_board: NoisyChannel,
     mut to_host: NoisyChannel,
@@ -121,7 +125,7 @@ fn run(
             Err(error) if error.kind() == ErrorKind::WouldBlock => (),
             Err(error) => return Err(error),
         }
-        if uart.idle_cycles() > QUIET {
+        if uart.idle_cycles() > quiet {
             let wait = Timespec { tv_sec: 0, tv_nsec: WAIT_NS };
             poll(&mut [PollFd::new(&master, PollFlags::IN)], Some(&wait))?;
             continue;

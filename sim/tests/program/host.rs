@@ -190,3 +190,67 @@ fn tables_are_written_over_a_noisy_channel() {
     let sent = run(&["host", "--port", &port, "--scene", "hand.toml", "--tables", "left.toml", "--check", "press.csv"]);
     assert!(sent.contains("against model   equal, every bit\n"), "{sent}");
 }
+
+/// A board that scans its array: results of its scans, their readings in files and lines, tables of a specimen.
+#[test]
+fn a_board_that_scans_is_asked_for_scans() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let scan = "[hardware.adc_scan]\nconverter = \"max11125\"\nsclk_MHz = 12.5\nperiod_us = 300\n";
+    let sensor = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let hardware = "[hardware]\nsource = \"adc-scan\"\ntables = \"writable\"\n";
+    let mat = format!("name = \"mat\"\n{sensor}[input]\nfull_scale_MPa = 0.5\n{hardware}{scan}");
+    std::fs::write(path("mat.toml"), &mat).unwrap();
+    std::fs::write(path("own.toml"), format!("{mat}[threshold]\nmin_force_N = 0.05\n")).unwrap();
+    let scene = path("mat.toml");
+
+    let mut model = Model::new(&Scene::load(&scene).unwrap()).unwrap();
+    model.board.uart_baud = Some(BAUD);
+    let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let hardware = Hardware::new(model.clone(), &build).unwrap();
+    let faults =
+        |seed| NoisyChannel::new(ChannelFaults { lost: 1500, flipped: 1500, seed, ..ChannelFaults::default() });
+    let terminal = PseudoTerminal::with_channels(&hardware, faults(1), faults(2)).unwrap();
+
+    let shown = host(&terminal, &scene, &["--check", "--forces", "--scans", "2", "--save", &path("readings")], "");
+    assert_eq!(shown.status.code(), Some(0), "{}", text(&shown.stderr));
+    assert_eq!(text(&shown.stdout).matches("against model   equal, every bit\n").count(), 2, "{}", text(&shown.stdout));
+    let own = Scene::load(&scene).unwrap();
+    let saved = [1, 2].map(|number| {
+        Frame::load(&folder.path().join(format!("readings/scan-{number}.json")), Some(&own)).unwrap().stress_MPa
+    });
+    // The same to a few LSB of the converter as one of the frames that the array shows.
+    let shows = |readings: &[f64]| {
+        let near = |shown: f64, reading: f64| (shown.clamp(0.0, 0.5) - reading).abs() < 5.0 * 0.5 / 4096.0;
+        let is = |frame: &Frame| frame.stress_MPa.iter().zip(readings).all(|(shown, reading)| near(*shown, *reading));
+        Frame::shipped(&own).iter().any(is)
+    };
+    assert!(saved.iter().all(|readings| shows(readings)));
+
+    let tables = ["--stream", "--check", "--scans", "3", "--tables", &path("own.toml"), "--tables-version", "7"];
+    let streamed = host(&terminal, &scene, &tables, "");
+    assert_eq!(streamed.status.code(), Some(0), "{}", text(&streamed.stderr));
+    let lines: Vec<serde_json::Value> =
+        text(&streamed.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(
+        lines.iter().map(|line| line["id"].as_str().unwrap()).collect::<Vec<_>>(),
+        ["scan-1", "scan-2", "scan-3"]
+    );
+    for line in &lines {
+        let readings: Vec<f64> = serde_json::from_value(line["readings"].clone()).unwrap();
+        assert!(line["equal"] == true && shows(&readings), "{line}");
+    }
+
+    let refused = |scene: &str, more: &[&str], message: &str| {
+        let output = host(&terminal, scene, more, "");
+        assert_eq!(output.status.code(), Some(2), "{more:?}");
+        assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
+    };
+    refused(&scene, &["press.csv"], "mat: a frame is not possible with hardware.source = adc-scan");
+    refused(&scene, &["--tare", "press.csv"], "mat: --tare is not possible with hardware.source = adc-scan");
+    refused(
+        "eight-by-eight",
+        &["--scans", "2"],
+        "eight-by-eight: --scans is not possible with hardware.source = stream",
+    );
+}

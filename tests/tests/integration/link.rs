@@ -16,6 +16,7 @@ use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
 use dermis_tests::{build_dir, scene, variants, with_network};
 
+mod scan;
 mod spi;
 mod tables;
 
@@ -100,13 +101,18 @@ impl Board {
         Board::of(shipped(&scene("eight-by-eight").0), simulators)
     }
 
-    fn of(mut questions: Questions, simulators: &[Simulator]) -> Board {
+    fn of(questions: Questions, simulators: &[Simulator]) -> Board {
+        Board::with(questions, |model| device(model, simulators))
+    }
+
+    /// A board that `device` makes of the model.
+    fn with(mut questions: Questions, device: impl FnOnce(&Model) -> Box<dyn BoardDevice>) -> Board {
         let model = &mut questions.model;
         let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
         model.board.uart_baud = Some(baud);
         let silence = Cycles::longest(model).total + 1_000;
         let clock_hz = Identity::of(model).unwrap().clock_hz;
-        let uart = HostUart::new(device(model, simulators), baud, clock_hz);
+        let uart = HostUart::new(device(model), baud, clock_hz);
         Board { uart, decoder: Decoder::default(), questions, silence }
     }
 

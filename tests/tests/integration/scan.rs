@@ -5,14 +5,16 @@ use dermis_golden::adc::{AdcScan, CONVERTERS};
 use dermis_golden::fixed::Model;
 use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{Scene, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::{generate_scan, generate_scan_changed};
 use dermis_sim::cosim::hardware::Simulator;
-use dermis_sim::cosim::scan::{expected, simulate, verify_scan, Array, Fault, VerifiedScan, VerilatedScan};
+use dermis_sim::cosim::scan::{expected, simulate, verify_scan, Array, Fault, Image, VerifiedScan, VerilatedScan};
 use dermis_tests::{build_dir, scene, verilog_code};
+
+use crate::tables::specimen;
 
 /// Both simulators.
 const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
@@ -36,7 +38,7 @@ fn scanned(converters: usize, average: u32) -> (Scene, Vec<Frame>) {
 }
 
 fn verified(scene: &Scene, frames: &[Frame], simulators: &[Simulator], fault: Option<Fault>) -> VerifiedScan {
-    let verified = verify_scan(scene, frames, simulators, fault, &build_dir()).unwrap();
+    let verified = verify_scan(scene, None, frames, simulators, fault, &build_dir()).unwrap();
     assert!(verified.findings.is_equal(), "{:#?}", &verified.findings.kept[..verified.findings.kept.len().min(3)]);
     verified
 }
@@ -88,19 +90,51 @@ fn one_sample_at_the_end_of_the_range_is_flagged_although_the_mean_is_not() {
     assert!(has(&verified, Flag::Saturated));
 }
 
+/// An array that shows the first of `frames` for ever.
+fn array(model: &Model, frames: &[Frame]) -> Array {
+    let full = f64::from(1u32 << (model.formats().code_bits - 1));
+    let codes = model.readings(&frames[..1]).unwrap();
+    let volts = vec![codes.iter().map(|code| f64::from(*code) / full).collect()];
+    Array::new(model.scene.hardware.adc_scan.unwrap(), model.scene.sensor.rows, volts, 3.0, None)
+}
+
+#[test]
+fn tables_that_come_within_a_scan_break_it_off_and_the_next_has_them() {
+    let (mut scene, frames) = scanned(1, 0);
+    scene.hardware.tables = TableStorage::Writable;
+    scene.hardware.table_range.gain = Some([0.5, 2.0]);
+    let (_folder, own) = specimen(&scene);
+    let hardware = Model::new(&scene).unwrap();
+    let specimen = hardware.with_tables(&own, 1).unwrap();
+    let array = array(&hardware, &frames);
+    let scans = [expected(&hardware, &array, 0..1), expected(&specimen, &array, 2..3)].concat();
+    assert_ne!(scans[0].beats[..4], scans[1].beats[..4]);
+    let mut image = Image::within(&specimen, 1).unwrap();
+    let findings = |image: &Image| {
+        let generated = generate_scan(&hardware).unwrap();
+        let mut device = VerilatedScan::new(&generated, &hardware, &build_dir().join("verilator")).unwrap();
+        simulate(&mut device, "tables", &hardware, &array, &scans, Some(image), true).0
+    };
+    let found = findings(&image);
+    assert!(found.is_equal(), "{:#?}", found.kept.first());
+    // A scan later, the third still has the old tables.
+    image.at += hardware.scan_timing().unwrap().period;
+    assert!(!findings(&image).is_equal());
+    // The program does the same, in both simulators.
+    let verified = verify_scan(&scene, Some(&own), &frames[..1], &BOTH, None, &build_dir()).unwrap();
+    assert!(verified.findings.is_equal(), "{:#?}", verified.findings.kept.first());
+}
+
 #[test]
 fn seeded_defects_are_found() {
     let (scene, frames) = scanned(1, 1);
     let model = Model::new(&scene).unwrap();
-    let full = f64::from(1u32 << (model.formats().code_bits - 1));
-    let codes = model.readings(&frames[..1]).unwrap();
-    let volts = vec![codes.iter().map(|code| f64::from(*code) / full).collect()];
-    let array = Array::new(scene.hardware.adc_scan.unwrap(), 8, volts, 3.0, None);
-    let expected = expected(&model, &array, 1);
+    let array = array(&model, &frames);
+    let expected = expected(&model, &array, 0..1);
     let findings = |changes: &[Change]| {
         let generated = generate_scan_changed(&model, changes).unwrap();
         let mut device = VerilatedScan::new(&generated, &model, &build_dir().join("verilator")).unwrap();
-        simulate(&mut device, "changed", &model, &array, &expected, false).0
+        simulate(&mut device, "changed", &model, &array, &expected, None, false).0
     };
     assert!(findings(&[]).is_equal());
     let defects: [(Change, &str); 4] = [
@@ -130,7 +164,10 @@ fn a_stream_has_nothing_of_a_scan() {
     let (scene, _) = scanned(1, 0);
     let model = Model::new(&scene).unwrap();
     let error = generate_board(&model).unwrap_err().to_string();
-    assert_eq!(error, "hardware.source = adc-scan: a board with a link around a scan is not available yet");
+    assert!(
+        error.starts_with("hardware.tables = rom: a board that scans its array without writable tables"),
+        "{error}"
+    );
     let error = generate_core(&model, CoreShape { bus: Bus::AxiLite, words: 1 }).unwrap_err().to_string();
     assert_eq!(error, "hardware.source = adc-scan: a core for a SoC around a scan is not available yet");
     let text = &generate_scan(&model).unwrap().files[0].text;

@@ -8,6 +8,7 @@ use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::Prepare;
 use crate::fixed::stages::resultants::{self, Summed};
+use crate::fixed::stages::scan::CODES_PER_BEAT;
 use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
@@ -270,6 +271,15 @@ impl Plan {
         match self.summed() {
             Some(summed) => summed.beats() * self.records(),
             None => self.scene.sensor.taxels() + self.label_beats(),
+        }
+    }
+
+    /// Number of beats with codes after the status: those of a scan whose tables, zero and gain among them, are found from
+    /// readings and written at run time.
+    pub fn code_beats(&self) -> usize {
+        match self.scene.hardware.adc_scan.is_some() && self.has_writable_tables() {
+            true => self.scene.sensor.taxels().div_ceil(CODES_PER_BEAT),
+            false => 0,
         }
     }
 

@@ -27,6 +27,16 @@ pub struct Scanned {
     pub flags: u32,
 }
 
+/// Codes in a beat of the output stream.
+pub const CODES_PER_BEAT: usize = 3;
+
+/// The beats with which a frame ends where a scan has writable tables: its codes, row-major, three in each, sign-extended; places
+/// beyond the array are 0.
+pub fn beats(codes: &[i32]) -> Vec<[i32; CODES_PER_BEAT]> {
+    let of = |codes: &[i32]| std::array::from_fn(|at| codes.get(at).copied().unwrap_or_default());
+    codes.chunks(CODES_PER_BEAT).map(of).collect()
+}
+
 /// Left shift of a sum of samples before it is rounded, ≥ 0 where the scene is supported.
 pub fn alignment(converter: &Converter, code_bits: u32) -> u32 {
     code_bits - 1 - converter.magnitude_bits()

@@ -22,6 +22,7 @@ const SHAPE: Shape = Shape {
     image_bytes: Some(IMAGE_BYTES),
     answers: Answers::Both,
     frames: 4,
+    scans: false,
 };
 const TAXELS: usize = 12;
 const IMAGE_BYTES: usize = 18;

@@ -72,7 +72,7 @@ pub struct Array {
 }
 
 impl Array {
-    /// An array of so many rows that shows one list of voltages per scan, the last one for ever.
+    /// An array of so many rows that shows one list of voltages per scan, again and again.
     pub fn new(scan: AdcScan, rows: usize, volts: Vec<Vec<f64>>, noise_lsb: f64, fault: Option<Fault>) -> Self {
         Array { scan, rows, volts, noise_lsb, fault }
     }
@@ -99,7 +99,7 @@ impl Array {
             Some(Fault::NextChannel { converter: of }) if of == converter => (channel + 1) % own.channels,
             _ => channel,
         };
-        let volts = self.volts.get(self.scan_of(frame)).or(self.volts.last());
+        let volts = self.volts.get(self.scan_of(frame) % self.volts.len().max(1));
         let at = row * self.scan.cols() + channel * self.scan.converters + converter;
         // Channels that are not used are open.
         let level = volts.filter(|_| channel < self.scan.channels).and_then(|volts| volts.get(at)).map_or(0.0, |v| *v);

@@ -12,7 +12,7 @@
 //! is over, so that a sample taken too early is wrong.
 
 use dermis_golden::adc::{AdcScan, Converter};
-use dermis_hdl::scan::ScanOutputs;
+use dermis_hdl::scan::ScanPins;
 
 use super::array::Array;
 
@@ -28,7 +28,7 @@ pub struct Converters {
     cycle_ns: f64,
     /// Cycles so far.
     now: u64,
-    before: ScanOutputs,
+    before: ScanPins,
     /// Row before the switch, and when it was switched.
     row: (u64, u64),
     /// Channel chosen before and now, and when.
@@ -50,7 +50,7 @@ pub struct Converters {
 impl Converters {
     /// The converters of `scan` at `array`; the hardware's clock has `clock_MHz`.
     pub fn new(scan: AdcScan, array: Array, clock_MHz: f64) -> Self {
-        let idle = ScanOutputs { cs_n: true, sclk: scan.converter.idle_high, ..ScanOutputs::default() };
+        let idle = ScanPins { cs_n: true, sclk: scan.converter.idle_high, ..ScanPins::default() };
         Converters {
             scan,
             array,
@@ -97,7 +97,7 @@ impl Converters {
     }
 
     /// The hardware's pins of one cycle, which begin with it.
-    pub fn cycle(&mut self, pins: &ScanOutputs) {
+    pub fn cycle(&mut self, pins: &ScanPins) {
         let (before, converter) = (self.before, self.scan.converter);
         if pins.row != before.row {
             self.row = (before.row, self.now);
@@ -126,7 +126,7 @@ impl Converters {
     }
 
     /// CS falls: the inputs are sampled.
-    fn fall(&mut self, pins: &ScanOutputs, converter: &Converter) {
+    fn fall(&mut self, pins: &ScanPins, converter: &Converter) {
         self.require("CS high", Some(self.rose), converter.cs_high_ns);
         self.require("acquisition", Some(self.rose), converter.acquisition_ns);
         if pins.sclk != converter.idle_high {
@@ -151,7 +151,7 @@ impl Converters {
         self.bits += 1;
     }
 
-    fn trail(&mut self, pins: &ScanOutputs, converter: &Converter) {
+    fn trail(&mut self, pins: &ScanPins, converter: &Converter) {
         self.require("setup of MOSI", Some(self.moved), converter.input_setup_ns);
         self.command = self.command << 1 | u64::from(pins.mosi);
         self.trailed = Some(self.now);

@@ -11,11 +11,13 @@
 //! those of the sequence that `dermis_golden::adc` states, in the simulation those that the pins said in time.
 
 mod array;
+mod board;
 mod converters;
 mod device;
 mod run;
 
 pub use array::{Array, Fault};
+pub use board::ScannedBoard;
 pub use converters::Converters;
 pub use device::VerilatedScan;
-pub use run::{expected, simulate, verify_scan, Expected, ScanTimes, ScannedFrame, VerifiedScan};
+pub use run::{expected, simulate, verify_scan, Expected, Image, ScanTimes, ScannedFrame, VerifiedScan};

@@ -1,9 +1,10 @@
 //! Runs a scan and compares it with the bit-true model.
 
+use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{anyhow, Result};
-use dermis_golden::fixed::stages::scan::{scan as codes_of, Scanned};
+use anyhow::{bail, Result};
+use dermis_golden::fixed::stages::scan::{beats, rail, scan as codes_of, Scanned};
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
@@ -26,17 +27,44 @@ const SPARE_SCANS: u64 = 3;
 /// Seed of the stalls.
 const SEED: u64 = 1;
 /// Largest noise of a sample in the co-simulation, in LSBs of the converter.
-const NOISE_LSB: f64 = 3.0;
+pub(super) const NOISE_LSB: f64 = 3.0;
 
 /// What the model expects of a scan.
 #[derive(Clone, Debug)]
 pub struct Expected {
+    /// Number of the scan since the reset.
+    pub number: usize,
     /// Codes and flags.
     pub scanned: Scanned,
-    /// Beats of the frame, status with its flags at the end.
+    /// Beats of the frame: forces, status with its flags, codes.
     pub beats: Vec<[i32; 3]>,
     /// Cycles of the engine.
     pub cycles: Cycles,
+}
+
+/// An image of tables that is sent while the hardware scans.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Its beats.
+    pub beats: Vec<i32>,
+    /// Cycles after the reset from which it is offered.
+    pub at: u64,
+}
+
+/// Cycles from the offer of an image until the engine takes its first byte, at most, and after its last one.
+const IMAGE_SLACK: u64 = 200;
+
+impl Image {
+    /// The image of the tables of `model`, in the middle of the scan of this number; `None` without a scan.
+    pub fn within(model: &Model, scan: usize) -> Option<Image> {
+        let timing = model.scan_timing()?;
+        Some(Image { beats: model.image_beats(), at: scan as u64 * timing.period + timing.scan / 2 })
+    }
+
+    /// The first scan that begins after it.
+    fn first_after(&self, period: u64) -> usize {
+        ((self.at + self.beats.len() as u64 + IMAGE_SLACK) / period) as usize + 1
+    }
 }
 
 /// When a scan happened, in cycles after the first.
@@ -50,8 +78,8 @@ pub struct ScanTimes {
     pub last_beat: u64,
 }
 
-/// Codes and beats by plan of so many scans of `array`.
-pub fn expected(model: &Model, array: &Array, scans: usize) -> Vec<Expected> {
+/// Codes and beats by plan of the scans of `array` with these numbers.
+pub fn expected(model: &Model, array: &Array, scans: Range<usize>) -> Vec<Expected> {
     let Some(scan) = model.scene.hardware.adc_scan else { return Vec::new() };
     let code_bits = model.formats().code_bits;
     let of = |number| {
@@ -59,19 +87,22 @@ pub fn expected(model: &Model, array: &Array, scans: usize) -> Vec<Expected> {
         let trace = model.run(&scanned.codes);
         let mut status = trace.status;
         status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] |= scanned.flags as i32);
-        Expected { scanned, beats: [trace.beats, status].concat(), cycles: trace.cycles }
+        let codes = if model.code_beats() > 0 { beats(&scanned.codes) } else { Vec::new() };
+        Expected { number, scanned, beats: [trace.beats, status, codes].concat(), cycles: trace.cycles }
     };
-    (0..scans).map(of).collect()
+    scans.map(of).collect()
 }
 
-/// Runs `device` from a reset until it has answered all `expected` scans of `array`; the receiver stalls at random if `stalls`.
-/// Returns what differs, violations of the data sheet among it, and the times of each scan.
+/// Runs `device` from a reset until it has answered all `expected` scans of `array`, those that `image` does not break off; the
+/// receiver stalls at random if `stalls`. Returns what differs, violations of the data sheet among it, and the times of each
+/// scan.
 pub fn simulate(
     device: &mut dyn ScanDevice,
     label: &str,
     model: &Model,
     array: &Array,
     expected: &[Expected],
+    image: Option<&Image>,
     stalls: bool,
 ) -> (Findings, Vec<ScanTimes>) {
     let (Some(scan), Some(timing)) = (model.scene.hardware.adc_scan, model.scan_timing()) else {
@@ -79,33 +110,59 @@ pub fn simulate(
     };
     let mut converters = Converters::new(scan, array.clone(), model.board.clock_MHz);
     let mut random = fastrand::Rng::with_seed(SEED);
-    let mut codes = Vec::new();
+    let mut frames: Vec<Vec<i32>> = vec![Vec::new()];
     let mut beats = Vec::new();
     let mut times = vec![ScanTimes::default(); expected.len()];
     let (taxels, wanted) = (model.scene.sensor.taxels(), expected.iter().map(|of| of.beats.len()).sum::<usize>());
     let longest = expected.iter().map(|of| of.cycles.total).max().unwrap_or(0);
-    let most = RESET + (expected.len() as u64 + SPARE_SCANS) * (timing.period + 4 * longest);
+    let scans = expected.last().map_or(0, |of| of.number) as u64 + SPARE_SCANS;
+    let most = RESET + scans * (timing.period + 4 * longest);
+    // The numbers beyond the codes are bytes of an image.
+    let most_code = rail(model.formats().code_bits);
     let mut ends: Vec<usize> = Vec::new();
     let mut begun = None;
+    let mut bytes = image.map_or(&[][..], |image| &image.beats);
     for cycle in 0..most {
         let m_ready = !stalls || random.u8(..4) > 0;
-        let inputs = ScanInputs { rst: cycle < RESET, miso: converters.outputs(), m_ready };
+        let byte = bytes.first().filter(|_| image.is_some_and(|image| cycle >= RESET + image.at));
+        let inputs = ScanInputs {
+            rst: cycle < RESET,
+            enable: true,
+            miso: converters.outputs(),
+            s_data: byte.copied().unwrap_or_default(),
+            s_valid: byte.is_some(),
+            s_last: bytes.len() == 1,
+            m_ready,
+        };
         let outputs = device.cycle(&inputs);
         // Registers are undefined until the second edge of a reset.
         if cycle < RESET {
             continue;
         }
-        converters.cycle(&outputs);
-        let scan_now = array.scan_of(converters.frames());
-        if !outputs.cs_n && begun != Some(scan_now) && scan_now < times.len() {
-            begun = Some(scan_now);
-            times[scan_now].begins = cycle - RESET;
+        converters.cycle(&outputs.pins);
+        if inputs.s_valid && outputs.s_ready {
+            bytes = &bytes[1..];
         }
-        if let Some(code) = outputs.code {
-            if let (true, Some(own)) = ((codes.len() + 1).is_multiple_of(taxels), times.get_mut(codes.len() / taxels)) {
-                own.last_code = cycle - RESET;
+        let scan_now = array.scan_of(converters.frames());
+        if !outputs.pins.cs_n && begun != Some(scan_now) {
+            begun = Some(scan_now);
+            let place = expected.iter().position(|own| own.number == scan_now);
+            if let Some(own) = place.and_then(|place| times.get_mut(place)) {
+                own.begins = cycle - RESET;
             }
-            codes.push(code);
+        }
+        if let Some(beat) = outputs.taken.filter(|beat| beat.data <= most_code) {
+            let place = frames.len() - 1;
+            frames[place].push(beat.data);
+            if beat.last && frames[place].len() == taxels {
+                if let Some(own) = times.get_mut(place) {
+                    own.last_code = cycle - RESET;
+                }
+                frames.push(Vec::new());
+            } else if beat.last {
+                // A scan that an image broke off.
+                frames[place].clear();
+            }
         }
         if outputs.m_valid && m_ready {
             beats.push(outputs.m_data);
@@ -120,13 +177,18 @@ pub fn simulate(
             break;
         }
     }
+    let codes = frames.concat();
     let mut compared = Comparison { run: label, findings: Findings::default() };
     // First in the list: a broken time explains what is wrong after it.
     let (violations, count) = converters.violations();
     violations.iter().for_each(|text| compared.rule(0, "converter", text.clone()));
     compared.findings.count += count - violations.len();
+    if !bytes.is_empty() {
+        compared.rule(0, "load", format!("{} bytes of the image are not taken", bytes.len()));
+    }
     let (mut code, mut beat) = (codes.iter(), beats.iter());
-    for (number, own) in expected.iter().enumerate() {
+    for (place, own) in expected.iter().enumerate() {
+        let number = own.number;
         for (index, &wanted) in own.scanned.codes.iter().enumerate() {
             let got = code.next().map(|code| vec![i64::from(*code)]);
             let cols = model.scene.sensor.cols;
@@ -136,8 +198,8 @@ pub fn simulate(
             let got = beat.next().map(|beat| beat.map(i64::from).to_vec());
             compared.word(number, "beats", index, None, wanted.map(i64::from).to_vec(), got);
         }
-        let end = expected[..=number].iter().map(|of| of.beats.len()).sum::<usize>();
-        if ends.get(number) != Some(&end) {
+        let end = expected[..=place].iter().map(|of| of.beats.len()).sum::<usize>();
+        if ends.get(place) != Some(&end) {
             compared.rule(number, "beats", format!("tlast is not on beat {end} of the run"));
         }
     }
@@ -219,35 +281,55 @@ pub struct VerifiedScan {
     pub runs: Vec<String>,
 }
 
-/// Co-simulates the scan of `scene` over an array that shows `frames` (at least one), one per scan, on the given simulators,
-/// with a fault of the wires if there is one.
+/// The voltages of an array that has the readings of `frame`, as shares of the converters' full range.
 ///
 /// # Errors
-/// A scene that cannot be built, a frame of another sensor, a fault of what the array does not have, no Verilator, a netlist,
-/// which a scan does not have.
+/// A frame of another sensor.
+pub(super) fn volts(model: &Model, frame: &Frame) -> Result<Vec<f64>> {
+    let full = f64::from(1u32 << (model.formats().code_bits - 1));
+    let codes = model.readings(std::slice::from_ref(frame))?;
+    Ok(codes.into_iter().map(|code| f64::from(code) / full).collect())
+}
+
+/// Co-simulates the scan of `scene` over an array that shows `frames` (at least one), one per scan, on the given simulators,
+/// with a fault of the wires if there is one. With a `specimen`, its tables come in the middle of the first scan, which they
+/// break off, and the frames are the specimen's.
+///
+/// # Errors
+/// A scene that cannot be built, tables that it does not take, a frame of another sensor, a fault of what the array does not
+/// have, no Verilator, a netlist, which a scan does not have.
 pub fn verify_scan(
     scene: &Scene,
+    specimen: Option<&Scene>,
     frames: &[Frame],
     simulators: &[Simulator],
     fault: Option<Fault>,
     build: &Path,
 ) -> Result<VerifiedScan> {
-    let model = Model::new(scene)?;
-    let scan = model.scene.hardware.adc_scan.ok_or_else(|| anyhow!("hardware.source = stream: there is no scan"))?;
-    let full = f64::from(1u32 << (model.formats().code_bits - 1));
-    let volts = |frame: &Frame| -> Result<Vec<f64>> {
-        let codes = model.readings(std::slice::from_ref(frame))?;
-        Ok(codes.into_iter().map(|code| f64::from(code) / full).collect())
+    let hardware = Model::new(scene)?;
+    let (Some(scan), Some(timing)) = (hardware.scene.hardware.adc_scan, hardware.scan_timing()) else {
+        bail!("hardware.source = stream: there is no scan");
     };
-    let volts = frames.iter().map(volts).collect::<Result<Vec<_>>>()?;
-    let array = Array::new(scan, scene.sensor.rows, volts, NOISE_LSB, fault);
+    let (model, image) = match specimen {
+        None => (hardware.clone(), None),
+        Some(specimen) => {
+            let model = hardware.with_tables(specimen, 1)?;
+            let image = Image::within(&model, 0);
+            (model, image)
+        }
+    };
+    let first = image.as_ref().map_or(0, |image| image.first_after(timing.period));
+    let volts = frames.iter().map(|frame| volts(&model, frame)).collect::<Result<Vec<_>>>()?;
+    let before = volts.iter().take(1).cycle().take(first).cloned().collect::<Vec<_>>();
+    let array = Array::new(scan, scene.sensor.rows, [before, volts].concat(), NOISE_LSB, fault);
+    let scans = first..first + frames.len();
     if let Some(fault) = fault {
-        fault.check(&array, frames.len())?;
+        fault.check(&array, scans.end)?;
     }
-    let expected = expected(&model, &array, frames.len());
+    let expected = expected(&model, &array, scans);
     let mut verified =
         VerifiedScan { model: model.clone(), rows: Vec::new(), findings: Findings::default(), runs: Vec::new() };
-    let mut first = Vec::new();
+    let mut first_times = Vec::new();
     for &simulator in simulators {
         let stimuli: &[bool] = if simulator == Simulator::Verilator { &[false, true] } else { &[false] };
         for &stalls in stimuli {
@@ -255,25 +337,24 @@ pub fn verify_scan(
             let _progress = Progress::start(&format!("{}: {label}", scene.name));
             let mut device: Box<dyn ScanDevice> = match simulator {
                 Simulator::Verilator => {
-                    Box::new(VerilatedScan::new(&generate_scan(&model)?, &model, &build.join("verilator"))?)
+                    Box::new(VerilatedScan::new(&generate_scan(&hardware)?, &hardware, &build.join("verilator"))?)
                 }
-                Simulator::RustHdl => scan_simulator(&model)?,
-                Simulator::Netlist => {
-                    return Err(anyhow!("a scan is not simulated as netlist: take verilator or rust-hdl"))
-                }
+                Simulator::RustHdl => scan_simulator(&hardware)?,
+                Simulator::Netlist => bail!("a scan is not simulated as netlist: take verilator or rust-hdl"),
             };
-            let (findings, times) = simulate(&mut *device, &label, &model, &array, &expected, stalls);
+            let (findings, times) = simulate(&mut *device, &label, &model, &array, &expected, image.as_ref(), stalls);
             verified.findings.extend(findings);
             verified.runs.push(label);
-            if first.is_empty() {
-                first = times;
+            if first_times.is_empty() {
+                first_times = times;
             }
         }
     }
-    for (index, ((frame, own), times)) in frames.iter().zip(&expected).zip(first).enumerate() {
-        let (beats, status) = own.beats.split_at(model.force_beats());
+    for (index, ((frame, own), times)) in frames.iter().zip(&expected).zip(first_times).enumerate() {
+        let (beats, others) = own.beats.split_at(model.force_beats());
+        let status = &others[..model.status_beats()];
         let result = model.decode(std::slice::from_ref(frame), "scan", beats, status)?;
-        let equal = !verified.findings.unequal.contains(&index);
+        let equal = !verified.findings.unequal.contains(&(first + index));
         verified.rows.push(ScannedFrame { frame: frame.id.clone(), result, equal, times });
     }
     Ok(verified)

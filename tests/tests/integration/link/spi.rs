@@ -178,7 +178,7 @@ fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
 fn small_board_with(defect: Change) -> Board {
     let questions = over_spi(small(SINGLE_BYTE), RATE);
     let generated = generate_board_changed(&questions.model, &[defect]).unwrap();
-    let device = VerilatedBoard::new(&generated, LinkKind::Spi, &build_dir().join("verilator")).unwrap();
+    let device = VerilatedBoard::new(&generated, &questions.model, &build_dir().join("verilator")).unwrap();
     Board::with(Box::new(device), questions, RATE, 0.6)
 }
 

@@ -16,7 +16,7 @@ fn board(more: &str, simulators: &[Simulator]) -> (Board, Model) {
     (Board::of(extremes(hardware), simulators), own)
 }
 
-fn image(model: &Model, sequence: u8) -> Packet {
+pub(super) fn image(model: &Model, sequence: u8) -> Packet {
     Packet { kind: Kind::Tables, sequence, payload: model.image() }
 }
 

@@ -1,0 +1,190 @@
+//! Frame gate: of the frames of a scan, those that are asked for.
+
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
+
+/// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose first beat
+/// comes while a request waits passes; the others are dropped, so that the engine never waits for the link.
+///
+/// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the array's rows
+/// driven meanwhile, and be old when they are sent.
+#[derive(LogicBlock)]
+pub struct FrameGate {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// A request waits.
+    pub requested: Signal<In, Bit>,
+    /// A beat of the engine, three words; valid with `s_axis_tvalid`.
+    pub s_axis_tdata: Wire<In>,
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// The block accepts a beat in this cycle.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// A beat that passes; valid with `m_axis_tvalid`.
+    pub m_axis_tdata: Wire<Out>,
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// The receiver accepts a beat in this cycle.
+    pub m_axis_tready: Signal<In, Bit>,
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    /// A frame passes.
+    pub busy: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    FrameGate,
+    clock clk,
+    inputs [rst, requested, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, busy]
+);
+
+/// Width of a beat.
+const BEAT: usize = 96;
+
+impl Default for FrameGate {
+    fn default() -> Self {
+        let block = FrameGate {
+            clk: Default::default(),
+            rst: Default::default(),
+            requested: Default::default(),
+            s_axis_tdata: Wire::new(BEAT),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(BEAT),
+            m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
+            m_axis_tlast: Default::default(),
+            busy: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(kernel())
+    }
+}
+
+fn kernel() -> Kernel {
+    let k = Builder::new("frame_gate");
+    let (rst, requested, data) = (k.input("rst", 1), k.input("requested", 1), k.input("s_axis_tdata", BEAT));
+    let (given, last, ready) = (k.input("s_axis_tvalid", 1), k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    let passing = k.state("passing", Type::unsigned(1), rst, 0);
+    let passing = passing.comment("Also where the request is answered before the first beat is taken.");
+    let dropping = k.state("dropping", Type::unsigned(1), rst, 0);
+    let passes = k.wire("passes", *passing | (requested & !*dropping));
+    let accepted = k.wire("s_axis_tready", ready | !passes);
+    let ends = k.wire("ends", accepted & last);
+    k.wire("m_axis_tvalid", given & passes);
+    k.wire("m_axis_tdata", data);
+    k.wire("m_axis_tlast", last);
+    k.wire("busy", *passing);
+    k.when(given, || {
+        passing.set(passes & !ends);
+        dropping.set(!passes & !ends);
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::wire::Word;
+
+    /// What becomes of the frame under way.
+    #[derive(Default)]
+    struct Gate {
+        passes: Option<bool>,
+        reset: bool,
+    }
+
+    impl Gate {
+        fn passes(&self, inputs: &[Word]) -> bool {
+            self.passes.unwrap_or(inputs[1].number() == 1)
+        }
+    }
+
+    impl Reference for Gate {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 5];
+            }
+            let is = |k: usize| inputs[k].number() == 1;
+            let offered = is(3) && self.passes(inputs);
+            let bit = |bit: bool| Some(Word::from(bit));
+            vec![
+                bit(is(5) || !self.passes(inputs)),
+                offered.then_some(inputs[2]),
+                bit(offered),
+                offered.then(|| Word::from(is(4))),
+                bit(self.passes == Some(true)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let is = |k: usize| inputs[k].number() == 1;
+            let passes = self.passes(inputs);
+            if is(3) {
+                let ends = is(4) && (is(5) || !passes);
+                self.passes = (!ends).then_some(passes);
+            }
+            if is(0) {
+                *self = Gate { reset: true, passes: None };
+            }
+        }
+    }
+
+    /// Frames of random length; requests that go while their frame's first beat waits.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut gate = Gate::default();
+        let mut beat: Option<[Word; 2]> = None;
+        let mut requested = false;
+        let of = |cycle: usize| {
+            requested = if requested { random.u8(..6) > 0 } else { random.u8(..12) == 0 };
+            if beat.is_none() && random.u8(..3) > 0 {
+                let mut data = Word::default();
+                data.set(0, 64, random.u64(..));
+                data.set(64, 32, random.u32(..).into());
+                beat = Some([data, Word::from(random.u8(..6) == 0)]);
+            }
+            let [data, last] = beat.unwrap_or_default();
+            let ready = random.u8(..3) > 0;
+            let [rst, requested, given] = [cycle < 2, requested, beat.is_some()].map(Word::from);
+            let inputs = vec![rst, requested, data, given, last, Word::from(ready)];
+            if ready || !gate.passes(&inputs) {
+                beat = None;
+            }
+            gate.clock(&inputs);
+            inputs
+        };
+        (0..cycles).map(of).collect()
+    }
+
+    #[test]
+    fn frames_pass_whole_or_not_at_all() {
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                FrameGate::default(),
+                changes,
+                inputs [rst, requested, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+                outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, busy],
+            )
+        };
+        let defects = [
+            // The rest of a frame of which the beginning is lost.
+            Change::value("", "dropping", |k| k.constant(1, 0)),
+            // Cut off when its request is answered.
+            Change::value("", "passing", |k| k.constant(1, 0)),
+        ];
+        check_with_defects(subject, &stimulus(4000), Gate::default, &defects);
+    }
+}
