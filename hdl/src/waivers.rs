@@ -7,12 +7,11 @@ use crate::device::Tap;
 use crate::language::Hierarchy;
 
 /// Reasons why an output of a block inside another one is not read, and the outputs.
-const UNREAD: [(&str, &[&str]); 5] = [
+const UNREAD: [(&str, &[&str]); 4] = [
     (
         "these counters are cleared from outside; their end is not needed.",
         &["column__last", "frame_quads__last", "quads__last"],
     ),
-    ("only a board that scans its array needs it.", &["link__requested"]),
     ("only `last` of this counter is used.", &["period__value"]),
     (
         "`receive` writes by mask and needs the end of a row, `send` reads by lane: outputs of one block.",

@@ -20,10 +20,10 @@ use crate::{engine, serial};
 /// because rust-hdl connects blocks by their fields and does not support type parameters for them. The pins are named
 /// as in the link block. A link that can receive a byte wrongly has an output for it, `$broken`; otherwise `$never` is
 /// `false`. `$source` is the block whose beats the link sends: `engine`, or `gate`, which stands behind an engine that scans
-/// its array, with the pins of the scan.
+/// its array, with the pins of the scan; `$unused` takes what only a gate needs.
 macro_rules! board_top {
     (
-        $name:ident, $engine:ty, $source:ident, [$($gate:ident, $row:ident, $miso:ident)?],
+        $name:ident, $engine:ty, $source:ident, [$($gate:ident, $row:ident, $miso:ident)?], [$($unused:ident)?],
         $block:ty, $line:expr, [$($input:ident),+] -> $output:ident, [$($broken:ident)?], [$($never:tt)?]
     ) => {
         /// ```text
@@ -72,6 +72,7 @@ macro_rules! board_top {
                 pub $miso: Wire<In>,
                 $gate: FrameGate,
             )?
+            $($unused: Signal<Local, Bit>,)?
             power_on: PowerOn,
             // Registered once more, because the engine is large and its reset has a long route.
             engine_rst: Dff,
@@ -106,6 +107,7 @@ macro_rules! board_top {
                         $miso: Wire::new(engine.adc_miso.width()),
                         $gate: FrameGate::default(),
                     )?
+                    $($unused: Default::default(),)?
                     power_on: PowerOn::default(),
                     engine_rst: Default::default(),
                     line: line(&identity),
@@ -168,6 +170,8 @@ macro_rules! board_top {
                     self.engine.adc_miso.next = self.$miso.val();
                 )?
 
+                $(self.$unused.next = self.link.requested.val();)?
+
                 self.lamps.activity.next = self.link.activity.val();
                 self.lamps.dropped.next = self.link.dropped.val();
                 self.alive.next = self.lamps.alive.val();
@@ -208,18 +212,18 @@ macro_rules! board_top {
 
 /// Board tops for the two links of an engine.
 macro_rules! boards {
-    ($uart:ident, $spi:ident, $engine:ty, $source:ident, $scan:tt) => {
-        board_top!($uart, $engine, $source, $scan, Uart, Uart::new, [uart_rx] -> uart_tx, [broken], []);
+    ($uart:ident, $spi:ident, $engine:ty, $source:ident, $scan:tt, $unused:tt) => {
+        board_top!($uart, $engine, $source, $scan, $unused, Uart, Uart::new, [uart_rx] -> uart_tx, [broken], []);
         board_top!(
-            $spi, $engine, $source, $scan,
+            $spi, $engine, $source, $scan, $unused,
             SpiSlave, |_| SpiSlave::default(), [spi_sclk, spi_cs_n, spi_mosi] -> spi_miso, [], [false]
         );
     };
 }
 
-boards!(BoardTop, SpiBoardTop, engine::Engine, engine, []);
-boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine, engine, []);
-boards!(ScanBoardTop, SpiScanBoardTop, WritableScanCore, gate, [gate, row, adc_miso]);
+boards!(BoardTop, SpiBoardTop, engine::Engine, engine, [], [unused]);
+boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine, engine, [], [unused]);
+boards!(ScanBoardTop, SpiScanBoardTop, WritableScanCore, gate, [gate, row, adc_miso], []);
 
 /// An engine for a board.
 trait OfModel: Sized {

@@ -100,10 +100,10 @@ fn kernel(taxels: usize, code_bits: usize) -> Kernel {
     let state = |name: &str, bits: usize| k.state(name, Type::unsigned(bits), rst, 0);
     let zero = |bits: usize| k.constant(bits, 0);
 
-    let codes = k.memory("codes", SLOTS << t, code_bits, Contents::Undefined).unchecked();
+    let kept = k.memory("kept", SLOTS << t, code_bits, Contents::Undefined).unchecked();
     let (slot, place) = (state("slot", s), state("place", t).comment("Codes of the scan that is taken, so far."));
     let (waiting, from) = (state("waiting", s + 1), state("from", s));
-    codes.write(passed, slot.concat(*place), code);
+    kept.write(passed, slot.concat(*place), code);
     k.when(passed, || place.set(place.plus(1)));
     k.when(complete | broken, || place.set(zero(t)));
     k.when(complete, || slot.set(slot.plus(1)));
@@ -116,7 +116,7 @@ fn kernel(taxels: usize, code_bits: usize) -> Kernel {
     let whole = CODES_PER_BEAT as u64;
     let reads = k.wire("reads", *sends & !asked.is(whole));
     let beyond = k.wire("beyond", !next.less(k.constant(t, taxels as u64)));
-    let came = k.delay("came", codes.read(from.concat(*next)));
+    let came = k.delay("came", kept.read(from.concat(*next)));
     let pads = k.delay("pads", beyond);
     let comes = state("comes", 1);
     comes.set(reads);

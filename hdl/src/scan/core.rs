@@ -20,8 +20,9 @@ const BEAT: usize = 96;
 /// Top module `$name` with engine `$engine`. A macro, because rust-hdl connects blocks by their fields and does not support
 /// type parameters for them. `$source` is the block from which the engine gets its beats: `capture`, or `tables`, which
 /// lets images in between, with their stream. `$output` is the last block: `told`, or `codes`, which adds the codes.
+/// `$unused` takes what only the other kind needs.
 macro_rules! scan_core {
-    ($name:ident, $engine:ty, $source:ident, $output:ident, [$($tables:ident, $codes:ident)?]) => {
+    ($name:ident, $engine:ty, $source:ident, $output:ident, [$($tables:ident, $codes:ident, $unused:ident)?]) => {
         /// An engine that reads the converters of its array by itself; ports as of the fields.
         #[derive(LogicBlock)]
         pub struct $name {
@@ -42,6 +43,7 @@ macro_rules! scan_core {
                 pub s_axis_tlast: Signal<In, Bit>,
                 $tables: ScanTables,
                 $codes: ScanCodes,
+                $unused: Signal<Local, Bit>,
             )?
             /// Address of the row that is driven, unsigned; valid after the reset.
             pub row: Wire<Out>,
@@ -87,6 +89,7 @@ macro_rules! scan_core {
                         s_axis_tlast: Default::default(),
                         $tables: ScanTables::new(shape.code_bits as usize),
                         $codes: ScanCodes::new(model.scene.sensor.taxels(), shape.code_bits as usize),
+                        $unused: Default::default(),
                     )?
                     row: Wire::new(count_bits(shape.rows)),
                     adc_sclk: Default::default(),
@@ -166,6 +169,7 @@ macro_rules! scan_core {
                 self.told.s_axis_tlast.next = self.engine.m_axis_tlast.val();
                 self.engine.m_axis_tready.next = self.told.s_axis_tready.val();
                 $(
+                    self.$unused.next = self.capture.complete.val();
                     self.$codes.clk.next = self.clk.val();
                     self.$codes.rst.next = self.restart.q.val();
                     self.$codes.code.next = self.capture.m_axis_tdata.val();
@@ -226,7 +230,7 @@ macro_rules! scan_core {
 }
 
 scan_core!(ScanCore, engine::Engine, capture, told, []);
-scan_core!(WritableScanCore, engine::Engine, tables, codes, [tables, codes]);
+scan_core!(WritableScanCore, engine::Engine, tables, codes, [tables, codes, unused]);
 scan_core!(SerialScanCore, serial::Engine, capture, told, []);
 
 /// The top module of `model`, after rust-hdl's checks.

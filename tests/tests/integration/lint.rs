@@ -122,6 +122,13 @@ fn a_scan_is_clean_with_the_engines_waivers() {
             period_us: 2000.0,
         });
         lint(&generate_scan(&Model::new(&scene).unwrap()).unwrap()).unwrap_or_else(|log| panic!("{converter}: {log}"));
+        // With tables, and behind both links.
+        (scene.hardware.tables, scene.input.dead) = (TableStorage::Writable, vec![]);
+        let model = Model::new(&scene).unwrap();
+        lint(&generate_scan(&model).unwrap()).unwrap_or_else(|log| panic!("{converter}, tables: {log}"));
+        scene.hardware.link = [LinkKind::Uart, LinkKind::Spi][converter];
+        let model = Model::new(&scene).unwrap();
+        lint(&generate_board(&model).unwrap()).unwrap_or_else(|log| panic!("{converter}, a board: {log}"));
     }
 }
 

@@ -59,6 +59,11 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
+    // A stage before the engine, which the plan does not count: told where it is there.
+    if let Some(scan) = scene.hardware.adc_scan {
+        let setting = format!("{} {} on one bus", scan.converters, scan.converter.name);
+        add("scan", true, setting, &|| plain(scene));
+    }
     let written = plan.has_writable_tables();
     let table = input.calibration.is_some() || written;
     let tare = table || input.tare.is_some();

@@ -2,6 +2,11 @@
 
 use anyhow::{ensure, Result};
 use dermis_golden::adc::AdcScan;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+
+/// Largest noise of a sample in the co-simulation, in LSBs of the converter.
+pub(super) const NOISE_LSB: f64 = 3.0;
 
 /// A fault of the wires between array, converters and hardware, for the whole run but for `Flip`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,6 +148,16 @@ impl Array {
         let share = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)).f64();
         self.noise_lsb * (2.0 * share - 1.0)
     }
+}
+
+/// The voltages of an array that has the readings of `frame`, as shares of the converters' full range.
+///
+/// # Errors
+/// A frame of another sensor.
+pub(super) fn volts(model: &Model, frame: &Frame) -> Result<Vec<f64>> {
+    let full = f64::from(1u32 << (model.formats().code_bits - 1));
+    let codes = model.readings(std::slice::from_ref(frame))?;
+    Ok(codes.into_iter().map(|code| f64::from(code) / full).collect())
 }
 
 #[cfg(test)]

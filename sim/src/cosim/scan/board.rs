@@ -6,9 +6,8 @@ use dermis_golden::frame::Frame;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::scan::ScanPins;
 
-use super::array::Array;
+use super::array::{volts, Array, NOISE_LSB};
 use super::converters::Converters;
-use super::run::{volts, NOISE_LSB};
 
 /// A board whose converters are simulated with it: only the pins of its link are left.
 pub struct ScannedBoard {

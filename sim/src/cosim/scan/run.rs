@@ -13,7 +13,7 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::scan::{generate_scan, scan_simulator, ScanDevice, ScanInputs};
 use serde::Serialize;
 
-use super::array::{Array, Fault};
+use super::array::{volts, Array, Fault, NOISE_LSB};
 use super::converters::Converters;
 use super::device::VerilatedScan;
 use crate::cosim::findings::{Findings, Mismatch, KEPT_PER_FRAME};
@@ -26,8 +26,6 @@ const RESET: u64 = 4;
 const SPARE_SCANS: u64 = 3;
 /// Seed of the stalls.
 const SEED: u64 = 1;
-/// Largest noise of a sample in the co-simulation, in LSBs of the converter.
-pub(super) const NOISE_LSB: f64 = 3.0;
 
 /// What the model expects of a scan.
 #[derive(Clone, Debug)]
@@ -279,16 +277,6 @@ pub struct VerifiedScan {
     pub findings: Findings,
     /// Labels of the runs.
     pub runs: Vec<String>,
-}
-
-/// The voltages of an array that has the readings of `frame`, as shares of the converters' full range.
-///
-/// # Errors
-/// A frame of another sensor.
-pub(super) fn volts(model: &Model, frame: &Frame) -> Result<Vec<f64>> {
-    let full = f64::from(1u32 << (model.formats().code_bits - 1));
-    let codes = model.readings(std::slice::from_ref(frame))?;
-    Ok(codes.into_iter().map(|code| f64::from(code) / full).collect())
 }
 
 /// Co-simulates the scan of `scene` over an array that shows `frames` (at least one), one per scan, on the given simulators,

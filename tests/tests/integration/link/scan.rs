@@ -17,7 +17,7 @@ const STEPS: [usize; 2] = [5, 7];
 
 /// What a taxel of it reads, in MPa.
 fn shown(taxel: usize, step: usize) -> f64 {
-    (taxel * step % 9) as f64 / 10.0
+    (taxel * step % 9) as f64 / 20.0
 }
 
 fn scene() -> Scene {
@@ -76,10 +76,10 @@ fn a_request_is_answered_with_the_next_scan_and_its_codes() {
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
     assert!(identity.scans() && identity.supports(Kind::Tables));
-    // To some LSB of the converter, whose range is 2 here because of the least gain.
+    // To some LSB of the converter, whose range is 0.5 here because of the largest gain.
     let shows = |board: &Board, codes: &[i32], step: usize| {
         let readings = board.model.readings_of("scan", codes).unwrap().stress_MPa;
-        readings.iter().enumerate().all(|(taxel, reading)| (reading - shown(taxel, step)).abs() < 5.0 * 2.0 / 4096.0)
+        readings.iter().enumerate().all(|(taxel, reading)| (reading - shown(taxel, step)).abs() < 5.0 * 0.5 / 4096.0)
     };
     let [sums, forces] = [Kind::FrameForResultants, Kind::FrameForForces].map(|kind| board.ask(kind, 9));
     assert!([sums, forces].iter().all(|codes| STEPS.iter().any(|step| shows(&board, codes, *step))));
