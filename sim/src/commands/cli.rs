@@ -171,7 +171,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     );
     let flow = matches!(
         error.downcast_ref::<ToolError>(),
-        Some(ToolError::Failed { .. } | ToolError::Late { .. } | ToolError::Output { .. })
+        Some(ToolError::Failed { .. } | ToolError::Late { .. } | ToolError::Stuck { .. } | ToolError::Output { .. })
     );
     if tool || hardware || model || board || flow {
         1

@@ -170,7 +170,7 @@ fn place(design: &Design, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
     let what = format!("{}: place and route", design.model.board.name);
     let place = |seed| match place_seed(design, seed) {
         // A seed that does not converge is skipped as long as there are others.
-        Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
+        Err(ToolError::Late { .. } | ToolError::Stuck { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
         placed => Ok(Some((seed, placed?))),
     };
     let placed = parallel(&what, (1..=seeds).collect(), jobs as usize, &Interrupt::default(), place)?;
@@ -182,6 +182,15 @@ fn seed_prefix(seed: u32) -> String {
     format!("seed{seed}")
 }
 
+/// Iterations of nextpnr's static placer after which it does not converge: where it does, it takes a third of them.
+const MOST_ITERATIONS: u32 = 1500;
+
+/// Whether the end of nextpnr's log says that its placer does not converge.
+fn is_stuck(log: &str) -> bool {
+    let iteration = log.rsplit_once("iter=").and_then(|(_, rest)| rest.split_whitespace().next()?.parse::<u32>().ok());
+    iteration.is_some_and(|iteration| iteration > MOST_ITERATIONS)
+}
+
 /// Places and routes one seed with the first of the board's placers that converges.
 fn place_seed(design: &Design, seed: u32) -> Result<Placed, ToolError> {
     let Design { model, routing, folder, pins } = design;
@@ -190,7 +199,8 @@ fn place_seed(design: &Design, seed: u32) -> Result<Placed, ToolError> {
     let mut last = Err(ToolError::Missing { tool: routing.place.name });
     for placer in &board.placers {
         let arguments = routing.place_arguments(board, [NETLIST, pins], seed, placer, &name);
-        last = routing.place.run(folder, &arguments, &format!("{name}.{placer}.log"), board.place_minutes);
+        let log = format!("{name}.{placer}.log");
+        last = routing.place.run_unless(folder, &arguments, &log, board.place_minutes, is_stuck);
         if last.is_ok() {
             break;
         }
@@ -248,6 +258,14 @@ mod tests {
         };
         assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
         assert_eq!(clocks(&seeds[..2]), [107.2, 94.5, 94.5]);
+    }
+
+    #[test]
+    fn a_placer_is_stuck_after_many_iterations() {
+        let log =
+            |iteration: u32| format!("Info: iter={iteration} steplen=1.9 a=1.0\nInfo: overlap: COMB=4.7%, RAM=24.8%\n");
+        assert!([log(1500), String::new(), "iter=".into()].iter().all(|log| !is_stuck(log)));
+        assert!(is_stuck(&(log(1500) + &log(1501))));
     }
 
     #[test]

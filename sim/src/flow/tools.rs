@@ -1,7 +1,7 @@
 //! The open tools of synthesis, place and route: looked up under two names, run with a log file and a time limit.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::sleep;
@@ -41,6 +41,14 @@ pub enum ToolError {
         tool: &'static str,
         /// The time limit.
         minutes: u32,
+        /// File with its log so far.
+        log: PathBuf,
+    },
+    /// The tool was stopped because it would not come to an end.
+    #[error("{tool} does not converge; log: {log}")]
+    Stuck {
+        /// The tool.
+        tool: &'static str,
         /// File with its log so far.
         log: PathBuf,
     },
@@ -120,6 +128,21 @@ impl Tool {
     /// # Errors
     /// As [`ToolError`] lists.
     pub fn run(self, folder: &Path, arguments: &[String], log: &str, minutes: u32) -> Result<(), ToolError> {
+        self.run_unless(folder, arguments, log, minutes, |_| false)
+    }
+
+    /// As [`Tool::run`]; it is stopped, too, when the end of its log `is_stuck`.
+    ///
+    /// # Errors
+    /// As [`ToolError`] lists.
+    pub fn run_unless(
+        self,
+        folder: &Path,
+        arguments: &[String],
+        log: &str,
+        minutes: u32,
+        is_stuck: impl Fn(&str) -> bool,
+    ) -> Result<(), ToolError> {
         let log = folder.join(log);
         let file = File::create(&log).map_err(ToolError::io(&log))?;
         let copy = file.try_clone().map_err(ToolError::io(&log))?;
@@ -137,9 +160,13 @@ impl Tool {
             if let Some(status) = child.try_wait().map_err(ToolError::io(&log))? {
                 return if status.success() { Ok(()) } else { Err(self.failed(log)) };
             }
-            if begun.elapsed() > limit {
+            let late = begun.elapsed() > limit;
+            if late || is_stuck(&end_of(&log).map_err(ToolError::io(&log))?) {
                 child.kill().and_then(|()| child.wait()).map_err(ToolError::io(&log))?;
-                return Err(ToolError::Late { tool: self.name, minutes, log });
+                return Err(match late {
+                    true => ToolError::Late { tool: self.name, minutes, log },
+                    false => ToolError::Stuck { tool: self.name, log },
+                });
             }
             sleep(POLL);
         }
@@ -152,6 +179,19 @@ impl Tool {
         let end = lines[lines.len().saturating_sub(LOG_LINES)..].join("\n");
         ToolError::Failed { tool: self.name, log, end }
     }
+}
+
+/// Bytes of a log that [`Tool::run_unless`] looks at.
+const LOG_END: u64 = 2048;
+
+/// The end of a log.
+fn end_of(log: &Path) -> io::Result<String> {
+    let mut file = File::open(log)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LOG_END)))?;
+    let mut end = Vec::new();
+    file.take(LOG_END).read_to_end(&mut end)?;
+    Ok(String::from_utf8_lossy(&end).into_owned())
 }
 
 #[cfg(test)]
@@ -175,6 +215,15 @@ mod tests {
     fn a_tool_is_stopped_at_its_limit() {
         let error = run("sleep 50", 0).to_string();
         assert!(error.starts_with("sh took longer than 0 min"), "{error}");
+    }
+
+    #[test]
+    fn a_tool_is_stopped_when_its_log_says_that_it_is_stuck() {
+        let folder = tempfile::tempdir().unwrap();
+        let arguments = ["-c".to_owned(), "seq 1 9; echo round 10; sleep 50".to_owned()];
+        let stuck = |end: &str| end.contains("round 10");
+        let error = Tool { name: "sh" }.run_unless(folder.path(), &arguments, "sh.log", 1, stuck).unwrap_err();
+        assert!(error.to_string().starts_with("sh does not converge; log: "), "{error}");
     }
 
     #[test]
