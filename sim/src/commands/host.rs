@@ -90,13 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let (hardware, tables) = (arguments.scene.as_deref(), arguments.tables.as_deref());
     let named = hardware.map(Scene::load).transpose()?;
     let scans = named.as_ref().is_some_and(|scene| scene.hardware.adc_scan.is_some());
-    refuse(arguments, scans, named.as_ref())?;
-    let (scene, specimen, frames) = match arguments.stream || scans {
-        true => {
-            let specimen = tables.map(Scene::load).transpose()?;
-            (Scene::load(hardware.unwrap_or_default())?, specimen, Vec::new())
-        }
-        false => resolve_specimen(hardware, tables, &arguments.frames)?,
+    refuse(arguments, named.as_ref(), scans)?;
+    let (scene, specimen, frames) = match named {
+        Some(scene) if arguments.stream || scans => (scene, tables.map(Scene::load).transpose()?, Vec::new()),
+        _ => resolve_specimen(hardware, tables, &arguments.frames)?,
     };
     let scene = arguments.target.apply(scene);
     let model = Model::new(&scene)?;
@@ -143,20 +140,22 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
 ///
 /// # Errors
 /// The option, and the scene's source of codes.
-fn refuse(arguments: &Arguments, scans: bool, scene: Option<&Scene>) -> Result<()> {
+fn refuse(arguments: &Arguments, scene: Option<&Scene>, scans: bool) -> Result<()> {
     let Arguments { frames, tare, save, stream, .. } = arguments;
-    let name = scene.map_or_else(String::new, |scene| scene.name.clone() + ": ");
-    let unfit = match scans {
-        true => [
-            ("a frame", !frames.is_empty()),
-            ("--tare", tare.is_some()),
-            ("--save with --stream", save.is_some() && *stream),
-        ],
-        false => [("--scans", arguments.scans.is_some()), ("--save", save.is_some()), ("", false)],
-    };
-    let why = match scans {
-        true => "adc-scan: the board scans its array; its zero is a table (--tables), its readings are in the lines of --stream",
-        false => "stream: the board takes frames and scans no array",
+    let name = scene.map_or_else(String::new, |scene| format!("{}: ", scene.name));
+    let (unfit, why) = match scans {
+        true => (
+            vec![
+                ("a frame", !frames.is_empty()),
+                ("--tare", tare.is_some()),
+                ("--save with --stream", *stream && save.is_some()),
+            ],
+            "adc-scan: the board scans its array; its zero is a table (--tables), its readings are in the lines of --stream",
+        ),
+        false => (
+            vec![("--scans", arguments.scans.is_some()), ("--save", save.is_some())],
+            "stream: the board takes frames and scans no array",
+        ),
     };
     match unfit.iter().find(|(_, unfit)| *unfit) {
         Some((what, _)) => bail!("{name}{what} is not possible with hardware.source = {why}"),

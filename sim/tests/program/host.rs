@@ -217,7 +217,7 @@ fn a_board_that_scans_is_asked_for_scans() {
     assert_eq!(text(&shown.stdout).matches("against model   equal, every bit\n").count(), 2, "{}", text(&shown.stdout));
     let own = Scene::load(&scene).unwrap();
     let saved = [1, 2].map(|number| {
-        Frame::load(&folder.path().join(format!("readings/scan-{number}.json")), Some(&own)).unwrap().stress_MPa
+        Frame::load(folder.path().join(format!("readings/scan-{number}.json")), Some(&own)).unwrap().stress_MPa
     });
     // The same to a few LSB of the converter as one of the frames that the array shows.
     let shows = |readings: &[f64]| {
