@@ -11,7 +11,7 @@ use super::board::{Board, BoardOutputs};
 use super::{FrameGate, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
-use crate::primitives::Dff;
+use crate::primitives::{Dff, RegisterSlice};
 use crate::scan::{ScanPins, WritableScanCore};
 use crate::wire::{Wire, Word};
 use crate::{engine, serial};
@@ -23,7 +23,7 @@ use crate::{engine, serial};
 /// its array, with the pins of the scan; `$unused` takes what only a gate needs.
 macro_rules! board_top {
     (
-        $name:ident, $engine:ty, $source:ident, [$($gate:ident, $row:ident, $miso:ident)?], [$($unused:ident)?],
+        $name:ident, $engine:ty, $source:ident, [$($gate:ident, $slice:ident, $row:ident, $miso:ident)?], [$($unused:ident)?],
         $block:ty, $line:expr, [$($input:ident),+] -> $output:ident, [$($broken:ident)?], [$($never:tt)?]
     ) => {
         /// ```text
@@ -70,6 +70,8 @@ macro_rules! board_top {
                 pub adc_mosi: Signal<Out, Bit>,
                 /// Outputs of the converters, one bit each; valid while `adc_cs_n` is low.
                 pub $miso: Wire<In>,
+                // Registers the way back of `ready` from the link's requests to the engine.
+                $slice: RegisterSlice,
                 $gate: FrameGate,
             )?
             $($unused: Signal<Local, Bit>,)?
@@ -105,6 +107,7 @@ macro_rules! board_top {
                         adc_cs_n: Default::default(),
                         adc_mosi: Default::default(),
                         $miso: Wire::new(engine.adc_miso.width()),
+                        $slice: RegisterSlice::new(BEAT, true),
                         $gate: FrameGate::default(),
                     )?
                     $($unused: Default::default(),)?
@@ -155,13 +158,19 @@ macro_rules! board_top {
                 self.link.m_axis_tlast.next = self.$source.m_axis_tlast.val();
                 self.$source.m_axis_tready.next = self.link.m_axis_tready.val();
                 $(
+                    self.$slice.clk.next = self.clk.val();
+                    self.$slice.rst.next = self.power_on.rst.val();
+                    self.$slice.s_axis_tdata.next = self.engine.m_axis_tdata.val();
+                    self.$slice.s_axis_tvalid.next = self.engine.m_axis_tvalid.val();
+                    self.$slice.s_axis_tlast.next = self.engine.m_axis_tlast.val();
+                    self.engine.m_axis_tready.next = self.$slice.s_axis_tready.val();
                     self.$gate.clk.next = self.clk.val();
                     self.$gate.rst.next = self.power_on.rst.val();
                     self.$gate.requested.next = self.link.requested.val();
-                    self.$gate.s_axis_tdata.next = self.engine.m_axis_tdata.val();
-                    self.$gate.s_axis_tvalid.next = self.engine.m_axis_tvalid.val();
-                    self.$gate.s_axis_tlast.next = self.engine.m_axis_tlast.val();
-                    self.engine.m_axis_tready.next = self.$gate.s_axis_tready.val();
+                    self.$gate.s_axis_tdata.next = self.$slice.m_axis_tdata.val();
+                    self.$gate.s_axis_tvalid.next = self.$slice.m_axis_tvalid.val();
+                    self.$gate.s_axis_tlast.next = self.$slice.m_axis_tlast.val();
+                    self.$slice.m_axis_tready.next = self.$gate.s_axis_tready.val();
                     self.engine.enable.next = !self.$gate.busy.val();
                     self.$row.next = self.engine.row.val();
                     self.adc_sclk.next = self.engine.adc_sclk.val();
@@ -223,7 +232,7 @@ macro_rules! boards {
 
 boards!(BoardTop, SpiBoardTop, engine::Engine, engine, [], [unused]);
 boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine, engine, [], [unused]);
-boards!(ScanBoardTop, SpiScanBoardTop, WritableScanCore, gate, [gate, row, adc_miso], []);
+boards!(ScanBoardTop, SpiScanBoardTop, WritableScanCore, gate, [gate, slice, row, adc_miso], []);
 
 /// An engine for a board.
 trait OfModel: Sized {
@@ -249,6 +258,8 @@ impl OfModel for WritableScanCore {
     }
 }
 
+/// Width of a beat of the engine.
+const BEAT: usize = 96;
 /// Stack on which a board is made: it is moved several times while it grows around its engine, and is large.
 const STACK_BYTES: usize = 64 << 20;
 
