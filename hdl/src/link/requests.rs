@@ -259,8 +259,10 @@ mod tests {
     fn requests_are_answered_in_order() {
         for (images, scans) in [(false, false), (true, false), (true, true)] {
             let mut lists = Lists { images, scans, ..Lists::default() };
-            let kernel = kernel(DEPTH, images, if scans { &FRAMES } else { &[] });
-            check(&kernel, &stimulus(8000, images, scans), &mut lists);
+            let outputs =
+                [("noted", 1), ("overrun", 1), ("offer", 1), ("answer_number", 8), ("source", 2), ("waiting", 1)];
+            let block = Body::new(kernel(DEPTH, images, if scans { &FRAMES } else { &[] }), &[], &outputs);
+            check(block.kernel(), &stimulus(8000, images, scans), &mut lists);
         }
     }
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 59] = [
+const NOT_RUN: [(&str, &str); 61] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -29,6 +29,8 @@ const NOT_RUN: [(&str, &str); 59] = [
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers", BOARD),
     ("dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene hand.toml --tables left-hand.toml press.json", BOARD),
+    ("dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 10 --save readings", BOARD),
+    ("dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 1000 --stream >answers", BOARD),
     ("dermis load hand.toml left-hand.toml --port /dev/ttyUSB0", BOARD),
     ("dermis board eight-by-eight", "runs until interrupted; host.rs talks to one"),
     ("dermis table", "every scene: minutes"),

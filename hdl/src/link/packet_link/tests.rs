@@ -42,7 +42,7 @@ fn subject(changes: &[Change]) -> Subject<'static> {
             m_axis_tlast,
         ],
         outputs [
-            send_data, send_valid, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, activity, dropped,
+            send_data, send_valid, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, requested, activity, dropped,
         ],
     )
 }
@@ -57,7 +57,7 @@ impl Reference for Recorded {
     fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
         let outputs = &self.outputs[0];
         let [sent, offered] = [1, 3].map(|output| outputs[output].number() == 1);
-        let is_known = [sent, true, offered, true, offered, true, true, true];
+        let is_known = [sent, true, offered, true, offered, true, true, true, true];
         outputs.iter().zip(is_known).map(|(&word, known)| (known && self.reset).then_some(word)).collect()
     }
 
