@@ -59,8 +59,8 @@ pub struct Arguments {
     /// Of a board that scans its array: number of scans to ask for [default: 1].
     #[arg(long, value_name = "N", conflicts_with = "frames", value_parser = clap::value_parser!(u64).range(1..))]
     scans: Option<u64>,
-    /// Of a board that scans its array: folder for the readings of each scan as scan-<n>.json, frames for `--tare`,
-    /// `dermis calibrate` and the like.
+    /// Of a board that scans its array: folder for the readings of each scan, as `scan-1.json` and so on, frames for
+    /// `dermis calibrate` and `input.tare`.
     #[arg(long, value_name = "FOLDER", conflicts_with = "frames")]
     save: Option<PathBuf>,
     /// Time without an answer, in ms, after which a request is sent again.
