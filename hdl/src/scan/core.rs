@@ -209,8 +209,6 @@ macro_rules! scan_core {
                     data: beat.signed(0, self.$source.m_axis_tdata.width()) as i32,
                     last: self.$source.m_axis_tlast.val(),
                 };
-                let s_ready = false;
-                $(let s_ready = s_ready | self.$tables.s_axis_tready.val();)?
                 ScanOutputs {
                     pins: ScanPins {
                         row: self.row.val().number(),
@@ -221,7 +219,7 @@ macro_rules! scan_core {
                     m_valid: self.m_axis_tvalid.val(),
                     m_last: self.m_axis_tlast.val(),
                     m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
-                    s_ready,
+                    s_ready: [$(self.$tables.s_axis_tready.val())?].contains(&true),
                     taken: taken.then_some(beat),
                 }
             }
