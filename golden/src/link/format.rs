@@ -76,7 +76,7 @@ frames may be in flight at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0,\ncodes only where the board scans\nits array: then a request for a frame is answered with the next scan, and the answer ends with its codes, three in a beat.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants), images in stage [`load`](crate::fixed::stages::load). The answer to an\nimage says that the engine has it; the status of the next frame says whether it is whole, and its version. A board\nwhose engine is not idle for the image drops it, and counts an overrun.\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. There are labels only where `label_bits` is not 0,\nand codes only where the board scans its array: a request for a frame is answered with the next scan then, and the answer\nends with its codes, three in a beat.\nLabels and status beats are described in stage [`send`](crate::fixed::stages::send), records in stage\n[`resultants`](crate::fixed::stages::resultants), images in stage [`load`](crate::fixed::stages::load). The answer to an\nimage says that the engine has it; the status of the next frame says whether it is whole, and its version. A board\nwhose engine is not idle for the image drops it, and counts an overrun.\n"
 }
 
 /// How a special byte is escaped in a packet.

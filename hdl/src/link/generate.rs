@@ -7,6 +7,7 @@ use super::board_top::board_top;
 use crate::error::HdlError;
 use crate::generate::{top_name, Around, Generated};
 use crate::language::{Change, Hierarchy};
+use crate::scan::pins_text;
 
 /// The link in the header comment of the top module: its name, and its pins.
 fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
@@ -29,20 +30,6 @@ fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
             ),
         ),
     }
-}
-
-/// The pins of a scan in the header comment of the top module; empty where codes come over the link.
-fn scan_text(model: &Model) -> String {
-    let Some(scan) = model.scene.hardware.adc_scan else { return String::new() };
-    format!(
-        "\
-//   row                 address of the row that is driven
-//   adc_sclk, adc_cs_n, adc_mosi, adc_miso
-//                       {count} {converter} on one bus with an output each; a request is answered with the next scan
-",
-        count = scan.converters,
-        converter = scan.converter.name,
-    )
 }
 
 /// Generates the hardware of `model` behind its board's link: the files of [`crate::generate()`] with the board's top
@@ -82,7 +69,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         sensor = model.scene.sensor,
         name = model.scene.name,
         clock = model.board.clock_MHz,
-        scan = scan_text(model),
+        scan = pins_text(model),
     );
     let around = Around { top, hierarchy, sources: &[include_str!("board_top.rs")], header, row: "link" };
     let mut board = around.generated(model, engine)?;

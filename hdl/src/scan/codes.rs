@@ -9,8 +9,8 @@ use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// The codes that the engine takes are kept until the frame's forces and status have left, and follow them, as
-/// [`dermis_golden::fixed::stages::scan::beats`] says: whoever gets the forces knows of which readings they are, can compare
-/// them with the model, and finds zero and gain of the array from them.
+/// [`dermis_golden::fixed::stages::scan::beats`] says: a host can compare the forces with the model's for these codes, and
+/// calibrate the array from them.
 ///
 /// Each scan has a slot of its own; one that is broken off leaves its slot to the next. There are slots for those in the
 /// engine, for one that is taken, and for one more, whose scan has begun.

@@ -15,6 +15,20 @@ const TABLES: &str = "\
 //   s_axis_tdata        a byte of an image of tables (`dermis load`), as a beat of the engine's stream; breaks a scan off
 ";
 
+/// The pins of a scan in the header comment of a top module; empty where codes come as a stream.
+pub(crate) fn pins_text(model: &Model) -> String {
+    let (Some(scan), Some(timing)) = (model.scene.hardware.adc_scan, model.scan_timing()) else { return String::new() };
+    format!(
+        "\
+//   row                 address of the row that is driven
+//   adc_sclk, adc_cs_n, adc_mosi, adc_miso
+//                       {count} converters on one bus with an output each: {sclk} MHz, column = channel * {count} + converter
+",
+        count = scan.converters,
+        sclk = model.board.clock_MHz / (2 * timing.half) as f64,
+    )
+}
+
 /// Generates the hardware of `model` with its scan: the files of [`crate::generate()`] with this top module in place of the
 /// engine's, without taps.
 ///
@@ -43,10 +57,7 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
 //
 //   clk, rst            clock, {clock} MHz; synchronous reset, active high
 //   enable              a scan may begin; high to scan all the time
-{tables}//   row                 address of the row that is driven
-//   adc_sclk, adc_cs_n, adc_mosi, adc_miso
-//                       {count} converters on one bus with an output each: {sclk} MHz, column = channel * {count} + converter
-//   m_axis_tdata        [95:0], {{fz, fy, fx}} of 32 bits signed, then status{codes}, once for each scan
+{tables}{pins}//   m_axis_tdata        [95:0], {{fz, fy, fx}} of 32 bits signed, then status{codes}, once for each scan
 //
 // A scan takes {scan} us of its period of {period} us.
 //
@@ -58,7 +69,7 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
         tables = if model.has_writable_tables() { TABLES } else { "" },
         sensor = model.scene.sensor,
         name = model.scene.name,
-        sclk = clock / (2 * timing.half) as f64,
+        pins = pins_text(model),
         scan = us(timing.scan),
         period = us(timing.period),
     );

@@ -23,6 +23,7 @@ mod tables;
 pub use self::core::{ScanCore, SerialScanCore, WritableScanCore};
 pub use capture::ScanCapture;
 pub use codes::ScanCodes;
+pub(crate) use generate::pins_text;
 pub use generate::{generate_scan, generate_scan_changed};
 pub use pins::{Beat, ScanDevice, ScanInputs, ScanOutputs, ScanPins};
 pub use sequencer::ScanSequencer;

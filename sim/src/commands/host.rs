@@ -14,7 +14,7 @@ use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 
-use super::inputs::{resolve_specimen, BoardOverride};
+use super::inputs::{frames_of, resolve, BoardOverride};
 use crate::link::stream::{self, FramesSent};
 use crate::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
 use crate::progress::Progress;
@@ -91,9 +91,14 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let named = hardware.map(Scene::load).transpose()?;
     let scans = named.as_ref().is_some_and(|scene| scene.hardware.adc_scan.is_some());
     refuse(arguments, named.as_ref(), scans)?;
-    let (scene, specimen, frames) = match named {
-        Some(scene) if arguments.stream || scans => (scene, tables.map(Scene::load).transpose()?, Vec::new()),
-        _ => resolve_specimen(hardware, tables, &arguments.frames)?,
+    let specimen = tables.map(Scene::load).transpose()?;
+    let (scene, frames) = match named {
+        Some(scene) if arguments.stream || scans => (scene, Vec::new()),
+        Some(scene) => {
+            let frames = frames_of(specimen.as_ref().unwrap_or(&scene), &arguments.frames)?;
+            (scene, frames)
+        }
+        None => resolve(None, &arguments.frames)?,
     };
     let scene = arguments.target.apply(scene);
     let model = Model::new(&scene)?;

@@ -72,16 +72,23 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
             Scene::builtin_names().join(", ")
         ),
     };
-    let frames = if frames.is_empty() {
-        let shipped = Frame::shipped(&scene);
-        if shipped.is_empty() {
-            bail!("scene {}: no frame is shipped for {}: give one with --frame", scene.name, scene.sensor);
-        }
-        shipped
-    } else {
-        frames.iter().map(|path| load(path, &scene)).collect::<Result<_>>()?
-    };
+    let frames = frames_of(&scene, frames)?;
     Ok((scene, frames))
+}
+
+/// The frames of the files, without any those shipped for the sensor of `scene`: at least one.
+///
+/// # Errors
+/// Unreadable frame, a frame of another sensor, no frames.
+pub(super) fn frames_of(scene: &Scene, files: &[String]) -> Result<Vec<Frame>> {
+    if !files.is_empty() {
+        return files.iter().map(|path| load(path, scene)).collect();
+    }
+    let shipped = Frame::shipped(scene);
+    if shipped.is_empty() {
+        bail!("scene {}: no frame is shipped for {}: give one with --frame", scene.name, scene.sensor);
+    }
+    Ok(shipped)
 }
 
 /// The scene of the hardware, that of the specimen whose tables are loaded into it, if `tables` names one, and frames for what is

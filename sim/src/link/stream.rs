@@ -4,11 +4,12 @@ use std::io::{BufRead, ErrorKind, Read, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
+use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::answer::PhysicalAnswer;
+use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
 use crate::stream::line::{self, NoFrame};
@@ -26,6 +27,14 @@ struct Reply {
     readings: Option<Vec<f64>>,
     #[serde(flatten)]
     answer: PhysicalAnswer,
+}
+
+impl Reply {
+    /// The line for an answer to `readings`, which were asked for at `sent_s`.
+    fn new(model: &Model, id: Value, sent_s: f64, readings: &Frame, answer: &Answer) -> Result<Reply> {
+        let physical = PhysicalAnswer::new(model, readings, answer)?;
+        Ok(Reply { id, sent_s, answered_s: seconds(answer.received_at), readings: None, answer: physical })
+    }
 }
 
 /// An output line for an input line that was refused.
@@ -102,9 +111,7 @@ fn answer<P: Read + Write>(
 fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -> Result<Reply> {
     let sent_s = seconds(SystemTime::now());
     let (frame, answer) = session.request(frame)?;
-    let physical = PhysicalAnswer::new(&session.model, &frame, &answer)?;
-    let answered_s = seconds(answer.received_at);
-    Ok(Reply { id: id.clone(), sent_s, answered_s, readings: None, answer: physical })
+    Reply::new(&session.model, id.clone(), sent_s, &frame, &answer)
 }
 
 /// Writes a line for each of so many scans of a board that scans its array.
@@ -120,11 +127,10 @@ pub(crate) fn run_scans<P: Read + Write>(
     for id in scans {
         let sent_s = seconds(SystemTime::now());
         let (readings, answer) = session.scan(&id)?;
-        let physical = PhysicalAnswer::new(&session.model, &readings, &answer)?;
-        sent.equal &= physical.equal != Some(false);
+        let reply = Reply::new(&session.model, id.into(), sent_s, &readings, &answer)?;
+        let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
+        sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;
-        let answered_s = seconds(answer.received_at);
-        let reply = Reply { id: id.into(), sent_s, answered_s, readings: Some(readings.stress_MPa), answer: physical };
         if !write_line(output, &serde_json::to_string(&reply)?)? {
             break;
         }

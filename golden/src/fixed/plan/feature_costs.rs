@@ -59,7 +59,7 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
-    // A stage before the engine, which the plan does not count: told where it is there.
+    // The plan does not count the scan, which stands before the engine: a scene that has it lists it, without its cost.
     if let Some(scan) = scene.hardware.adc_scan {
         let setting = format!("{} {} on one bus", scan.converters, scan.converter.name);
         add("scan", true, setting, &|| plain(scene));
