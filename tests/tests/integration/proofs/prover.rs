@@ -52,17 +52,21 @@ fn replaced(top: &str, property: &str) -> String {
     own.map(|rest| format!("delete {top}{}; ", rest.split('(').next().unwrap_or_default())).collect()
 }
 
-/// Whether the property is proved; a timeout counts as not proved.
-fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
+/// The property on the Verilog of `top` as gates, in the file `proof.aig`.
+fn to_gates(folder: &Path, top: &str, open_products: bool) {
     let cut = if open_products { "cutpoint t:$mul; " } else { "" };
     let own = replaced(top, &std::fs::read_to_string(folder.join("proof.v")).unwrap());
-    let to_gates = format!(
+    let script = format!(
         "read_verilog {top}.v; {own}read_verilog -formal -sv proof.v; hierarchy -top proof; {cut}\
          prep -flatten -nordff -top proof; setundef -undriven -anyseq; setattr -unset keep; delete -output; opt -full; \
          techmap; opt -fast; memory_map; simplemap; dffunmap; abc -g AND -fast; opt_clean; \
          write_aiger -I -B -zinit -no-startoffset proof.aig"
     );
-    yosys(folder, &to_gates).unwrap_or_else(|error| panic!("{error}"));
+    yosys(folder, &script).unwrap_or_else(|error| panic!("{error}"));
+}
+
+/// Whether the property in `proof.aig` is proved; panics if ABC can neither prove nor refute it.
+fn proved(folder: &Path) -> bool {
     // Signals that are always equal are merged first, which makes the problem smaller by a third.
     let text = abc(folder, "read_aiger proof.aig; fold; strash; scorr; dc2; scorr; write_aiger small.aig");
     let header = std::fs::read(folder.join("small.aig")).unwrap_or_default();
@@ -77,6 +81,12 @@ fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
             verdict(&abc(folder, &check)).unwrap_or_else(|text| panic!("neither proved nor refuted: {text}"))
         })
     })
+}
+
+/// Whether the property in `proof.aig` fails within some cycles after the start: most defects show there, without the
+/// simplification that a proof needs.
+fn fails_soon(folder: &Path) -> bool {
+    verdict(&abc(folder, "read_aiger proof.aig; fold; strash; bmc3 -F 40 -T 3")) == Ok(false)
 }
 
 /// Whether ABC proved (`true`) or refuted (`false`) what it was given; its output if neither.
@@ -105,14 +115,17 @@ impl Proof<'_> {
             text = text.replace(&format!("@{name}@"), value);
         }
         std::fs::write(folder.path().join("proof.v"), text.replace("@TOP@", top)).unwrap();
-        assert!(proved(folder.path(), top, self.open_products), "{} {:?}", self.property, self.given);
+        let gates = || to_gates(folder.path(), top, self.open_products);
+        gates();
+        assert!(proved(folder.path()), "{} {:?}", self.property, self.given);
 
         let verilog = format!("{top}.v");
         for defect in self.defects {
             let name = defect.to_string();
             let broken = self.hardware.generate(&[defect]).files.into_iter().find(|file| file.name == verilog);
             std::fs::write(folder.path().join(&verilog), broken.unwrap().text).unwrap();
-            let noticed = !proved(folder.path(), top, self.open_products);
+            gates();
+            let noticed = fails_soon(folder.path()) || !proved(folder.path());
             assert!(noticed, "{}: the defect in {name} went unnoticed", self.property);
         }
     }
