@@ -106,9 +106,10 @@ fn absent_stages_leave_no_logic() {
 #[test]
 fn a_scene_that_does_not_fit_is_told_what_does() {
     let text =
-        "name = \"wide\"\n[sensor]\nrows = 32\ncols = 32\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+        "name = \"wide\"\n[sensor]\nrows = 16\ncols = 16\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+                [hardware]\nboard = \"colorlight-i5\"\n";
     let error = Model::new(&Scene::parse(text, "wide").unwrap()).unwrap_err().to_string();
-    assert!(error.contains("there are 208; it fits with any one of:"), "{error}");
+    assert!(error.contains("there are 56; it fits with any one of:"), "{error}");
     // The suggested change works.
     let suggestion = error.lines().find_map(|line| line.trim().strip_prefix("partition.case = ")).unwrap();
     let (case, needs) = suggestion.split_once(": ").unwrap();

@@ -166,9 +166,10 @@ mod tests {
 
     #[test]
     fn a_refusal_is_told_in_full() {
-        // 32×32 taxels in one subarray do not fit; what makes them fit is told too.
+        // 16×16 taxels in one subarray do not fit a small device; what makes them fit is told too.
         let mut scene = Scene::builtin("sensor-3").unwrap();
-        (scene.sensor.rows, scene.sensor.cols) = (32, 32);
+        (scene.sensor.rows, scene.sensor.cols) = (16, 16);
+        scene.hardware.board = "colorlight-i5".into();
         let error = Model::new(&scene).unwrap_err().to_string();
         let told = in_one_line(&error);
         assert!(error.lines().count() > 1 && !told.contains('\n'), "{error}");
