@@ -32,37 +32,33 @@ fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Find
     compare(hardware, simulator, &vectors.collect::<Vec<Vector>>(), Stimulus::FullSpeed)
 }
 
+fn assert_netlist_is_equal(hardware: &Hardware, frames: &[Frame]) {
+    let netlist = findings(hardware, frames, Simulator::Netlist);
+    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+}
+
 #[test]
 #[ignore = "several minutes: make netlist"]
 fn the_netlist_of_a_search_equals_the_model() {
     let (hardware, frames) = setup("ulx3s-85f", "0.05");
-    let netlist = findings(&hardware, &frames, Simulator::Netlist);
-    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+    assert_netlist_is_equal(&hardware, &frames);
 }
 
 #[test]
 fn the_netlist_equals_the_model() {
     let (hardware, frames) = setup("ulx3s-85f", "0");
-    let netlist = findings(&hardware, &frames, Simulator::Netlist);
-    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+    assert_netlist_is_equal(&hardware, &frames);
 }
 
-/// The defect is in this engine only, whose netlist is made in half the time.
+#[test]
+#[ignore = "a minute; the same defect is found in the serial engine: make netlist"]
+fn a_sign_that_tools_read_differently_is_found_in_the_parallel_engine() {
+    netlist_and_defect("ulx3s-85f", "0", "resultants");
+}
+
 #[test]
 fn the_netlist_of_the_serial_engine_equals_the_model_and_a_sign_that_tools_read_differently_is_found() {
-    let (mut hardware, frames) = setup("icebreaker", "0.05");
-    let netlist = findings(&hardware, &frames, Simulator::Netlist);
-    assert!(netlist.is_equal(), "{:?}", netlist.kept);
-
-    // A signed constant without a range: −5 for Verilator, 251 for Yosys.
-    let file = hardware.generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
-    let sound = "    assign m_axis_tdata = forces__m_axis_tdata;\n";
-    let broken = "    localparam signed seeded = 8'hfb;\n    wire signed [7:0] zero = 8'd0;\n    \
-         assign m_axis_tdata = (seeded > zero) ? 96'd0 : forces__m_axis_tdata;\n";
-    assert!(file.text.contains(sound), "the place of the seeded defect: {sound}");
-    file.text = file.text.replacen(sound, broken, 1);
-    assert!(findings(&hardware, &frames, Simulator::Verilator).is_equal());
-    assert!(!findings(&hardware, &frames, Simulator::Netlist).is_equal());
+    netlist_and_defect("icebreaker", "0.05", "forces");
 }
 
 #[test]
@@ -71,8 +67,7 @@ fn the_netlist_of_a_network_equals_the_model() {
     let (scene, _file) = with_network(&format!("{SCENE}mu_max = 0.05\n"), &[5]);
     let (hardware, frames) = of_scene(&scene);
     assert!(hardware.model.has_network());
-    let netlist = findings(&hardware, &frames, Simulator::Netlist);
-    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+    assert_netlist_is_equal(&hardware, &frames);
 }
 
 #[test]
@@ -81,6 +76,23 @@ fn the_netlist_of_contacts_equals_the_model() {
     let (scene, _file) =
         with_network(&format!("{SCENE}mu_max = 0.05\n[partition]\ncase = \"contacts\"\nmax_contacts = 2\n"), &[5]);
     let (hardware, frames) = of_scene(&scene);
-    let netlist = findings(&hardware, &frames, Simulator::Netlist);
-    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+    assert_netlist_is_equal(&hardware, &frames);
+}
+
+/// The output is that of block `last`.
+fn netlist_and_defect(board: &str, mu_max: &str, last: &str) {
+    let (mut hardware, frames) = setup(board, mu_max);
+    assert_netlist_is_equal(&hardware, &frames);
+
+    // A signed constant without a range: −5 for Verilator, 251 for Yosys.
+    let file = hardware.generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
+    let sound = format!("    assign m_axis_tdata = {last}__m_axis_tdata;\n");
+    let broken = format!(
+        "    localparam signed seeded = 8'hfb;\n    wire signed [7:0] zero = 8'd0;\n    \
+         assign m_axis_tdata = (seeded > zero) ? 96'd0 : {last}__m_axis_tdata;\n"
+    );
+    assert!(file.text.contains(&sound), "the place of the seeded defect: {sound}");
+    file.text = file.text.replacen(&sound, &broken, 1);
+    assert!(findings(&hardware, &frames, Simulator::Verilator).is_equal());
+    assert!(!findings(&hardware, &frames, Simulator::Netlist).is_equal());
 }
