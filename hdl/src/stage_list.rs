@@ -27,7 +27,7 @@ macro_rules! engine {
         }
     ) => {
         $(#[$meta])*
-        #[derive(LogicBlock)]
+        #[derive(dermis_hdl_derive::Block)]
         pub struct $engine {
             /// Clock; registers change on its rising edge.
             pub clk: Signal<In, Clock>,

@@ -31,7 +31,7 @@ pub(crate) trait Signalled: Atom {
 
 impl<D: Direction> Signalled for Wire<D> {
     fn word(&self) -> Word {
-        self.val()
+        self.val().word()
     }
 }
 

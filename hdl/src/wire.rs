@@ -6,6 +6,7 @@
 //! is signed.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 use rust_hdl::prelude::*;
 
@@ -111,12 +112,77 @@ impl Word {
     }
 }
 
+/// What a wire holds: the limbs of a [`Word`], least significant first, without zeros at the end except for that of 0.
+///
+/// A simulation copies and compares the values of all wires in each of its rounds. Nearly all fit 64 bits, so that these
+/// are held in place, and the limbs of a longer one are shared between its copies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// At most 64 bits.
+    Short(u64),
+    /// More; the last limb is not 0.
+    Long(Arc<[u64]>),
+}
+
+impl Default for Value {
+    fn default() -> Self {
+        Value::Short(0)
+    }
+}
+
+impl From<u64> for Value {
+    fn from(value: u64) -> Self {
+        Value::Short(value)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(bit: bool) -> Self {
+        Value::Short(u64::from(bit))
+    }
+}
+
+impl From<Word> for Value {
+    fn from(word: Word) -> Self {
+        let mut value = Value::default();
+        value.set_limbs(word.limbs());
+        value
+    }
+}
+
+impl Value {
+    /// Limbs of 64 bits, least significant first; those that it lacks are zeros.
+    pub fn limbs(&self) -> &[u64] {
+        match self {
+            Value::Short(limb) => std::slice::from_ref(limb),
+            Value::Long(limbs) => limbs,
+        }
+    }
+
+    /// Takes limbs of 64 bits, least significant first; a value that has them already stays as it is.
+    pub fn set_limbs(&mut self, limbs: &[u64]) {
+        match limbs.iter().rposition(|&limb| limb != 0) {
+            None => *self = Value::Short(0),
+            Some(0) => *self = Value::Short(limbs[0]),
+            Some(top) if self.limbs() == &limbs[..=top] => {}
+            Some(top) => *self = Value::Long(limbs[..=top].into()),
+        }
+    }
+
+    /// The value as a word.
+    pub fn word(&self) -> Word {
+        let mut word = Word::default();
+        word.set_limbs(self.limbs());
+        word
+    }
+}
+
 /// A signal of direction `D` with a width known at run time.
 #[derive(Clone, Debug)]
 pub struct Wire<D: Direction> {
     /// The value after the next update.
-    pub next: Word,
-    value: Word,
+    pub next: Value,
+    value: Value,
     changed: bool,
     claimed: bool,
     id: usize,
@@ -132,8 +198,8 @@ impl<D: Direction> Wire<D> {
     pub fn new(bits: usize) -> Self {
         assert!((1..=MAX_BITS).contains(&bits), "a wire of {bits} bits");
         Wire {
-            next: Word::default(),
-            value: Word::default(),
+            next: Value::default(),
+            value: Value::default(),
             changed: false,
             claimed: false,
             id: rust_hdl::core::signal::get_signal_id(),
@@ -143,11 +209,11 @@ impl<D: Direction> Wire<D> {
     }
 
     /// The current value.
-    pub fn val(&self) -> Word {
-        self.value
+    pub fn val(&self) -> Value {
+        self.value.clone()
     }
 
-    /// The limbs of the current value, least significant first.
+    /// The limbs of the current value, as [`Value::limbs`].
     pub fn limbs(&self) -> &[u64] {
         self.value.limbs()
     }
@@ -169,11 +235,9 @@ impl<D: Direction> Block for Wire<D> {
     fn connect_all(&mut self) {}
 
     fn update_all(&mut self) {
-        // Only the limbs in use: the others are zeros.
-        let used = self.bits.div_ceil(64);
-        self.changed = self.value.0[..used] != self.next.0[..used];
+        self.changed = self.value != self.next;
         if self.changed {
-            self.value.0[..used].copy_from_slice(&self.next.0[..used]);
+            self.value = self.next.clone();
         }
     }
 
@@ -209,7 +273,8 @@ impl<D: Direction> Atom for Wire<D> {
 
     fn vcd(&self) -> VCDValue {
         // VCD is most significant bit first.
-        let bit = |at| if self.value.field(at, 1) == 1 { vcd::Value::V1 } else { vcd::Value::V0 };
+        let word = self.value.word();
+        let bit = |at| if word.field(at, 1) == 1 { vcd::Value::V1 } else { vcd::Value::V0 };
         VCDValue::Vector((0..self.bits).rev().map(bit).collect())
     }
 
@@ -219,7 +284,7 @@ impl<D: Direction> Atom for Wire<D> {
 
     fn verilog(&self) -> VerilogLiteral {
         // rust-hdl prints this value for constants only; a wire is never constant.
-        self.value.number().into()
+        self.limbs()[0].into()
     }
 
     fn constraints(&self) -> Vec<PinConstraint> {

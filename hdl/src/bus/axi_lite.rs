@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// One access at a time: address and data of a write are taken together; a read and a write that wait take turns. The answer
 /// comes two cycles later and stays until it is taken. A refused access is answered with SLVERR.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct AxiLite {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

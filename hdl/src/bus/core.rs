@@ -23,7 +23,7 @@ macro_rules! core {
         out [$($bit_out:ident),+], wide out [$($wire_out:ident: $out_bits:expr),+]
     ) => {
         /// An engine with streams of whole words and registers on a bus; all ports change on the rising edge of `aclk`.
-        #[derive(LogicBlock)]
+        #[derive(dermis_hdl_derive::Block)]
         pub struct $name {
             /// Clock of core and engine.
             pub aclk: Signal<In, Clock>,

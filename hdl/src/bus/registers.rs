@@ -13,7 +13,7 @@ use crate::wire::Wire;
 const BYTES: usize = REGISTER_BITS / 8;
 
 /// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Registers {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -15,7 +15,7 @@ pub const WORD_BYTES: usize = 4;
 /// cannot hold is clipped. With the last taxel the label of the frame is given away: its identifier and whether a code was
 /// clipped or a beat was incomplete. A `tlast` that comes early begins the count anew, as in the engine; the next frame is then
 /// the engine's next one too.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct StreamIn {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -21,7 +21,7 @@ pub const WIDTHS: [usize; 3] = [1, 2, 4];
 ///
 /// `tuser` has a bit for each word, high if it belongs to the beats behind the forces; above them a bit that is high in every
 /// beat of a spoiled frame. `tid` is the frame's identifier. The label of the frame must be there before its first beat.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct StreamOut {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

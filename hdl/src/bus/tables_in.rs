@@ -13,7 +13,7 @@ use crate::wire::Wire;
 /// ```
 /// A byte waits for the end of the frame under way; from an image's first byte to its last the next frame waits. Without
 /// writable tables the stream passes through.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct TablesIn {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// Classic single accesses of Wishbone B4 with addresses of words; the answer comes one cycle later, `wb_err` in the place of
 /// `wb_ack` where the access is refused.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Wishbone {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

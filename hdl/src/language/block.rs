@@ -36,7 +36,7 @@ impl<D: Direction> Port for Wire<D> {
     }
 
     fn read(&self, take: &mut dyn FnMut(&[u64])) {
-        take(&self.limbs()[..self.width().div_ceil(64)]);
+        take(self.limbs());
     }
 
     fn write(&mut self, value: &[u64]) {
@@ -126,13 +126,16 @@ impl Body {
         inputs: impl FnOnce(&mut dyn FnMut(usize, &dyn Port)),
         outputs: impl FnOnce(&mut dyn FnMut(usize, &mut dyn Port)),
     ) {
-        let Some(simulation) = &mut self.simulation else { return };
         if !(edge || changed || !self.started) {
             return;
         }
         self.started = true;
+        let Some(simulation) = &mut self.simulation else { return };
         let places = &self.inputs;
-        inputs(&mut |index, port| port.read(&mut |value| simulation.set(places[index].0, value)));
+        inputs(&mut |index, port| {
+            let (slot, limbs) = places[index];
+            port.read(&mut |value| simulation.set(slot, limbs, value));
+        });
         if edge {
             simulation.clock();
         }
@@ -172,8 +175,9 @@ impl Block for Body {
 
     fn update_all(&mut self) {}
 
+    /// Until its first update, which shows the outputs of the initial state.
     fn has_changed(&self) -> bool {
-        false
+        !self.started
     }
 
     fn accept(&self, _name: &str, _probe: &mut dyn Probe) {

@@ -8,7 +8,7 @@
 //!   (Rust loops and functions repeat)                     checked   +--> Verilog      the body of the block's module
 //!                                                                   +--> LUTs, flip-flops, memories
 //! ```
-//! A block is a rust-hdl `LogicBlock` whose ports are the struct's fields, with a field `kernel` of type [`Body`]; the
+//! A block is a rust-hdl `Block` whose ports are the struct's fields, with a field `kernel` of type [`Body`]; the
 //! macro [`kernel_block!`](crate::kernel_block) writes `update` and `connect`; [`Hierarchy`] prints the modules. No node holds text or a function.
 //!
 //! | checked when a kernel is built | error |

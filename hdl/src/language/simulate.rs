@@ -149,12 +149,12 @@ impl Simulation {
         Simulation { clocks, slots, memories, transitions, staged, writes, changed: true, program }
     }
 
-    /// Sets an input from its limbs; `signal` as from [`Simulation::slot_of`].
-    pub fn set(&mut self, slot: usize, value: &[u64]) {
-        let own = &mut self.slots[slot..][..value.len()];
-        if own != value {
-            own.copy_from_slice(value);
-            self.changed = true;
+    /// Sets an input of `limbs` limbs; `slot` as from [`Simulation::slot_of`]. Limbs that `value` lacks are zeros.
+    pub fn set(&mut self, slot: usize, limbs: usize, value: &[u64]) {
+        for (index, own) in self.slots[slot..][..limbs].iter_mut().enumerate() {
+            let limb = value.get(index).copied().unwrap_or(0);
+            self.changed |= *own != limb;
+            *own = limb;
         }
     }
 

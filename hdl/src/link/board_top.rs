@@ -13,7 +13,7 @@ use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::{Dff, RegisterSlice};
 use crate::scan::{ScanPins, WritableScanCore};
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
@@ -41,7 +41,7 @@ macro_rules! board_top {
         $(
             #[doc = concat!("| `", stringify!($row), "`, `adc_sclk`, `adc_cs_n`, `adc_mosi`, `", stringify!($miso), "` | pins of the scan |")]
         )?
-        #[derive(LogicBlock)]
+        #[derive(dermis_hdl_derive::Block)]
         pub struct $name {
             /// Clock of link and engine.
             pub clk: Signal<In, Clock>,
@@ -196,13 +196,13 @@ macro_rules! board_top {
                     pin.next = rest & 1 == 1;
                     rest >> 1
                 });
-                [$(&mut self.$miso)?].into_iter().for_each(|miso: &mut Wire<In>| miso.next = Word::from(rest));
+                [$(&mut self.$miso)?].into_iter().for_each(|miso: &mut Wire<In>| miso.next = rest.into());
                 self.clk.next = clock.into();
             }
 
             fn outputs(&self) -> BoardOutputs {
                 let scan: &[ScanPins] = &[$(ScanPins {
-                    row: self.$row.val().number(),
+                    row: self.$row.val().word().number(),
                     sclk: self.adc_sclk.val(),
                     cs_n: self.adc_cs_n.val(),
                     mosi: self.adc_mosi.val(),

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 /// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory and adder
 /// in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is not valid
 /// meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct CounterRam {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -20,7 +20,7 @@ pub const CYCLES: u32 = 4;
 /// `load` XORs a byte into the low end of the register; the next four cycles process it. To send the CRC, the
 /// register's own low byte is loaded for each byte sent: the XOR clears it, which leaves only the shift to the next
 /// byte.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Crc {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

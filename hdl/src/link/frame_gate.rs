@@ -11,7 +11,7 @@ use crate::wire::Wire;
 ///
 /// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the array's rows
 /// driven meanwhile, and be old when they are sent.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct FrameGate {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -21,7 +21,7 @@ use crate::wire::Wire;
 /// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses a code
 /// or byte because of that, or starts while the frame or image before is still held, is dropped too, and counts as an
 /// `overrun` if its packet is good.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct FrameIngress {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

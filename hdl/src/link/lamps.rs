@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 
 /// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period after
 /// their event.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Lamps {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

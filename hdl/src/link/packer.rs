@@ -13,7 +13,7 @@ use crate::wire::Wire;
 /// each byte themselves, so that no word register is needed here: `index` is the byte of the word that is needed, and
 /// `taken` says that the word has been sent. An offered byte stays until it is accepted; the next one waits until the
 /// CRC has processed it.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Packer {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -16,7 +16,7 @@ use crate::wire::Wire;
 /// ```
 /// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
 /// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct PacketLink {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 ///
 /// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header is complete
 /// and correct, then `payload` with each byte, in the same cycle.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Parser {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 
 /// `rst` is high for seventeen cycles after configuration, and while the button is held. Relies on the register values
 /// after configuration.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct PowerOn {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -19,7 +19,7 @@ use crate::wire::Wire;
 /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
 /// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a payload, and
 /// the request is dropped while the queue is full.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Requests {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is needed: for
 /// Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times,
 /// once per cycle; likewise for rows.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Resultants {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

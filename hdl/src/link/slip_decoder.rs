@@ -12,7 +12,7 @@ const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 
 
 /// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the next
 /// END.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SlipDecoder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

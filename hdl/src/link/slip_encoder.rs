@@ -11,7 +11,7 @@ use crate::wire::Wire;
 ///
 /// With many lanes the block has two extra registers, because the link's pins may be far from the packer: whether a
 /// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted it.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SlipEncoder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five cycles
 /// after it asked for it.
 /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Sources {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -24,7 +24,7 @@ use crate::wire::Wire;
 /// bit. The first byte of a transaction is IDLE.
 ///
 /// While `spi_cs_n` is high, edges of `spi_sclk` have no effect: they are for another slave.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SpiSlave {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
@@ -275,10 +275,10 @@ mod tests {
             let block = &mut self.block;
             if !self.clock {
                 if block.valid.val() {
-                    self.received.push(block.data.val().number() as u8);
+                    self.received.push(block.data.val().word().number() as u8);
                 }
                 block.send_valid.next = !self.sending.is_empty();
-                block.send_data.next = Word::from(u64::from(self.sending.first().copied().unwrap_or(0)));
+                block.send_data.next = u64::from(self.sending.first().copied().unwrap_or(0)).into();
                 self.settle();
                 if !self.sending.is_empty() && self.block.send_ready.val() {
                     self.sending.remove(0);

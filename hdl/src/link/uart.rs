@@ -7,7 +7,7 @@ use super::{UartReceiver, UartTransmitter};
 use crate::wire::Wire;
 
 /// [`UartReceiver`] and [`UartTransmitter`] side by side.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Uart {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// without stop bit is `broken`; the next one starts only after the line has been idle again.
 ///
 /// `valid` and `broken` are pulses of one cycle; `data` is stable until the first data bit of the next byte.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct UartReceiver {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -8,7 +8,7 @@ use crate::language::{concat, Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// Start bit, eight data bits, stop bit. A byte is accepted when `valid` and `ready` are both high.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct UartTransmitter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -16,7 +16,7 @@ use crate::wire::Wire;
 /// that name another channel are those of [`dermis_golden::fixed::stages::scan`]. The codes of one channel of all converters
 /// leave one after the other, beginning three cycles after `done`; the frames before the next channel's last must leave
 /// them time for it: `clear`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScanCapture {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 ///
 /// Each scan has a slot of its own; one that is broken off leaves its slot to the next. There are slots for those in the
 /// engine, for one that is taken, and for one more, whose scan has begun.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScanCodes {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

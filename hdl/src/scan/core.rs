@@ -24,7 +24,7 @@ const BEAT: usize = 96;
 macro_rules! scan_core {
     ($name:ident, $engine:ty, $source:ident, $output:ident, [$($tables:ident, $codes:ident, $unused:ident)?]) => {
         /// An engine that reads the converters of its array by itself; ports as of the fields.
-        #[derive(LogicBlock)]
+        #[derive(dermis_hdl_derive::Block)]
         pub struct $name {
             /// Clock; registers change on its rising edge.
             pub clk: Signal<In, Clock>,
@@ -192,9 +192,10 @@ macro_rules! scan_core {
             fn drive(&mut self, inputs: &ScanInputs, clock: bool) {
                 self.rst.next = inputs.rst;
                 self.enable.next = inputs.enable;
-                self.adc_miso.next = Word::from(inputs.miso);
+                self.adc_miso.next = inputs.miso.into();
                 $(
-                    self.s_axis_tdata.next = Word::of_fields(&[inputs.s_data.into()], self.$tables.s_axis_tdata.width());
+                    let bits = self.$tables.s_axis_tdata.width();
+                    self.s_axis_tdata.next = Word::of_fields(&[inputs.s_data.into()], bits).into();
                     self.s_axis_tvalid.next = inputs.s_valid;
                     self.s_axis_tlast.next = inputs.s_last;
                 )?
@@ -203,7 +204,7 @@ macro_rules! scan_core {
             }
 
             fn pins(&self) -> ScanOutputs {
-                let (data, beat) = (self.m_axis_tdata.val(), self.$source.m_axis_tdata.val());
+                let [data, beat] = [&self.m_axis_tdata, &self.$source.m_axis_tdata].map(|wire| wire.val().word());
                 let taken = self.$source.m_axis_tvalid.val() & self.engine.s_axis_tready.val();
                 let beat = Beat {
                     data: beat.signed(0, self.$source.m_axis_tdata.width()) as i32,
@@ -211,7 +212,7 @@ macro_rules! scan_core {
                 };
                 ScanOutputs {
                     pins: ScanPins {
-                        row: self.row.val().number(),
+                        row: self.row.val().word().number(),
                         sclk: self.adc_sclk.val(),
                         cs_n: self.adc_cs_n.val(),
                         mosi: self.adc_mosi.val(),

@@ -17,7 +17,7 @@ use crate::wire::Wire;
 ///
 /// `take` and `done` are one cycle after the edge of the pin: the input registers of `scan_capture` have the sample then.
 /// What belongs to `done` is held until the next.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScanSequencer {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::wire::Wire;
 
 /// The engine's beats pass through; in the first beat of every status the flags word gets the marks of its scan, which
 /// wait in a queue while the engine computes. Frames leave in the order in which they came.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScanStatus {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -9,7 +9,7 @@ use crate::wire::Wire;
 /// The engine takes an image between frames only, and a scan takes much longer than a frame does otherwise: an image does not
 /// wait for the end of a scan. It breaks the scan off: the frame ends early, at which the engine drops it, and the rest of
 /// the scan's codes are taken and dropped, as those of scans that begin while the image comes. The sequencer goes on.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScanTables {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

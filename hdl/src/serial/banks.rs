@@ -12,7 +12,7 @@ use crate::wire::Wire;
 
 /// `odd` selects the bank that is read; writes go to the other one. An address is `{region, polynomial, coefficient}`,
 /// of 1, n and 4 bits.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Banks {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

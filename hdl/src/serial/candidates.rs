@@ -19,7 +19,7 @@ use crate::language::{concat, Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// Schedule in the module docs; `value` and `index` are registered, one cycle after the sums.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Candidates {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// `halved` is ⌊word / 2^halvings⌋, one cycle later.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct CoefficientShift {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

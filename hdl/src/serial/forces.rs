@@ -32,7 +32,7 @@ const AGAIN_PHASE: u64 = FIRST_BEAT - BEAT;
 const CYCLES: usize = 20;
 
 /// Values in, beats out; timing in the module docs.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Forces {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 /// that all four are complete when c0 has arrived. They leave in the next four cycles, each before its register
 /// restarts. `element` counts the cycles of a polynomial, `top` is its degree; coefficients above the degree are
 /// ignored, and the outputs in their place are undefined.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Horner {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -28,7 +28,7 @@ const REPLAY: u64 = 4;
 const OTHERS: u64 = 5;
 
 /// The sequencer and its counters; steps in the module docs.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct PassSequencer {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

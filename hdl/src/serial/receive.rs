@@ -16,7 +16,7 @@ use crate::wire::Wire;
 /// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing as
 /// in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing` until
 /// `reported`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Receive {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

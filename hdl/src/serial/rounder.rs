@@ -16,7 +16,7 @@ const WIDE: usize = FORCE_BITS as usize;
 /// ```
 /// Latency four cycles. `wide` saturates to a force word, otherwise to `narrow` bits; it must not change while words
 /// are in the pipeline.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Rounder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

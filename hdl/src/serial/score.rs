@@ -22,7 +22,7 @@ const LOG_BITS: usize = PLACE_BITS + LOG_FRACTION as usize;
 
 /// Function in the module docs. A total is written to its memory six cycles after its value arrived; the values of a
 /// candidate are 16 cycles apart.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Score {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

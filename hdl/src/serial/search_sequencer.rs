@@ -37,7 +37,7 @@ const LEAVES: u64 = ALONG_Y + 4;
 const BACK: u64 = LEAVES + 1;
 
 /// Addresses of the sweeps and the best candidate; timing in the module docs.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SearchSequencer {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

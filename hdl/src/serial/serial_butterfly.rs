@@ -13,7 +13,7 @@ use crate::wire::Wire;
 /// ```
 /// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::symmetry::parity::hadamard). The first
 /// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SerialButterfly {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 
 /// `place` follows `index` by one cycle: with `back` the place (4·quad + lane) of a row-major taxel, otherwise the
 /// row-major taxel at a place.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct TaxelReorder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

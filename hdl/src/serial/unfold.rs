@@ -13,7 +13,7 @@ use crate::wire::Wire;
 
 /// Words of v_ij, one vector after the other, to words of the polynomial memory. Polynomial 0 is the sum, polynomial 1
 /// + p the taxel at place p; coefficient v_ij of a polynomial is at 4j + i.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Unfold {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

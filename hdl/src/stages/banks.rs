@@ -19,7 +19,7 @@ use crate::primitives::expression_by_case;
 /// The scene decides how many buffers there are. `kernel_block!` binds the fields that it names, and a loop in `#[hdl_gen]`
 /// has a constant number of turns over an array of constant length: neither reaches the ports of a `Vec` of blocks. So
 /// `pins` lists them, and `update` and `connect` here do over that list what the macro writes over names.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Banks {
     ports: ReceivePorts,
     banks: Vec<Receive>,

@@ -16,7 +16,7 @@ use crate::wire::Wire;
 
 /// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
 /// `free`, and keeps its value until the next choice.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Choose {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

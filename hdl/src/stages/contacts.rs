@@ -27,7 +27,7 @@ use crate::wire::Wire;
 /// ports of the frame buffer and of the labels are those of the stage that runs.
 ///
 /// Without contacts pulses pass on wires, and what only contacts need is constant 0.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Contacts {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

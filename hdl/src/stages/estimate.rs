@@ -23,7 +23,7 @@ use crate::wire::Wire;
 /// layer. One more quad, of both positions and two zeros, says that μ is known; no product reads it.
 ///
 /// Without a network all outputs are constant 0.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Estimate {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

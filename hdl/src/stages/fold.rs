@@ -13,7 +13,7 @@ use crate::wire::Wire;
 
 /// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
 /// input memory.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Fold {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

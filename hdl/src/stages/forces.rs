@@ -11,7 +11,7 @@ use crate::primitives::{
 use crate::wire::Wire;
 
 /// Values in by step, a quad or a part of it; beats out in the order in which `send` requests them.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Forces {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -18,7 +18,7 @@ use crate::wire::Wire;
 /// labels --> lane --> beat -----^
 /// ```
 /// Without contacts, and where a record of each takes the place of the forces, the stream passes on wires.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct LabelBeats {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

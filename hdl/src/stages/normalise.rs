@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
 /// then registered and shifted, one per cycle: the frame buffer may lie far from the shifter.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Normalise {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

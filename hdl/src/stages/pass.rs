@@ -16,7 +16,7 @@ use crate::primitives::{
 use crate::wire::Wire;
 
 /// Words of the input memory and finished v_ij in, accumulators of whole rows out.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Pass {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::primitives::{Average, Calibrate, Load, THRESHOLD_BITS, VERSION_WORD_B
 use crate::wire::Wire;
 
 /// Codes in, words of the frame buffer out.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Prepare {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -21,7 +21,7 @@ use crate::wire::Wire;
 /// ```
 /// `full` is high from two cycles after the frame's last beat until `free`; the gathered values of a subarray are valid from
 /// two cycles after its last beat.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Receive {
     ports: ReceivePorts,
     scan: Scan,

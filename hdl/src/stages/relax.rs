@@ -12,7 +12,7 @@ use crate::primitives::{count_bits, count_saturations, operand_of, saturated, sa
 use crate::wire::Wire;
 
 /// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Relax {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

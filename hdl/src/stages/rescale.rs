@@ -16,7 +16,7 @@ use crate::primitives::{
 use crate::wire::Wire;
 
 /// Rows of accumulators in; words three cycles after they enter the rescaler, operands four.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Rescale {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -19,7 +19,7 @@ use crate::wire::Wire;
 /// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
 ///
 /// Where each contact has a μ of its own, a force comes with the label of its taxel, and the taxels of a label are counted.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Resultants {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -20,7 +20,7 @@ use crate::primitives::{
 use crate::wire::Wire;
 
 /// Polynomials in by coefficient, p(μ*) out by step.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Search {
     ports: SearchPorts,
     sequencer: SearchSequencer,

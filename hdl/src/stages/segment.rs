@@ -44,7 +44,7 @@ mod labels;
 mod walk;
 
 /// Segments the quads that were filled in; ports below, steps in the module docs.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Segment {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff
 use crate::wire::Wire;
 
 /// From the first subarray's values on, one beat is requested in each cycle with `room`: all taxels, then the status beats.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Send {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

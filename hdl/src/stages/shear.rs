@@ -19,7 +19,7 @@ use crate::wire::Wire;
 
 /// Operands of p in, in the order of the quads; after `start`, operands of the products with Ax, then with Ay, the first
 /// [`LATENCY`] cycles later. Without contacts all outputs are constant 0.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Shear {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

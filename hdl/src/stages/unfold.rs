@@ -8,7 +8,7 @@ use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, Trans
 use crate::wire::Wire;
 
 /// Quads of v_ij in, in order; two cycles later four taxels with coefficient index and quad address.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Unfold {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -14,7 +14,7 @@ use crate::ports::has_ports;
 
 /// The `fill_quad`s of the last vector leave as `values` in the same cycle; `settled`, `values_begin` and `done` are `start` one cycle later.
 /// The inputs that only a search needs are unused; the outputs that describe its result are constant 0.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Unsearched {
     ports: SearchPorts,
     kernel: Body,

@@ -28,7 +28,7 @@ use crate::wire::{Wire, Word};
 /// subarray.
 ///
 /// Without contacts all outputs are constant 0.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Window {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::kernel_block;
 use crate::language::{Body, Builder};
 
 /// The contrary of a bit.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 struct Inverter {
     a: Signal<In, Bit>,
     b: Signal<Out, Bit>,
@@ -25,7 +25,7 @@ impl Default for Inverter {
 }
 
 /// Two inverters, one behind the other.
-#[derive(LogicBlock, Default)]
+#[derive(dermis_hdl_derive::Block, Default)]
 struct Chain {
     a: Signal<In, Bit>,
     b: Signal<Out, Bit>,
@@ -43,7 +43,7 @@ impl Logic for Chain {
 }
 
 /// Two inverters in a ring while `a` is high.
-#[derive(LogicBlock, Default)]
+#[derive(dermis_hdl_derive::Block, Default)]
 struct Ring {
     a: Signal<In, Bit>,
     b: Signal<Out, Bit>,
@@ -61,7 +61,7 @@ impl Logic for Ring {
 }
 
 /// An instance with a name that tools refuse.
-#[derive(LogicBlock, Default)]
+#[derive(dermis_hdl_derive::Block, Default)]
 struct Named {
     a: Signal<In, Bit>,
     b: Signal<Out, Bit>,

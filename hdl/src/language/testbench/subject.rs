@@ -62,7 +62,7 @@ impl<'a> From<&'a Kernel> for Subject<'a> {
         let (read, driven) = (places(&inputs), places(&outputs));
         let cycle = move |words: &[Word]| {
             for (word, &(slot, bits)) in words.iter().zip(&read) {
-                simulation.set(slot, &word.limbs()[..bits.div_ceil(64)]);
+                simulation.set(slot, bits.div_ceil(64), word.limbs());
             }
             simulation.show();
             let outputs =

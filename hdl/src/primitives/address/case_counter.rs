@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// As [`Counter`](super::counter::Counter), with the limit of case `which`. When `which` changes, the count must be below the
 /// new limit, or be cleared before it is enabled again.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct CaseCounter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

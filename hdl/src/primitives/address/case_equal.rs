@@ -9,7 +9,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// Tells whether a count is that of the case; combinational.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct CaseEqual {
     /// Index of the case; valid with `value`.
     pub which: Wire<In>,

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// ```
 /// `enable` steps at the clock edge, from `limit − 1` back to 0; `clear` has priority. `last` is high while the value
 /// is `limit − 1`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Counter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

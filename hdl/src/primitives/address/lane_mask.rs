@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
 /// line of an odd row or column count only one does. Where a quad takes several steps, the address is
 /// `{quad, step}`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct LaneMask {
     /// Index of the case; valid with `address`.
     pub which: Wire<In>,

@@ -16,7 +16,7 @@ use crate::wire::Wire;
 /// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
 /// count is written to several lanes. A memory word holds the four lanes of a quad or, where it holds fewer, the lanes of a
 /// quad follow one another.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct QuadAddress {
     /// Index of the case; valid with `row`.
     pub which: Wire<In>,

@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// Visits the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
 /// combinational from the count.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Scan {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

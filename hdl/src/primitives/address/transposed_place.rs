@@ -10,7 +10,7 @@ use crate::wire::Wire;
 
 /// Address and taxels of a quad; rows and columns are exchanged for the v_ij that were computed transposed.
 /// Combinational.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct TransposedPlace {
     /// Index of the v_ij; valid with `address` and `quad`.
     pub index: Wire<In>,

@@ -7,7 +7,7 @@ use crate::language::{concat, Body, Builder, Expr, Kernel};
 use crate::wire::Wire;
 
 /// Four signed fields in, their Hadamard transform one cycle later: four signed sums, two bits wider.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Butterfly {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

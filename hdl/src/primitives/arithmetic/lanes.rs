@@ -29,7 +29,7 @@ const M: usize = MULTIPLIER_BITS as usize;
 ///
 /// Where low limbs are in a memory of their own, both memories are read and their words combined; the other one then has
 /// a word of zeros.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Lanes {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

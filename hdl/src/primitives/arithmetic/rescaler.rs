@@ -14,7 +14,7 @@ use crate::wire::Wire;
 ///
 /// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
 /// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Rescaler {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -8,7 +8,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// Butterfly in two steps, then v_ij / 4^(i+j), rounded half up: taxels three cycles after their parities.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Unfolder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel, Type};
 
 /// Where frames begin whole, all outputs follow from `full` and `begins`, and there is no register.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Arrival {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

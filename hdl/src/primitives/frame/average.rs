@@ -20,7 +20,7 @@ use crate::wire::Wire;
 /// k = 0 the stream passes through. Module `sliding_mean` has the kernel of a sliding mean.
 ///
 /// Latency two cycles, of a sliding mean three; all registers advance together while the output is free.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Average {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -15,7 +15,7 @@ use crate::wire::Wire;
 /// ```
 /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
 /// table, where the stream passes through. The taxel count restarts at `tlast`, as in `receive`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Calibrate {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

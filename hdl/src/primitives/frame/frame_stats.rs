@@ -10,7 +10,7 @@ use crate::wire::Wire;
 
 /// For each subarray: the OR of the magnitudes of its accepted codes, and whether any code was above the noise floor or
 /// below its negative. `select` chooses the subarray whose values are on the outputs.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct FrameStats {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

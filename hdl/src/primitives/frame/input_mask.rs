@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// Counts the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead or, in a unipolar array, the word
 /// negative. Combinational from `word` to `kept`: the comparison with the list of dead taxels is registered a cycle ahead.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct InputMask {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

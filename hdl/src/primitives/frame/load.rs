@@ -27,7 +27,7 @@ use crate::wire::Wire;
 /// and used in the next, but for a reset.
 /// From the first written word to the last byte `restart` is high. What is in the tables, whether they are whole and their
 /// version stand in memories, which a reset leaves and the bitstream initialises.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Load {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

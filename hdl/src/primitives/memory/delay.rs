@@ -8,7 +8,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// A word delayed by `depth` cycles, with 0 on wires. Data, therefore without reset.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Delay {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
@@ -43,7 +43,7 @@ fn kernel(bits: usize, depth: usize) -> Kernel {
 }
 
 /// A control bit delayed by `depth` cycles; reset clears the whole shift register.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct BitDelay {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

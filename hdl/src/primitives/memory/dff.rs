@@ -6,7 +6,7 @@ use crate::kernel_block;
 use crate::language::{Body, Builder, Type};
 
 /// One bit, one cycle later; 0 after configuration.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Dff {
     /// Clock; the register changes on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// `kept` is the value of `word` at the last clock edge at which `keep` was high.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct EnableRegister {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 /// The read registers change only while `read` is high. The content is undefined until written, and so is what is read
 /// in the cycle that writes the word: then block RAM needs no logic that defines it. In simulation such a read returns
 /// the complement of the old content, so that using it would show as an error.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Ram {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
@@ -177,14 +177,14 @@ mod tests {
         ram.connect_all();
         // A clock edge with this word written to `to`, read from `from` if `read`.
         let mut edge = |word: u64, to: u64, from: u64, read: bool| {
-            ram.write.next = Word::from(1);
+            ram.write.next = 1.into();
             (ram.write_address.next, ram.write_data.next) = (to.into(), word.into());
             (ram.read_address.next, ram.read.next) = (from.into(), read);
             for level in [false, true] {
                 ram.clk.next = level.into();
                 assert!(settles(&mut ram));
             }
-            ram.read_data.val().number()
+            ram.read_data.val().word().number()
         };
         edge(0x12, 1, 0, true);
         assert_eq!(edge(0x34, 1, 1, true), 0xed);

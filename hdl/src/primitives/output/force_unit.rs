@@ -33,7 +33,7 @@ use crate::wire::Wire;
 /// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for each from 1 on,
 /// and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact. Where a record of each contact is sent,
 /// the label is above the force.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ForceUnit {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

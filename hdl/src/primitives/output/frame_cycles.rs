@@ -10,7 +10,7 @@ use crate::wire::Wire;
 /// and goes on there, so that the next frame can begin. Cycles in which a frame waits for the one before it are not counted.
 ///
 /// All inputs take effect `COUNT_DELAY` cycles later: the first beat of the frame before has been sent by then.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct FrameCycles {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// Counts the subarrays of a frame whose values have begun; `open` where `part` is one of them, combinational from `part`.
 /// The values are written in an order and at a rate in which each is there when `send` requests it row-major, from then on.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct PartsBegun {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -9,7 +9,7 @@ use crate::wire::Wire;
 
 /// During the status, beat codes 1 to 3 and the status counter's subarray; otherwise code 0 and the scanned subarray;
 /// combinational. Where each contact has a μ of its own, the subarray of a status is the label of a contact, from 1 on.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct StatusCode {
     /// The status is being requested.
     pub status: Signal<In, Bit>,

@@ -11,7 +11,7 @@ use crate::primitives::search::sweep::position_bits;
 use crate::wire::Wire;
 
 /// From the search, from the network, or from `contacts`; combinational.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct StatusSource {
     /// The result of a subarray is there.
     pub settled: Signal<In, Bit>,

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// a memory. Until `clear` is followed by the `last` row of the low limbs, rows pass unchanged.
 ///
 /// Where neither factor of v_00 has a low limb, all rows pass unchanged and all are `complete`.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct LimbSum {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

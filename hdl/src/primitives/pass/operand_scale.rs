@@ -12,7 +12,7 @@ use crate::wire::Wire;
 
 /// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
 /// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the operands pass on wires.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct OperandScale {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::primitives::pass::pass_program::SOURCE_BITS;
 use crate::wire::Wire;
 
 /// Words of the input memory and of a v_ij in, four multiplier operands out one cycle later.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct OperandSelect {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

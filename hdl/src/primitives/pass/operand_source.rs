@@ -18,7 +18,7 @@ use crate::wire::Wire;
 /// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
 ///
 /// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct OperandSource {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::wire::Wire;
 
 /// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
 /// later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`, begun.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct OperandWriter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

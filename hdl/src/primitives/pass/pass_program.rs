@@ -88,7 +88,7 @@ pub fn longest(model: &Model) -> usize {
 ///
 /// The current instruction is in a register. The table is always read at the next instruction, because `advance`
 /// settles late in the cycle.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct PassProgram {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -10,7 +10,7 @@ use crate::primitives::arithmetic::leading_one::by_leading_one;
 use crate::wire::Wire;
 
 /// ORs the magnitudes of the raw quads; `shift` is valid three cycles after the last of them.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct RawLength {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

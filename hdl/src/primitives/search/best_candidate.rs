@@ -15,7 +15,7 @@ use crate::wire::Wire;
 ///
 /// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, `LATENCY` cycles later.
 /// `begin_frame` clears the result for a new search, `halve` doubles the position for the next level.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct BestCandidate {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k, as
 /// wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle: their
 /// combination over y. 21 adders per lane at degree 3.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Candidates {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

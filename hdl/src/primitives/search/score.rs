@@ -12,7 +12,7 @@ use crate::wire::Wire;
 ///
 /// One cycle each: magnitude; addition of ε Σp (0 for Σp < 0: such a candidate is not eligible); first half of the
 /// logarithm; second half and table; sum of the counted lanes; accumulation.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Score {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -16,7 +16,7 @@ use crate::wire::Wire;
 ///
 /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
 /// nine cycles after `start`, until those of the next sweep.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct ScoreBias {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

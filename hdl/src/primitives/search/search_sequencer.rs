@@ -20,7 +20,7 @@ use crate::wire::Wire;
 /// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
 /// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `compared` with
 /// `improved` makes the buffer of a coarse sweep the best.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct SearchSequencer {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

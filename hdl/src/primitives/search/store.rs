@@ -27,7 +27,7 @@ use crate::wire::Wire;
 /// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
 /// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
 /// old content, so that using it would show as an error.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Store {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
@@ -252,16 +252,16 @@ mod tests {
 
     /// Writes `data` to quad 1 of buffer 0 and reads quad `at`, `late` cycles after `write`.
     fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
-        store.write_data.next = Word::from(data);
-        store.write_address.next = Word::from(1);
+        store.write_data.next = data.into();
+        store.write_address.next = 1.into();
         store.begins.next = true;
         for cycle in 0..=late + LATENCY {
             store.write.next = cycle == 1;
             // Reads another quad in all cycles but the tested one.
-            store.next_base.next = Word::from(if cycle == late { at } else { 2 });
+            store.next_base.next = if cycle == late { at.into() } else { 2.into() };
             clock(store);
         }
-        store.read_data.val().field(0, 4 * BITS)
+        store.read_data.val().word().field(0, 4 * BITS)
     }
 
     #[test]

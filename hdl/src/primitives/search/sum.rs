@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
 /// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
 /// `write` replaces a buffer's sum by the `write_data` of the next cycle.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Sum {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
 /// two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms, one of
 /// which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Taylor {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel};
 use crate::wire::Wire;
 
 /// The sample on all four lanes, and the mask gated by `enable`; combinational.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct LaneBroadcast {
     /// A sample of `bits` bits; valid with `enable`.
     pub word: Wire<In>,

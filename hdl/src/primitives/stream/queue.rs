@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// ```
 /// `reserve` is allowed only with `room`; each is followed by one `write` at any later time, in order. A place is free
 /// again one cycle after its beat was accepted.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Queue {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 /// ```
 /// Data and handshake pass through registers in both directions, which lets sender and receiver be placed far apart, at
 /// the cost of one beat every two cycles. If not wanted, the stream passes through on wires.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct RegisterSlice {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,

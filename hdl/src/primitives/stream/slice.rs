@@ -7,7 +7,7 @@ use crate::language::{Body, Builder};
 use crate::wire::Wire;
 
 /// The least significant bits of a wider word; combinational.
-#[derive(LogicBlock)]
+#[derive(dermis_hdl_derive::Block)]
 pub struct Slice {
     /// The word of which the low bits are shown; taken in every cycle.
     pub word: Wire<In>,
