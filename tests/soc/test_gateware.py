@@ -10,8 +10,7 @@ import sys
 import pytest
 from dermis_litex import CoreError, route
 from dermis_litex.gateware import BOARDS, LEAST_HZ, write
-from test_cores import BUILD, HERE, generate
-from test_litex import NIGHTLY
+from test_cores import BUILD, HERE, NIGHTLY, generate
 
 PACKAGE = HERE.parent.parent / "python/litex"
 SCENE = HERE / "still.toml"

@@ -1,6 +1,5 @@
 """A core in a LiteX SoC with a VexRiscv, in LiteX's simulation: the firmware sends frames and prints what comes back."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -9,9 +8,8 @@ from collections import defaultdict
 import pytest
 from dermis_litex import CoreError, DermisDMA
 from dermis_litex.core import read_manifest
-from test_cores import BUILD, HERE, SCENE, generate
+from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
 
-NIGHTLY = pytest.mark.skipif("DERMIS_NIGHTLY" not in os.environ, reason="minutes; make nightly runs it")
 FRAMING, CLIPPED = 4, 1
 
 

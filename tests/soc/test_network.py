@@ -15,8 +15,7 @@ from gateware import Network, verilate
 from scapy.layers.inet import ICMP, IP, UDP
 from scapy.layers.l2 import ARP, Ether
 from scapy.packet import Raw
-from test_cores import BUILD, HERE, SCENE, generate
-from test_litex import NIGHTLY
+from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
 from test_udp import Received
 
 CYCLES = 1_000_000 if "DERMIS_NIGHTLY" in os.environ else 20_000

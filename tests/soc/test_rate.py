@@ -1,7 +1,7 @@
 """48x48 taxels behind LiteEth under Verilator, a frame every millisecond; with whole packets, which test_network.py shortens."""
 
 from dermis_litex.packets import Results, frame_packets
-from test_litex import NIGHTLY
+from test_cores import NIGHTLY
 from test_network import built, datagram, on_the_wire, payload_of
 
 # Of 125 MHz in a millisecond; what separates two frames of Ethernet.

@@ -4,7 +4,7 @@ import os
 import subprocess
 
 import pytest
-from test_cores import BUILD, DERMIS, HERE, environment, generate, icarus
+from test_cores import BUILD, DERMIS, HERE, NIGHTLY, environment, generate, icarus
 
 VERSION = 7
 HARDWARE, SPECIMEN = HERE / "written.toml", HERE / "specimen.toml"
@@ -49,7 +49,12 @@ def test_tables(files, bus):
     [
         # A damaged image counts as whole; bytes do not wait for the end of a frame.
         ("crc", "wire wrong_crc = ends && ", "wire wrong_crc = 1'b0 && "),
-        ("frame", "wire is_byte = in_image || octet_valid && !in_frame && !held", "wire is_byte = in_image || octet_valid"),
+        pytest.param(
+            "frame",
+            "wire is_byte = in_image || octet_valid && !in_frame && !held",
+            "wire is_byte = in_image || octet_valid",
+            marks=NIGHTLY,
+        ),
     ],
 )
 def test_a_defect_of_tables_is_found(files, name, right, wrong):

@@ -27,8 +27,7 @@ from dermis_litex.udp import DermisUDP, FrameReceiver, Requesters, ResultSender,
 from gateware import Packets, Port, write_verilog
 from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
-from test_cores import BUILD, environment, generate, icarus
-from test_litex import NIGHTLY
+from test_cores import BUILD, NIGHTLY, environment, generate, icarus
 
 CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
 
@@ -148,7 +147,7 @@ def traffic(draw, taxels, code_bytes):
 
 @pytest.mark.parametrize(
     "taxels, code_bits, code_bytes",
-    [(12, 20, 2), (15, 14, 2), pytest.param(730, 20, 2, marks=NIGHTLY), (7, 20, 4)],
+    [(12, 20, 2), (7, 20, 4), *(pytest.param(taxels, bits, 2, marks=NIGHTLY) for taxels, bits in [(15, 14), (730, 20)])],
 )
 def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes):
     only_whole_frames_leave(taxels, code_bits, code_bytes)

@@ -74,11 +74,21 @@ pub(crate) fn difference<'a>(
 ) -> Option<String> {
     let mut subject = subject.into();
     let runs = [("simulation", subject.simulated(stimulus)), ("verilator", verilated(&subject, stimulus))];
+    first_difference(&subject, &runs, stimulus, reference)
+}
+
+/// The first difference between `reference` and the outputs of one of `runs`, each with its name.
+fn first_difference(
+    subject: &Subject,
+    runs: &[(&str, Vec<Vec<Word>>)],
+    stimulus: &[Vec<Word>],
+    reference: &mut dyn Reference,
+) -> Option<String> {
     let mut compared = 0;
     for (cycle, inputs) in stimulus.iter().enumerate() {
         let expected = reference.outputs(inputs);
         assert_eq!(expected.len(), subject.outputs.len(), "a value for every output");
-        for (name, run) in &runs {
+        for (name, run) in runs {
             for ((output, _), (value, expected)) in subject.outputs.iter().zip(run[cycle].iter().zip(&expected)) {
                 let Some(expected) = expected else { continue };
                 compared += 1;
@@ -99,7 +109,7 @@ pub(crate) fn check<'a>(subject: impl Into<Subject<'a>>, stimulus: &[Vec<Word>],
     assert!(difference.is_none(), "{}", difference.unwrap_or_default());
 }
 
-/// Checks a subject without change, and that the check finds each of `defects`.
+/// Checks a subject without change, and that the check finds each of `defects`, which are in its Verilog.
 pub(crate) fn check_with_defects<'a, R: Reference>(
     subject: impl Fn(&[Change]) -> Subject<'a>,
     stimulus: &[Vec<Word>],
@@ -108,7 +118,9 @@ pub(crate) fn check_with_defects<'a, R: Reference>(
 ) {
     check(subject(&[]), stimulus, &mut reference());
     for defect in defects {
-        let found = difference(subject(std::slice::from_ref(defect)), stimulus, &mut reference());
+        let changed = subject(std::slice::from_ref(defect));
+        let run = ("verilator", verilated(&changed, stimulus));
+        let found = first_difference(&changed, &[run], stimulus, &mut reference());
         assert!(found.is_some(), "not found: {defect}");
     }
 }

@@ -16,7 +16,7 @@ use serde_json::Value;
 /// Bits 6 to 4 of a DSP48E1's OPMODE, lowest first, where it adds to its own last result.
 const ADDS_TO_RESULT: [&str; 3] = ["0", "1", "0"];
 /// Lanes of the scene.
-const LANES: usize = 16;
+const LANES: usize = 8;
 
 /// A scene without a search and with so many lanes, on a board of two lines.
 fn model(lanes: usize) -> Model {

@@ -20,7 +20,7 @@ use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::{assert_equal, build_dir, variants};
 
 /// Number of frames of one run.
-const FRAMES: usize = 24;
+const FRAMES: usize = 16;
 
 fn scene(sensor: &str, more: &str) -> Scene {
     let text = Scene::builtin(sensor).map(|scene| scene.sensor).unwrap();
@@ -146,11 +146,10 @@ fn a_wrong_constant_is_found() {
         }),
         Change::within("fold__quads", "last", |k| [3, 2].map(|quads| k.constant(4, quads))),
     ];
-    for change in changes {
-        let name = change.to_string();
-        hardware.generated = generate_changed(&hardware.model, &[change]).unwrap();
+    for change in variants(&changes, 1) {
+        hardware.generated = generate_changed(&hardware.model, std::slice::from_ref(change)).unwrap();
         let findings = check(&hardware, Simulator::Verilator, &vectors, &[Stimulus::FullSpeed]);
-        assert!(!findings.is_equal(), "the change of {name} went unnoticed");
+        assert!(!findings.is_equal(), "the change of {change} went unnoticed");
     }
 }
 

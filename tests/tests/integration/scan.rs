@@ -12,7 +12,7 @@ use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::{generate_scan, generate_scan_changed};
 use dermis_sim::cosim::hardware::Simulator;
 use dermis_sim::cosim::scan::{expected, simulate, verify_scan, Array, Fault, Image, VerifiedScan, VerilatedScan};
-use dermis_tests::{build_dir, scene, verilog_code};
+use dermis_tests::{build_dir, scene, variants, verilog_code};
 
 use crate::tables::specimen;
 
@@ -147,11 +147,10 @@ fn seeded_defects_are_found() {
         // A command that is shifted all the time.
         (Change::value("sequencer", "command", |k| k.named("command").shift_left(1).low(16)), "stage converter"),
     ];
-    for (defect, stage) in defects {
-        let text = format!("{defect}");
-        let found = findings(&[defect]);
-        assert!(!found.is_equal(), "{text}");
-        assert!(found.kept.iter().any(|one| one.to_string().contains(stage)), "{text}: {:?}", found.kept.first());
+    for (defect, stage) in variants(&defects, 2) {
+        let found = findings(std::slice::from_ref(defect));
+        assert!(!found.is_equal(), "{defect}");
+        assert!(found.kept.iter().any(|one| one.to_string().contains(stage)), "{defect}: {:?}", found.kept.first());
     }
 }
 

@@ -12,7 +12,7 @@ use dermis_hdl::language::Change;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::Vector;
-use dermis_tests::{assert_equal, build_dir, compare, with_network};
+use dermis_tests::{assert_equal, build_dir, compare, variants, with_network};
 use tempfile::TempDir;
 
 pub const SCENE: &str = "name = \"writable\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
@@ -116,10 +116,13 @@ fn is_equal(scene: &Scene, what: &str) {
 fn hardware_with_loaded_tables_is_the_specimen_s() {
     let full_scale = "[input]\nfull_scale_MPa = 1.0\n";
     let sliding = "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\naverage = 2\nmean = \"sliding\"\n";
-    for (more, what) in [(full_scale, "whole array"), (sliding, "two subarrays, sliding mean")] {
-        is_equal(&Scene::parse(&format!("{SCENE}{more}"), "writable.toml").unwrap(), what);
-    }
-    for (more, what) in [(COVERS, "another cover, dead taxels"), (PARTS, "another cover, two subarrays")] {
+    let scenes = [
+        (sliding, "two subarrays, sliding mean"),
+        (COVERS, "another cover, dead taxels"),
+        (PARTS, "another cover, two subarrays"),
+        (full_scale, "whole array"),
+    ];
+    for (more, what) in variants(&scenes, 2) {
         is_equal(&Scene::parse(&format!("{SCENE}{more}"), "writable.toml").unwrap(), what);
     }
     let contacts = "[search]\nmu_max = 0.3\n[partition]\ncase = \"contacts\"\n[input]\nfull_scale_MPa = 1.0\n";
@@ -146,10 +149,9 @@ fn a_defect_is_found() {
         // The upper of two coefficients is that of the lower.
         Change::value("pass", "lanes__coefficient_data", |k| k.named("coefficient_data").low(18).repeat(2)),
     ];
-    for defect in defects {
-        let what = defect.to_string();
-        hardware.generated = generate_changed(&hardware.model, &[defect]).unwrap();
+    for defect in variants(&defects, 2) {
+        hardware.generated = generate_changed(&hardware.model, std::slice::from_ref(defect)).unwrap();
         let found = compare(&hardware, Simulator::Verilator, &vectors, Stimulus::BackToBack);
-        assert!(!found.is_equal(), "not found: {what}");
+        assert!(!found.is_equal(), "not found: {defect}");
     }
 }
