@@ -50,9 +50,6 @@ use tempfile::NamedTempFile;
 /// Findings that a failed assertion shows.
 const SHOWN: usize = 3;
 
-/// Scenes verified on the shipped frames.
-pub const SCENES: [&str; 4] = ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"];
-
 /// A built-in scene and its shipped half-space frames.
 ///
 /// # Panics

@@ -18,7 +18,7 @@ pub trait Port {
     fn port_bits(&self) -> usize;
     /// Whether the value changed in the last update.
     fn has_new_value(&self) -> bool;
-    /// Gives the current value to `take`.
+    /// Gives the current value to `take`; limbs at the end that are zeros may be missing.
     fn read(&self, take: &mut dyn FnMut(&[u64]));
     /// Sets the value after the next update.
     fn write(&mut self, value: &[u64]);

@@ -12,8 +12,8 @@ use dermis_hdl::{generate, usage::total};
 use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::Vector;
-use dermis_tests::{assert_equal, build_dir, scene, variants, verilog_code, SCENES};
+use dermis_sim::cosim::{Vector, QUICK_SCENES};
+use dermis_tests::{assert_equal, build_dir, scene, variants, verilog_code};
 
 /// Number of flips tried in each scene.
 const FLIPS: usize = 100;
@@ -41,7 +41,7 @@ fn check(scene: &Scene, frames: &[Frame]) {
 
 #[test]
 fn no_false_alarm() {
-    for name in variants(&SCENES, 2) {
+    for name in variants(&QUICK_SCENES, 2) {
         let (scene, frames) = checked(name);
         check(&scene, &frames);
     }
@@ -76,7 +76,7 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
 
 #[test]
 fn every_tried_flip_is_told() {
-    for name in variants(&SCENES, 1) {
+    for name in variants(&QUICK_SCENES, 1) {
         let (scene, frames) = checked(name);
         let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
         let vector = hardware.vector(&frames[..1]).unwrap();

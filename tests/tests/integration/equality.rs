@@ -7,8 +7,9 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::hardware::Simulator;
 use dermis_sim::cosim::verify::{verify, Verified};
+use dermis_sim::cosim::QUICK_SCENES;
 use dermis_sim::report;
-use dermis_tests::{assert_equal, build_dir, check_cycles, scene, SCENES};
+use dermis_tests::{assert_equal, build_dir, check_cycles, scene};
 
 fn check(scene: &Scene, frames: &[Frame]) -> Verified {
     let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
@@ -18,7 +19,7 @@ fn check(scene: &Scene, frames: &[Frame]) -> Verified {
 
 #[test]
 fn every_shipped_frame_is_equal_and_within_its_cycles() {
-    for name in SCENES {
+    for name in QUICK_SCENES {
         let (scene, frames) = scene(name);
         let verified = check(&scene, &frames);
         assert_eq!(verified.frame_interval, Some(verified.planned_interval), "{name}");

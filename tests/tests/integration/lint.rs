@@ -12,8 +12,9 @@ use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;
 use dermis_hdl::{generate, Generated};
+use dermis_sim::cosim::QUICK_SCENES;
+use dermis_tests::scene;
 use dermis_tests::tools::folder_of;
-use dermis_tests::{scene, SCENES};
 
 /// Whether Verilator has no warning, and what it says; with the design's waivers or without them.
 fn verilator(generated: &Generated, with_waivers: bool) -> (bool, String) {
@@ -53,7 +54,7 @@ fn idle_waivers(waivers: &str, warnings: &str) -> Vec<String> {
 
 #[test]
 fn generated_verilog_is_clean_and_needs_each_waiver() {
-    let own = SCENES.map(|name| (name, None));
+    let own = QUICK_SCENES.map(|name| (name, None));
     for (name, board) in own.into_iter().chain([("eight-by-eight", Some("icebreaker"))]) {
         let mut scene = scene(name).0;
         scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
@@ -166,7 +167,7 @@ fn a_choice_of_cases_is_clean_with_the_engines_waivers() {
 
 #[test]
 fn a_board_is_clean_with_the_engines_waivers() {
-    for name in SCENES {
+    for name in QUICK_SCENES {
         for (_, link) in LinkKind::NAMES {
             let mut scene = scene(name).0;
             scene.hardware.link = link;

@@ -15,7 +15,7 @@ pub mod cycles;
 use crate::fixed::words::formats::Formats;
 use crate::segment::{Segmenter, NONE, WORD_BITS};
 use crate::sensor::Sensor;
-use cycles::{Course, Segmentation};
+use cycles::{Counts, Segmentation};
 
 /// The contacts of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -60,7 +60,7 @@ pub fn segment(sensor: &Sensor, segmenter: &Segmenter, words: &[i64], most: usiz
     Segmented {
         labels: segments.labels.iter().map(|label| label.map_or(NONE, name)).collect(),
         overflow: basins.overflow || segments.count > most,
-        cycles: segmentation.cycles(&Course::of(sensor, &basins, &middles)),
+        cycles: segmentation.cycles(&Counts::of(sensor, &basins, &middles)),
         middles,
     }
 }

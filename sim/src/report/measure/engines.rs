@@ -15,6 +15,7 @@ use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
 use super::timing::Timing;
 use crate::cosim::hardware::Simulator;
 use crate::cosim::verify::verify;
+use crate::cosim::QUICK_SCENES;
 use crate::jobs::parallel;
 use crate::progress::Progress;
 
@@ -120,10 +121,8 @@ fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue
     Ok(bit_true)
 }
 
-/// The quick variant co-simulates the scenes of `make run`.
 fn is_simulated(scene: &Scene, options: &Options) -> bool {
-    let first =
-        ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"].contains(&scene.name.as_str());
+    let first = QUICK_SCENES.contains(&scene.name.as_str());
     let own = Scene::builtin(&scene.name).is_ok_and(|own| own.partition.case == scene.partition.case);
     options.simulate && (!options.quick || first && own)
 }

@@ -1,4 +1,4 @@
-//! Cycles of the hardware of `segment`, which follow from the course of a segmentation.
+//! Cycles of the hardware of `segment`, which follow from the counts of a segmentation.
 //!
 //! With n taxels in R rows and C columns, Q quads, t taps of both windows along a line, b basins:
 //!
@@ -43,7 +43,7 @@ pub struct Segmentation<'a> {
 
 /// What the cycles of a segmentation depend on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Course {
+pub struct Counts {
     /// Number of basins.
     pub basins: usize,
     /// Number of taxels that are no maxima.
@@ -60,7 +60,7 @@ pub struct Course {
     pub middles: Vec<[usize; 2]>,
 }
 
-impl Course {
+impl Counts {
     /// Of a segmentation of `sensor` that found `basins` and these middles.
     pub fn of(sensor: &Sensor, basins: &Basins, middles: &[[usize; 2]]) -> Self {
         let taxels = 0..basins.steps.len();
@@ -75,7 +75,7 @@ impl Course {
         }
         let ahead = |taxel: usize| neighbours(sensor, taxel).filter(move |&other| other > taxel);
         let differ = |taxel: usize| ahead(taxel).filter(|&other| basins.basins[other] != basins.basins[taxel]).count();
-        Course {
+        Counts {
             basins: basins.basins.iter().copied().max().unwrap_or(NONE),
             steps,
             walks,
@@ -140,12 +140,12 @@ impl Segmentation<'_> {
     }
 
     /// Cycles from the start to the end.
-    pub fn cycles(&self, course: &Course) -> u64 {
-        let joined = course.joins.iter().map(|join| round(join.basins, join.small, true)).sum::<u64>();
-        let middles = course.middles.iter().map(|[row, col]| (2 * (row + col) + 9) as u64).sum::<u64>();
-        let readings = self.sensor.taxels() + 2 * course.steps + course.walks;
-        let joining = joined + round(course.contacts, false, false) + order(course.contacts);
-        self.fixed() + cleared(course.basins) + 3 * (readings + course.borders) as u64 + joining + middles
+    pub fn cycles(&self, counts: &Counts) -> u64 {
+        let joined = counts.joins.iter().map(|join| round(join.basins, join.small, true)).sum::<u64>();
+        let middles = counts.middles.iter().map(|[row, col]| (2 * (row + col) + 9) as u64).sum::<u64>();
+        let readings = self.sensor.taxels() + 2 * counts.steps + counts.walks;
+        let joining = joined + round(counts.contacts, false, false) + order(counts.contacts);
+        self.fixed() + cleared(counts.basins) + 3 * (readings + counts.borders) as u64 + joining + middles
     }
 
     /// A bound of the cycles: every taxel but the maxima starts a walk, all neighbours are in different basins, all middles are
@@ -206,12 +206,12 @@ mod tests {
 
     /// A row that rises to its right end: the first walk visits all, the other taxels are read once more.
     #[test]
-    fn the_course_of_a_slope() {
+    fn the_counts_of_a_slope() {
         let sensor = Sensor { rows: 1, cols: 6, pitch_x_mm: 2.0, pitch_y_mm: 2.0, thickness_mm: 2.0 };
         let words: Vec<i64> = (0..6).map(|col| 1000 * col).collect();
         let basins = Segmenter::new(&sensor, WIDTH).segment(&words);
-        let course = Course::of(&sensor, &basins, &[[0, 4]]);
-        assert_eq!((course.basins, course.steps, course.walks, course.borders), (1, 5, 1, 0));
-        assert_eq!((course.joins.len(), course.contacts), (0, 1));
+        let counts = Counts::of(&sensor, &basins, &[[0, 4]]);
+        assert_eq!((counts.basins, counts.steps, counts.walks, counts.borders), (1, 5, 1, 0));
+        assert_eq!((counts.joins.len(), counts.contacts), (0, 1));
     }
 }
