@@ -308,6 +308,19 @@ mod tests {
     }
 
     #[test]
+    fn a_value_has_one_form_and_gives_its_word_back() {
+        let mut value = Value::default();
+        for limbs in [&[0, 7, 0][..], &[7, 0, 0], &[0; 20], &[1, 2, 3], &[1, 2, 3, 0], &[9]] {
+            value.set_limbs(limbs);
+            let mut word = Word::default();
+            word.set_limbs(limbs);
+            assert_eq!((value.word(), &Value::from(word)), (word, &value));
+            assert!(value.limbs().len() == 1 || value.limbs().last() != Some(&0), "{value:?}");
+        }
+        assert_eq!(value, Value::from(9));
+    }
+
+    #[test]
     fn fields_straddle_limbs() {
         let fields: Vec<i64> = (0..40).map(|i| (i * 977 - 15_000) % (1 << 25)).collect();
         let word = Word::of_fields(&fields, 27);
