@@ -18,7 +18,12 @@ const SETTLE_ROUNDS: usize = 200;
 
 /// Updates a block until no signal changes; `false` if it does not settle.
 pub(crate) fn settles(block: &mut (impl Block + ?Sized)) -> bool {
-    (0..SETTLE_ROUNDS).any(|_| {
+    rounds(block).is_some()
+}
+
+/// Updates a block until no signal changes, and counts the rounds; `None` if it does not settle.
+fn rounds(block: &mut (impl Block + ?Sized)) -> Option<usize> {
+    (1..=SETTLE_ROUNDS).find(|_| {
         block.update_all();
         !block.has_changed()
     })
@@ -195,13 +200,7 @@ mod tests {
                     for &input in inputs {
                         for clock in [false, true] {
                             (block.d.next, block.clk.next) = (input, clock.into());
-                            loop {
-                                block.update_all();
-                                rounds += 1;
-                                if !block.has_changed() {
-                                    break;
-                                }
-                            }
+                            rounds += crate::simulate::rounds(&mut block).unwrap();
                             outputs.extend((!clock).then(|| block.q.val()));
                         }
                     }

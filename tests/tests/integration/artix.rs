@@ -11,12 +11,13 @@ use dermis_hdl::language::Change;
 use dermis_hdl::{generate, generate_changed, Generated};
 use dermis_sim::flow::synthesis::{commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
+use dermis_tests::variants;
 use serde_json::Value;
 
 /// Bits 6 to 4 of a DSP48E1's OPMODE, lowest first, where it adds to its own last result.
 const ADDS_TO_RESULT: [&str; 3] = ["0", "1", "0"];
-/// Lanes of the scene.
-const LANES: usize = 8;
+/// Lanes of the scene; with the others in `make nightly`.
+const LANES: [usize; 2] = [8, 16];
 
 /// A scene without a search and with so many lanes, on a board of two lines.
 fn model(lanes: usize) -> Model {
@@ -47,32 +48,36 @@ fn accumulators(generated: &Generated) -> usize {
 
 #[test]
 fn accumulators_are_inside_the_multipliers_and_one_that_cannot_be_is_found() {
-    let model = model(LANES);
-    assert_eq!(accumulators(&generate(&model).unwrap()), LANES);
-    // A lane that does not add to its sum needs none.
-    let lane = "parity_0__lane_0__accumulator";
-    let sum = Change::value("pass__lanes", lane, |k| k.named("parity_0__lane_1__accumulator"));
-    assert_eq!(accumulators(&generate_changed(&model, &[sum]).unwrap()), LANES - 1);
+    for &lanes in variants(&LANES, 1) {
+        let model = model(lanes);
+        assert_eq!(accumulators(&generate(&model).unwrap()), lanes);
+        // A lane that does not add to its sum needs none.
+        let lane = "parity_0__lane_0__accumulator";
+        let sum = Change::value("pass__lanes", lane, |k| k.named("parity_0__lane_1__accumulator"));
+        assert_eq!(accumulators(&generate_changed(&model, &[sum]).unwrap()), lanes - 1);
+    }
 }
 
 #[test]
 fn block_rams_and_multipliers_are_those_of_yosys() {
-    let model = model(LANES);
-    // Flattened, because the statistics of a hierarchy are no JSON in Yosys 0.23.
-    let synthesis = "synth_xilinx -family xc7 -flatten -run begin:map_ffram";
-    let cells = tools::cells(&generate(&model).unwrap(), synthesis);
-    // A RAMB36E1 is two of the model's block RAMs.
-    let counted = [cells("RAMB18E1") + 2 * cells("RAMB36E1"), cells("DSP48E1")];
-    let of = |resources: &Resources| [resources.block_rams(), resources.multipliers()];
-    assert_eq!(counted, of(&model.resources));
-    // The counts tell designs apart.
-    let other = self::model(LANES - 4);
-    assert_ne!(counted, of(&other.resources));
+    for &lanes in variants(&LANES, 1) {
+        let model = model(lanes);
+        // Flattened, because the statistics of a hierarchy are no JSON in Yosys 0.23.
+        let synthesis = "synth_xilinx -family xc7 -flatten -run begin:map_ffram";
+        let cells = tools::cells(&generate(&model).unwrap(), synthesis);
+        // A RAMB36E1 is two of the model's block RAMs.
+        let counted = [cells("RAMB18E1") + 2 * cells("RAMB36E1"), cells("DSP48E1")];
+        let of = |resources: &Resources| [resources.block_rams(), resources.multipliers()];
+        assert_eq!(counted, of(&model.resources));
+        // The counts tell designs apart.
+        let other = self::model(lanes - 4);
+        assert_ne!(counted, of(&other.resources));
+    }
 }
 
 #[test]
 fn the_script_for_vivado_names_files_that_exist_and_no_unknown_command() {
-    let model = model(LANES);
+    let model = model(LANES[0]);
     let mut generated = generate(&model).unwrap();
     generated.add_integration(&model);
     let folder = folder_of(&generated);

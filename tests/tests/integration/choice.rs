@@ -20,7 +20,7 @@ use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::{assert_equal, build_dir, variants};
 
 /// Number of frames of one run.
-const FRAMES: usize = 20;
+const FRAMES: usize = 24;
 
 fn scene(sensor: &str, more: &str) -> Scene {
     let text = Scene::builtin(sensor).map(|scene| scene.sensor).unwrap();

@@ -20,7 +20,7 @@ use dermis_tests::tools::{self, folder_of, yosys};
 use dermis_tests::{variants, with_network};
 use serde_json::Value;
 
-/// Largest relative error of the estimated flip-flops and LUTs; here it is 10 and 11 %.
+/// Largest relative error of the estimated flip-flops and LUTs; of the smaller array here it is 2 and 14 %, of the larger 12 %.
 const NEAR: f64 = 0.15;
 
 /// Largest relative error of the estimated LUTs of a whole board against place and route; it is −4 to +7 %.
@@ -31,18 +31,27 @@ fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
     tools::cells(generated, &format!("synth_ecp5 -run begin:{until}"))
 }
 
+/// A scene of this name with an array of this size.
+fn text(name: &str, [rows, cols]: [usize; 2], more: &str) -> String {
+    format!(
+        "name = \"{name}\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+         thickness_mm = 3.0\n{more}"
+    )
+}
+
+fn model(name: &str, size: [usize; 2], more: &str) -> Model {
+    Model::new(&Scene::parse(&text(name, size, more), name).unwrap()).unwrap()
+}
+
 fn small(name: &str, more: &str) -> Model {
-    let sensor = "[sensor]\nrows = 8\ncols = 12\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
-    Model::new(&Scene::parse(&format!("name = \"{name}\"\n{sensor}{more}"), name).unwrap()).unwrap()
+    model(name, [8, 12], more)
 }
 
 /// A scene with a network of a few steps that finds contacts and sends a record of each.
 fn contacts(lanes: usize) -> Model {
-    let text = format!(
-        "name = \"contacts\"\n[sensor]\nrows = 8\ncols = 12\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-         [partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n[output]\nforces = \"resultants\"\n"
-    );
-    Model::new(&with_network(&text, &[20, 10]).0).unwrap()
+    let more =
+        format!("[partition]\ncase = \"contacts\"\n[fixed]\nlanes = {lanes}\n[output]\nforces = \"resultants\"\n");
+    Model::new(&with_network(&text("contacts", [8, 12], &more), &[20, 10]).0).unwrap()
 }
 
 #[test]
@@ -90,25 +99,30 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
 
 #[test]
 fn flip_flops_and_luts_are_near_those_of_yosys() {
-    // With a search, but so small that Yosys does not take minutes.
-    let small =
-        "name = \"near\"\n[sensor]\nrows = 4\ncols = 6\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-                 [search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 4\n[hardware]\nsearch_width = 1\n";
-    let generated = generate(&Model::new(&Scene::parse(small, "near").unwrap()).unwrap()).unwrap();
-    let (folder, top) = (folder_of(&generated), &generated.top);
-    let commands = commands(Family::Ecp5, top);
-    yosys(folder.path(), &format!("read_verilog {top}.v; {commands}")).unwrap();
-    let cells = cells(folder.path(), top).unwrap();
-    let cells = |name: &str| cells.get(name).map_or(0, |&count| count as usize);
-    // Place and route needs four LUTs where a carry chain begins and ends; nextpnr is not part of the tests.
-    let carries = carry_chains(folder.path(), top);
-    let ram = 6 * cells("TRELLIS_DPR16X4");
-    let counted = [cells("TRELLIS_FF"), cells("LUT4") + 2 * cells("CCU2C") + 4 * carries + ram];
-    let usage = total(&generated.usage);
-    assert_eq!([cells("DP16KD"), cells("MULT18X18D")], [usage.block_rams, usage.multipliers]);
-    for (counted, estimated) in counted.into_iter().zip([usage.flip_flops, usage.luts]) {
-        let share = estimated as f64 / counted as f64;
-        assert!((share - 1.0).abs() < NEAR, "estimated {estimated}, counted {counted}");
+    // With a search of low degree; the larger one takes Yosys two minutes.
+    let search = "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = ";
+    let models = [
+        model("near", [4, 6], &format!("{search}4\n[hardware]\nsearch_width = 1\n")),
+        small("near", &format!("{search}8\n")),
+    ];
+    for model in variants(&models, 1) {
+        let generated = generate(model).unwrap();
+        let (folder, top) = (folder_of(&generated), &generated.top);
+        let commands = commands(Family::Ecp5, top);
+        yosys(folder.path(), &format!("read_verilog {top}.v; {commands}")).unwrap();
+        let cells = cells(folder.path(), top).unwrap();
+        let cells = |name: &str| cells.get(name).map_or(0, |&count| count as usize);
+        // Place and route needs four LUTs where a carry chain begins and ends; nextpnr is not part of the tests.
+        let carries = carry_chains(folder.path(), top);
+        let ram = 6 * cells("TRELLIS_DPR16X4");
+        let counted = [cells("TRELLIS_FF"), cells("LUT4") + 2 * cells("CCU2C") + 4 * carries + ram];
+        let usage = total(&generated.usage);
+        assert_eq!([cells("DP16KD"), cells("MULT18X18D")], [usage.block_rams, usage.multipliers]);
+        for (counted, estimated) in counted.into_iter().zip([usage.flip_flops, usage.luts]) {
+            let share = estimated as f64 / counted as f64;
+            println!("estimated {estimated}, counted {counted}, {:+.1} %", 1e2 * (share - 1.0));
+            assert!((share - 1.0).abs() < NEAR, "estimated {estimated}, counted {counted}");
+        }
     }
 }
 
