@@ -106,7 +106,7 @@ bitstream: program tools ## make the bitstream of SCENE for BOARD, by default th
 # The file of python/litex/boards takes the place of the scene's board.
 gateware: NETWORK = $(or $(BOARD),colorlight-i9)
 gateware: OUT = $(BUILD)/gateware/$(NETWORK)/$(notdir $(basename $(SCENE)))
-gateware: program tools ## put SCENE behind the Ethernet of BOARD, by default colorlight-i9: bitstream and figures (half an hour)
+gateware: program tools ## put SCENE behind the Ethernet of BOARD, by default colorlight-i9: bitstream and figures (half an hour a seed)
 	@test -x $(BUILD)/gateware-tools/bin/pip || python3 -m venv $(BUILD)/gateware-tools
 	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check -c tests/soc/requirements.txt './python/litex[gateware]'
 	$(DERMIS) build $(SCENE) --bus wishbone --target-board python/litex/boards/$(NETWORK).toml --out $(OUT)/core

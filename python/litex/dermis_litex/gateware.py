@@ -31,7 +31,7 @@ LEAST_HZ = 2 * LiteEthPHYRGMII.rx_clk_freq * LiteEthPHYRGMII.dw / WORD_BITS
 EXAMPLES = """examples:
   dermis build sensor-1 --bus wishbone --target-board python/litex/boards/colorlight-i9.toml --out ip/sensor-1
   python -m dermis_litex.gateware colorlight-i9 ip/sensor-1 build/sensor-1         Verilog, pins and scripts
-  python -m dermis_litex.gateware colorlight-i9 ip/sensor-1 build/sensor-1 --run   bitstream and figures, half an hour
+  python -m dermis_litex.gateware colorlight-i9 ip/sensor-1 build/sensor-1 --run   bitstream and figures, half an hour a seed
   python -m dermis_litex.route build/*/gateware.json                               a table of figures
 """
 
