@@ -130,8 +130,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out
-	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
-	$(CARGO) test --release -p dermis-sim --test program -- --include-ignored bitstream::
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 	$(DERMIS) --build-dir $(BUILD) guide --check
 

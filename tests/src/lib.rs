@@ -107,11 +107,16 @@ pub fn assert_equal(findings: &Findings, what: impl Display) {
     assert!(findings.is_equal(), "{what}: {} {first:#?}", findings.count);
 }
 
-/// The variants that a test takes: all of them in `make nightly`, which sets `DERMIS_NIGHTLY`, else the first `few`.
+/// Whether `make nightly`, which sets `DERMIS_NIGHTLY`, runs the test.
+pub fn nightly() -> bool {
+    std::env::var_os("DERMIS_NIGHTLY").is_some()
+}
+
+/// The variants that a test takes: all of them in `make nightly`, else the first `few`.
 pub fn variants<T>(all: &[T], few: usize) -> &[T] {
-    match std::env::var_os("DERMIS_NIGHTLY") {
-        Some(_) => all,
-        None => &all[..few.min(all.len())],
+    match nightly() {
+        true => all,
+        false => &all[..few.min(all.len())],
     }
 }
 

@@ -76,20 +76,17 @@ impl Design {
         self.contact.len()
     }
 
-    /// Factor of column `i` of block `axis` (z, x, y) at μ.
-    fn share(&self, mu: &[[f64; 2]], axis: usize, i: usize) -> f64 {
-        match axis {
-            0 => 1.0,
-            axis => mu[self.contact[i]][axis - 1],
-        }
-    }
-
     /// H(μ), readings × r.
     pub fn at(&self, mu: &[[f64; 2]]) -> Mat<f64> {
         let r = self.rank();
-        Mat::from_fn(self.s.nrows(), r, |t, i| {
-            self.s[(t, i)] + self.share(mu, 1, i) * self.s[(t, r + i)] + self.share(mu, 2, i) * self.s[(t, 2 * r + i)]
-        })
+        let mut h = Mat::zeros(self.s.nrows(), r);
+        for (i, &contact) in self.contact.iter().enumerate() {
+            let [mu1, mu2] = mu[contact];
+            let [z, x, y] = [0, 1, 2].map(|axis| self.s.col_as_slice(axis * r + i));
+            let entries = h.col_as_slice_mut(i).iter_mut().zip(z).zip(x).zip(y);
+            entries.for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+        }
+        h
     }
 
     /// The stress of the posterior at μ on every reading: mean in MPa, variance in MPa².
@@ -116,23 +113,34 @@ impl<'a> Products<'a> {
         Products { design, gram, right, square, log_precision }
     }
 
+    /// Column `j` of SᵀTS, rows of block `a` (z, x, y).
+    fn column(&self, a: usize, j: usize) -> &[f64] {
+        let r = self.design.rank();
+        &self.gram.col_as_slice(j)[a * r..][..r]
+    }
+
     /// The posterior at μ, one pair per contact; `None` if it is not representable.
     pub fn at(&self, mu: &[[f64; 2]]) -> Option<Posterior> {
         let (design, r) = (self.design, self.design.rank());
-        let share = |axis: usize, i: usize| design.share(mu, axis, i);
+        let shares: Vec<[f64; 2]> = design.contact.iter().map(|&contact| mu[contact]).collect();
         let rows = [0, 1, 2].map(|a| {
-            let entry = |i: usize, j: usize| {
-                let block = |b: usize| self.gram[(a * r + i, b * r + j)];
-                block(0) + share(1, j) * block(1) + share(2, j) * block(2)
-            };
-            Mat::from_fn(r, r, entry)
+            let mut rows = Mat::zeros(r, r);
+            for (j, [mu1, mu2]) in shares.iter().enumerate() {
+                let [z, x, y] = [0, 1, 2].map(|b| self.column(a, b * r + j));
+                let entries = rows.col_as_slice_mut(j).iter_mut().zip(z).zip(x).zip(y);
+                entries.for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+            }
+            rows
         });
-        let m = Mat::from_fn(r, r, |i, j| {
-            let own = rows[0][(i, j)] + share(1, i) * rows[1][(i, j)] + share(2, i) * rows[2][(i, j)];
-            own + if i == j { 1.0 } else { 0.0 }
-        });
-        let u =
-            Col::from_fn(r, |i| self.right[i] + share(1, i) * self.right[r + i] + share(2, i) * self.right[2 * r + i]);
+        let mut m = Mat::zeros(r, r);
+        for j in 0..r {
+            let [z, x, y] = rows.each_ref().map(|rows| rows.col_as_slice(j));
+            let entries = m.col_as_slice_mut(j).iter_mut().zip(z).zip(x).zip(y).zip(&shares);
+            entries.for_each(|((((entry, z), x), y), [mu1, mu2])| *entry = z + mu1 * x + mu2 * y);
+            m[(j, j)] += 1.0;
+        }
+        let of = |i: usize| self.right[i] + shares[i][0] * self.right[r + i] + shares[i][1] * self.right[2 * r + i];
+        let u = Col::from_fn(r, of);
         let factor = m.llt(Side::Lower).ok()?;
         let w = factor.solve(&u);
         let explained: f64 = w.iter().zip(u.iter()).map(|(w, u)| w * u).sum();
@@ -147,19 +155,21 @@ impl<'a> Products<'a> {
     /// For each unknown of μ, contact by contact: HᵀT of the derivative of the stress (r × unknowns), and the part of
     /// HᵀT(y − H w) that its own columns see (r × unknowns).
     fn derivatives(&self, posterior: &Posterior, unknowns: usize) -> [Mat<f64>; 2] {
-        let (design, r) = (self.design, self.design.rank());
+        let (contact, r) = (&self.design.contact, self.design.rank());
         let Posterior { w, rows, .. } = posterior;
         let (mut cross, mut left) = (Mat::<f64>::zeros(r, unknowns), Mat::<f64>::zeros(r, unknowns));
         for axis in [0, 1] {
-            let rows = &rows[axis + 1];
-            for i in 0..r {
-                let unknown = 2 * design.contact[i] + axis;
-                let mut stress = 0.0;
-                for j in 0..r {
-                    stress += rows[(i, j)] * w[j];
-                    cross[(j, unknown)] += rows[(i, j)] * w[i];
+            let mut stress = vec![0.0; r];
+            for j in 0..r {
+                let mut sums = vec![0.0; unknowns / 2];
+                for (i, entry) in rows[axis + 1].col_as_slice(j).iter().enumerate() {
+                    stress[i] += entry * w[j];
+                    sums[contact[i]] += entry * w[i];
                 }
-                left[(i, unknown)] = self.right[(axis + 1) * r + i] - stress;
+                sums.into_iter().enumerate().for_each(|(contact, sum)| cross[(j, 2 * contact + axis)] = sum);
+            }
+            for (i, stress) in stress.into_iter().enumerate() {
+                left[(i, 2 * contact[i] + axis)] = self.right[(axis + 1) * r + i] - stress;
             }
         }
         [cross, left]
@@ -173,30 +183,37 @@ impl<'a> Products<'a> {
 
     /// Slope and information at the μ of `posterior`.
     pub fn slope(&self, posterior: &Posterior) -> Slope {
-        let (design, r) = (self.design, self.design.rank());
-        let unknowns = 2 * design.contact.iter().max().map_or(0, |last| last + 1);
+        let (contact, r) = (&self.design.contact, self.design.rank());
+        let unknowns = 2 * contact.iter().max().map_or(0, |last| last + 1);
         let Posterior { w, covariance, rows, .. } = posterior;
         let [cross, left] = self.derivatives(posterior, unknowns);
         let mut gradient = vec![0.0; unknowns];
         for (axis, rows) in [(0, &rows[1]), (1, &rows[2])] {
-            for i in 0..r {
-                let unknown = 2 * design.contact[i] + axis;
-                let trace: f64 = (0..r).map(|j| rows[(i, j)] * covariance[(j, i)]).sum();
+            // The covariance is symmetric: its rows are its columns.
+            let mut trace = vec![0.0; r];
+            for j in 0..r {
+                let entries = trace.iter_mut().zip(rows.col_as_slice(j)).zip(covariance.col_as_slice(j));
+                entries.for_each(|((trace, entry), covariance)| *trace += entry * covariance);
+            }
+            for (i, trace) in trace.into_iter().enumerate() {
+                let unknown = 2 * contact[i] + axis;
                 gradient[unknown] += w[i] * left[(i, unknown)] - trace;
             }
         }
         let inner = cross.transpose() * (covariance * &cross);
-        let mut information = Mat::<f64>::zeros(unknowns, unknowns);
+        // Row by row.
+        let mut information = vec![0.0; unknowns * unknowns];
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             for i in 0..r {
-                let row = (a + 1) * r + i;
-                let of = 2 * design.contact[i] + a;
-                for j in 0..r {
-                    information[(of, 2 * design.contact[j] + b)] += w[i] * self.gram[(row, (b + 1) * r + j)] * w[j];
+                // SᵀTS is symmetric, too.
+                let of = &mut information[unknowns * (2 * contact[i] + a)..][..unknowns];
+                for (j, entry) in self.column(b + 1, (a + 1) * r + i).iter().enumerate() {
+                    of[2 * contact[j] + b] += w[i] * entry * w[j];
                 }
             }
         }
-        Slope { gradient, information: information - inner }
+        let information = Mat::from_fn(unknowns, unknowns, |i, j| information[unknowns * i + j] - inner[(i, j)]);
+        Slope { gradient, information }
     }
 }
 

@@ -8,7 +8,7 @@
 //! ```
 //! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
-use dermis_golden::fixed::plan::serial::{first_vector, operand_index, DRAIN, OPERAND_BITS, ROW_GAP, WIDE};
+use dermis_golden::fixed::plan::serial::{first_vector, operand_index, row_gap, DRAIN, OPERAND_BITS, WIDE};
 use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{schedule, Kind, Product};
 use rust_hdl::prelude::*;
@@ -236,7 +236,8 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let zero = |bits: usize| k.constant(bits, 0);
     let step = k.state("step", Type::unsigned(3), rst, 0);
     let draining = k.state("draining", Type::unsigned(1), rst, 0);
-    let (phase, gap, wait_count) = (register("phase", 3), register("gap", 3), register("wait_count", 4));
+    let (row_gap, gap_bits) = (row_gap(f.quads), count_bits(row_gap(f.quads) as usize + 1));
+    let (phase, gap, wait_count) = (register("phase", 3), register("gap", gap_bits), register("wait_count", 4));
     let (quad, column) = (register("quad", quads), register("column", quads));
     let (product, first_product) = (register("product", pc), register("first_product", pc));
     let (seen, length) = (register("seen", seen_bits), register("length", SHIFT_BITS));
@@ -317,17 +318,17 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     k.when(!*draining & multiplies, || {
         k.when(gap.is(0), || {
             column.set(last_column.mux(zero(quads), column.plus(1)));
-            k.when(last_column & row_last, || gap.set(k.constant(3, 1)));
+            k.when(last_column & row_last, || gap.set(k.constant(gap_bits, 1)));
             k.when(last_column & !row_last, || product.set(next_product));
         });
-        k.when(gap.is(ROW_GAP), || {
-            gap.set(zero(3));
+        k.when(gap.is(row_gap), || {
+            gap.set(zero(gap_bits));
             quad.set(last_quad.mux(zero(quads), quad.plus(1)));
             product.set(last_quad.mux(next_product, *first_product));
             k.when(last_quad, || first_product.set(next_product));
             draining.set(last_quad & (is(FIRST) | product.is(count as u64 - 1)));
         });
-        k.when(!gap.is(0) & !gap.is(ROW_GAP), || gap.set(gap.plus(1)));
+        k.when(!gap.is(0) & !gap.is(row_gap), || gap.set(gap.plus(1)));
     });
     k.when(is(0) & start, || {
         step.set(k.constant(3, FOLD_HIGH));

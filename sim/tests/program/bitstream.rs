@@ -72,6 +72,7 @@ fn the_baselines_are_of_the_hardware_generated_now() {
 }
 
 #[test]
+#[ignore = "half a minute; boards.rs places and routes the same scene on a board of its own: make nightly"]
 fn a_small_scene_behind_a_uart() {
     makes_a_bitstream_without_regression("tiny");
 }

@@ -94,8 +94,8 @@ fn every_case_is_equal_in_any_order() {
         scene("sensor-1", "[partition]\ncases = [0, 1, 2, 3]\n[fixed]\nlanes = 36\nprune_bits = 10\n"),
         scene("eight-by-eight", &format!("[partition]\ncases = [0, 3]\n{both_signs}")),
     ];
-    for (number, scene) in scenes.into_iter().enumerate() {
-        let hardware = hardware(&scene);
+    for (number, scene) in variants(&scenes, 2).iter().enumerate() {
+        let hardware = hardware(scene);
         let vectors = vectors(&hardware, 1);
         let cases: BTreeSet<i64> = vectors.iter().map(taken).collect();
         assert_eq!(cases.len(), hardware.model.cases().len(), "{:?}: {cases:?}", scene.partition);
@@ -169,13 +169,14 @@ const DRAWN: u32 = 60;
 fn the_choice_is_measured() {
     let grids: Vec<Grid> = (0..4).filter_map(|number| Case::numbered(number)?.grid()).collect();
     println!("| scene | contacts | case 0 | 1 | 2 | 3 | shift 1 | 2 | 3 | 4 | 5 | 6 | 8 | golden |");
-    for (name, counts, drawn) in [
+    let scenes = [
         ("eight-by-eight", &[1][..], DRAWN),
-        ("sensor-1", &[1], DRAWN),
         ("sensor-1", &[2, 3], DRAWN),
+        ("sensor-1", &[1], DRAWN),
         ("sensor-3", &[1], DRAWN / 3),
         ("sensor-3", &[2, 3, 4], DRAWN),
-    ] {
+    ];
+    for &(name, counts, drawn) in variants(&scenes, 2) {
         let scene = Scene::builtin(name).unwrap();
         let of = |case: Case| {
             let mut scene = scene.clone();

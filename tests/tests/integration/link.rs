@@ -22,6 +22,8 @@ mod tables;
 
 /// Clock cycles per bit, the minimum of the link; the rest of the design runs at full speed.
 const CYCLES_PER_BIT: u32 = 8;
+/// Both simulators, in lockstep; one is a tenth of the work.
+const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
 /// That bit rate at 100 MHz.
 const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
 
@@ -151,7 +153,7 @@ fn sealed(kind: u8, length: u16, payload: &[u8]) -> Vec<u8> {
 
 #[test]
 fn both_simulations_answer_as_the_model() {
-    let mut board = Board::new(&[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = Board::new(&BOTH);
     board.send(&Packet::request(Kind::Identify, 200).to_wire());
     let identity = Identity::of(&board.model).unwrap().to_bytes();
     assert_eq!(board.receive(), [Packet { kind: Kind::Identity, sequence: 200, payload: identity }]);
@@ -175,7 +177,7 @@ fn both_simulations_answer_as_the_model() {
 fn a_board_with_the_serial_engine_sends_forces_and_says_that_it_adds_nothing_up() {
     let (mut scene, _) = scene("eight-by-eight");
     scene.hardware.board = "icebreaker".to_string();
-    let mut board = Board::of(shipped(&scene), &[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = Board::of(shipped(&scene), &BOTH);
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let packets = board.receive();
     let identity = Identity::of_bytes(&packets[0].payload).unwrap();
@@ -341,7 +343,7 @@ fn records_of_contacts_are_the_resultants() {
 #[test]
 fn contacts_are_answered_with_their_labels() {
     let (questions, frame, _file) = two_contacts("");
-    let mut board = Board::of(questions, &[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = Board::of(questions, variants(&BOTH, 1));
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
     assert_eq!((identity.statuses, identity.label_bits), (2, 4));
@@ -366,7 +368,7 @@ fn contacts_are_answered_with_their_labels() {
 
 #[test]
 fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped() {
-    let mut board = Board::of(small(SINGLE_BYTE), &[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = Board::of(small(SINGLE_BYTE), &BOTH);
     // Sending all forces takes longer than receiving a frame: while the first frame's are sent, the second waits behind
     // them, the third in the engine's buffer, and the first code of the fourth in front of it until after the packet's
     // end.
@@ -388,8 +390,7 @@ fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped(
 #[test]
 fn other_arrays_codes_of_one_and_two_bytes_and_the_largest_sums_are_answered() {
     for text in [TWO_SUBARRAYS, SINGLE_BYTE] {
-        // One simulation is a tenth of the work of both in lockstep.
-        let simulators = variants(&[Simulator::Verilator, Simulator::RustHdl], if text == SINGLE_BYTE { 2 } else { 1 });
+        let simulators = variants(&BOTH, if text == SINGLE_BYTE { 2 } else { 1 });
         let mut board = Board::of(small(text), simulators);
         for index in 0..3 {
             for kind in [Kind::FrameForResultants, Kind::FrameForForces] {

@@ -12,7 +12,7 @@ use dermis_tests::{build_dir, compare, with_network};
 
 /// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;
 /// limbs, matrix passes and force unit remain.
-const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 2\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
                      thickness_mm = 3.0\n[fixed]\nlanes = 4\ninput_bits = 18\ndata_bits = 12\ncoef_bits = 12\n\
                      inverse_bits = 20\n[search]\n";
 

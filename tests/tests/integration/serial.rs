@@ -93,6 +93,15 @@ fn other_arrays_degrees_widths_and_options_are_equal() {
     }
 }
 
+/// A row has as many products as there are quads: with fewer than four it is shorter than the way of its words.
+#[test]
+fn arrays_of_few_quads_are_equal() {
+    for [rows, cols] in [[2, 2], [2, 4], [6, 2]] {
+        let scene = sensor(rows, cols, "");
+        check(&scene, &drawn(&scene, 3), BOTH);
+    }
+}
+
 #[test]
 fn memories_and_multipliers_are_those_of_yosys() {
     let (scene, _) = scene("eight-by-eight");

@@ -29,8 +29,8 @@ pub const SLOT: u64 = 16;
 pub const QUAD: u64 = 8;
 /// Cycles after each part of the passes until its last word is written.
 pub const DRAIN: u64 = 16;
-/// Cycles between two rows, in which the four accumulators are read.
-pub const ROW_GAP: u64 = 4;
+/// Least number of cycles between two rows, in which the four accumulators are read.
+const ROW_GAP: u64 = 4;
 /// Latency of a sweep beyond its slots: memories, Horner chains, candidates, score.
 pub const SWEEP_TAIL: u64 = 33;
 /// Cycles to select the best of nine candidates: one starts every two cycles and takes five.
@@ -178,10 +178,18 @@ pub(super) fn frame_interval(formats: &Formats, beats: u64) -> u64 {
     first_output(formats, true) + (beats - 1) * BEAT
 }
 
+/// Cycles between two rows of an array of `quads` quads: in fewer than four the products of a row are done before the butterfly
+/// has given the quad of the row before, or a v_ij before the one of which the next is made has been written.
+pub fn row_gap(quads: usize) -> u64 {
+    let quads = quads as u64;
+    let shortest = QUAD.max(DRAIN.div_ceil(quads));
+    ROW_GAP.max(shortest.saturating_sub(quads))
+}
+
 /// Cycles from the first product to the end of the last v_ij.
 fn passes(formats: &Formats) -> u64 {
     let quads = formats.quads as u64;
-    let row = |products: &Vec<Product>| quads * (products.len() as u64 * quads + ROW_GAP);
+    let row = |products: &Vec<Product>| quads * (products.len() as u64 * quads + row_gap(formats.quads));
     // v_00 is replayed between the passes; there is a drain after v_00, after its replay and after the last v_ij.
     schedule(formats).iter().map(row).sum::<u64>() + quads * QUAD + 3 * DRAIN
 }

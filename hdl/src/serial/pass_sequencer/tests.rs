@@ -134,7 +134,7 @@ impl Machine {
                         next.product = s.product + 1;
                     }
                 }
-            } else if s.gap == ROW_GAP {
+            } else if s.gap == row_gap(f.quads) {
                 next.gap = 0;
                 next.quad = if last_quad { 0 } else { s.quad + 1 };
                 next.product = if last_quad { s.product + 1 } else { s.first_product };

@@ -72,7 +72,7 @@ impl Board {
 
 #[test]
 fn a_request_is_answered_with_the_next_scan_and_its_codes() {
-    let mut board = board(&[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = board(variants(&BOTH, 1));
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
     assert!(identity.scans() && identity.supports(Kind::Tables));

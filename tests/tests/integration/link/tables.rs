@@ -42,7 +42,7 @@ impl Board {
 
 #[test]
 fn a_board_holds_the_tables_of_a_packet() {
-    let (mut board, own) = board(FULL_SCALE, &[Simulator::Verilator, Simulator::RustHdl]);
+    let (mut board, own) = board(FULL_SCALE, variants(&BOTH, 1));
     let hardware = board.model.clone();
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let identity = Identity::of_bytes(&board.receive()[0].payload).unwrap();
