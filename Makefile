@@ -124,14 +124,17 @@ netlist: setup ## co-simulate the synthesised netlist of a small scene with sear
 	$(CARGO) test --release -p dermis-tests --test integration -- netlist:: --include-ignored
 
 fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
+	@echo '== fuzz'
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out
+	@echo '== all tests'
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
+	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)

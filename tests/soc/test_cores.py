@@ -68,7 +68,9 @@ def simulate(folder, bus, bits, vectors, change=lambda text: text):
     return icarus(folder, top, [verilog], "core", environment(bus, bits, vectors))
 
 
-@pytest.mark.parametrize("bus, bits", [("axi", 32), ("axi", 64), ("axi", 128), ("wishbone", 32)])
+@pytest.mark.parametrize(
+    "bus, bits", [("axi", 64), ("wishbone", 32), *(pytest.param("axi", bits, marks=NIGHTLY) for bits in [32, 128])]
+)
 def test_core(vectors, bus, bits):
     assert simulate(BUILD / f"{bus}-{bits}", bus, bits, vectors) == (8, 0)
 

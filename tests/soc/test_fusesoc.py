@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from test_cores import BUILD, HERE, SCENE, generate
+from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
 
 FUSESOC = Path(sys.executable).with_name("fusesoc")
 
@@ -48,7 +48,7 @@ def test_lint(core):
     assert passed, output
 
 
-@pytest.mark.parametrize("form", ["engine", "axi"])
+@pytest.mark.parametrize("form", [pytest.param("engine", marks=NIGHTLY), "axi"])
 def test_synth(form):
     passed, output = fusesoc(*generated(form, HERE / "still.toml"), "synth")
     assert passed, output

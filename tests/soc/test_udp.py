@@ -147,7 +147,7 @@ def traffic(draw, taxels, code_bytes):
 
 @pytest.mark.parametrize(
     "taxels, code_bits, code_bytes",
-    [(12, 20, 2), (7, 20, 4), *(pytest.param(taxels, bits, 2, marks=NIGHTLY) for taxels, bits in [(15, 14), (730, 20)])],
+    [(12, 20, 2), *(pytest.param(*own, marks=NIGHTLY) for own in [(7, 20, 4), (15, 14, 2), (730, 20, 2)])],
 )
 def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes):
     only_whole_frames_leave(taxels, code_bits, code_bytes)
@@ -343,7 +343,7 @@ def test_an_exponent_that_ignores_rounding_saturates():
     assert exponent_of([force]) == 2
 
 
-@pytest.mark.parametrize("force_words, fragment", [(45, 8), (16, 8), (9, 360), (1, 1)])
+@pytest.mark.parametrize("force_words, fragment", [(45, 8), (1, 1), *(pytest.param(*own, marks=NIGHTLY) for own in [(16, 8), (9, 360)])])
 def test_short_forces_are_those_of_the_model(force_words, fragment):
     dut = ShortForces(force_words, fragment)
     draw = random.Random(force_words)

@@ -41,7 +41,7 @@ fn check(scene: &Scene, frames: &[Frame]) {
 
 #[test]
 fn no_false_alarm() {
-    for name in variants(&QUICK_SCENES, 2) {
+    for name in variants(&QUICK_SCENES, 1) {
         let (scene, frames) = checked(name);
         check(&scene, &frames);
     }

@@ -29,7 +29,8 @@
 //! parser, counters and request queue, which have no back-pressure; the banks of an adaptive scene, several `receive`
 //! in step; the rounding of the force unit.
 //!
-//! Each proof has seeded defects with which it must fail.
+//! Each proof has seeded defects with which it must fail. `make nightly` tries all of them, and proves what takes ABC half a
+//! minute; without it only a short counterexample of those is looked for.
 
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::stages::send::STATUS_BEATS;

@@ -1,5 +1,5 @@
-//! Co-simulation at scale, under Verilator, with all stages compared: the largest array with a foot on it, and a
-//! thousand random frames of small sensors with random gaps and back-pressure on both streams.
+//! Co-simulation at scale, under Verilator, with all stages compared: the largest array with a foot on it, and hundreds of
+//! random frames of small sensors with random gaps and back-pressure on both streams.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Case;
@@ -8,7 +8,7 @@ use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
 use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
-use dermis_tests::{assert_equal, build_dir, check_cycles, scene};
+use dermis_tests::{assert_equal, build_dir, check_cycles, nightly, scene};
 
 /// Number of frames of one run; all their traces are in memory.
 const CHUNK: u64 = 50;
@@ -45,7 +45,8 @@ fn codes(random: &mut fastrand::Rng, scene: &Scene) -> Vec<i32> {
         .collect()
 }
 
-fn random_frames(scene: &Scene, frames: u64) {
+fn random_frames_are_equal(scene: &Scene) {
+    let frames = if nightly() { 500 } else { 150 };
     let hardware = Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap();
     let taps = hardware.tap_names();
     let mut device = hardware.device(Simulator::Verilator).unwrap();
@@ -66,12 +67,12 @@ fn random_frames(scene: &Scene, frames: u64) {
 
 #[test]
 fn random_frames_of_a_whole_array_are_equal() {
-    random_frames(&scene("eight-by-eight").0, 500);
+    random_frames_are_equal(&scene("eight-by-eight").0);
 }
 
 #[test]
 fn random_frames_of_a_partitioned_array_are_equal() {
     let (mut scene, _) = scene("sensor-1");
     scene.partition.case = Case::numbered(1).unwrap();
-    random_frames(&scene, 500);
+    random_frames_are_equal(&scene);
 }

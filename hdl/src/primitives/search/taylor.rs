@@ -74,7 +74,9 @@ fn moved<'k>(k: &'k Builder, layout: &PolynomialWord, step: Expr<'k>, word: Expr
     let halved = |(n, value): (usize, Expr<'k>)| {
         let value = k.wire(&format!("shifted_{n}"), value);
         let degree = (EXPONENTS[n].0 + EXPONENTS[n].1) as usize;
-        let half = if degree > 0 { halving.mux(value.shift_right(degree), value) } else { value };
+        // Of a word that is no wider the sign is left.
+        let by = degree.min(value.bits() - 1);
+        let half = if by > 0 { halving.mux(value.shift_right(by), value) } else { value };
         k.delay(&format!("moved_{n}"), half)
     };
     (0..).zip(along_y).map(halved).collect()
@@ -189,11 +191,12 @@ mod tests {
         check(block.kernel.kernel(), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, delayed));
     }
 
-    /// Degrees 3, 2 and 1; the constant coefficient may wrap.
+    /// Degrees 3, 2 and 1; the constant coefficient may wrap. Words no wider than their degree.
     #[test]
     fn the_shift_is_exact() {
         is_exact(4, &[27, 26, 26, 25, 25, 25, 20, 22, 21, 20]);
         is_exact(1, &[34, 33, 31, 30, 29, 28]);
         is_exact(2, &[19, 18, 17]);
+        is_exact(1, &[14, 12, 12, 9, 9, 9, 3, 2, 3, 1]);
     }
 }

@@ -134,8 +134,8 @@ fn every_rate_and_phase_is_understood() {
         Board::new(small(SINGLE_BYTE), rate, phase, variants(&BOTH, 1)).answers_as_the_model(&kinds);
     }
     Board::new(small(TWO_SUBARRAYS), rates[0].0, 0.8, variants(&BOTH, 1)).answers_as_the_model(&kinds);
-    for phase in [0.0, 0.4] {
-        Board::new(small(SINGLE_BYTE), 1_000_000, phase, &[Simulator::Verilator]).answers_as_the_model(&kinds);
+    for phase in variants(&[0.0, 0.4], 1) {
+        Board::new(small(SINGLE_BYTE), 1_000_000, *phase, &[Simulator::Verilator]).answers_as_the_model(&kinds);
     }
 }
 
