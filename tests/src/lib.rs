@@ -25,7 +25,7 @@
 //! | `tables` | images of tables between frames: equality before, after, and while tables are not whole |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scan` | a scan by the hardware with modelled converters: equality, faults of the wires, seeded defects |
-//! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
+//! | `scale` | the largest array, and hundreds of random frames with stalls on both streams |
 //! | `circles` | no two modules of a crate use one another, directly or through others; layers are in order |
 //! | `words` | no file has a phrase of `tests/words.txt` |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
@@ -33,6 +33,7 @@
 
 pub mod baseline;
 pub mod tools;
+mod variants;
 
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -46,6 +47,7 @@ use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use tempfile::NamedTempFile;
+pub use variants::{nightly, variants};
 
 /// Findings that a failed assertion shows.
 const SHOWN: usize = 3;
@@ -105,19 +107,6 @@ pub fn compare(hardware: &Hardware, simulator: Simulator, vectors: &[Vector], st
 pub fn assert_equal(findings: &Findings, what: impl Display) {
     let first: Vec<String> = findings.kept.iter().take(SHOWN).map(ToString::to_string).collect();
     assert!(findings.is_equal(), "{what}: {} {first:#?}", findings.count);
-}
-
-/// Whether `make nightly`, which sets `DERMIS_NIGHTLY`, runs the test.
-pub fn nightly() -> bool {
-    std::env::var_os("DERMIS_NIGHTLY").is_some()
-}
-
-/// The variants that a test takes: all of them in `make nightly`, else the first `few`.
-pub fn variants<T>(all: &[T], few: usize) -> &[T] {
-    match nightly() {
-        true => all,
-        false => &all[..few.min(all.len())],
-    }
 }
 
 /// Number of trials of a test: the value of an environment variable, else the default of a normal run.

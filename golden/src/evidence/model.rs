@@ -70,6 +70,11 @@ pub(super) struct Slope {
     pub information: Mat<f64>,
 }
 
+/// z + μ1 x + μ2 y, entry by entry.
+fn combine(entries: &mut [f64], [z, x, y]: [&[f64]; 3], [mu1, mu2]: [f64; 2]) {
+    entries.iter_mut().zip(z).zip(x).zip(y).for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+}
+
 impl Design {
     /// Number of coefficients r.
     pub fn rank(&self) -> usize {
@@ -81,10 +86,7 @@ impl Design {
         let r = self.rank();
         let mut h = Mat::zeros(self.s.nrows(), r);
         for (i, &contact) in self.contact.iter().enumerate() {
-            let [mu1, mu2] = mu[contact];
-            let [z, x, y] = [0, 1, 2].map(|axis| self.s.col_as_slice(axis * r + i));
-            let entries = h.col_as_slice_mut(i).iter_mut().zip(z).zip(x).zip(y);
-            entries.for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+            combine(h.col_as_slice_mut(i), [0, 1, 2].map(|axis| self.s.col_as_slice(axis * r + i)), mu[contact]);
         }
         h
     }
@@ -125,10 +127,8 @@ impl<'a> Products<'a> {
         let shares: Vec<[f64; 2]> = design.contact.iter().map(|&contact| mu[contact]).collect();
         let rows = [0, 1, 2].map(|a| {
             let mut rows = Mat::zeros(r, r);
-            for (j, [mu1, mu2]) in shares.iter().enumerate() {
-                let [z, x, y] = [0, 1, 2].map(|b| self.column(a, b * r + j));
-                let entries = rows.col_as_slice_mut(j).iter_mut().zip(z).zip(x).zip(y);
-                entries.for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+            for (j, &mu) in shares.iter().enumerate() {
+                combine(rows.col_as_slice_mut(j), [0, 1, 2].map(|b| self.column(a, b * r + j)), mu);
             }
             rows
         });

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use dermis_golden::fixed::Model;
 
 use super::Engine;
-use crate::language::testbench::{check_with_defects, random_word, Reference};
+use crate::language::testbench::{check_with_defects, random_word, variants, Reference};
 use crate::language::Change;
 use crate::scenes::{learned, model};
 use crate::wire::Word;
@@ -146,28 +146,20 @@ fn with_a_network_beats_leave_in_the_cycles_of_the_model() {
 
 #[test]
 fn contacts_leave_in_the_cycles_of_the_model() {
-    contacts_leave(4, 5, &[7], CONTACTS);
-}
-
-#[test]
-#[ignore = "a minute; the same with other words: make nightly"]
-fn contacts_of_narrow_words_and_their_records_leave_in_the_cycles_of_the_model() {
+    let contacts = "mu_max = 0.3\n[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
     let narrow = "mu_max = 0.05\n[input]\ndead = [[1, 2]]\n[partition]\ncase = \"contacts\"\n[fixed]\nlanes = 4\n\
                   input_bits = 18\ndata_bits = 12\ncoef_bits = 12\ninverse_bits = 20\n";
-    contacts_leave(3, 4, &[5, 4], narrow);
-    contacts_leave(4, 5, &[7], &format!("{CONTACTS}[output]\nforces = \"resultants\"\n"));
-}
-
-const CONTACTS: &str = "mu_max = 0.3\n[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
-
-fn contacts_leave(rows: usize, cols: usize, hidden: &[usize], more: &str) {
-    let model = learned(rows, cols, hidden, more);
-    let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
-    let defects = [
-        Change::value("", "forces__labels", |k| k.constant(1, 0)),
-        Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
-        Change::value("", "shear__labels", |k| k.constant(1, 0)),
-        Change::value("", "operand_source__mask", |k| k.constant(1, 0)),
-    ];
-    check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
+    let records = &format!("{contacts}[output]\nforces = \"resultants\"\n");
+    let scenes = [(4, 5, vec![7], contacts), (3, 4, vec![5, 4], narrow), (4, 5, vec![7], records)];
+    for (rows, cols, hidden, more) in variants(&scenes, 1) {
+        let model = learned(*rows, *cols, hidden, more);
+        let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
+        let defects = [
+            Change::value("", "forces__labels", |k| k.constant(1, 0)),
+            Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
+            Change::value("", "shear__labels", |k| k.constant(1, 0)),
+            Change::value("", "operand_source__mask", |k| k.constant(1, 0)),
+        ];
+        check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
+    }
 }
