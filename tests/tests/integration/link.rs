@@ -22,10 +22,11 @@ mod tables;
 
 /// Clock cycles per bit, the minimum of the link; the rest of the design runs at full speed.
 const CYCLES_PER_BIT: u32 = 8;
-/// Both simulators, in lockstep; one is a tenth of the work.
-const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
 /// That bit rate at 100 MHz.
 const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
+
+/// Both simulators, in lockstep; one is a tenth of the work.
+const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
 
 /// Changes of pins until a board is out of reset; before, Verilator's registers are undefined.
 const RESET: u64 = 40;

@@ -120,7 +120,7 @@ fn tables_that_come_within_a_scan_break_it_off_and_the_next_has_them() {
     // A scan later, the third still has the old tables.
     image.at += hardware.scan_timing().unwrap().period;
     assert!(!findings(&image).is_equal());
-    // The program does the same, in both simulators.
+    // The program does the same.
     let verified = verify_scan(&scene, Some(&own), &frames[..1], variants(&BOTH, 1), None, &build_dir()).unwrap();
     assert!(verified.findings.is_equal(), "{:#?}", verified.findings.kept.first());
 }

@@ -89,7 +89,7 @@ impl Board {
 }
 
 #[test]
-fn both_simulations_answer_as_the_model() {
+fn a_board_answers_as_the_model() {
     let mut board = Board::new(shipped(&scene("eight-by-eight").0), RATE, 0.3, variants(&BOTH, 1));
     board.answers_as_the_model(&[Kind::FrameForResultants]);
 }

@@ -3,7 +3,6 @@
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_hdl::bus::{Bus, CoreShape, WIDTHS};
 use dermis_hdl::language::Change;
-
 use dermis_tests::variants;
 
 use super::prover::{number, Hardware, Proof};
