@@ -15,6 +15,13 @@ use dermis_sim::cosim::verify::verify;
 use dermis_sim::cosim::{Vector, QUICK_SCENES};
 use dermis_tests::{assert_equal, build_dir, scene, variants, verilog_code};
 
+/// The scenes that are simulated in seconds, first the one whose subarray has several signatures.
+fn quick_scenes() -> [&'static str; QUICK_SCENES.len()] {
+    let mut scenes = QUICK_SCENES;
+    scenes.reverse();
+    scenes
+}
+
 /// Number of flips tried in each scene.
 const FLIPS: usize = 100;
 
@@ -41,7 +48,7 @@ fn check(scene: &Scene, frames: &[Frame]) {
 
 #[test]
 fn no_false_alarm() {
-    for name in variants(&QUICK_SCENES, 1) {
+    for name in variants(&quick_scenes(), 1) {
         let (scene, frames) = checked(name);
         check(&scene, &frames);
     }
@@ -76,7 +83,7 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
 
 #[test]
 fn every_tried_flip_is_told() {
-    for name in variants(&QUICK_SCENES, 1) {
+    for name in variants(&quick_scenes(), 1) {
         let (scene, frames) = checked(name);
         let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
         let vector = hardware.vector(&frames[..1]).unwrap();

@@ -6,7 +6,7 @@
 //! ```text
 //! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the section's first word
 //! ```
-//! If it differs from the generated value after the last word, the subarray's status has
+//! If it differs from the generated value after the last word of any section, the subarray's status has
 //! [`FLAG_COEFFICIENTS`](crate::fixed::stages::send::FLAG_COEFFICIENTS). The forces are sent all the same.
 //!
 //! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so a parity bit per word of the lanes would

@@ -101,6 +101,8 @@ struct Shape {
     written: CoefficientPlaces,
     /// Expected signatures of the sections, with the coefficient check.
     signatures: Option<Vec<u32>>,
+    /// A subarray has all sections in turn, beginning with section 0, in the place of one of them.
+    in_turn: bool,
     control: Control,
 }
 
@@ -120,6 +122,7 @@ impl Lanes {
             signatures: model
                 .has_coefficient_check()
                 .then(|| programs.iter().map(|(case, section)| signature(case, section)).collect()),
+            in_turn: formats.by_contact(),
             control: Control::new(model),
         })
     }
@@ -344,9 +347,21 @@ impl Shape {
         let signature = k.register("signature", Type::unsigned(32));
         let so_far = k.wire("sofar", opens2.mux(k.constant(32, START.into()), *signature));
         let feedback = so_far.top().mux(k.constant(32, POLYNOMIAL.into()), k.constant(32, 0));
-        k.when(valid2(), || signature.set(so_far.low(31).concat(odd_fours.parity()) ^ feedback));
+        let valid2 = valid2();
+        k.when(valid2, || signature.set(so_far.low(31).concat(odd_fours.parity()) ^ feedback));
         let expected: Vec<usize> = signatures.iter().map(|&signature| signature as usize).collect();
-        k.wire("damaged", signature.differs(value_by_case(k, which, &expected, 32)));
+        let differs = |which: Expr<'k>| signature.differs(value_by_case(k, which, &expected, 32));
+        if !self.in_turn {
+            k.wire("damaged", differs(which));
+            return;
+        }
+        k.comment("A section that begins keeps whether one before it in its subarray was damaged.");
+        let (section, earlier) = (k.register("section", which.ty()), k.register("earlier", Type::unsigned(1)));
+        let damaged = k.wire("damaged", differs(*section) | *earlier);
+        k.when(opens2 & valid2, || {
+            section.set(which);
+            earlier.set(!which.is(0) & damaged);
+        });
     }
 
     /// The lanes of one parity; the accumulator that its chain shows.
@@ -409,6 +424,7 @@ mod tests {
             narrow: (0, 0),
             written: CoefficientPlaces::default(),
             signatures: Some(vec![0x1234_5678, 0xabcd_ef01]),
+            in_turn: false,
             control: Control { layers: false, opens: true },
         }
     }
@@ -438,9 +454,21 @@ mod tests {
         of_layer: [bool; 3],
         group: usize,
         signature: Option<u32>,
+        /// Section of the signature, and whether one before it in its subarray was damaged.
+        section: usize,
+        earlier: Option<bool>,
     }
 
     impl Integers {
+        /// Whether the signature, or one before it, is not that of the case `which`.
+        fn damaged(&self, which: usize) -> Option<bool> {
+            let Some(expected) = &self.shape.signatures else { return Some(false) };
+            match self.shape.in_turn {
+                true => Some(self.earlier? | (self.signature? != expected[self.section])),
+                false => Some(self.signature? != expected[which]),
+            }
+        }
+
         fn accumulate(&mut self, beat: &Beat) {
             let (per_parity, wrap) = (self.shape.per_parity, 64 - self.shape.lane_bits);
             let word = &self.shape.memory[beat.word];
@@ -459,15 +487,11 @@ mod tests {
             let row =
                 |of: usize, layer: bool| self.leaves.map(|leaves| Word::from(leaves[of] && self.of_layer[of] == layer));
             let quad = self.chain.as_ref().filter(|_| shows).map(heads);
-            let expected = self.shape.signatures.as_ref().map(|all| all[inputs[1].number() as usize]);
             vec![
                 row(0, false),
                 row(2, false),
                 row(2, true),
-                match expected {
-                    None => Some(Word::default()),
-                    Some(expected) => self.signature.map(|signature| Word::from(signature != expected)),
-                },
+                self.damaged(inputs[1].number() as usize).map(Word::from),
                 quad.map(|heads| Word::of_fields(&heads, self.shape.lane_bits)),
             ]
         }
@@ -492,6 +516,11 @@ mod tests {
             if added.valid {
                 self.accumulate(&added);
                 let opens = self.shape.control.opens_at().is_some_and(|bit| added.control >> bit & 1 == 1);
+                if opens {
+                    let which = inputs[1].number() as usize;
+                    self.earlier = if which == 0 { Some(false) } else { self.damaged(which) };
+                    self.section = which;
+                }
                 let start = if opens { Some(START) } else { self.signature };
                 self.signature = start.map(|signature| step(signature, parity(&self.shape.memory[added.word])));
             }
@@ -543,6 +572,9 @@ mod tests {
             let valid = !rst && since > 0 && rested > 3 && random.u8(..4) > 0;
             let last = since > shape.per_parity && random.u8(..4) == 0;
             let opens = first && random.bool();
+            if opens && shape.in_turn {
+                case = random.u64(..2);
+            }
             let mut control = u64::from(last);
             for (bit, set) in [(shape.control.layer_at(), random.bool()), (shape.control.opens_at(), opens)] {
                 control |= bit.map_or(0, |bit| u64::from(set) << bit);
@@ -574,6 +606,17 @@ mod tests {
     #[test]
     fn rows_of_sums_leave_and_the_signature_is_the_model_s() {
         is_equal(shape());
+    }
+
+    /// With one word everywhere the signature depends on the number of words alone, so that some sections are undamaged. All have
+    /// the same rows: sections change between two accumulations.
+    #[test]
+    fn a_section_tells_of_those_before_it() {
+        let mut shape = Shape { in_turn: true, groups: vec![1; 2], last_rows: vec![2; 2], ..shape() };
+        shape.memory = vec![shape.memory[0].clone(); shape.memory.len()];
+        let after = |words: usize| (0..words).fold(START, |signature, _| step(signature, parity(&shape.memory[0])));
+        shape.signatures = Some(vec![after(6), after(7)]);
+        is_equal(shape);
     }
 
     #[test]
@@ -611,6 +654,8 @@ mod tests {
             of_layer: [false; 3],
             group: 0,
             signature: None,
+            section: 0,
+            earlier: None,
             shape,
         };
         check(block.kernel.kernel(), &stimulus, &mut reference);
