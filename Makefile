@@ -132,7 +132,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out
 	@echo '== all tests'
-	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --no-fail-fast -- --include-ignored
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --lib --bins --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check
