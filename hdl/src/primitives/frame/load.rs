@@ -255,7 +255,7 @@ impl Shape {
         let busy = k.wire("busy", *image | *skipping);
         let rested = k.wire("rested", rests.is(REST));
         let takes = k.wire("takes", offered & is_byte & !*took & (busy | *in_frame | rested) & !rst);
-        let passes = k.wire("passes", offered & !is_byte & !busy & !*took & !rst);
+        let passes = k.wire("passes", offered & !is_byte & !busy & !*took & !*writing & !rst);
         k.wire("m_axis_tvalid", passes);
         k.wire("m_axis_tdata", data.low(bits));
         k.wire("m_axis_tlast", tlast);
@@ -300,11 +300,13 @@ impl Shape {
             place.set(next);
             k.when(ends_word, || index.set(index.plus(1)));
         });
+        k.comment("An image that ends with its first word resets the engine for a cycle.");
         k.when(right_head, || writing.set(k.constant(1, 1)));
+        k.when(!*image, || writing.set(zero));
         k.when(*took & *skipping & *took_last | broken_off, || skipping.set(zero));
         k.when(over, || {
             image.set(zero);
-            writing.set(zero);
+            writing.set(right_head);
             place.set(k.constant(place.bits(), 0));
             index.set(k.constant(index.bits(), 0));
             refused.set(fails);

@@ -25,6 +25,8 @@ struct Loader {
     threshold: u64,
     /// Number and content of a word of coefficients that ended in the cycle before.
     pair: Option<(usize, u64)>,
+    /// An image ended with its first word in the cycle before.
+    ended: bool,
     reset: bool,
 }
 
@@ -39,6 +41,7 @@ impl Loader {
             floor: plan.noise_floor as u64,
             threshold: plan.threshold as u64,
             pair: None,
+            ended: false,
             reset: false,
         }
     }
@@ -52,7 +55,10 @@ impl Loader {
         let [rst, valid] = [0, 3].map(|k| inputs[k].number() == 1);
         let (free, is_byte) = (valid && self.took.is_none() && !rst, self.is_byte(inputs));
         let may_begin = self.in_frame || self.rests == REST;
-        [free && is_byte && (self.intake.is_busy() || may_begin), free && !is_byte && !self.intake.is_busy()]
+        [
+            free && is_byte && (self.intake.is_busy() || may_begin),
+            free && !is_byte && !self.intake.is_busy() && !self.ended,
+        ]
     }
 
     fn is_byte(&self, inputs: &[Word]) -> bool {
@@ -117,7 +123,7 @@ impl Reference for Loader {
             pair.map(|(number, _)| Word::from((number / pairs) as u64)),
             pair.map(|(number, _)| Word::from((number % pairs) as u64)),
             pair.map(|(_, word)| Word::from(low(word, PAIR_BITS))),
-            bit(rst || self.writing()),
+            bit(rst || self.writing() || self.ended),
             Some(Word::from(self.floor)),
             Some(Word::from(self.threshold)),
             bit(true).map(|_| Word::from(spoiled << VERSION_BITS | u64::from(version))),
@@ -136,18 +142,20 @@ impl Reference for Loader {
         if rst {
             // The byte taken last has not been used.
             intake.reset(plan, 0);
-            let (took, in_frame, rests, pair, reset) = (None, false, 0, None, true);
-            *self = Loader { took, in_frame, rests, pair, reset, ..self.clone() };
+            let (took, in_frame, rests, pair, ended, reset) = (None, false, 0, None, false, true);
+            *self = Loader { took, in_frame, rests, pair, ended, reset, ..self.clone() };
             return;
         }
+        self.ended = false;
         match self.took.take() {
             Some(Some((byte, last))) => {
+                let is_first = intake.image().len() + 1 == WORD_BYTES;
                 match written {
                     Some((1, word)) => self.threshold = low(word, THRESHOLD_BITS),
                     Some((2, word)) => self.floor = low(word, plan.formats().input_bits as usize),
                     _ => {}
                 }
-                intake.byte(plan, byte, last, false);
+                self.ended = intake.byte(plan, byte, last, false) == Some(Outcome::Broken) && is_first;
             }
             None if valid && !self.is_byte(inputs) => {
                 self.intake.code(&mut self.plan);
@@ -212,6 +220,7 @@ fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
                             0 => all.truncate(random.usize(1..all.len())),
                             1 => all.push(all[0]),
                             2 => all.extend(of_frame(&mut random)),
+                            3 => all.truncate(WORD_BYTES),
                             _ => {}
                         }
                         all
@@ -250,17 +259,18 @@ fn an_image_is_taken_as_the_model_takes_it() {
 
 fn is_taken(model: &Model) {
     let stimulus = stimulus(model, 60_000);
-    let mut seen = [false; 3];
+    let mut seen = [false; 4];
     let mut loader = Loader::new(model);
     for inputs in &stimulus {
         loader.clock(inputs);
+        seen[3] |= loader.ended;
         match loader.plan.tables_outcome {
             Outcome::Whole => seen[0] |= loader.plan.tables_version > 0,
             Outcome::Refused => seen[1] = true,
             Outcome::Broken => seen[2] = true,
         }
     }
-    assert_eq!(seen, [true; 3], "images are taken, refused and broken");
+    assert_eq!(seen, [true; 4], "images are taken, refused, broken, and broken after their first word");
     let subject = |changes: &[Change]| {
         block_subject!(
             Load::new(model),
