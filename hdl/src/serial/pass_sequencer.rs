@@ -236,7 +236,8 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let zero = |bits: usize| k.constant(bits, 0);
     let step = k.state("step", Type::unsigned(3), rst, 0);
     let draining = k.state("draining", Type::unsigned(1), rst, 0);
-    let (row_gap, gap_bits) = (row_gap(f.quads), count_bits(row_gap(f.quads) as usize + 1));
+    let row_gap = row_gap(f.quads);
+    let gap_bits = count_bits(row_gap as usize + 1);
     let (phase, gap, wait_count) = (register("phase", 3), register("gap", gap_bits), register("wait_count", 4));
     let (quad, column) = (register("quad", quads), register("column", quads));
     let (product, first_product) = (register("product", pc), register("first_product", pc));

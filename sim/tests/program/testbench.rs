@@ -5,9 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 /// Few taxels: Icarus simulates a larger array for ten seconds.
-const SCENE: &str =
-    "name = \"small\"\n[sensor]\nrows = 2\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-                     [search]\nmu_max = 0.1\n";
+const SCENE: &str = "name = \"small\"\n[sensor]\nrows = 2\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+                     thickness_mm = 3.0\n[search]\nmu_max = 0.1\n";
 
 /// Compiles and runs the testbench in `folder`; what it printed, and whether it passed.
 fn run(folder: &Path) -> (String, bool) {

@@ -62,8 +62,8 @@ pub struct Lanes {
     pub quad_soon: Signal<Out, Bit>,
     /// `quad` holds a row of a layer of a network; `quad_valid` is low. Constant 0 without a network.
     pub layer_valid: Signal<Out, Bit>,
-    /// The signature of the coefficients read since the section's first product is wrong, 1 bit; valid from three
-    /// cycles after its last product. Constant 0 without the check.
+    /// The signature of the coefficients read since the section's first product, or of a section before it in its
+    /// subarray, is wrong, 1 bit; valid from three cycles after its last product. Constant 0 without the check.
     pub damaged: Wire<Out>,
     kernel: Body,
 }
