@@ -325,7 +325,7 @@ impl Shape {
         k.wire("write", ends_word & !index.less(first) & index.less(after));
         k.wire("taxel", (*index - first).low(count_bits(self.taxels)));
         k.wire("entry", word.low(bits + GAIN_BITS as usize));
-        self.write_coefficients(&k, rst, ends_word & !index.less(after) & !index.is(words as u64 - 1), over, *word);
+        self.write_coefficients(&k, rst, ends_word & !index.less(after) & !index.is(words as u64 - 1), *image, *word);
         k.wire("restart", rst | *writing);
         k.wire("noise_floor", floors.read(zero));
         k.wire("threshold", thresholds.read(zero));
@@ -350,7 +350,7 @@ impl Shape {
 
     /// The write port of the coefficient memory: with `is_pair` the register `word` holds two coefficients, which are written in
     /// the next cycle, before another byte is taken.
-    fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, over: Expr<'k>, word: Expr<'k>) {
+    fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, image: Expr<'k>, word: Expr<'k>) {
         let [address_bits, pair_bits] = self.coefficients.bits();
         let CoefficientPlaces { words, pairs } = self.coefficients;
         if words == 0 {
@@ -365,7 +365,8 @@ impl Shape {
             pair.set(is_last.mux(k.constant(pair_bits, 0), pair.plus(1)));
             k.when(is_last, || address.set(address.plus(1)));
         });
-        k.when(over, || {
+        // Not with the end of the image: a short one may end with two coefficients, which are written in the next cycle.
+        k.when(!image, || {
             address.set(k.constant(address_bits, 0));
             pair.set(k.constant(pair_bits, 0));
         });

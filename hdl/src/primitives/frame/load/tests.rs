@@ -221,6 +221,7 @@ fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
                             1 => all.push(all[0]),
                             2 => all.extend(of_frame(&mut random)),
                             3 => all.truncate(WORD_BYTES),
+                            4 => all.truncate(WORD_BYTES * random.usize(1..all.len() / WORD_BYTES)),
                             _ => {}
                         }
                         all
@@ -259,11 +260,12 @@ fn an_image_is_taken_as_the_model_takes_it() {
 
 fn is_taken(model: &Model) {
     let stimulus = stimulus(model, 60_000);
-    let mut seen = [false; 4];
+    let (mut seen, mut ends_with_pair) = ([false; 4], false);
     let mut loader = Loader::new(model);
     for inputs in &stimulus {
         loader.clock(inputs);
         seen[3] |= loader.ended;
+        ends_with_pair |= loader.pair.is_some() && loader.intake.image().is_empty();
         match loader.plan.tables_outcome {
             Outcome::Whole => seen[0] |= loader.plan.tables_version > 0,
             Outcome::Refused => seen[1] = true,
@@ -271,6 +273,8 @@ fn is_taken(model: &Model) {
         }
     }
     assert_eq!(seen, [true; 4], "images are taken, refused, broken, and broken after their first word");
+    let writes_coefficients = !loader.coefficient_words().is_empty();
+    assert_eq!(ends_with_pair, writes_coefficients, "a short image ends with two coefficients");
     let subject = |changes: &[Change]| {
         block_subject!(
             Load::new(model),
@@ -293,10 +297,14 @@ fn is_taken(model: &Model) {
         Change::value("", "broken_off", |k| k.constant(1, 0)),
     ];
     check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
-    if !model.tables().unwrap().coefficients.is_empty() {
-        // The next image begins where a broken one stopped.
-        let defect = Change::value("", "address", |k| k.named("address"));
-        check_with_defects(subject, &stimulus, || Loader::new(model), &[defect]);
+    if writes_coefficients {
+        let defects = [
+            // The next image begins a pair late after one that ended with two coefficients.
+            Change::within("", "pair", |k| [!k.named("image"), k.named("over")]),
+            // All coefficients go to the first word.
+            Change::value("", "address", |k| k.named("address")),
+        ];
+        check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
     }
 }
 
