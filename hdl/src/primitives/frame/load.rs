@@ -350,7 +350,14 @@ impl Shape {
 
     /// The write port of the coefficient memory: with `is_pair` the register `word` holds two coefficients, which are written in
     /// the next cycle, before another byte is taken.
-    fn write_coefficients<'k>(&self, k: &'k Builder, rst: Expr<'k>, is_pair: Expr<'k>, image: Expr<'k>, word: Expr<'k>) {
+    fn write_coefficients<'k>(
+        &self,
+        k: &'k Builder,
+        rst: Expr<'k>,
+        is_pair: Expr<'k>,
+        image: Expr<'k>,
+        word: Expr<'k>,
+    ) {
         let [address_bits, pair_bits] = self.coefficients.bits();
         let CoefficientPlaces { words, pairs } = self.coefficients;
         if words == 0 {
