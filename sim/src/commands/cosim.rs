@@ -59,8 +59,7 @@ fn wire_fault(text: &str) -> Result<Fault, String> {
         ("stuck-high", Some(&[converter])) => Ok(Fault::Stuck { converter, level: true }),
         ("next-channel", Some(&[converter])) => Ok(Fault::NextChannel { converter }),
         ("row", Some(&[row])) => Ok(Fault::Row { row }),
-        // An answer has at most 32 bits.
-        ("flip", Some(&[converter, frame, bit])) if bit < 32 => Ok(Fault::Flip { converter, frame, bit: bit as u32 }),
+        ("flip", Some(&[converter, frame, bit])) => Ok(Fault::Flip { converter, frame, bit }),
         _ => Err("there are stuck-low:N, stuck-high:N, next-channel:N, row:N, flip:N:FRAME:BIT".to_owned()),
     }
 }

@@ -10,6 +10,7 @@ use dermis_golden::scene::Scene;
 
 use crate::cosim::hardware::Simulator;
 use crate::cosim::verify::{verify, Verified};
+use crate::cosim::QUICK_SCENES;
 use crate::drawn_frames::DrawnFrames;
 use crate::progress::Progress;
 use crate::report::tabulate::tabulate;
@@ -22,10 +23,10 @@ use crate::report::{self, Format};
   dermis table sensor-1 --case 0 --format csv
   dermis table sensor-3 --case adaptive --case contacts --case 4x2
   dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
-  dermis table sensor-1 eight-by-eight --cosim       co-simulate, one line per scene")]
+  dermis table --cosim                               co-simulate the four scenes that take seconds, one line each
+  dermis table sensor-1 eight-by-eight --cosim")]
 pub struct Arguments {
-    /// Built-in names or paths of scenes; default: all built-in ones.
-    #[arg(required_if_eq("cosim", "true"))]
+    /// Built-in names or paths of scenes; default: all built-in ones, with --cosim the four that take seconds.
     scenes: Vec<String>,
     /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3, with a network the scene's own.
     #[arg(long = "case", value_name = "CASE")]
@@ -53,9 +54,17 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         let (scene, frames) = shipped(name, "dermis cosim takes them with --frame")?;
         verify(&scene, &frames, &[Simulator::Verilator, Simulator::RustHdl], build_dir)
     };
-    let all = scenes.iter().map(verify).collect::<Result<Vec<_>>>()?;
+    let all = or_default(scenes, QUICK_SCENES).iter().map(verify).collect::<Result<Vec<_>>>()?;
     let equal = all.iter().all(|v| v.findings.is_equal());
     Ok((report::scenes(&all), equal))
+}
+
+/// `scenes`, or if there is none those of `default`.
+fn or_default(scenes: &[String], default: impl IntoIterator<Item = &'static str>) -> Vec<String> {
+    match scenes {
+        [] => default.into_iter().map(str::to_owned).collect(),
+        named => named.to_vec(),
+    }
 }
 
 /// A scene with its shipped frames; `otherwise` says where others come from.
@@ -69,8 +78,7 @@ fn shipped(name: &str, otherwise: &str) -> Result<(Scene, Vec<Frame>)> {
 
 /// The error table of the named scenes, or of all built-in ones.
 fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format) -> Result<String> {
-    let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
-    let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
+    let scenes = or_default(scenes, Scene::builtin_names());
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let mut rows = Vec::new();
     for name in &scenes {

@@ -5,7 +5,7 @@
 //!
 //! | in | out |
 //! |---|---|
-//! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first [`Mismatch`]es of each frame and their total number |
+//! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first mismatches of each frame and their total number |
 //! | a [`Device`] with its tap names | [`Times`] of every frame |
 
 use dermis_golden::board::EngineKind;
@@ -14,7 +14,7 @@ use dermis_golden::fixed::{Cycles, Model, Stage, Trace};
 use dermis_hdl::device::Device;
 
 use super::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};
-use super::findings::{Findings, Mismatch, KEPT_PER_FRAME};
+use super::findings::{Findings, FrameComparison, Place};
 
 /// Shortest watchdog, in cycles without a transfer.
 const WATCHDOG_MIN: u64 = 10_000;
@@ -112,164 +112,109 @@ pub fn compare_recording(
     let mut streams: Vec<_> = recording.taps.iter().map(|words| words.iter()).collect();
     let mut beats_before = 0;
     for (number, vector) in vectors.iter().enumerate() {
-        let mut comparison = FrameComparison { run, vector, number, findings: Findings::default() };
+        let mut comparison = FrameComparison::new(run, vector.frame.clone(), number);
         let beats_after = beats_before + vector.expected.beats.len() + vector.expected.status.len();
         let last = number + 1 == vectors.len();
         let here = |beat: usize| beat >= beats_before && (beat < beats_after || last);
         // First in the list: a watchdog timeout explains all missing words after it.
         for timeout in recording.timeout.iter().filter(|t| here(t.beat)) {
-            comparison.add_violation(
-                "watchdog",
-                timeout.beat - beats_before,
-                Some(timeout.cycle),
-                timeout.rule.clone(),
-            );
+            let (index, cycle) = (timeout.beat - beats_before, Some(timeout.cycle));
+            let place = Place { stage: "watchdog", index, cycle, taxel: None };
+            comparison.add_violation(place, timeout.rule.clone());
         }
-        comparison.compare_stage_names(taps);
+        compare_stage_names(&mut comparison, vector, taps);
         for stage in &vector.expected.stages {
             let Some(tap) = taps.iter().position(|name| *name == stage.name) else {
                 continue;
             };
             for (index, expected) in stage.words.iter().enumerate() {
                 let got = streams[tap].next().map(|w| (w.cycle, w.fields.clone()));
-                comparison.compare_word(stage.name, index, Some(expected.clone()), got);
+                compare_word(&mut comparison, vector, (stage.name, index), Some(expected.clone()), got);
             }
         }
         for (stage, words) in [("beats", &vector.expected.beats), ("status", &vector.expected.status)] {
             for (index, expected) in words.iter().enumerate() {
                 let got = beats.next().map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
-                comparison.compare_word(stage, index, Some(expected.map(i64::from).to_vec()), got);
+                let expected = expected.map(i64::from).to_vec();
+                compare_word(&mut comparison, vector, (stage, index), Some(expected), got);
             }
         }
         if last {
             // Words beyond all expected ones are reported with the last frame.
             for (stream, name) in streams.iter_mut().zip(taps) {
                 for (extra, word) in stream.enumerate() {
-                    comparison.compare_word(name, extra, None, Some((word.cycle, word.fields.clone())));
+                    let got = Some((word.cycle, word.fields.clone()));
+                    compare_word(&mut comparison, vector, (name, extra), None, got);
                 }
             }
         }
         for violation in recording.violations.iter().filter(|v| here(v.beat)) {
-            comparison.add_violation(
-                "handshake",
-                violation.beat - beats_before,
-                Some(violation.cycle),
-                violation.rule.clone(),
-            );
+            let (index, cycle) = (violation.beat - beats_before, Some(violation.cycle));
+            let place = Place { stage: "handshake", index, cycle, taxel: None };
+            comparison.add_violation(place, violation.rule.clone());
         }
         if exact && beats_after > beats_before {
             let times = &recording.times[number];
-            comparison.compare_cycle_counts(vector.expected.cycles, times);
+            compare_cycle_counts(&mut comparison, vector.expected.cycles, times);
             let end = beats_after.min(recording.beats.len());
-            comparison.compare_beat_cycles(
-                &vector.expected.beat_cycles,
-                times,
-                &recording.beats[beats_before.min(end)..end],
-            );
+            let own = &recording.beats[beats_before.min(end)..end];
+            compare_beat_cycles(&mut comparison, &vector.expected.beat_cycles, times, own);
         }
         beats_before = beats_after;
-        findings.extend(comparison.findings);
+        findings.extend(comparison.finish());
     }
     findings
 }
 
-/// Comparison of one frame, with its findings so far.
-struct FrameComparison<'a> {
-    run: &'a str,
-    vector: &'a Vector,
-    /// Index of the frame.
-    number: usize,
-    findings: Findings,
+/// Compares the word `index` of a stage; at most one of the two is missing.
+fn compare_word(
+    comparison: &mut FrameComparison,
+    vector: &Vector,
+    (stage, index): (&str, usize),
+    expected: Option<Vec<i64>>,
+    got: Option<(u64, Vec<i64>)>,
+) {
+    let (cycle, got) = got.unzip();
+    // Only in these streams is the word's index a taxel; other stages may have as many words by coincidence.
+    let forces = stage == "beats" && vector.expected.beats.len() == vector.taxels;
+    let per_taxel = (stage == "receive" || forces) && expected.is_some();
+    let taxel = per_taxel.then(|| [index / vector.cols, index % vector.cols]);
+    comparison.compare(Place { stage, index, taxel, cycle }, expected, got);
 }
 
-impl FrameComparison<'_> {
-    fn add_mismatch(&mut self, make: impl FnOnce(String, String) -> Mismatch) {
-        self.findings.count += 1;
-        self.findings.unequal.insert(self.number);
-        if self.findings.kept.len() < KEPT_PER_FRAME {
-            self.findings.kept.push(make(self.run.to_owned(), self.vector.frame.clone()));
+/// Checks that the device's taps and the model's stages have the same names.
+fn compare_stage_names(comparison: &mut FrameComparison, vector: &Vector, taps: &[&'static str]) {
+    let mut add = |stage, rule: &str| comparison.add_violation(Place { stage, ..Place::default() }, rule.to_owned());
+    let stages: Vec<&str> = vector.expected.stages.iter().map(|s| s.name).collect();
+    for name in taps.iter().filter(|t| !stages.contains(t)) {
+        add(name, "the hardware has a tap for which the model has no stage");
+    }
+    for name in stages.iter().filter(|s| !taps.contains(s)) {
+        add(name, "the model has a stage for which the hardware has no tap");
+    }
+}
+
+/// Checks the cycle of every output beat, `expected` from the last input.
+fn compare_beat_cycles(comparison: &mut FrameComparison, expected: &[u64], times: &Times, beats: &[Beat]) {
+    let Some(last_in) = times.last_in else {
+        return;
+    };
+    for (index, (beat, expected)) in beats.iter().zip(expected).enumerate() {
+        let due = last_in + expected;
+        if beat.cycle != due {
+            let place = Place { stage: "cycles", index, cycle: Some(beat.cycle), taxel: None };
+            comparison.add_violation(place, format!("output beat {index} was due in cycle {due}"));
         }
     }
+}
 
-    /// Compares one word; at most one of the two is missing.
-    fn compare_word(&mut self, stage: &str, index: usize, expected: Option<Vec<i64>>, got: Option<(u64, Vec<i64>)>) {
-        let (cycle, got) = got.unzip();
-        if expected == got {
-            return;
-        }
-        // Only in these streams is the word's index a taxel; other stages may have as many words by coincidence.
-        let forces = stage == "beats" && self.vector.expected.beats.len() == self.vector.taxels;
-        let per_taxel = (stage == "receive" || forces) && expected.is_some();
-        let cols = self.vector.cols;
-        let taxel = per_taxel.then(|| [index / cols, index % cols]);
-        self.add_mismatch(|run, frame| Mismatch {
-            run,
-            frame,
-            stage: stage.into(),
-            index,
-            taxel,
-            cycle,
-            expected,
-            got,
-            rule: None,
-        });
-    }
-
-    fn add_violation(&mut self, stage: &str, index: usize, cycle: Option<u64>, rule: String) {
-        self.add_mismatch(|run, frame| Mismatch {
-            run,
-            frame,
-            stage: stage.into(),
-            index,
-            taxel: None,
-            cycle,
-            expected: None,
-            got: None,
-            rule: Some(rule),
-        });
-    }
-
-    /// Checks that the device's taps and the model's stages have the same names.
-    fn compare_stage_names(&mut self, taps: &[&'static str]) {
-        let stages: Vec<&str> = self.vector.expected.stages.iter().map(|s| s.name).collect();
-        for name in taps.iter().filter(|t| !stages.contains(t)) {
-            self.add_violation(name, 0, None, "the hardware has a tap for which the model has no stage".into());
-        }
-        for name in stages.iter().filter(|s| !taps.contains(s)) {
-            self.add_violation(name, 0, None, "the model has a stage for which the hardware has no tap".into());
-        }
-    }
-
-    /// Checks the cycle of every output beat, `expected` from the last input.
-    fn compare_beat_cycles(&mut self, expected: &[u64], times: &Times, beats: &[Beat]) {
-        let Some(last_in) = times.last_in else {
-            return;
-        };
-        for (index, (beat, expected)) in beats.iter().zip(expected).enumerate() {
-            let due = last_in + expected;
-            if beat.cycle != due {
-                self.add_violation(
-                    "cycles",
-                    index,
-                    Some(beat.cycle),
-                    format!("output beat {index} was due in cycle {due}"),
-                );
-            }
-        }
-    }
-
-    fn compare_cycle_counts(&mut self, expected: Cycles, times: &Times) {
-        let pairs = [("latency", expected.latency, times.latency()), ("total", expected.total, times.total())];
-        for (index, (name, due, got)) in pairs.into_iter().enumerate() {
-            if got != Some(due) {
-                let got = got.map_or("no end".to_owned(), |g| g.to_string());
-                self.add_violation(
-                    "cycles",
-                    index,
-                    times.last_out,
-                    format!("{name}: expected {due} cycles, got {got}"),
-                );
-            }
+fn compare_cycle_counts(comparison: &mut FrameComparison, expected: Cycles, times: &Times) {
+    let pairs = [("latency", expected.latency, times.latency()), ("total", expected.total, times.total())];
+    for (index, (name, due, got)) in pairs.into_iter().enumerate() {
+        if got != Some(due) {
+            let got = got.map_or("no end".to_owned(), |g| g.to_string());
+            let place = Place { stage: "cycles", index, cycle: times.last_out, taxel: None };
+            comparison.add_violation(place, format!("{name}: expected {due} cycles, got {got}"));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Mismatches between a device and the bit-true model: contents, counting, text.
+//! Mismatches between a device and the bit-true model: contents, comparison, counting, text.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -76,5 +76,60 @@ impl Findings {
         self.kept.extend(other.kept);
         self.count += other.count;
         self.unequal.extend(other.unequal);
+    }
+}
+
+/// Where a word of a frame is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place<'a> {
+    /// As in [`Mismatch::stage`].
+    pub stage: &'a str,
+    /// As in [`Mismatch::index`].
+    pub index: usize,
+    /// As in [`Mismatch::taxel`].
+    pub taxel: Option<[usize; 2]>,
+    /// As in [`Mismatch::cycle`].
+    pub cycle: Option<u64>,
+}
+
+/// Comparison of one frame, with its findings so far.
+pub struct FrameComparison<'a> {
+    run: &'a str,
+    frame: String,
+    number: usize,
+    findings: Findings,
+}
+
+impl<'a> FrameComparison<'a> {
+    /// Of the frame with this name and index, in the run with this label.
+    pub fn new(run: &'a str, frame: String, number: usize) -> Self {
+        FrameComparison { run, frame, number, findings: Findings::default() }
+    }
+
+    /// Compares one word; at most one of the two is missing.
+    pub fn compare(&mut self, place: Place, expected: Option<Vec<i64>>, got: Option<Vec<i64>>) {
+        if expected != got {
+            self.add(place, expected, got, None);
+        }
+    }
+
+    /// Adds a violated rule.
+    pub fn add_violation(&mut self, place: Place, rule: String) {
+        self.add(place, None, None, Some(rule));
+    }
+
+    fn add(&mut self, place: Place, expected: Option<Vec<i64>>, got: Option<Vec<i64>>, rule: Option<String>) {
+        let Place { stage, index, taxel, cycle } = place;
+        self.findings.count += 1;
+        self.findings.unequal.insert(self.number);
+        if self.findings.kept.len() < KEPT_PER_FRAME {
+            let (run, frame, stage) = (self.run.to_owned(), self.frame.clone(), stage.to_owned());
+            self.findings.kept.push(Mismatch { run, frame, stage, index, taxel, cycle, expected, got, rule });
+        }
+    }
+
+    /// What was found.
+    pub fn finish(self) -> Findings {
+        self.findings
     }
 }

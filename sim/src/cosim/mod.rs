@@ -44,5 +44,6 @@ pub use against_model::{compare_recording, run, DeviceUnderTest, Vector};
 pub use board::VerilatedBoard;
 pub use findings::{Findings, Mismatch, KEPT_PER_FRAME};
 
-/// Scenes whose co-simulation takes seconds: those of the short report and, on their shipped frames, of the tests.
+/// Scenes whose co-simulation takes seconds: those of the short report, of `dermis table --cosim` and, on their shipped frames,
+/// of the tests.
 pub const QUICK_SCENES: [&str; 4] = ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"];

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 62] = [
+const NOT_RUN: [(&str, &str); 63] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -35,6 +35,7 @@ const NOT_RUN: [(&str, &str); 62] = [
     ("dermis board eight-by-eight", "runs until interrupted; host.rs talks to one"),
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
+    ("dermis table --cosim", "make run"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
     ("dermis stability", "a minute; one of its groups is run with a picture, all in the guide"),
     ("dermis check my-scene.toml", "a quarter of a minute; the same for sensor-1 is run"),

@@ -25,7 +25,7 @@ pub enum Fault {
         /// Number of the frame on the bus, from 0.
         frame: usize,
         /// Bit of the answer, 0 is the last.
-        bit: u32,
+        bit: usize,
     },
     /// A converter takes each command for that of the channel after it.
     NextChannel {
@@ -53,7 +53,7 @@ impl Fault {
             Fault::Flip { converter, frame, bit } => vec![
                 ("converter", converter, converters),
                 ("frame on the bus", frame, scans * array.rows * array.frames_of_row()),
-                ("bit of an answer", bit as usize, array.scan.converter.answer_bits() as usize),
+                ("bit of an answer", bit, array.scan.converter.answer_bits() as usize),
             ],
             Fault::Row { row } => vec![("row", row, array.rows)],
         };

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::array::{volts, Array, Fault, NOISE_LSB};
 use super::converters::Converters;
 use super::device::VerilatedScan;
-use crate::cosim::findings::{Findings, Mismatch, KEPT_PER_FRAME};
+use crate::cosim::findings::{Findings, FrameComparison, Place};
 use crate::cosim::hardware::Simulator;
 use crate::progress::Progress;
 
@@ -176,81 +176,41 @@ pub fn simulate(
         }
     }
     let codes = frames.concat();
-    let mut compared = Comparison { run: label, findings: Findings::default() };
+    let mut findings = Findings::default();
+    let of_scan = |number: usize| FrameComparison::new(label, format!("scan {number}"), number);
     // First in the list: a broken time explains what is wrong after it.
+    let mut comparison = of_scan(0);
     let (violations, count) = converters.violations();
-    violations.iter().for_each(|text| compared.rule(0, "converter", text.clone()));
-    compared.findings.count += count - violations.len();
+    let place = Place { stage: "converter", ..Place::default() };
+    violations.iter().for_each(|text| comparison.add_violation(place, text.clone()));
     if !bytes.is_empty() {
-        compared.rule(0, "load", format!("{} bytes of the image are not taken", bytes.len()));
+        let place = Place { stage: "load", ..Place::default() };
+        comparison.add_violation(place, format!("{} bytes of the image are not taken", bytes.len()));
     }
+    findings.extend(comparison.finish());
+    findings.count += count - violations.len();
     let (mut code, mut beat) = (codes.iter(), beats.iter());
-    for (place, own) in expected.iter().enumerate() {
-        let number = own.number;
+    let (cols, mut end) = (model.scene.sensor.cols, 0);
+    for (nth, own) in expected.iter().enumerate() {
+        let mut comparison = of_scan(own.number);
         for (index, &wanted) in own.scanned.codes.iter().enumerate() {
+            let taxel = Some([index / cols, index % cols]);
             let got = code.next().map(|code| vec![i64::from(*code)]);
-            let cols = model.scene.sensor.cols;
-            compared.word(number, "scan", index, Some([index / cols, index % cols]), vec![wanted.into()], got);
+            comparison.compare(Place { stage: "scan", index, taxel, cycle: None }, Some(vec![wanted.into()]), got);
         }
         for (index, wanted) in own.beats.iter().enumerate() {
             let got = beat.next().map(|beat| beat.map(i64::from).to_vec());
-            compared.word(number, "beats", index, None, wanted.map(i64::from).to_vec(), got);
+            let place = Place { stage: "beats", index, ..Place::default() };
+            comparison.compare(place, Some(wanted.map(i64::from).to_vec()), got);
         }
-        let end = expected[..=place].iter().map(|of| of.beats.len()).sum::<usize>();
-        if ends.get(place) != Some(&end) {
-            compared.rule(number, "beats", format!("tlast is not on beat {end} of the run"));
+        end += own.beats.len();
+        if ends.get(nth) != Some(&end) {
+            let place = Place { stage: "beats", ..Place::default() };
+            comparison.add_violation(place, format!("tlast is not on beat {end} of the run"));
         }
+        findings.extend(comparison.finish());
     }
-    (compared.findings, times)
-}
-
-struct Comparison<'a> {
-    run: &'a str,
-    findings: Findings,
-}
-
-impl Comparison<'_> {
-    fn add(&mut self, number: usize, mismatch: Mismatch) {
-        self.findings.count += 1;
-        self.findings.unequal.insert(number);
-        if self.findings.kept.len() < KEPT_PER_FRAME {
-            self.findings.kept.push(mismatch);
-        }
-    }
-
-    fn of(&self, number: usize, stage: &str, index: usize) -> Mismatch {
-        Mismatch {
-            run: self.run.to_owned(),
-            frame: format!("scan {number}"),
-            stage: stage.to_owned(),
-            index,
-            taxel: None,
-            cycle: None,
-            expected: None,
-            got: None,
-            rule: None,
-        }
-    }
-
-    fn word(
-        &mut self,
-        number: usize,
-        stage: &str,
-        index: usize,
-        taxel: Option<[usize; 2]>,
-        expected: Vec<i64>,
-        got: Option<Vec<i64>>,
-    ) {
-        if got.as_ref() != Some(&expected) {
-            let mismatch = Mismatch { taxel, expected: Some(expected), got, ..self.of(number, stage, index) };
-            self.add(number, mismatch);
-        }
-    }
-
-    fn rule(&mut self, number: usize, stage: &str, rule: String) {
-        let mismatch = Mismatch { rule: Some(rule), ..self.of(number, stage, 0) };
-        self.add(number, mismatch);
-    }
+    (findings, times)
 }
 
 /// A scanned frame.
