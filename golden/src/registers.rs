@@ -176,8 +176,8 @@ pub fn constants(plan: &Plan, stream_bytes: usize) -> Vec<(&'static str, u32)> {
         ("scene", scene_hash(plan)),
         ("array", array.iter().rev().fold(0, |word, part| word << 8 | *part as u32)),
         ("clock_Hz", (plan.board.clock_MHz * 1e6).round() as u32),
-        ("force_triples", plan.force_beats() as u32),
-        ("status_triples", (plan.label_beats() + plan.status_beats()) as u32),
+        ("force_triples", plan.force_triples() as u32),
+        ("status_triples", plan.status_triples() as u32),
     ]
 }
 
@@ -236,6 +236,8 @@ pub fn system_rdl() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixed::Model;
+    use crate::scene::Scene;
 
     #[test]
     fn addresses_and_fields_do_not_overlap() {
@@ -275,11 +277,30 @@ mod tests {
         assert!(header.contains("DERMIS_ARRAY_COLS_MASK 0x0000ff00u"));
     }
 
+    fn model(scene: &str) -> Model {
+        Model::new(&Scene::builtin(scene).unwrap()).unwrap()
+    }
+
+    fn content(constants: &[(&str, u32)], name: &str) -> u32 {
+        constants.iter().find(|(own, _)| *own == name).unwrap().1
+    }
+
+    #[test]
+    fn forces_and_what_is_behind_them_are_all_triples_of_a_frame() {
+        for scene in ["eight-by-eight", "eight-by-eight-contacts"] {
+            let model = model(scene);
+            let trace = model.run(&[0; 64]);
+            let constants = constants(&model, 4);
+            let [forces, others] = ["force_triples", "status_triples"].map(|name| content(&constants, name) as usize);
+            assert_eq!((forces, forces + others), (64, trace.beats.len() + trace.status.len()), "{scene}");
+        }
+    }
+
     #[test]
     fn constants_are_those_of_the_scene() {
-        let model = crate::fixed::Model::new(&crate::scene::Scene::builtin("eight-by-eight").unwrap()).unwrap();
+        let model = model("eight-by-eight");
         let constants = constants(&model, 16);
-        let of = |name: &str| constants.iter().find(|(own, _)| *own == name).unwrap().1;
+        let of = |name| content(&constants, name);
         assert_eq!(of("array"), 8 | 8 << 8 | model.formats().code_bits << 16 | 16 << 24);
         assert_eq!([of("force_triples"), of("status_triples"), of("clock_Hz")], [64, 3, 100_000_000]);
         // A register that is constant has a content, another none.

@@ -233,6 +233,9 @@ fn header(model: &Model, top: &str) -> String {
             true => "; a number beyond the codes is a byte of an image of tables",
         },
         forces = match model.sends_resultants() {
+            false if model.label_beats() > 0 => {
+                format!("{} forces row-major, {} beats of labels", model.force_triples(), model.label_beats())
+            }
             false => format!("{} forces row-major", model.force_beats()),
             true => format!("{} beats of sums", model.force_beats()),
         },

@@ -20,7 +20,7 @@ MAP = json.loads(Path(FOLDER, "registers.json").read_text(encoding="utf-8"))
 REGISTERS = {register["name"]: register for register in MAP["registers"]}
 MANIFEST = json.loads(Path(FOLDER, "manifest.json").read_text(encoding="utf-8"))
 CODE_BITS = MANIFEST["input"]["bits"]
-FORCES = MANIFEST["output"]["force_beats"]
+FORCES = MAP["constants"]["force_triples"]
 # Cycles after which something hangs, far more than two frames take.
 PATIENCE = 40_000
 

@@ -112,7 +112,7 @@ macro_rules! core {
                     tables_in: TablesIn::new(model.formats().code_bits as usize, model.has_writable_tables()),
                     labels: Queue::new(ID_BITS + 1),
                     engine: <$engine>::new(model),
-                    stream_out: StreamOut::new(words, model.force_beats()),
+                    stream_out: StreamOut::new(words, model.force_triples()),
                     registers: Registers::new(
                         &constants(model, REGISTER_BITS / 8 * words),
                         model.has_writable_tables(),

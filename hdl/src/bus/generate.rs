@@ -53,8 +53,8 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
         engine_top = engine.top,
         sensor = scene.sensor,
         clock = model.board.clock_MHz,
-        forces = model.force_beats(),
-        others = model.label_beats() + model.status_beats(),
+        forces = model.force_triples(),
+        others = model.status_triples(),
         pins = match shape.bus {
             Bus::AxiLite => "s_axil",
             Bus::Wishbone => "wb",

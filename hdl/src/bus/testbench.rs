@@ -28,15 +28,17 @@ pub(super) fn testbench(model: &Model, top: &str, shape: CoreShape, command: Str
         counts: [codes.len(), words.len()],
         patience,
     };
-    let text = opening.text(model, top) + &text(top, shape);
+    let text = opening.text(model, top) + &text(top, shape, 3 * model.force_triples());
     vec![file(".sv", text), file("_codes.hex", lines(&codes)), file("_words.hex", lines(&words))]
 }
 
-fn text(top: &str, shape: CoreShape) -> String {
+/// The module after its opening; the first `force_words` words of a frame are forces.
+fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
     let (pins, access) = bus(shape.bus);
     format!(
         "
   localparam LANES = {lanes};
+  localparam FORCE_WORDS = {force_words};
   localparam [3:0] TID = 4'd9;
 
   integer lane;
@@ -81,6 +83,7 @@ fn text(top: &str, shape: CoreShape) -> String {
         if (m_keep[4*lane]) begin
           if (m_data[32*lane +: 32] !== expected[received])
             $fatal(1, \"word %0d is %h, expected %h\", received, m_data[32*lane +: 32], expected[received]);
+          if (m_user[lane] !== (received >= FORCE_WORDS)) $fatal(1, \"word %0d: tuser %b\", received, m_user);
           received = received + 1;
         end
       if (m_last !== (received == WORDS)) $fatal(1, \"word %0d: m_axis_tlast is %b\", received, m_last);

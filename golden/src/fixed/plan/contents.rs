@@ -274,6 +274,16 @@ impl Plan {
         }
     }
 
+    /// Number of output beats with forces of taxels, or with resultants: those before labels and status.
+    pub fn force_triples(&self) -> usize {
+        self.force_beats() - self.label_beats()
+    }
+
+    /// Number of output beats behind them: labels of contacts, then status.
+    pub fn status_triples(&self) -> usize {
+        self.label_beats() + self.status_beats()
+    }
+
     /// Number of beats with codes after the status: those of a scan whose tables, zero and gain among them, are found from
     /// readings and written at run time.
     pub fn code_beats(&self) -> usize {
