@@ -133,7 +133,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 
 # Without examples in documentation, of which --include-ignored would run those that are no programs. The Python module is left
 # out by name, since --lib links a test program of it even with `test = false`.
-nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out
+nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out (70 minutes)
 	@echo '== all tests'
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --exclude dermis-python --lib --bins --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses

@@ -11,6 +11,7 @@ import pytest
 from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
 
 FUSESOC = Path(sys.executable).with_name("fusesoc")
+CONTACTS = HERE.parents[1] / "golden/scenes/eight-by-eight-contacts.toml"
 
 
 def fusesoc(root, core, target):
@@ -35,11 +36,16 @@ def generated(form, scene):
     suffix = f"_{form}" if bus else ""
     folder = BUILD / "fusesoc" / f"{scene.stem}{suffix}"
     generate(folder, *bus, scene=scene)
-    return folder, f"dermis:ip:dermis_{scene.stem}{suffix}"
+    return folder, f"dermis:ip:dermis_{scene.stem.replace('-', '_')}{suffix}"
 
 
 def test_sim(core):
     passed, output = fusesoc(*core, "sim")
+    assert passed and "PASS" in output, output
+
+
+def test_sim_with_labels_of_contacts():
+    passed, output = fusesoc(*generated("axi", CONTACTS), "sim")
     assert passed and "PASS" in output, output
 
 
