@@ -88,7 +88,7 @@ fn bit(kind: Kind) -> u8 {
 /// Length in bytes of a frame's codes to the board, of its resultants and of its forces, each with a name.
 pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
     let taxels = plan.scene.sensor.taxels();
-    let others = (plan.label_beats() + plan.status_beats() + plan.code_beats()) * BEAT_BYTES;
+    let others = (plan.status_triples() + plan.code_beats()) * BEAT_BYTES;
     let sent = if plan.scene.hardware.adc_scan.is_some() { 0 } else { taxels };
     let resultants = if plan.sends_resultants() { BEAT_BYTES * plan.force_beats() } else { Sums::BYTES };
     [

@@ -139,6 +139,14 @@ fn load(path: &str, scene: &Scene) -> Result<Frame> {
     Ok(frame)
 }
 
+/// Names of scenes: `scenes`, or if there is none those of `default`.
+pub fn scenes_or(scenes: &[String], default: impl IntoIterator<Item = &'static str>) -> Vec<String> {
+    match scenes {
+        [] => default.into_iter().map(str::to_owned).collect(),
+        named => named.to_vec(),
+    }
+}
+
 /// The built-in scene with the sensor in a frame file, else the default scene of that sensor.
 fn scene_of_frame(path: &str) -> Result<Scene> {
     let sensor = Frame::load(path, None)?.sensor;

@@ -9,6 +9,7 @@ use dermis_golden::import::Imported;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
+use super::inputs::scenes_or;
 use crate::jobs::Interrupt;
 use crate::report::document::{Document, Section};
 use crate::report::measure::{
@@ -63,10 +64,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     if !arguments.recordings.is_empty() {
         return Ok((recordings_page(arguments, build)?, true));
     }
-    let names: Vec<String> = match &arguments.scenes[..] {
-        [] => Scene::builtin_names().into_iter().map(str::to_owned).collect(),
-        named => named.to_vec(),
-    };
+    let names = scenes_or(&arguments.scenes, Scene::builtin_names());
     let scenes = names.iter().map(|name| Scene::load(name)).collect::<Result<Vec<_>, _>>()?;
     let processors = available_parallelism().map_or(1, usize::from);
     let options = Options {

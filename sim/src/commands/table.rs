@@ -8,6 +8,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 
+use super::inputs::scenes_or;
 use crate::cosim::hardware::Simulator;
 use crate::cosim::verify::{verify, Verified};
 use crate::cosim::QUICK_SCENES;
@@ -54,17 +55,9 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         let (scene, frames) = shipped(name, "dermis cosim takes them with --frame")?;
         verify(&scene, &frames, &[Simulator::Verilator, Simulator::RustHdl], build_dir)
     };
-    let all = or_default(scenes, QUICK_SCENES).iter().map(verify).collect::<Result<Vec<_>>>()?;
+    let all = scenes_or(scenes, QUICK_SCENES).iter().map(verify).collect::<Result<Vec<_>>>()?;
     let equal = all.iter().all(|v| v.findings.is_equal());
     Ok((report::scenes(&all), equal))
-}
-
-/// `scenes`, or if there is none those of `default`.
-fn or_default(scenes: &[String], default: impl IntoIterator<Item = &'static str>) -> Vec<String> {
-    match scenes {
-        [] => default.into_iter().map(str::to_owned).collect(),
-        named => named.to_vec(),
-    }
 }
 
 /// A scene with its shipped frames; `otherwise` says where others come from.
@@ -78,7 +71,7 @@ fn shipped(name: &str, otherwise: &str) -> Result<(Scene, Vec<Frame>)> {
 
 /// The error table of the named scenes, or of all built-in ones.
 fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format) -> Result<String> {
-    let scenes = or_default(scenes, Scene::builtin_names());
+    let scenes = scenes_or(scenes, Scene::builtin_names());
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let mut rows = Vec::new();
     for name in &scenes {

@@ -40,7 +40,7 @@ pub struct Answer {
 impl Answer {
     /// Parses the payload of a forces or resultants packet; `None` if its length is wrong.
     pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
-        let others = (model.label_beats() + model.status_beats() + model.code_beats()) * BEAT_BYTES;
+        let others = (model.status_triples() + model.code_beats()) * BEAT_BYTES;
         let (front, others) = bytes.split_at_checked(bytes.len().checked_sub(others)?)?;
         let mut labels = beats_of_bytes(others)?;
         let mut status = labels.split_off(model.label_beats());
@@ -50,7 +50,7 @@ impl Answer {
         let records = model.sends_resultants();
         let forces = if forces || records { Some(beats_of_bytes(front)?) } else { None };
         let sums = match &forces {
-            Some(forces) if forces.len() + labels.len() != model.force_beats() => return None,
+            Some(forces) if forces.len() != model.force_triples() => return None,
             Some(_) if records => None,
             Some(forces) => Some(Sums::of(forces, sensor.cols)),
             None => Some(Sums::of_bytes(front)?),
@@ -63,7 +63,7 @@ impl Answer {
     pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
-        let (forces, labels) = trace.beats.split_at(trace.beats.len() - model.label_beats());
+        let (forces, labels) = trace.beats.split_at(model.force_triples());
         let pairs = self.forces.iter().flatten().zip(forces).enumerate();
         let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
         if let Some((index, (got, expected))) = differing.next() {
