@@ -40,7 +40,7 @@ mod tests;
 mod traction;
 
 pub use error::GeneratorError;
-pub use random::{random_contacts, Draw, Shapes};
+pub use random::{random_contacts, Draw, Shapes, MOST_RANDOM};
 
 use crate::frame::{Contact, Frame};
 use crate::scene::Medium;

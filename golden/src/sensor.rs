@@ -7,6 +7,8 @@
 //! |---|---|---|---|
 //! | rows, cols | scalar | taxels | 2 … 256 |
 //! | pitch, thickness | scalar | mm | above 0, up to 10⁶ |
+//! | pitch over pitch | scalar | – | 1/16 … 16 |
+//! | thickness over pitch | scalar | – | 1/1000 … 1000 |
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -18,6 +20,11 @@ pub const MIN_SIDE: usize = 2;
 pub const MAX_SIDE: usize = 256;
 /// Largest pitch or thickness in mm.
 pub const MAX_LENGTH_MM: f64 = 1e6;
+/// Largest ratio of the two pitches: the estimator `evidence` divides the larger one into cells of the size of the smaller.
+pub const MAX_PITCH_RATIO: f64 = 16.0;
+/// Largest ratio of a pitch to the thickness, and of the thickness to a pitch: beyond it the taxels tell nothing of each
+/// other, or everything.
+pub const MAX_DEPTH_RATIO: f64 = 1e3;
 
 /// A regular rectangular array of taxels under an elastic cover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -96,6 +103,17 @@ impl Sensor {
                 return Err(SensorError { field, value, allowed });
             }
         }
+        let ratios = [
+            ("pitch_y_mm", self.pitch_y_mm, "pitch_x_mm", self.pitch_x_mm, MAX_PITCH_RATIO),
+            ("thickness_mm", self.thickness_mm, "pitch_x_mm", self.pitch_x_mm, MAX_DEPTH_RATIO),
+            ("thickness_mm", self.thickness_mm, "pitch_y_mm", self.pitch_y_mm, MAX_DEPTH_RATIO),
+        ];
+        for (field, value, other, length, most) in ratios {
+            if value.max(length) / value.min(length) > most {
+                let allowed = format!("from 1/{most} to {most} times {other} = {length}");
+                return Err(SensorError { field, value, allowed });
+            }
+        }
         Ok(())
     }
 }
@@ -141,8 +159,25 @@ mod tests {
             Sensor { pitch_x_mm: 0.0, ..sensor() },
             Sensor { pitch_y_mm: f64::NAN, ..sensor() },
             Sensor { thickness_mm: f64::INFINITY, ..sensor() },
+            Sensor { pitch_x_mm: 1e-300, ..sensor() },
+            Sensor { pitch_x_mm: 1000.0, pitch_y_mm: 1e-12, thickness_mm: 1000.0, ..sensor() },
+            Sensor { pitch_x_mm: 1.0, pitch_y_mm: 0.001, thickness_mm: 1.0, ..sensor() },
+            Sensor { thickness_mm: 1e-3, ..sensor() },
+            Sensor { thickness_mm: 1e4, ..sensor() },
         ];
-        let fields = ["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"];
+        let fields = [
+            "rows",
+            "cols",
+            "pitch_x_mm",
+            "pitch_y_mm",
+            "thickness_mm",
+            "pitch_y_mm",
+            "pitch_y_mm",
+            "pitch_y_mm",
+            "thickness_mm",
+            "thickness_mm",
+        ];
+        assert_eq!(bad.len(), fields.len());
         for (sensor, field) in bad.iter().zip(fields) {
             assert_eq!(sensor.check().unwrap_err().field, field);
         }

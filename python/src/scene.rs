@@ -229,7 +229,7 @@ impl Scene {
     ///     Contacts with the keys of a frame file: shape, centre_mm, size_mm, normal_N, tangential_N, kind_of_slip,
     ///     friction, rotation_rad; `dermis generate --help` lists the shapes.
     /// random : int, default 0
-    ///     Number of random contacts, beside those described.
+    ///     Number of random contacts, beside those described; at most 1000.
     /// shapes : "elliptic" or "other", default "elliptic"
     ///     Shapes of the random contacts.
     /// touching : bool, default False
@@ -287,6 +287,7 @@ impl Scene {
         let mut all = contacts.map_or(Ok(Vec::new()), self::contacts)?;
         let seed = count("seed", seed)?;
         let draw = Draw { count: count("random", random)?, shapes: shapes_named(shapes)?, touching, seed };
+        draw.check().map_err(input)?;
         let converter = Converter {
             noise,
             gain_spread,

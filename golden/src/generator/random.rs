@@ -13,6 +13,7 @@
 //!
 //! Sizes, loads and shear ratios have the distribution of the shipped frames `S?-hs-random-*` and `S3-hs-multi-*`.
 
+use super::GeneratorError;
 use crate::frame::Contact;
 use crate::random::Random;
 use crate::sensor::Sensor;
@@ -48,6 +49,23 @@ pub struct Draw {
     pub touching: bool,
     /// Seed of the random numbers.
     pub seed: u64,
+}
+
+/// Largest number of random contacts.
+pub const MOST_RANDOM: usize = 1000;
+
+impl Draw {
+    /// Checks the number of contacts.
+    ///
+    /// # Errors
+    /// [`GeneratorError::Option`] above [`MOST_RANDOM`].
+    pub fn check(&self) -> Result<(), GeneratorError> {
+        if self.count > MOST_RANDOM {
+            let allowed = "a whole number from 0 to 1000";
+            return Err(GeneratorError::Option { field: "random", value: self.count as f64, allowed });
+        }
+        Ok(())
+    }
 }
 
 /// Draws random contacts for an array.

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Use the contacts described in a frame file.
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
-    /// Draw N random contacts.
+    /// Draw N random contacts, at most 1000.
     #[arg(long, value_name = "N", default_value_t = 0)]
     random: usize,
     /// Shapes of the random contacts.
@@ -104,7 +104,9 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         contacts.extend(Frame::load(path, Some(&scene))?.contacts);
     }
     let Arguments { random: count, shapes, touching, seed, .. } = *arguments;
-    contacts.extend(random_contacts(&scene.sensor, Draw { count, shapes: shapes.into(), touching, seed }));
+    let draw = Draw { count, shapes: shapes.into(), touching, seed };
+    draw.check()?;
+    contacts.extend(random_contacts(&scene.sensor, draw));
     if contacts.is_empty() {
         bail!("no contact: give --contact, --like or --random");
     }
