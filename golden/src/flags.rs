@@ -20,6 +20,8 @@
 //! | `tables-incomplete` | the hardware's tables are not whole: no force is computed from them | the engine |
 //! | `tables-refused` | the last tables sent to the hardware were refused; it has those of before | the engine |
 //! | `wrong-channel` | a converter that the hardware scans named another channel than that asked for | the scan |
+//! | `estimate-failed` | no fit explains the stress, or it is implausible: the normal force is Σ b·area, the shear is not known | `evidence`, `learned` |
+//! | `taxel-suspect` | a reading that no force explains: the taxel is taken as missing in this frame | `evidence`, `learned` |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -69,11 +71,15 @@ pub enum Flag {
     TablesRefused,
     /// A converter that the hardware scans named another channel than that asked for.
     WrongChannel,
+    /// No fit explains the stress; the normal force is Σ b·area, the shear is not known.
+    EstimateFailed,
+    /// A taxel reads what no force explains, and is taken as missing.
+    TaxelSuspect,
 }
 
 impl Flag {
     /// All flags, in order.
-    pub const ALL: [Flag; 18] = [
+    pub const ALL: [Flag; 20] = [
         Flag::NoContact,
         Flag::NoCompression,
         Flag::ConditionUnmet,
@@ -92,6 +98,8 @@ impl Flag {
         Flag::TablesIncomplete,
         Flag::TablesRefused,
         Flag::WrongChannel,
+        Flag::EstimateFailed,
+        Flag::TaxelSuspect,
     ];
 }
 
@@ -182,6 +190,8 @@ mod tests {
             "tables-incomplete",
             "tables-refused",
             "wrong-channel",
+            "estimate-failed",
+            "taxel-suspect",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

@@ -147,6 +147,14 @@ typedef enum {
    * `wrong-channel`
    */
   DERMIS_FLAG_WRONG_CHANNEL = (1 << 17),
+  /**
+   * `estimate-failed`
+   */
+  DERMIS_FLAG_ESTIMATE_FAILED = (1 << 18),
+  /**
+   * `taxel-suspect`
+   */
+  DERMIS_FLAG_TAXEL_SUSPECT = (1 << 19),
 } dermis_flag;
 
 /**

@@ -14,13 +14,15 @@
 //! | out: μ, covariance (J + 1/s²)⁻¹ | contacts × 2, square of it | – |
 
 use super::model::{Posterior, Products, Slope};
-use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 use faer::{Col, Mat, Side};
 
 /// Halvings of a step before the ascent ends.
 const HALVINGS: usize = 6;
 /// s in units of mu_max.
 const SPREAD: f64 = 0.4;
+/// Rounding of J relative to its largest entry.
+const ROUNDING: f64 = 1e-6;
 /// Length of a step, in units of mu_max, below which the ascent ends.
 pub(super) const TOLERANCE: f64 = 1e-4;
 
@@ -60,15 +62,27 @@ impl Prior {
         }
     }
 
-    /// J + 1/s², whose inverse is the covariance of μ.
-    pub fn information(self, slope: &Slope) -> Mat<f64> {
+    /// J + 1/s², whose inverse is the covariance of μ, factored. J is a difference of large matrices: where rounding makes it
+    /// indefinite, it is raised by the rounding that it can have. `None` if it is not representable.
+    fn information(self, slope: &Slope) -> Option<Llt<f64>> {
         let n = slope.gradient.len();
-        Mat::from_fn(n, n, |i, j| slope.information[(i, j)] + if i == j { self.precision() } else { 0.0 })
+        let factor = |raised: f64| {
+            let own =
+                |i: usize, j: usize| slope.information[(i, j)] + if i == j { self.precision() + raised } else { 0.0 };
+            Mat::from_fn(n, n, own).llt(Side::Lower).ok()
+        };
+        let largest = (0..n).map(|i| slope.information[(i, i)].abs()).fold(0.0, f64::max);
+        factor(0.0).or_else(|| factor(ROUNDING * largest)).or_else(|| factor(largest))
+    }
+
+    /// The covariance of `unknowns` entries of μ of which the stress says nothing.
+    pub fn unresolved(self, unknowns: usize) -> Mat<f64> {
+        Mat::from_fn(unknowns, unknowns, |i, j| if i == j { 1.0 / self.precision() } else { 0.0 })
     }
 
     /// The covariance of all μ; `None` if it is not representable.
     pub fn covariance(self, slope: &Slope) -> Option<Mat<f64>> {
-        self.information(slope).llt(Side::Lower).ok().map(|factor| factor.inverse())
+        self.information(slope).map(|factor| factor.inverse())
     }
 }
 
@@ -87,7 +101,7 @@ pub(super) fn ascend(products: &Products, mu: &[[f64; 2]], prior: Prior, steps: 
         let value = best.posterior.value + prior.log(&best.mu);
         let uphill = |i: usize| best.slope.gradient[i] - prior.precision() * best.mu[i / 2][i % 2];
         let right = Col::from_fn(best.slope.gradient.len(), uphill);
-        let step = prior.information(&best.slope).llt(Side::Lower).ok()?.solve(&right);
+        let step = prior.information(&best.slope)?.solve(&right);
         let longest = step.iter().fold(0.0f64, |longest, step| step.abs().max(longest));
         if longest <= TOLERANCE * prior.mu_max {
             break;

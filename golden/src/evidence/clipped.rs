@@ -66,7 +66,8 @@ mod tests {
     #[test]
     fn moments_are_exact_for_one_reading() {
         for (shift, sigma) in [(0.0, 0.3), (2.0, 0.5), (-1.0, 0.01)] {
-            let design = Design { s: Mat::from_fn(2, 3, |_, i| if i == 0 { 1.0 } else { 0.0 }), contact: vec![0] };
+            let design =
+                Design { s: Mat::from_fn(2, 3, |_, i| if i == 0 { 1.0 } else { 0.0 }), contact: vec![0], baseline: 0 };
             let mut readings = Readings { y: vec![shift, 0.0], precision: vec![2.0, 0.0] };
             let mu = [[0.0; 2]];
             for _ in 0..3 {
@@ -84,7 +85,7 @@ mod tests {
             let (zero, mean) = (moment(0), moment(1) / moment(0));
             let variance = moment(2) / zero - mean * mean;
             assert!((posterior.w[0] - mean).abs() < 1e-3, "{shift}: {} {mean}", posterior.w[0]);
-            assert!((posterior.covariance[(0, 0)] - variance).abs() < 1e-3, "{shift}");
+            assert!((posterior.covariance()[(0, 0)] - variance).abs() < 1e-3, "{shift}");
         }
     }
 }

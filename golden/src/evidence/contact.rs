@@ -40,7 +40,7 @@ pub(super) fn forces(products: &Products, top: &Top, covariance: &Mat<f64>, load
     let one = |k: usize| {
         let f = &loads[k];
         let r = f.len();
-        let dot = |i: usize| -> f64 { (0..r).map(|j| top.posterior.covariance[(i, j)] * f[j]).sum() };
+        let dot = |i: usize| -> f64 { (0..r).map(|j| top.posterior.covariance()[(i, j)] * f[j]).sum() };
         let given: f64 = (0..r).map(|i| f[i] * dot(i)).sum();
         let normal: f64 = f.iter().zip(&top.posterior.w).map(|(f, w)| f * w).sum();
         let slope: Vec<f64> = (0..unknowns).map(|u| (0..r).map(|i| f[i] * drift[(i, u)]).sum()).collect();

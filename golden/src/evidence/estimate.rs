@@ -1,6 +1,7 @@
 //! What the evidence says of one frame.
 
 use crate::frame::Forces;
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// One contact.
@@ -19,7 +20,7 @@ pub struct ContactEstimate {
 }
 
 /// What one frame says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// The contacts; none without a reading above zero.
     pub contacts: Vec<ContactEstimate>,
@@ -34,4 +35,32 @@ pub struct Estimate {
     pub rounds: usize,
     /// Number of coefficients r of the pressures.
     pub rank: usize,
+    /// Whether no fit explains the stress: the normal force is Σ b·area, the shear is not known.
+    pub failed: bool,
+    /// Taxels whose readings no force explains; they are taken as missing.
+    pub suspects: Vec<SuspectTaxel>,
+    /// Distance, in standard deviations, of the reading that the others explain least; `None` where no fit was made.
+    pub outlier: Option<f64>,
+    /// Correlation of what neighbours leave, in standard deviations; `None` where no fit was made.
+    pub residual_correlation: Option<f64>,
+}
+
+/// A taxel whose reading no force explains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SuspectTaxel {
+    /// Its row.
+    pub row: usize,
+    /// Its column.
+    pub col: usize,
+    /// Its reading in MPa.
+    pub stress_MPa: f64,
+    /// The stress in MPa that the other readings predict there.
+    pub expected_MPa: f64,
+}
+
+impl SuspectTaxel {
+    /// The taxel with this row-major index.
+    pub(super) fn new(sensor: &Sensor, taxel: usize, stress_MPa: f64, expected_MPa: f64) -> SuspectTaxel {
+        SuspectTaxel { row: taxel / sensor.cols, col: taxel % sensor.cols, stress_MPa, expected_MPa }
+    }
 }

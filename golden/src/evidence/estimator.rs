@@ -3,6 +3,7 @@
 use super::ascent::Prior;
 use super::cells::Cells;
 use super::envelope::envelope;
+use super::screen::Screen;
 use crate::learned::Learned;
 use crate::scene::Scene;
 
@@ -27,6 +28,7 @@ pub struct Evidence {
     /// Noise of each taxel over the root mean square of all.
     pub(super) noise_shares: Vec<f64>,
     pub(super) adviser: Option<Adviser>,
+    pub(super) screen: Option<Screen>,
 }
 
 /// A network, and whether the evidence has a say.
@@ -50,6 +52,7 @@ impl Evidence {
             cells: Cells::new(sensor, scene.medium, length_mm),
             length_mm,
             prior: Prior { mu_max: scene.search.mu_max },
+            screen: Screen::new(sensor, scene.medium, &alive),
             alive,
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,

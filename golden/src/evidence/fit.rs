@@ -11,12 +11,14 @@
 mod advice;
 
 use super::ascent::{ascend, Top};
+use super::baseline::{plane, terms, Sizes, TERMS};
 use super::contact::forces;
 use super::envelope::{envelope, from_stress};
 use super::estimate::{ContactEstimate, Estimate};
 use super::estimator::Evidence;
 use super::model::{Design, Products, Readings};
 use super::prior::factor;
+use super::residual::Residual;
 use super::{clipped, noise};
 use crate::frame::Forces;
 use crate::segment::{neighbours, segment, WIDTH};
@@ -43,6 +45,13 @@ const ENVELOPE_FACTOR: f64 = 1.1;
 const PASSES: usize = 2;
 /// Steps of the ascent.
 const STEPS: usize = 4;
+/// Largest variance of a pressure, in units of its own, that may be left out because there are more coefficients than
+/// readings: with more the shear counts as not known.
+const WIDE: f64 = 0.01;
+/// Coefficients of a contact beside which larger ones take none.
+const LEAST_RANK: usize = 8;
+/// Steps with the noise, baseline and clipped readings of a pass: the next round goes on from there.
+const PASS_STEPS: usize = 1;
 /// Change of μ per round, in units of mu_max, below which the rounds end.
 const SETTLED: f64 = 1e-3;
 
@@ -50,11 +59,17 @@ const SETTLED: f64 = 1e-3;
 pub(super) struct Fit<'a> {
     scene: &'a Evidence,
     b: &'a [f64],
+    /// Taxels whose readings count.
+    used: &'a [bool],
     /// The taxels that are read.
     taxels: Vec<usize>,
     /// Which of them read zero because they read no tension.
     clipped: Vec<usize>,
+    /// Which of them are read for what the estimate says of them alone.
+    missing: Vec<usize>,
     readings: Readings,
+    /// Sizes of the baseline.
+    sizes: Sizes,
     sigma: f64,
     /// Whether sigma is known.
     stated: bool,
@@ -73,6 +88,26 @@ struct Regions {
     /// F of each contact.
     factors: Vec<Mat<f64>>,
     design: Design,
+    /// Whether a pressure has many more coefficients than the readings can tell, and was cut to as many.
+    wide: bool,
+}
+
+/// What a fit says of one frame.
+pub(super) struct Fitted {
+    /// Contacts and forces.
+    pub estimate: Estimate,
+    /// The reading that the others explain least: taxel, and its distance in standard deviations.
+    pub worst: Option<(usize, f64)>,
+    /// Correlation of what neighbours leave, in standard deviations.
+    pub correlation: f64,
+    /// Of each taxel that is not used: mean and variance of its stress.
+    pub predicted: Vec<(usize, [f64; 2])>,
+    /// Σ b·area that no baseline explains, of the readings that count.
+    pub load: f64,
+    /// Root mean square of what is left of a reading.
+    pub left: f64,
+    /// Whether a pressure has more coefficients than the readings can tell.
+    pub wide: bool,
 }
 
 /// The contacts with their μ.
@@ -113,30 +148,44 @@ impl Regions {
 }
 
 impl<'a> Fit<'a> {
-    /// A fit that has not begun; `stated` is the noise in units of the peak, if it is known.
-    pub fn new(scene: &'a Evidence, b: &'a [f64], stated: Option<f64>) -> Fit<'a> {
-        let alive = b.iter().zip(&scene.alive).filter_map(|(b, alive)| alive.then_some(*b));
-        let sigma = stated.unwrap_or_else(|| noise::first(alive).min(UNKNOWN)).max(FLOOR);
-        let p = from_stress(&scene.cells, b, &scene.alive, sigma);
+    /// A fit that has not begun, of the taxels `used`; `stated` is the noise in units of the peak, if it is known.
+    pub fn new(scene: &'a Evidence, b: &'a [f64], used: &'a [bool], stated: Option<f64>) -> Fit<'a> {
+        let sensor = &scene.cells.sensor;
+        let first = plane(sensor, b, used);
+        let above = |t: usize| b[t] - first.iter().zip(terms(sensor, t)).map(|(size, term)| size * term).sum::<f64>();
+        let without: Vec<f64> = (0..b.len()).map(above).collect();
+        let readings = (0..b.len()).filter(|&t| used[t]).map(|t| without[t]);
+        let sigma = stated.unwrap_or_else(|| noise::first(readings).min(UNKNOWN)).max(FLOOR);
+        let p = from_stress(&scene.cells, &without, used, sigma);
         let taxels = scene.window(&p, sigma);
-        let is_clipped = |k: &usize| scene.unipolar && b[taxels[*k]] <= 0.0;
-        let clipped = (0..taxels.len()).filter(is_clipped).collect();
+        let of = |is: &dyn Fn(usize) -> bool| (0..taxels.len()).filter(|k| is(taxels[*k])).collect();
+        let clipped = of(&|t| used[t] && scene.unipolar && b[t] <= 0.0);
+        let missing = of(&|t| !used[t]);
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
-        let (labels, mu) = (vec![0; p.len()], vec![[0.0; 2]]);
-        Fit { scene, b, taxels, clipped, readings, sigma, stated: stated.is_some(), p, labels, mu }
+        let (labels, mu, sizes) = (vec![0; p.len()], vec![[0.0; 2]], Sizes::of_plane(first));
+        let stated = stated.is_some();
+        Fit { scene, b, used, taxels, clipped, missing, readings, sizes, sigma, stated, p, labels, mu }
+    }
+
+    /// Whether a reading counts: it is neither clipped nor missing.
+    fn counts(&self, k: usize) -> bool {
+        self.clipped.binary_search(&k).is_err() && self.missing.binary_search(&k).is_err()
     }
 
     /// The estimate; `None` if the model is not representable.
-    pub fn run(mut self) -> Option<Estimate> {
+    pub fn run(mut self) -> Option<Fitted> {
         let (mut round, mut joined) = (0, false);
         let (regions, top) = loop {
             round += 1;
             if round <= SEGMENTED && !joined {
                 self.segment();
             }
+            if self.mu.is_empty() {
+                return None;
+            }
             let before = self.mu.clone();
-            let regions = self.regions();
-            let top = self.ascend(&regions.design, STEPS)?;
+            let mut regions = self.regions();
+            let top = self.ascend(&mut regions.design, STEPS)?;
             self.mu.clone_from(&top.mu);
             self.p = regions.pressure(&top.posterior.w, self.p.len());
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
@@ -159,11 +208,13 @@ impl<'a> Fit<'a> {
         let unknowns = 2 * top.mu.len();
         let searched = self.scene.prior.mu_max > 0.0;
         let covariance = match searched {
+            // What was cut would have left the shear open.
+            true if regions.wide => self.scene.prior.unresolved(unknowns),
             true => self.scene.prior.covariance(&top.slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR),
             false => Mat::zeros(unknowns, unknowns),
         };
         let mut found = Found { regions, top, covariance };
-        if let Some(adviser) = &self.scene.adviser {
+        if let Some(adviser) = self.scene.adviser.as_ref().filter(|_| !found.regions.wide) {
             found = self.advised(adviser, found)?;
         }
         self.estimate(&found, round)
@@ -227,24 +278,31 @@ impl<'a> Fit<'a> {
     /// The contacts under envelopes of the last pressure.
     fn regions(&self) -> Regions {
         let (cells, length) = (&self.scene.cells, self.scene.length_mm);
-        let (mut of_contact, mut factors) = (Vec::new(), Vec::new());
+        let mut of_contact = Vec::new();
         for contact in 0..self.mu.len() {
             let inside = |cell: usize| self.labels[cell] == contact;
             let p: Vec<f64> = (0..self.p.len()).map(|cell| if inside(cell) { self.p[cell] } else { 0.0 }).collect();
             let e = envelope(cells, &p, length, self.sigma);
             let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && inside(cell)).collect();
             let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
-            factors.push(factor(cells, &own, &on_own, length));
-            of_contact.push(own);
+            of_contact.push((own, on_own));
         }
+        let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
+        let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
+            let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
+            let (factor, rest) = factor(cells, own, on_own, length, most);
+            (rest > WIDE, factor)
+        };
+        let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
+        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(own, _)| own).collect();
         let design = self.design(&of_contact, &factors);
-        Regions { cells: of_contact, factors, design }
+        Regions { cells: of_contact, factors, design, wide: cut.contains(&true) }
     }
 
-    /// S: the stress of every column of every factor, for shear along x and y and normal force.
+    /// S: the stress of every column of every factor, for shear along x and y and normal force, and of the baseline.
     fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
         let n = self.taxels.len();
-        let rank: usize = factors.iter().map(Mat::ncols).sum();
+        let rank = TERMS + factors.iter().map(Mat::ncols).sum::<usize>();
         let mut s = Mat::zeros(n, 3 * rank);
         let mut contact = Vec::with_capacity(rank);
         for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
@@ -263,7 +321,18 @@ impl<'a> Fit<'a> {
             }
             contact.extend(vec![k; factor.ncols()]);
         }
-        Design { s, contact }
+        contact.extend([0; TERMS]);
+        let mut design = Design { s, contact, baseline: TERMS };
+        self.baseline(&mut design);
+        design
+    }
+
+    /// The columns B S of the baseline.
+    fn baseline(&self, design: &mut Design) {
+        for (column, term) in design.of_baseline().zip(0..) {
+            let of = |taxel: usize| self.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
+            self.taxels.iter().enumerate().for_each(|(k, &taxel)| design.s[(k, column)] = of(taxel));
+        }
     }
 
     /// Standard deviation of a taxel.
@@ -275,7 +344,7 @@ impl<'a> Fit<'a> {
     fn weigh(&mut self) {
         for (k, &taxel) in self.taxels.iter().enumerate() {
             let b = self.b[taxel];
-            if !(self.scene.unipolar && b <= 0.0) {
+            if self.used[taxel] && !(self.scene.unipolar && b <= 0.0) {
                 let (noise, gain) = (self.noise(taxel), self.scene.gain_spread * b);
                 self.readings.y[k] = b;
                 self.readings.precision[k] = 1.0 / (noise * noise + gain * gain);
@@ -283,26 +352,29 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The largest posterior of μ under the present envelopes within `steps` steps, with the noise and the clipped readings
-    /// that go with it; without a step the posterior at the present μ.
-    fn ascend(&mut self, design: &Design, steps: usize) -> Option<Top> {
+    /// The largest posterior of μ under the present envelopes within `steps` steps, with the noise, the baseline and the
+    /// clipped readings that go with it; without a step the posterior at the present μ.
+    fn ascend(&mut self, design: &mut Design, steps: usize) -> Option<Top> {
         let prior = self.scene.prior;
         self.weigh();
         let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, steps)?;
-        if self.clipped.is_empty() && self.stated {
-            return Some(top);
-        }
         for _ in 0..PASSES {
             let stress = design.stress(&top.posterior, &top.mu);
             if !self.stated {
-                self.sigma = (self.sigma * noise::ratio(&self.readings, &self.clipped, &stress)).clamp(FLOOR, 1.0);
+                let ratio = noise::ratio(&self.readings, |k| self.counts(k), &stress);
+                self.sigma = (self.sigma * ratio).clamp(FLOOR, 1.0);
                 self.weigh();
             }
+            let first = design.of_baseline().start;
+            let of =
+                |term: usize| [top.posterior.w[first + term], top.posterior.covariance()[(first + term, first + term)]];
+            self.sizes = self.sizes.found(std::array::from_fn(of));
+            self.baseline(design);
             for &k in &self.clipped {
                 let noise = self.noise(self.taxels[k]);
                 clipped::update(&mut self.readings, k, stress[k], noise);
             }
-            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps)?;
+            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps.min(PASS_STEPS))?;
         }
         Some(top)
     }
@@ -319,7 +391,7 @@ impl<'a> Fit<'a> {
     }
 
     /// The result of the last round.
-    fn estimate(&self, found: &Found, rounds: usize) -> Option<Estimate> {
+    fn estimate(&self, found: &Found, rounds: usize) -> Option<Fitted> {
         let Found { regions, top, covariance } = found;
         let cells = &self.scene.cells;
         let products = Products::new(&regions.design, &self.readings);
@@ -328,6 +400,9 @@ impl<'a> Fit<'a> {
         let mut contacts = Vec::with_capacity(forces.len());
         for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
             let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
+            if pressed == 0.0 {
+                return None;
+            }
             for &cell in own {
                 // Contacts do not pull: the pressures below zero go to the others.
                 let share = self.p[cell].max(0.0) / pressed;
@@ -346,10 +421,42 @@ impl<'a> Fit<'a> {
             };
             contacts.push(contact);
         }
-        let known = self.taxels.len() - self.clipped.len();
+        let known = self.taxels.len() - self.clipped.len() - self.missing.len();
         let misfit_probability = self.stated.then(|| chi_square_tail(top.posterior.square, known as f64));
         let (noise_MPa, rank) = (self.sigma, regions.design.rank());
-        Some(Estimate { contacts, forces_N: on_taxels, noise_MPa, misfit_probability, rounds, rank })
+        let estimate = Estimate {
+            contacts,
+            forces_N: on_taxels,
+            noise_MPa,
+            misfit_probability,
+            rounds,
+            rank,
+            ..Estimate::default()
+        };
+        Some(self.fitted(estimate, regions, top))
+    }
+
+    /// The estimate with what it leaves of the readings.
+    fn fitted(&self, estimate: Estimate, regions: &Regions, top: &Top) -> Fitted {
+        let design = &regions.design;
+        let stress = design.stress(&top.posterior, &top.mu);
+        let sensor = &self.scene.cells.sensor;
+        let residual = Residual::new(&self.readings, |k| self.counts(k), &stress);
+        let least = if self.stated { 1.0 } else { FLOOR / self.sigma };
+        let above = |k: usize| {
+            let own = design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]);
+            self.b[self.taxels[k]] - own.sum::<f64>()
+        };
+        let load = (0..self.taxels.len()).filter(|&k| self.counts(k)).map(above).sum::<f64>();
+        Fitted {
+            worst: residual.worst(least).map(|(k, size)| (self.taxels[k], size)),
+            correlation: residual.correlation(sensor, &self.taxels),
+            predicted: self.missing.iter().map(|&k| (self.taxels[k], stress[k])).collect(),
+            left: self.sigma * residual.left(),
+            wide: regions.wide,
+            load: load * sensor.pitch_x_mm * sensor.pitch_y_mm,
+            estimate,
+        }
     }
 }
 

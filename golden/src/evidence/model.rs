@@ -19,15 +19,19 @@
 //! | out: slope and information in μ | 2 × contacts, square of it | – |
 
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 use faer::{Accum, Col, Mat, Par, Side};
+use std::cell::OnceCell;
 
 /// S for the readings in use, and which contact each column of a block belongs to.
 pub(super) struct Design {
     /// [Gz F, Gx F, Gy F], readings × 3r, MPa.
     pub s: Mat<f64>,
-    /// Contact of each of the r coefficients.
+    /// Contact of each of the r coefficients; those of the baseline, the last ones, are counted to the first contact, as no μ
+    /// moves their stress.
     pub contact: Vec<usize>,
+    /// Number of coefficients of the baseline.
+    pub baseline: usize,
 }
 
 /// The readings as the model takes them: what each says, and how surely.
@@ -56,8 +60,9 @@ pub(super) struct Posterior {
     pub square: f64,
     /// Posterior mean of w.
     pub w: Vec<f64>,
-    /// Posterior covariance of w, M⁻¹.
-    pub covariance: Mat<f64>,
+    /// M, factored, and its inverse once that is needed.
+    factor: Llt<f64>,
+    inverse: OnceCell<Mat<f64>>,
     /// (Ga F)ᵀ T H for a = z, x, y: row block a of SᵀTS times the factors of μ.
     rows: [Mat<f64>; 3],
 }
@@ -70,6 +75,13 @@ pub(super) struct Slope {
     pub information: Mat<f64>,
 }
 
+impl Posterior {
+    /// Posterior covariance of w, M⁻¹; most candidates for μ do without.
+    pub fn covariance(&self) -> &Mat<f64> {
+        self.inverse.get_or_init(|| self.factor.inverse())
+    }
+}
+
 /// z + μ1 x + μ2 y, entry by entry.
 fn combine(entries: &mut [f64], [z, x, y]: [&[f64]; 3], [mu1, mu2]: [f64; 2]) {
     entries.iter_mut().zip(z).zip(x).zip(y).for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
@@ -79,6 +91,11 @@ impl Design {
     /// Number of coefficients r.
     pub fn rank(&self) -> usize {
         self.contact.len()
+    }
+
+    /// The coefficients of the baseline.
+    pub fn of_baseline(&self) -> std::ops::Range<usize> {
+        self.rank() - self.baseline..self.rank()
     }
 
     /// H(μ), readings × r.
@@ -94,7 +111,7 @@ impl Design {
     /// The stress of the posterior at μ on every reading: mean in MPa, variance in MPa².
     pub fn stress(&self, posterior: &Posterior, mu: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let h = self.at(mu);
-        let spread = &h * &posterior.covariance;
+        let spread = &h * posterior.covariance();
         let of = |t: usize, other: &dyn Fn(usize) -> f64| (0..self.rank()).map(|i| h[(t, i)] * other(i)).sum();
         (0..h.nrows()).map(|t| [of(t, &|i| posterior.w[i]), of(t, &|i| spread[(t, i)])]).collect()
     }
@@ -149,7 +166,7 @@ impl<'a> Products<'a> {
         let log_m = 2.0 * (0..r).map(|i| lower[(i, i)].ln()).sum::<f64>();
         let value = -0.5 * (square + log_m - self.log_precision);
         let w: Vec<f64> = w.iter().copied().collect();
-        value.is_finite().then(|| Posterior { value, square, w, covariance: factor.inverse(), rows })
+        value.is_finite().then(|| Posterior { value, square, w, factor, inverse: OnceCell::new(), rows })
     }
 
     /// For each unknown of μ, contact by contact: HᵀT of the derivative of the stress (r × unknowns), and the part of
@@ -178,14 +195,14 @@ impl<'a> Products<'a> {
     /// Derivative of the posterior mean w in each unknown of μ, r × unknowns.
     pub fn drift(&self, posterior: &Posterior, unknowns: usize) -> Mat<f64> {
         let [cross, left] = self.derivatives(posterior, unknowns);
-        &posterior.covariance * (left - cross)
+        posterior.covariance() * (left - cross)
     }
 
     /// Slope and information at the μ of `posterior`.
     pub fn slope(&self, posterior: &Posterior) -> Slope {
         let (contact, r) = (&self.design.contact, self.design.rank());
         let unknowns = 2 * contact.iter().max().map_or(0, |last| last + 1);
-        let Posterior { w, covariance, rows, .. } = posterior;
+        let (Posterior { w, rows, .. }, covariance) = (posterior, posterior.covariance());
         let [cross, left] = self.derivatives(posterior, unknowns);
         let mut gradient = vec![0.0; unknowns];
         for (axis, rows) in [(0, &rows[1]), (1, &rows[2])] {
@@ -225,7 +242,10 @@ mod tests {
     fn setting() -> (Design, Readings) {
         let s = Mat::from_fn(6, 12, |t, i| ((3 * t + 5 * i) as f64).sin());
         let y = (0..6).map(|t| (t as f64).cos()).collect();
-        (Design { s, contact: vec![0, 0, 1, 1] }, Readings { y, precision: vec![4.0, 3.0, 0.0, 2.0, 9.0, 1.0] })
+        (
+            Design { s, contact: vec![0, 0, 1, 1], baseline: 0 },
+            Readings { y, precision: vec![4.0, 3.0, 0.0, 2.0, 9.0, 1.0] },
+        )
     }
 
     /// Evidence, slope and information agree with K as it is written.

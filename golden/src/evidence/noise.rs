@@ -29,11 +29,11 @@ pub(super) fn first(b: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Noise found over the noise assumed in the precision of `readings`; `stress` is mean and variance of the posterior's
-/// stress, `clipped` are the readings that count for nothing, in ascending order.
-pub(super) fn ratio(readings: &Readings, clipped: &[usize], stress: &[[f64; 2]]) -> f64 {
+/// stress, `counts` tells which readings count: neither clipped nor missing ones.
+pub(super) fn ratio(readings: &Readings, counts: impl Fn(usize) -> bool, stress: &[[f64; 2]]) -> f64 {
     let (mut left, mut free) = (0.0, 0.0);
     for (t, [mean, variance]) in stress.iter().enumerate() {
-        if clipped.binary_search(&t).is_err() {
+        if counts(t) {
             left += readings.precision[t] * (readings.y[t] - mean).powi(2);
             free += 1.0 - readings.precision[t] * variance;
         }
@@ -65,7 +65,7 @@ mod tests {
     fn noise_is_found_from_unclipped_readings() {
         let count = 400;
         let s = Mat::from_fn(count, 6, |t, i| if i < 2 { ((t + 1) as f64 * (i + 1) as f64).sin() } else { 0.0 });
-        let design = Design { s, contact: vec![0, 0] };
+        let design = Design { s, contact: vec![0, 0], baseline: 0 };
         let clipped: Vec<usize> = (0..count).step_by(4).collect();
         let mut random = Random::new(5);
         let sigma = 0.03;
@@ -74,7 +74,7 @@ mod tests {
         let readings = Readings { y, precision };
         let mu = [[0.0; 2]];
         let posterior = Products::new(&design, &readings).at(&mu).unwrap();
-        let found = ratio(&readings, &clipped, &design.stress(&posterior, &mu));
+        let found = ratio(&readings, |t| clipped.binary_search(&t).is_err(), &design.stress(&posterior, &mu));
         assert!((found / 3.0 - 1.0).abs() < 0.1, "{found}");
     }
 }

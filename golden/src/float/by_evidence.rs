@@ -7,6 +7,7 @@ use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::{ContactEstimate, Evidence};
+use crate::flags::Flag;
 use crate::frame::Frame;
 use crate::partition::Subarray;
 use crate::reconstruct::{Reconstruction, SubarrayResult};
@@ -14,13 +15,27 @@ use crate::reconstruct::{Reconstruction, SubarrayResult};
 impl Golden {
     /// Estimates the contacts of calibrated stress, clipped readings as they are.
     pub(super) fn by_evidence(&self, evidence: &Evidence, frame: &Frame, input: &EngineInput) -> Reconstruction {
-        let estimate = evidence.solve(input.stress_MPa, (input.noise_MPa > 0.0).then_some(input.noise_MPa));
+        let stated = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
+        // No force is worth a fit of readings that no contact causes, such as counts without calibration.
+        let estimate = match frame.peak_MPa() > self.scene.input.plausible_MPa {
+            true => evidence.without_fit(input.stress_MPa, stated),
+            false => evidence.solve(input.stress_MPa, stated),
+        };
         let forces = threshold(estimate.forces_N, self.scene.threshold.min_force_N);
         let subarrays = vec![self.array_of(input, forces.resultant())];
         let mut result = self.finish(frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
+        result.checks.residual_outlier = estimate.outlier;
+        result.checks.residual_correlation = estimate.residual_correlation;
+        if estimate.failed {
+            result.flags.push(Flag::EstimateFailed);
+        }
+        if !estimate.suspects.is_empty() {
+            result.flags.push(Flag::TaxelSuspect);
+        }
+        result.extra.suspects = estimate.suspects;
         result.extra.contacts = Some(estimate.contacts);
         result
     }

@@ -84,7 +84,7 @@ impl Golden {
         })
     }
 
-    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless both press.
+    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless the latter presses.
     fn load_ratio(&self, frame: &Frame, result: &Reconstruction) -> Option<f64> {
         let scene = &self.scene;
         let normal = |(part, matrices): (&Subarray, &Matrices)| {
@@ -93,7 +93,7 @@ impl Golden {
         };
         let without_shear: f64 = self.parts().map(normal).sum();
         let ratio = result.resultant_N[2] / without_shear;
-        (without_shear > 0.0 && ratio > 0.0).then_some(ratio)
+        (without_shear > 0.0).then_some(ratio)
     }
 
     /// The frame with tension in place of clipped readings, and its report without the misfit.

@@ -9,13 +9,14 @@
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `wrench` | a force per taxel, or a record for each contact | force and moment of the whole array |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
+//! | `suspects` | `search.estimator = "evidence"`, flag `taxel-suspect` | row, column, reading and expected stress of taxels taken as missing |
 //! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
 //! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::{shear_sigma_N, Resultant, Wrench};
 use crate::checks::{largest_spread, relative_spread};
-use crate::evidence::ContactEstimate;
+use crate::evidence::{ContactEstimate, SuspectTaxel};
 use crate::frame::Forces;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,9 @@ pub struct Extra {
     /// Force and moment of the whole array; `None` where a device sends sums of subarrays, which do not have the moments.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wrench: Option<Wrench>,
+    /// Taxels whose readings no force explains; the estimate takes them as missing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub suspects: Vec<SuspectTaxel>,
 }
 
 /// Statistics of the estimated tension.

@@ -55,9 +55,9 @@ impl Reconstruction {
         if !searched || whole.estimator() != EstimatorKind::Evidence || Input::new(scene)?.noise_MPa() > 0.0 {
             return Ok(());
         }
-        let found_MPa = Evidence::new(&whole).solve(&stress.stress_MPa, None).noise_MPa;
-        self.checks.noise_MPa = Some(found_MPa);
-        if found_MPa > FOUND_NOISE_LIMIT * stress.peak_MPa() {
+        let estimate = Evidence::new(&whole).solve(&stress.stress_MPa, None);
+        self.checks.noise_MPa = Some(estimate.noise_MPa);
+        if estimate.failed || estimate.noise_MPa > FOUND_NOISE_LIMIT * stress.peak_MPa() {
             self.flags.push(Flag::ShearUnreliable);
             self.flags.sort();
             self.flags.dedup();

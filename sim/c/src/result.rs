@@ -52,6 +52,10 @@ pub enum dermis_flag {
     TablesRefused = 1 << 16,
     /// `wrong-channel`
     WrongChannel = 1 << 17,
+    /// `estimate-failed`
+    EstimateFailed = 1 << 18,
+    /// `taxel-suspect`
+    TaxelSuspect = 1 << 19,
 }
 
 /// The bit of a flag.
@@ -75,6 +79,8 @@ pub fn bit(flag: Flag) -> u32 {
         Flag::TablesIncomplete => dermis_flag::TablesIncomplete,
         Flag::TablesRefused => dermis_flag::TablesRefused,
         Flag::WrongChannel => dermis_flag::WrongChannel,
+        Flag::EstimateFailed => dermis_flag::EstimateFailed,
+        Flag::TaxelSuspect => dermis_flag::TaxelSuspect,
     };
     bit as u32
 }

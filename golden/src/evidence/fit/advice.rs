@@ -17,11 +17,12 @@
 //! | in: contacts found by the evidence | – | – |
 //! | out: the same at the new μ | – | – |
 
-use super::{Fit, Found};
+use super::{Fit, Found, ENVELOPE_FACTOR};
 use crate::evidence::estimator::Adviser;
+use crate::evidence::model::{Design, Products};
 use crate::learned::{Gaussian, Learned, OneContact};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
-use faer::{Col, Mat, Side};
+use faer::{Col, Mat, Scale, Side};
 
 /// Rounds with the network: the second takes the others' stress out with its own first answer.
 const ROUNDS: usize = 2;
@@ -34,18 +35,41 @@ impl Fit<'_> {
     pub(super) fn advised(&mut self, adviser: &Adviser, found: Found) -> Option<Found> {
         let (own, own_covariance) = (found.top.mu.clone(), found.covariance.clone());
         let mut found = found;
+        let unknown = self.by_baseline(&found)?;
         for _ in 0..ROUNDS {
-            let told: Vec<Gaussian> =
-                (0..own.len()).map(|contact| self.ask(&adviser.network, &found, contact)).collect();
+            let ask = |contact: usize| {
+                let mut told = self.ask(&adviser.network, &found, contact);
+                (0..2).for_each(|axis| told.sigma[axis] = told.sigma[axis].hypot(unknown[2 * contact + axis]));
+                told
+            };
+            let told: Vec<Gaussian> = (0..own.len()).map(ask).collect();
             (self.mu, found.covariance) = match adviser.combined {
                 true => combine(&own, &own_covariance, &told)?,
                 false => (told.iter().map(|told| told.mean).collect(), variances(&told)),
             };
             found.regions = self.regions();
-            found.top = self.ascend(&found.regions.design, 0)?;
+            found.top = self.ascend(&mut found.regions.design, 0)?;
             self.p = found.regions.pressure(&found.top.posterior.w, self.p.len());
         }
         Some(found)
+    }
+
+    /// The standard deviation that the baseline adds to each μ: the network knows of none.
+    fn by_baseline(&self, found: &Found) -> Option<Vec<f64>> {
+        let Found { regions, top, covariance } = found;
+        let (design, kept) = (&regions.design, regions.design.of_baseline().start);
+        let rank = design.rank();
+        let mut s = Mat::zeros(design.s.nrows(), 3 * kept);
+        (0..3).for_each(|block| s.subcols_mut(block * kept, kept).copy_from(design.s.subcols(block * rank, kept)));
+        let mut readings = self.readings.clone();
+        let of = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
+        readings.y.iter_mut().enumerate().for_each(|(k, y)| *y -= of(k));
+        let without = Design { s, contact: design.contact[..kept].to_vec(), baseline: 0 };
+        let products = Products::new(&without, &readings);
+        let slope = products.slope(&products.at(&top.mu)?);
+        let known = self.scene.prior.covariance(&slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
+        let added = |i: usize| (covariance[(i, i)] - known[(i, i)]).max(0.0).sqrt();
+        Some((0..covariance.nrows()).map(added).collect())
     }
 
     /// What the network says of one contact.
@@ -54,8 +78,12 @@ impl Fit<'_> {
         let h = design.at(&found.top.mu);
         let mut b = self.b.to_vec();
         for (row, &taxel) in self.taxels.iter().enumerate() {
-            let others = (0..design.rank()).filter(|&i| design.contact[i] != contact);
-            b[taxel] -= others.map(|i| h[(row, i)] * found.top.posterior.w[i]).sum::<f64>();
+            let own = |i: &usize| design.contact[*i] == contact && !design.of_baseline().contains(i);
+            let sum = |of: &dyn Fn(&usize) -> bool| -> f64 {
+                (0..design.rank()).filter(of).map(|i| h[(row, i)] * found.top.posterior.w[i]).sum()
+            };
+            // Of a missing reading, what the estimate says of it.
+            b[taxel] = if self.used[taxel] { b[taxel] - sum(&|i| !own(i)) } else { sum(&own) };
         }
         network.shear(&OneContact {
             b: &b,
