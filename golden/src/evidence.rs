@@ -55,7 +55,7 @@ mod suspect;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{ContactEstimate, Estimate, SuspectTaxel};
+pub use estimate::Estimate;
 pub use estimator::Evidence;
 
 use crate::frame::Forces;

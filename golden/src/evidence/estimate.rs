@@ -1,23 +1,8 @@
 //! What the evidence says of one frame.
 
 use crate::frame::Forces;
+use crate::reconstruct::{ContactEstimate, SuspectTaxel};
 use crate::sensor::Sensor;
-use serde::{Deserialize, Serialize};
-
-/// One contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ContactEstimate {
-    /// Centre of pressure in mm from the array's centre.
-    pub centre_mm: [f64; 2],
-    /// Ratio of shear to normal force, [x, y].
-    pub mu: [f64; 2],
-    /// Force in N, [x, y, normal].
-    pub force_N: [f64; 3],
-    /// Standard deviation of the force in N, [x, y, normal].
-    pub sigma_N: [f64; 3],
-    /// Covariance of μ, [xx, xy, yy].
-    pub mu_covariance: [f64; 3],
-}
 
 /// What one frame says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,19 +28,6 @@ pub struct Estimate {
     pub outlier: Option<f64>,
     /// Correlation of what neighbours leave, in standard deviations; `None` where no fit was made.
     pub residual_correlation: Option<f64>,
-}
-
-/// A taxel whose reading no force explains.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SuspectTaxel {
-    /// Its row.
-    pub row: usize,
-    /// Its column.
-    pub col: usize,
-    /// Its reading in MPa.
-    pub stress_MPa: f64,
-    /// The stress in MPa that the other readings predict there.
-    pub expected_MPa: f64,
 }
 
 impl SuspectTaxel {

@@ -10,7 +10,7 @@
 //! | in: stress of a frame | taxels | of its peak |
 //! | out: fit without the suspect taxels | – | – |
 
-use super::estimate::SuspectTaxel;
+use crate::reconstruct::SuspectTaxel;
 use super::estimator::Evidence;
 use super::fit::{Fit, Fitted};
 
