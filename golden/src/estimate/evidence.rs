@@ -1,0 +1,103 @@
+//! Evidence: force and its standard deviation from noisy stress, for contacts of any shape.
+//!
+//! The objectives of [`crate::estimate::float`] look for the μ whose pressure looks like a contact. Here the pressure is a random
+//! function, smooth over a length ℓ and zero outside the contact, and μ is what the stress makes probable when all such
+//! pressures are integrated out.
+//!
+//! ```text
+//! b ── envelope ── segment ── prior F ── model: SᵀTS, SᵀTy ── ascent: μ ── p = F w ─┬─ contact: force, σ
+//!          ▲                                  ▲ clipped, noise                      │
+//!          └────────────────────────── until μ stands still ────────────────────────┘
+//! ```
+//!
+//! | file | step |
+//! |---|---|
+//! | `cells` | grid finer than the taxels, and its influence |
+//! | `envelope` | expected size of the pressure, from the last one |
+//! | `prior` | p = F w: load and smooth shape under the envelope |
+//! | `model` | evidence, posterior, slope and information in μ |
+//! | `ascent` | μ of all contacts |
+//! | `clipped` | readings of zero on an array that reads no tension |
+//! | `baseline` | offset, slopes and bends that no force causes |
+//! | `noise` | size of the noise, where it is not stated |
+//! | `contact` | force and standard deviation |
+//! | `residual` | whether what is left can be white noise |
+//! | `screen`, `suspect` | taxels that read what no force explains; they are taken as missing |
+//! | `failed` | Σ b·area where no fit explains the stress |
+//!
+//! ℓ is ⅔ h: finer structure is not visible at the depth of the taxels. ℓ² is at least a quarter of a taxel's area, and at
+//! most half of it: with a larger one a contact narrower than a thick cover has no room, and its shear is wrong by more
+//! than its standard deviation says. The noise has a floor of 1e-4 of the peak, the error of the cells. Where it is not known, `noise` finds it in every round.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: b | taxels | MPa |
+//! | in: noise | 1 | MPa, optional |
+//! | out: forces | 3 × taxels | N |
+//! | out: per contact centre, μ, force, σ | – | mm, –, N |
+
+mod ascent;
+mod baseline;
+pub(crate) mod cells;
+mod clipped;
+mod contact;
+mod envelope;
+mod estimate;
+mod estimator;
+mod failed;
+mod fit;
+mod model;
+mod noise;
+mod prior;
+mod residual;
+mod screen;
+mod suspect;
+#[cfg(test)]
+mod tests;
+
+pub use estimate::Estimate;
+pub use estimator::Evidence;
+
+use crate::data::frame::Forces;
+use fit::Fitted;
+
+/// Share of Σ b·area below which a normal force does not explain the stress.
+const EXPLAINED: f64 = 0.5;
+
+impl Evidence {
+    /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.
+    pub fn solve(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
+        let peak = (0..b.len()).filter(|&t| self.alive[t]).fold(0.0f64, |peak, t| b[t].max(peak));
+        if peak <= 0.0 || !peak.is_finite() {
+            let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
+            return Estimate { forces_N, noise_MPa, ..Estimate::default() };
+        }
+        // In units of the peak, so that no frame is too small or too large.
+        let scaled: Vec<f64> = b.iter().map(|b| b / peak).collect();
+        let Some((Fitted { mut estimate, worst, correlation, load, .. }, suspects)) =
+            suspect::fit(self, &scaled, noise_MPa.map(|noise| noise / peak))
+        else {
+            return self.without_fit(b, noise_MPa);
+        };
+        let normal: f64 = estimate.forces_N.fz.iter().sum();
+        if !normal.is_finite() || normal < EXPLAINED * load {
+            return self.without_fit(b, noise_MPa);
+        }
+        estimate.noise_MPa = noise_MPa.unwrap_or(estimate.noise_MPa * peak);
+        let Forces { fx, fy, fz } = &mut estimate.forces_N;
+        [fx, fy, fz].into_iter().flatten().for_each(|force| *force *= peak);
+        for contact in &mut estimate.contacts {
+            contact.force_N.iter_mut().chain(&mut contact.sigma_N).for_each(|force| *force *= peak);
+        }
+        estimate.suspects = suspects;
+        for own in &mut estimate.suspects {
+            (own.stress_MPa, own.expected_MPa) = (own.stress_MPa * peak, own.expected_MPa * peak);
+        }
+        Estimate { outlier: worst.map(|(_, size)| size), residual_correlation: Some(correlation), ..estimate }
+    }
+
+    /// What stress `b` in MPa says without a fit: Σ b·area.
+    pub fn without_fit(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
+        failed::estimate(self, b, noise_MPa)
+    }
+}

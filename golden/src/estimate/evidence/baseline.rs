@@ -1,0 +1,125 @@
+//! Baseline: readings that no force causes, smooth over the array, as nuisance parameters of the model.
+//!
+//! A drifted zero, a warm side, a bent base add the same few smooth terms to every frame:
+//!
+//! ```text
+//! b = H(μ) w + B S c + noise        c ~ N(0, 1)        B: 1 | x, y | x² − ⅓, xy, y² − ⅓     x, y from −1 to 1
+//! ```
+//!
+//! S holds one size for the offset, one for the slopes, one for the bends, and each is the one that makes the stress most
+//! probable (MacKay 1992): with v the posterior variances of its coefficients,
+//!
+//! ```text
+//! size² ← size² Σ c² / Σ (1 − v)
+//! ```
+//!
+//! A term that the frame does not need gets a size of nearly 0 and costs nothing; one that it needs makes the standard
+//! deviations grow as far as the unloaded taxels leave it unknown. A baseline is small: [`LARGEST`] of the peak, so that an
+//! even pressure on the whole array is no offset.
+//!
+//! The rounds begin with the plane through the half of the taxels that lies closest to one (least trimmed squares,
+//! Rousseeuw 1984).
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: posterior of c | terms | – |
+//! | out: sizes | 3 | of the peak |
+
+use crate::spec::sensor::Sensor;
+use faer::linalg::solvers::Solve;
+use faer::{Col, Mat, Side};
+
+/// The group of each term: offset, slopes, bends.
+const GROUPS: [usize; TERMS] = [0, 1, 1, 2, 2, 2];
+/// Number of terms.
+pub(super) const TERMS: usize = 6;
+/// Terms of the first plane.
+const PLANE: usize = 3;
+/// Smallest size, of the peak: it has no effect, and grows from there within a few rounds if the frame needs it.
+const LEAST: f64 = 1e-5;
+/// Largest size, of the peak.
+pub(super) const LARGEST: f64 = 0.05;
+/// Largest first baseline, of the peak: a larger one is a contact on half of the array.
+const FIRST: f64 = 0.15;
+/// Steps of the trimmed fit.
+const STEPS: usize = 12;
+
+/// Sizes of offset, slopes and bends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes([f64; 3]);
+
+/// The terms of B on a taxel.
+pub(super) fn terms(sensor: &Sensor, taxel: usize) -> [f64; TERMS] {
+    let along = |index: usize, count: usize| 2.0 * index as f64 / (count - 1) as f64 - 1.0;
+    let (x, y) = (along(taxel % sensor.cols, sensor.cols), along(taxel / sensor.cols, sensor.rows));
+    [1.0, x, y, x * x - 1.0 / 3.0, x * y, y * y - 1.0 / 3.0]
+}
+
+impl Sizes {
+    /// The sizes that agree with a first plane.
+    pub fn of_plane(plane: [f64; PLANE]) -> Sizes {
+        let [offset, x, y] = plane;
+        Sizes([offset.abs(), (0.5 * (x * x + y * y)).sqrt(), LEAST].map(|size| size.clamp(LEAST, LARGEST)))
+    }
+
+    /// Size of a term.
+    pub fn of(self, term: usize) -> f64 {
+        self.0[GROUPS[term]]
+    }
+
+    /// The sizes that make the stress most probable, from means and variances of the coefficients c.
+    pub fn found(self, posterior: [[f64; 2]; TERMS]) -> Sizes {
+        let (mut square, mut known) = ([0.0; 3], [0.0; 3]);
+        for (&group, [mean, variance]) in GROUPS.iter().zip(posterior) {
+            square[group] += mean * mean;
+            known[group] += 1.0 - variance;
+        }
+        let next = |group: usize| {
+            let ratio = if known[group] > 0.0 { square[group] / known[group] } else { 1.0 };
+            (self.0[group] * ratio.sqrt()).clamp(LEAST, LARGEST)
+        };
+        Sizes([0, 1, 2].map(next))
+    }
+}
+
+/// The plane through the half of the taxels `used` that lies closest to one: offset and slopes of `b`, in its unit; 0 if
+/// that half is loaded. `b` is in units of the peak.
+pub(super) fn plane(sensor: &Sensor, b: &[f64], used: &[bool]) -> [f64; PLANE] {
+    let all: Vec<usize> = (0..b.len()).filter(|&t| used[t]).collect();
+    let half = all.len() / 2;
+    if half < 2 * PLANE {
+        return [0.0; PLANE];
+    }
+    // The shortest interval that holds half of the readings.
+    let mut sorted: Vec<f64> = all.iter().map(|&t| b[t]).collect();
+    sorted.sort_by(f64::total_cmp);
+    let width = |k: &usize| sorted[k + half] - sorted[*k];
+    let first = (0..sorted.len() - half).min_by(|a, b| width(a).total_cmp(&width(b))).unwrap_or(0);
+    let mut plane = [0.5 * (sorted[first] + sorted[first + half]), 0.0, 0.0];
+    let at = |plane: [f64; PLANE], t: usize| -> f64 {
+        plane.iter().zip(terms(sensor, t)).map(|(size, term)| size * term).sum()
+    };
+    for _ in 0..STEPS {
+        let mut near = all.clone();
+        near.sort_by(|&s, &t| (b[s] - at(plane, s)).abs().total_cmp(&(b[t] - at(plane, t)).abs()));
+        near.truncate(half + 1);
+        let mut gram = Mat::<f64>::zeros(PLANE, PLANE);
+        let mut right = Col::<f64>::zeros(PLANE);
+        for &t in &near {
+            let own = terms(sensor, t);
+            for i in 0..PLANE {
+                right[i] += own[i] * b[t];
+                (0..PLANE).for_each(|j| gram[(i, j)] += own[i] * own[j]);
+            }
+        }
+        let Ok(factor) = gram.llt(Side::Lower) else { break };
+        let next = factor.solve(&right);
+        plane = [next[0], next[1], next[2]];
+    }
+    let largest = plane.iter().map(|size| size.abs()).sum::<f64>();
+    if largest <= FIRST {
+        plane
+    } else {
+        [0.0; PLANE]
+    }
+}

@@ -1,0 +1,38 @@
+//! What the evidence says of one frame.
+
+use crate::data::frame::Forces;
+use crate::result::reconstruct::{ContactEstimate, SuspectTaxel};
+use crate::spec::sensor::Sensor;
+
+/// What one frame says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The contacts; none without a reading above zero.
+    pub contacts: Vec<ContactEstimate>,
+    /// Force on each taxel in N.
+    pub forces_N: Forces,
+    /// Standard deviation of the noise in MPa, as it was given or as it was found.
+    pub noise_MPa: f64,
+    /// Probability that noise of the given size leaves as much unexplained; `None` where the noise was found from the
+    /// frame itself.
+    pub misfit_probability: Option<f64>,
+    /// Rounds until μ stood still.
+    pub rounds: usize,
+    /// Number of coefficients r of the pressures.
+    pub rank: usize,
+    /// Whether no fit explains the stress: the normal force is Σ b·area, the shear is not known.
+    pub failed: bool,
+    /// Taxels whose readings no force explains; they are taken as missing.
+    pub suspects: Vec<SuspectTaxel>,
+    /// Distance, in standard deviations, of the reading that the others explain least; `None` where no fit was made.
+    pub outlier: Option<f64>,
+    /// Correlation of what neighbours leave, in standard deviations; `None` where no fit was made.
+    pub residual_correlation: Option<f64>,
+}
+
+impl SuspectTaxel {
+    /// The taxel with this row-major index.
+    pub(super) fn new(sensor: &Sensor, taxel: usize, stress_MPa: f64, expected_MPa: f64) -> SuspectTaxel {
+        SuspectTaxel { row: taxel / sensor.cols, col: taxel % sensor.cols, stress_MPa, expected_MPa }
+    }
+}
