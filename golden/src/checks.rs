@@ -13,9 +13,15 @@
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
 //! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::deviations::Deviations)) |
+//! | `plateau` | – | `clipped` | above [`PLATEAU`] | all, [`readings`] |
+//! | `line_share` | – | `line-fault` | above [`LINE`] | all, [`readings`] |
+//! | `constant_share` | – | `taxel-constant` | above [`CONSTANT`] | streams, [`history`] |
+//! | `torn_share` | – | `torn-frame` | above [`TORN`] | streams, [`history`] |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
+pub mod history;
+pub mod readings;
 #[cfg(test)]
 mod tests;
 
@@ -37,6 +43,14 @@ pub const MISFIT: f64 = 1e-3;
 pub const LOUD: f64 = 0.1;
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
+/// [`Checks::plateau`] above which readings are clipped: one frame in a thousand by chance.
+pub const PLATEAU: f64 = 7.0;
+/// [`Checks::line_share`] above which a row or column is faulty.
+pub const LINE: f64 = 0.2;
+/// [`Checks::constant_share`] above which a taxel is stuck.
+pub const CONSTANT: f64 = 0.06;
+/// [`Checks::torn_share`] above which a frame's parts are of two moments.
+pub const TORN: f64 = 0.08;
 
 /// Ratio to the normal force below which a shear counts as none.
 const NO_SHEAR: f64 = 0.01;
@@ -96,6 +110,22 @@ pub struct Checks {
     /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
+    /// Logarithm of the inverse probability that as many readings are the largest by rounding, see [`readings`]; `None` where
+    /// all are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plateau: Option<f64>,
+    /// Largest range of a row or column that repeats the next one or lies beside a silent one, over the frame's, see
+    /// [`readings`]; `None` on arrays of few rows and columns, and where all readings are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_share: Option<f64>,
+    /// Largest change of the taxels beside one that stands still, over the range of a frame, see [`history`]; `None` but in
+    /// streams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constant_share: Option<f64>,
+    /// Range of a part of the frame that is that of the frame before, or change of the rest if smaller, over the range of a
+    /// frame, see [`history`]; `None` but in streams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torn_share: Option<f64>,
 }
 
 impl Checks {
@@ -121,6 +151,12 @@ impl Checks {
                 (Some(probability), _) => Some(format!("probability {probability:.1e}")),
                 _ => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
             },
+            Flag::Clipped => self.plateau.map(|plateau| format!("by chance in e^-{plateau:.0} of the frames")),
+            Flag::LineFault => self.line_share.map(|share| format!("beside {:.0} % of the range", 1e2 * share)),
+            Flag::TaxelConstant => {
+                self.constant_share.map(|share| format!("beside a change of {:.0} % of the range", 1e2 * share))
+            }
+            Flag::TornFrame => self.torn_share.map(|share| format!("{:.0} % of the range", 1e2 * share)),
             _ => None,
         }
     }
@@ -138,6 +174,7 @@ impl Checks {
 
     /// The flags that the figures raise.
     pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
+        let above = |figure: Option<f64>, limit: f64| figure.is_some_and(|figure| figure > limit);
         let last_code = 1.0 - 0.5 / f64::from(crate::quantise::largest_code(scene.fixed.input_bits));
         [
             (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
@@ -147,6 +184,10 @@ impl Checks {
             (Flag::Misfit, self.misfits()),
             (Flag::ShearNotResolved, self.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED)),
             (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
+            (Flag::Clipped, above(self.plateau, PLATEAU)),
+            (Flag::LineFault, above(self.line_share, LINE)),
+            (Flag::TaxelConstant, above(self.constant_share, CONSTANT)),
+            (Flag::TornFrame, above(self.torn_share, TORN)),
         ]
         .into_iter()
         .filter_map(|(flag, raised)| raised.then_some(flag))

@@ -20,6 +20,10 @@
 //! | `tables-incomplete` | the hardware's tables are not whole: no force is computed from them | the engine |
 //! | `tables-refused` | the last tables sent to the hardware were refused; it has those of before | the engine |
 //! | `wrong-channel` | a converter that the hardware scans named another channel than that asked for | the scan |
+//! | `clipped` | a plateau of equal largest readings | [`Checks::flags`] |
+//! | `line-fault` | a row or column repeats the next one, or has one reading beside others | `Checks::flags` |
+//! | `taxel-constant` | in a stream, a taxel stands still while those beside it change | `Checks::flags` |
+//! | `torn-frame` | in a stream, a part of the frame is that of the frame before | `Checks::flags` |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -69,11 +73,19 @@ pub enum Flag {
     TablesRefused,
     /// A converter that the hardware scans named another channel than that asked for.
     WrongChannel,
+    /// Largest readings are equal: the converter or an amplifier clips below full scale.
+    Clipped,
+    /// A row or column repeats another one or is silent.
+    LineFault,
+    /// A taxel's reading has not changed with those of the taxels beside it.
+    TaxelConstant,
+    /// The frame has readings of two moments.
+    TornFrame,
 }
 
 impl Flag {
     /// All flags, in order.
-    pub const ALL: [Flag; 18] = [
+    pub const ALL: [Flag; 22] = [
         Flag::NoContact,
         Flag::NoCompression,
         Flag::ConditionUnmet,
@@ -92,6 +104,10 @@ impl Flag {
         Flag::TablesIncomplete,
         Flag::TablesRefused,
         Flag::WrongChannel,
+        Flag::Clipped,
+        Flag::LineFault,
+        Flag::TaxelConstant,
+        Flag::TornFrame,
     ];
 }
 
@@ -182,6 +198,10 @@ mod tests {
             "tables-incomplete",
             "tables-refused",
             "wrong-channel",
+            "clipped",
+            "line-fault",
+            "taxel-constant",
+            "torn-frame",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

@@ -169,6 +169,21 @@ impl Input {
         Some(readings.iter().map(share).fold(0.0, f64::max))
     }
 
+    /// 1 where readings rise with the load, −1 where the table's gains have them fall.
+    pub(crate) fn sign(&self) -> f64 {
+        let gains = self.scale.iter().flat_map(|(_, gain)| gain);
+        if gains.sum::<f64>() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        }
+    }
+
+    /// The options themselves.
+    pub(crate) fn spec(&self) -> &InputSpec {
+        &self.spec
+    }
+
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
     /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {

@@ -23,6 +23,7 @@ pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
 pub use output::{shear_sigma_N, Resultant, Wrench};
 
+use crate::checks::history::History;
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::Flag;
@@ -147,6 +148,13 @@ impl Reconstruction {
         self.extra.resultants = Some(resultants);
         self.forces_N = Forces::default();
         self
+    }
+
+    /// Adds what the readings of a stream so far show, `frames` being those of this result; the flags `taxel-constant` and
+    /// `torn-frame`.
+    pub fn add_history(&mut self, scene: &Scene, history: &mut History, frames: &[Frame]) {
+        let checks = history.add(frames, self.checks);
+        self.add_checks(scene, checks);
     }
 
     /// Adds the figures of `checks` and the flags that they raise.

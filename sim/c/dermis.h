@@ -147,6 +147,22 @@ typedef enum {
    * `wrong-channel`
    */
   DERMIS_FLAG_WRONG_CHANNEL = (1 << 17),
+  /**
+   * `clipped`
+   */
+  DERMIS_FLAG_CLIPPED = (1 << 18),
+  /**
+   * `line-fault`
+   */
+  DERMIS_FLAG_LINE_FAULT = (1 << 19),
+  /**
+   * `taxel-constant`
+   */
+  DERMIS_FLAG_TAXEL_CONSTANT = (1 << 20),
+  /**
+   * `torn-frame`
+   */
+  DERMIS_FLAG_TORN_FRAME = (1 << 21),
 } dermis_flag;
 
 /**

@@ -10,7 +10,7 @@ use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, Medium, ObjectiveKind};
 use crate::sensor::Sensor;
 
-fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
+pub(super) fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
     let contact = Contact {
         shape: Some("hertz-circle".to_string()),
         size_mm: vec![radius_mm],

@@ -184,9 +184,9 @@ impl Model {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
-        let full_scale_share = input.full_scale_share(readings);
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
-        let checks = Checks { full_scale_share, network_misfit, shear_spread, ..result.figures(&self.scene, frame) };
+        let figures = result.figures(&self.scene, frame).with_readings(&input, readings);
+        let checks = Checks { network_misfit, shear_spread, ..figures };
         result.add_checks(&self.scene, checks);
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, &self.scene, frame, noise_MPa);

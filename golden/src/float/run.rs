@@ -69,10 +69,9 @@ impl Golden {
         let misfit = |report| Unipolar { misfit: misfit(&self.scene, &frame, &result.forces_N), ..report };
         result.extra.unipolar = report.map(misfit);
         let checks = Checks {
-            full_scale_share: self.input.full_scale_share(readings),
             network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
             load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
-            ..result.figures(&self.scene, &frame)
+            ..result.figures(&self.scene, &frame).with_readings(&self.input, readings)
         };
         result.add_checks(&self.scene, checks);
         if let Some(deviations) = &self.deviations {

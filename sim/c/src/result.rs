@@ -52,6 +52,14 @@ pub enum dermis_flag {
     TablesRefused = 1 << 16,
     /// `wrong-channel`
     WrongChannel = 1 << 17,
+    /// `clipped`
+    Clipped = 1 << 18,
+    /// `line-fault`
+    LineFault = 1 << 19,
+    /// `taxel-constant`
+    TaxelConstant = 1 << 20,
+    /// `torn-frame`
+    TornFrame = 1 << 21,
 }
 
 /// The bit of a flag.
@@ -75,6 +83,10 @@ pub fn bit(flag: Flag) -> u32 {
         Flag::TablesIncomplete => dermis_flag::TablesIncomplete,
         Flag::TablesRefused => dermis_flag::TablesRefused,
         Flag::WrongChannel => dermis_flag::WrongChannel,
+        Flag::Clipped => dermis_flag::Clipped,
+        Flag::LineFault => dermis_flag::LineFault,
+        Flag::TaxelConstant => dermis_flag::TaxelConstant,
+        Flag::TornFrame => dermis_flag::TornFrame,
     };
     bit as u32
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use anyhow::Result;
+use dermis_golden::checks::history::History;
 use dermis_golden::checks::Checks;
 use dermis_golden::fixed::stages::send::{
     labels_of_beats, Status, FLAG_CHANNEL, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS,
@@ -16,6 +17,7 @@ use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::input::Input;
 use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::scene::Scene;
 use serde::Serialize;
 
 /// A board's answer to a frame, in LSBs.
@@ -130,12 +132,8 @@ impl Answer {
 
     /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
-        Ok(Checks {
-            full_scale_share: Input::new(&model.scene)?.full_scale_share(std::slice::from_ref(readings)),
-            peak_MPa: frame.peak_MPa(),
-            mu_share: self.mu_share(),
-            ..Checks::default()
-        })
+        let figures = Checks { peak_MPa: frame.peak_MPa(), mu_share: self.mu_share(), ..Checks::default() };
+        Ok(figures.with_readings(&Input::new(&model.scene)?, std::slice::from_ref(readings)))
     }
 
     /// The flags of an answer with sums, as in a reconstruction, but `mu-at-bound` only with one subarray.
@@ -194,6 +192,14 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
+    /// Adds what the readings of a stream so far show, `readings` being those of this answer.
+    pub fn add_history(&mut self, scene: &Scene, history: &mut History, readings: &Frame) {
+        self.checks = history.add(std::slice::from_ref(readings), self.checks);
+        self.flags.extend(self.checks.flags(scene));
+        self.flags.sort();
+        self.flags.dedup();
+    }
+
     /// The answer to `readings`, in physical units.
     ///
     /// # Errors

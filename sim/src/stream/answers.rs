@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
+use dermis_golden::checks::history::History;
 use dermis_golden::fixed::Model;
 use dermis_golden::float::Golden;
 use dermis_golden::frame::{Forces, Frame};
@@ -184,7 +185,7 @@ pub fn run_until(
     };
     stop.add(&queue);
     let (waiting, times, counts) = (Vec::new(), Vec::new(), Counts::default());
-    let mut stream = Stream { scene, engine, waiting, times, counts };
+    let mut stream = Stream { scene, engine, history: History::new(scene), waiting, times, counts };
     loop {
         if stop.stopped() {
             queue.close();
@@ -235,6 +236,7 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 struct Stream<'a> {
     scene: &'a Scene,
     engine: &'a Engine,
+    history: History,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
     /// Seconds since 1970 when the line of each was read.
@@ -252,7 +254,8 @@ impl Stream<'_> {
                 return Ok(None);
             }
             let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
-            let result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
+            let mut result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
+            result.add_history(self.scene, &mut self.history, &frames);
             Ok(Some((frames, times, result)))
         });
         let line = received.number;
@@ -347,6 +350,26 @@ mod tests {
         assert_eq!(answers[0]["forces_N"]["fz"], Value::Array(Vec::new()));
         let mean = Golden::new(&scene).unwrap().run_averaged(&frames[..2]).unwrap().resultant_N;
         assert_eq!(answers[0]["resultant_N"], serde_json::to_value(mean).unwrap());
+    }
+
+    /// A press that grows over a taxel that does not; both models, and only from the frame on that is late enough.
+    #[test]
+    fn a_taxel_that_stands_still_is_flagged_in_a_stream() {
+        let (scene, exact) = (scene(), Frame::shipped(&scene()).remove(1));
+        let peak = (0..64).max_by(|a, b| exact.stress_MPa[*a].total_cmp(&exact.stress_MPa[*b])).unwrap();
+        let line = |moment: usize| {
+            let mut frame = exact.clone();
+            frame.stress_MPa.iter_mut().for_each(|b| *b *= moment as f64);
+            frame.stress_MPa[peak] = exact.stress_MPa[peak];
+            csv(&frame)
+        };
+        let input: String = (1..=10).map(line).collect();
+        for fixed in [false, true] {
+            let (_, answers) = answers(&scene, fixed, input.clone(), ALL, true);
+            let has = |answer: &Value| answer["flags"].as_array().unwrap().contains(&Value::from("taxel-constant"));
+            assert_eq!((has(&answers[6]), has(&answers[9])), (false, true), "{answers:?}");
+            assert!(answers[9]["checks"]["constant_share"].as_f64() > Some(0.06));
+        }
     }
 
     #[test]
