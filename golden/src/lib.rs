@@ -63,6 +63,7 @@
 //! | [`registers`] | the register map of an engine on a bus |
 //! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
 //! | [`noise`], [`stability`] | studies: errors with noise against the Cramér–Rao bound; errors against conditioning |
+//! | [`sensor_faults`] | study: frames that a sensor's faults spoil, flagged or silently wrong |
 //! | [`gauss`], [`mod@write`] | Gauss–Legendre quadrature; atomic file writing |
 //!
 //! # Conventions
@@ -106,6 +107,7 @@ pub mod registers;
 pub mod scene;
 pub mod segment;
 pub mod sensor;
+pub mod sensor_faults;
 pub mod stability;
 pub mod symmetry;
 pub mod write;
