@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::{value_parser, Args};
-use dermis_golden::sensor_faults::SensorFaults;
+use dermis_golden::study::sensor_faults::SensorFaults;
 
 use crate::report::study::sensor_faults;
 

@@ -2,8 +2,8 @@
 //! clean frames, have tables of their own; the last table has the sums.
 
 use anyhow::Result;
-use dermis_golden::scene::Scene;
-use dermis_golden::sensor_faults::{sensor_faults, Counts, FaultRow, Kind, SensorFaults, ENGINES};
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::study::sensor_faults::{sensor_faults, Counts, FaultRow, Kind, SensorFaults, ENGINES};
 use serde::Serialize;
 
 use super::super::table::{aligned, percent};
@@ -35,7 +35,7 @@ pub fn sums(rows: &[FaultRow]) -> Vec<Sum> {
         let own = rows.iter().filter(|row| kinds.contains(&row.kind)).map(|row| row.engines[path]);
         own.fold(Counts::default(), Counts::plus)
     };
-    let sum = |(path, engine): (usize, &dermis_golden::sensor_faults::Path)| Sum {
+    let sum = |(path, engine): (usize, &dermis_golden::study::sensor_faults::Path)| Sum {
         engine: engine.name(),
         shown: of(path, &[Kind::Shown, Kind::NoContact]),
         hidden: of(path, &[Kind::Hidden]),
