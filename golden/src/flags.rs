@@ -100,15 +100,15 @@ pub const SHARE_INSIDE: f64 = 0.995;
 /// Noise relative to the peak above which the sparse objective cannot determine the shear.
 pub const SPARSE_NOISE_LIMIT: f64 = 5e-5;
 
-/// The flags that depend on the frame and its codes alone, in the order of [`Flag`]; `noise_MPa` is the standard deviation
+/// The flags that depend on the estimator, the frame and its codes alone, in the order of [`Flag`]; `noise_MPa` is the standard deviation
 /// of a taxel of the averaged frame, 0 if it is not known, see [`crate::input::Input::noise_MPa`].
-pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) -> Vec<Flag> {
+pub fn frame_flags(scene: &Scene, estimator: EstimatorKind, frame: &Frame, codes: &Codes, noise_MPa: f64) -> Vec<Flag> {
     let medium_differs = frame.medium.is_some_and(|medium| medium != scene.medium);
     [
         (Flag::Saturated, codes.clipped.contains(&true)),
         (Flag::LoadOutside, load_outside(frame)),
         (Flag::MediumMismatch, medium_differs),
-        (Flag::ShearUnreliable, shear_unreliable(scene, frame, codes, noise_MPa)),
+        (Flag::ShearUnreliable, estimator == EstimatorKind::Search && shear_unreliable(scene, frame, codes, noise_MPa)),
     ]
     .into_iter()
     .filter_map(|(flag, raised)| raised.then_some(flag))
@@ -131,11 +131,10 @@ fn load_outside(frame: &Frame) -> bool {
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
 
-/// Compares the noise, or the standard deviation LSB/√12 of rounding, with the peak.
+/// Of a search: compares the noise, or the standard deviation LSB/√12 of rounding, with the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) -> bool {
     let search = &scene.search;
-    let by_search = scene.estimator() == EstimatorKind::Search;
-    let searched = by_search && search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
+    let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
     let noise = noise_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
@@ -148,7 +147,7 @@ mod tests {
     use crate::scene::Medium;
 
     fn setting() -> (Scene, Frame) {
-        let scene = Scene::builtin("sensor-1").unwrap().for_hardware();
+        let scene = Scene::builtin("sensor-1").unwrap();
         let frame = Frame::shipped(&scene).remove(1);
         (scene, frame)
     }
@@ -157,7 +156,7 @@ mod tests {
         let peak = frame.peak_MPa();
         let full_scale = if peak > 0.0 { share * peak } else { 1.0 };
         let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
-        frame_flags(scene, frame, &quantise(&frame.stress_MPa, bits, full_scale), noise_MPa)
+        frame_flags(scene, EstimatorKind::Search, frame, &quantise(&frame.stress_MPa, bits, full_scale), noise_MPa)
     }
 
     #[test]

@@ -172,6 +172,8 @@ impl Input {
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
     /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
+        #[cfg(test)]
+        tests::CALIBRATIONS.with(|count| count.set(count.get() + 1));
         let mut frame = frame.clone();
         if let Some((zero, gain)) = &self.scale {
             for (b, (zero, gain)) in frame.stress_MPa.iter_mut().zip(zero.iter().zip(gain)) {

@@ -49,7 +49,7 @@ pub use trial::with_network;
 pub use window::{Place, Window};
 
 use crate::read::bytes_up_to;
-use crate::scene::Scene;
+use crate::scene::{EstimatorKind, Scene};
 use crate::sensor::Sensor;
 use crate::symmetry::quads::Quads;
 use faer::Mat;
@@ -119,18 +119,19 @@ impl Learned {
         let signature = Signature::of(scene);
         let (network, losses) = training::train(scene, signature.window, training, progress)?;
         let bytes = file::encode(&network, &signature)?;
-        let learned = Learned::from_bytes(scene, &bytes, "the trained network")?;
+        let learned = Learned::from_bytes(scene, EstimatorKind::Network, &bytes, "the trained network")?;
         Ok(Trained { learned, bytes, loss: [losses.first, losses.last] })
     }
 
-    /// The network that a scene names with `search.network`: a file, or `dermis:NAME`, a part of the program.
+    /// The network that a scene names with `search.network`, for one of its estimators: a file, or `dermis:NAME`, a part of
+    /// the program.
     ///
     /// # Errors
     /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`], [`LearnedError::Damaged`] or
     /// [`LearnedError::Mismatch`].
-    pub fn of_scene(scene: &Scene) -> Result<Learned, LearnedError> {
+    pub fn of_scene(scene: &Scene, estimator: EstimatorKind) -> Result<Learned, LearnedError> {
         let (bytes, file) = bytes_of(scene)?;
-        Learned::from_bytes(scene, &bytes, &file)
+        Learned::from_bytes(scene, estimator, &bytes, &file)
     }
 
     /// The limit of [`crate::misfit`] of the network that a scene names; `None` for a file without one.
@@ -151,13 +152,18 @@ impl Learned {
         file::with_limit(&bytes, limit, &file)
     }
 
-    /// The network in the bytes of a file, for a scene; `file` names it in errors.
+    /// The network in the bytes of a file, for an estimator of a scene; `file` names it in errors.
     ///
     /// # Errors
     /// [`LearnedError::Damaged`] or [`LearnedError::Mismatch`].
-    pub fn from_bytes(scene: &Scene, bytes: &[u8], file: &str) -> Result<Learned, LearnedError> {
+    pub fn from_bytes(
+        scene: &Scene,
+        estimator: EstimatorKind,
+        bytes: &[u8],
+        file: &str,
+    ) -> Result<Learned, LearnedError> {
         let (network, signature) = file::decode(bytes, file)?;
-        signature.check(scene, file)?;
+        signature.check(scene, estimator, file)?;
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
     }

@@ -55,6 +55,7 @@
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`reconstruct`] | the result format of all engines |
+//! | [`engine`] | the trait of all engines, and the one way to a result |
 //! | [`deviations`] | standard deviations of forces that a search found |
 //! | [`misfit`] | how far a frame is from those of a network's training |
 //! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
@@ -80,6 +81,7 @@ pub mod bonded;
 pub mod checks;
 pub mod degree;
 pub mod deviations;
+pub mod engine;
 pub mod errors;
 pub mod evidence;
 pub mod fixed;

@@ -1,5 +1,6 @@
 //! Why a scene has no hardware.
 
+use dermis_golden::fixed::FixedError;
 use dermis_golden::link::LinkError;
 use thiserror::Error;
 
@@ -18,6 +19,9 @@ pub enum HdlError {
         /// The hardware that would be needed.
         what: &'static str,
     },
+    /// A variant of the scene has no bit-true model.
+    #[error(transparent)]
+    Fixed(#[from] FixedError),
     /// The scene's link cannot be built.
     #[error(transparent)]
     Link(#[from] LinkError),

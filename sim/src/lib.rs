@@ -29,6 +29,7 @@ mod artifact_cache;
 pub mod commands;
 pub mod compare;
 pub mod cosim;
+mod device_error;
 pub mod drawn_frames;
 pub mod engine;
 pub mod flow;

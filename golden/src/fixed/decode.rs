@@ -16,9 +16,8 @@ use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
 use crate::float::objective::Estimate;
 use crate::frame::{Forces, Frame};
-use crate::input::Input;
 use crate::partition::Subarray;
-use crate::reception::{noise_floor_codes, receive, Received};
+use crate::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
@@ -46,8 +45,9 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
-        let trace = self.run(&self.readings(frames)?);
-        self.decode(frames, "fixed", &trace.beats, &trace.status)
+        let stress = self.stress(frames)?;
+        let trace = self.run(&self.readings_at(full_scale(&self.scene, &stress), frames));
+        self.decode_stress(frames, &stress, "fixed", &trace.beats, &trace.status)
     }
 
     /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
@@ -62,9 +62,19 @@ impl Model {
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
+        self.decode_stress(readings, &self.stress(readings)?, engine, beats, status)
+    }
+
+    /// The same for `frame`, the [`Model::stress`] of the readings.
+    fn decode_stress(
+        &self,
+        readings: &[Frame],
+        frame: &Frame,
+        engine: &str,
+        beats: &[[i32; 3]],
+        status: &[[i32; 3]],
+    ) -> Result<Reconstruction, FixedError> {
         let case = self.case_of(status)?;
-        let input = Input::new(&self.scene)?;
-        let frame = &input.calibrate(&input.average(&self.scene, readings)?);
         let codes = self.codes(frame)?;
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
@@ -89,8 +99,8 @@ impl Model {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let sensor = &self.scene.sensor;
-        let noise_MPa = input.noise_of_mean_MPa(readings.len());
-        let mut flags = frame_flags(&self.scene, frame, &codes, noise_MPa);
+        let noise_MPa = self.input.noise_of_mean_MPa(readings.len());
+        let mut flags = frame_flags(&self.scene, self.estimator(), frame, &codes, noise_MPa);
         let mut subarrays = Vec::with_capacity(case.parts.len());
         let mut shear_spread = None;
         let all: Vec<Status> = status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
@@ -184,7 +194,7 @@ impl Model {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
-        let full_scale_share = input.full_scale_share(readings);
+        let full_scale_share = self.input.full_scale_share(readings);
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
         let checks = Checks { full_scale_share, network_misfit, shear_spread, ..result.figures(&self.scene, frame) };
         result.add_checks(&self.scene, checks);

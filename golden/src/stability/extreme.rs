@@ -147,7 +147,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
         plain(bare("all clipped, unipolar", &|row, col| -press.stress_MPa[row * sensor.cols + col].abs()));
     unipolar.scene.input.unipolar = true;
     // A network serves the readings and the partition that it was trained for.
-    let network = scene.for_hardware().search.estimator == EstimatorKind::Network;
+    let network = scene.hardware_estimator() == EstimatorKind::Network;
     if scene.input.unipolar || !network {
         all.push(unipolar);
     }
@@ -175,7 +175,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
 /// [`GoldenError`] if the golden model rejects scene or frame.
 pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
     let Extreme { scene, frame } = extreme;
-    let golden = Golden::new(&scene.for_hardware())?.run(frame)?;
+    let golden = Golden::reference(scene)?.run(frame)?;
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
         let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
         let trace = model.run(&model.readings(std::slice::from_ref(frame))?);

@@ -243,7 +243,7 @@ pub unsafe extern "C" fn dermis_result_forces(
 
 /// Write the contacts, at most capacity of them, and the number that the result has to count. With capacity 0, contacts may be
 /// NULL. DERMIS_STATUS_ABSENT, and a count of 0, if the result does not tell contacts apart: those of the estimators
-/// "evidence" and "learned" and of partition.case = "contacts" do.
+/// with evidence and of partition.case = "contacts" do.
 #[no_mangle]
 pub unsafe extern "C" fn dermis_result_contacts(
     result: *const dermis_result,

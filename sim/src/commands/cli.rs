@@ -52,7 +52,7 @@ const EXAMPLES: &str = "Examples:
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
-  dermis train sensor-1                              a network for search.estimator = \"learned\"
+  dermis train sensor-1                              a network for search.estimator = \"evidence+network\"
   dermis deviations my-scene.toml                    how far shear and normal force of a search may be off
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
@@ -123,7 +123,7 @@ enum Command {
     Guide(super::guide_pages::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
     Table(super::table::Arguments),
-    /// Train a network for search.estimator = "learned" on frames drawn from the scene's own physics.
+    /// Train a network for the estimators that have one on frames drawn from the scene's own physics.
     Train(super::train::Arguments),
     /// Measure the standard deviations of a search on frames drawn from the scene's own physics.
     Deviations(super::deviations::Arguments),

@@ -13,7 +13,6 @@ use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::flags::{frame_flags, Flag};
 use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::input::Input;
 use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use dermis_golden::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
@@ -131,7 +130,7 @@ impl Answer {
     /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
         Ok(Checks {
-            full_scale_share: Input::new(&model.scene)?.full_scale_share(std::slice::from_ref(readings)),
+            full_scale_share: model.input().full_scale_share(std::slice::from_ref(readings)),
             peak_MPa: frame.peak_MPa(),
             mu_share: self.mu_share(),
             ..Checks::default()
@@ -140,8 +139,8 @@ impl Answer {
 
     /// The flags of an answer with sums, as in a reconstruction, but `mu-at-bound` only with one subarray.
     fn flags(&self, model: &Model, frame: &Frame, checks: &Checks) -> Result<Vec<Flag>> {
-        let noise_MPa = Input::new(&model.scene)?.noise_MPa();
-        let of_frame = frame_flags(&model.scene, frame, &model.codes(frame)?, noise_MPa);
+        let noise_MPa = model.input().noise_MPa();
+        let of_frame = frame_flags(&model.scene, model.estimator(), frame, &model.codes(frame)?, noise_MPa);
         let mut flags: BTreeSet<Flag> = of_frame.into_iter().collect();
         flags.extend(checks.flags(&model.scene));
         // The statuses of contacts that are not there say nothing of μ.

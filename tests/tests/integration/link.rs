@@ -110,9 +110,9 @@ impl Board {
 
     /// A board that `device` makes of the model.
     fn with(mut questions: Questions, device: impl FnOnce(&Model) -> Box<dyn BoardDevice>) -> Board {
-        let model = &mut questions.model;
-        let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
-        model.board.uart_baud = Some(baud);
+        let baud = (questions.model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
+        questions.model = questions.model.with_changed_plan(|plan| plan.board.uart_baud = Some(baud)).unwrap();
+        let model = &questions.model;
         let silence = Cycles::longest(model).total + 1_000;
         let clock_hz = Identity::of(model).unwrap().clock_hz;
         let uart = HostUart::new(device(model), baud, clock_hz);

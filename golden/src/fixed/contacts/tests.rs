@@ -16,7 +16,7 @@ use tempfile::NamedTempFile;
 fn scene(more: &str, partition: &str) -> (Scene, NamedTempFile) {
     let sensor = "[sensor]\nrows = 13\ncols = 18\npitch_x_mm = 2\npitch_y_mm = 2.5\nthickness_mm = 2\n";
     let text = format!(
-        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"learned\"\n{more}"
+        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"evidence+network\"\n{more}"
     );
     let training = Training { steps: 30, contacts: 60, ..Training::trial(&[16, 8]) };
     with_network(Scene::parse(&text, "pad.toml").unwrap(), &training).unwrap()
@@ -40,7 +40,8 @@ fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
 fn a_contact_has_what_the_network_says_of_its_window() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
     let model = Model::without_fit_check(&scene).unwrap();
-    let (network, alive) = (Learned::of_scene(&scene).unwrap(), scene.input.alive(&scene.sensor));
+    let (network, alive) =
+        (Learned::of_scene(&scene, crate::scene::EstimatorKind::Network).unwrap(), scene.input.alive(&scene.sensor));
     let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 9, ..Default::default() }).unwrap();
     let mut asked = 0;
     for number in 0..8 {
@@ -72,7 +73,7 @@ fn contacts_are_those_of_the_golden_model() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
     // Dead taxels break the symmetry, so that the matrices are too large for the board.
     let model = Model::without_fit_check(&scene).unwrap();
-    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let golden = Golden::reference(&scene).unwrap();
     let draws = Draws::new(&scene, DrawOptions { contacts: 3, seed: 5, ..Default::default() }).unwrap();
     let (mut taxels, mut other, mut compared, mut moved) = (0, 0, 0, 0);
     for number in 0..12 {
@@ -105,7 +106,7 @@ fn contacts_are_those_of_the_golden_model() {
 #[test]
 fn of_more_contacts_the_largest_have_shear() {
     let (scene, _file) = scene("", "max_contacts = 1\n");
-    let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+    let (model, golden) = (Model::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
     let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 3, ..Default::default() }).unwrap();
     let frame = draws.frame(1).unwrap().frame;
     let (fixed, float) = (model.reconstruct(&frame).unwrap(), golden.run(&frame).unwrap());

@@ -150,7 +150,7 @@ pub fn trace(scene: &Scene, frame: &Frame) -> Result<Vec<(&'static str, u32, Com
     if scene.input.average > 0 {
         bail!("scene {}: input.average = {}: stages are compared without averaging", scene.name, scene.input.average);
     }
-    let engine = Golden::new(&scene.for_hardware())?;
+    let engine = Golden::reference(scene)?;
     let frames = std::slice::from_ref(frame);
     let model = Model::for_frames(scene, frames)?;
     if model.by_contact.is_some() {

@@ -236,9 +236,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    let mut model = model(side, side, more);
-    model.threshold = threshold;
-    check_forces(model);
+    check_forces(model(side, side, more).with_changed_plan(|plan| plan.threshold = threshold).unwrap());
 }
 
 fn check_forces(model: Model) {
