@@ -8,7 +8,7 @@
 //! | `border_share` | – | none; beside `load-outside` | – | [`Reconstruction::figures`](crate::reconstruct::Reconstruction::figures) |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators with evidence, [`Reconstruction::find_noise`](crate::reconstruct::Reconstruction::find_noise) |
+//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::found_noise::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators with evidence, [`Reconstruction::find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
@@ -138,7 +138,7 @@ impl Checks {
 
     /// The flags that the figures raise.
     pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
-        let last_code = 1.0 - 0.5 / f64::from(crate::quantise::largest_code(scene.fixed.input_bits));
+        let last_code = 1.0 - 0.5 / f64::from(crate::scene::largest_code(scene.fixed.input_bits));
         [
             (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
             (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),

@@ -11,10 +11,9 @@ use crate::deviations::Deviations;
 use crate::float::{Golden, GoldenError};
 use crate::frame::Frame;
 use crate::input::Input;
-use crate::matrices::MAX_DEGREE;
-use crate::quantise::{largest_code, quantise, Codes};
+use crate::quantise::{quantise, Codes};
 use crate::reception::full_scale;
-use crate::scene::{EstimatorKind, Scene};
+use crate::scene::{largest_code, EstimatorKind, Scene, MAX_DEGREE};
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences, and the input
 /// options with their files, read once. Of the plan only the tables that the hardware takes change, by [`Model::load`] and

@@ -7,10 +7,10 @@ use super::array::{Array, CaseOutcome, EngineInput};
 use super::estimator::{Clipped, Estimator};
 use super::forces::threshold;
 use crate::checks::{largest_spread, relative_spread};
-use crate::evidence::{ContactEstimate, Evidence};
+use crate::evidence::Evidence;
 use crate::input::Input;
 use crate::learned::{Learned, LearnedError};
-use crate::reconstruct::Reconstruction;
+use crate::reconstruct::{ContactEstimate, Reconstruction};
 use crate::scene::{EstimatorKind, Scene};
 
 /// The estimator `evidence`, with or without a network.
