@@ -7,11 +7,11 @@
 //! [`result`] is the one way by which the programs and the interfaces to other languages get a result.
 
 use crate::fixed::{FixedError, Model};
-use crate::float::{Golden, GoldenError};
-use crate::frame::Frame;
-use crate::input::Input;
-use crate::reconstruct::Reconstruction;
-use crate::scene::{EstimatorKind, Scene};
+use crate::estimate::float::{Golden, GoldenError};
+use crate::data::frame::Frame;
+use crate::data::input::Input;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::scene::{EstimatorKind, Scene};
 use std::error::Error;
 use thiserror::Error;
 
@@ -115,7 +115,7 @@ impl From<bool> for FindNoise {
 ///
 /// ```
 /// use dermis_golden::engine::{result, Engine, FindNoise};
-/// use dermis_golden::{fixed::Model, float::Golden, frame::Frame, scene::Scene};
+/// use dermis_golden::{fixed::Model, estimate::float::Golden, data::frame::Frame, spec::scene::Scene};
 ///
 /// let scene = Scene::builtin("eight-by-eight")?;
 /// let frames = &Frame::shipped(&scene)[..1];

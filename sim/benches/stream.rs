@@ -10,8 +10,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::ensure;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
 use dermis_sim::stream::{as_lines, run, Policy, StreamOptions};
 

@@ -11,12 +11,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{anyhow, bail, Error, Result};
 use clap::ValueEnum;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{Engine, EngineError, FindNoise};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 use crate::cosim::hardware::Hardware;
 use crate::device_error::DeviceError;

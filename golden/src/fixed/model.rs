@@ -7,13 +7,13 @@ use super::plan::cases::{planned, planned_with};
 use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
-use crate::deviations::Deviations;
-use crate::float::{Golden, GoldenError};
-use crate::frame::Frame;
-use crate::input::Input;
-use crate::quantise::{quantise, Codes};
-use crate::reception::full_scale;
-use crate::scene::{largest_code, EstimatorKind, Scene, MAX_DEGREE};
+use crate::data::frame::Frame;
+use crate::data::input::Input;
+use crate::data::quantise::{quantise, Codes};
+use crate::data::reception::full_scale;
+use crate::estimate::deviations::Deviations;
+use crate::estimate::float::{Golden, GoldenError};
+use crate::spec::scene::{largest_code, EstimatorKind, Scene, MAX_DEGREE};
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences, and the input
 /// options with their files, read once. Of the plan only the tables that the hardware takes change, by [`Model::load`] and
@@ -39,7 +39,7 @@ impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
     /// ```
-    /// use dermis_golden::{fixed::{Cycles, Model}, frame::Frame, scene::Scene};
+    /// use dermis_golden::{fixed::{Cycles, Model}, data::frame::Frame, spec::scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let frame = Frame::shipped(&scene).remove(0);
@@ -147,7 +147,7 @@ impl Model {
     /// one of all frames, in MPa.
     ///
     /// # Errors
-    /// [`InputError`](crate::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
+    /// [`InputError`](crate::data::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
     /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
         Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
@@ -180,7 +180,7 @@ impl Model {
     /// The codes of a frame of stress, from a converter without input options.
     ///
     /// # Errors
-    /// [`FrameError`](crate::frame::FrameError) if the frame's sensor is not the scene's.
+    /// [`FrameError`](crate::data::frame::FrameError) if the frame's sensor is not the scene's.
     pub fn codes(&self, frame: &Frame) -> Result<Codes, FixedError> {
         frame.check(&self.scene)?;
         Ok(quantise(&frame.stress_MPa, self.formats().code_bits, full_scale(&self.scene, frame)))

@@ -8,7 +8,7 @@ use anyhow::{anyhow, bail, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::engine::Engine;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_estimator;
 use crate::engine::EngineName;
@@ -135,7 +135,7 @@ pub(super) fn software_engine() -> impl TypedValueParser<Value = EngineName> {
 pub(super) fn open(source: &Source, scene: &Scene, baud: Option<u32>) -> Result<(Box<dyn Read + Send>, String)> {
     let baud = match baud {
         Some(baud) => Some(baud),
-        None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
+        None => dermis_golden::spec::board::Board::load(&scene.hardware.board)?.uart_baud,
     };
     let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
     if let Some(address) = address {

@@ -4,14 +4,14 @@ use std::cell::RefCell;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::Input;
 use dermis_golden::engine::{Engine, EngineError};
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::input::Input;
-use dermis_golden::link::{Identity, Kind};
-use dermis_golden::link_kind::LinkKind;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_golden::wire::link::{Identity, Kind};
 use serialport::SerialPort;
 
 use super::answer::Answer;
@@ -203,7 +203,7 @@ pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn a_tare_of_the_host_takes_the_place_of_the_scenes() {

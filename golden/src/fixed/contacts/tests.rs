@@ -1,15 +1,15 @@
+use crate::data::frame::Frame;
+use crate::data::generator::draws::{DrawOptions, Draws};
+use crate::estimate::float::Golden;
+use crate::estimate::learned::{with_network, Learned, OneContact, Training};
 use crate::fixed::stages::receive::mask;
 use crate::fixed::stages::send::{Status, FLAG_FOUND, STATUS_BEATS};
 use crate::fixed::subarray::SubarrayTrace;
 use crate::fixed::words::formats::MU_STEPS;
 use crate::fixed::Model;
-use crate::flags::Flag;
-use crate::float::Golden;
-use crate::frame::Frame;
-use crate::generator::draws::{DrawOptions, Draws};
-use crate::learned::{with_network, Learned, OneContact, Training};
-use crate::reconstruct::{Reconstruction, Region};
-use crate::scene::{ForceOutput, Scene};
+use crate::result::flags::Flag;
+use crate::result::reconstruct::{Reconstruction, Region};
+use crate::spec::scene::{ForceOutput, Scene};
 use tempfile::NamedTempFile;
 
 /// A scene of 13 × 18 taxels with a network of a few steps: as good as any to compare the models.
@@ -40,8 +40,10 @@ fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
 fn a_contact_has_what_the_network_says_of_its_window() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
     let model = Model::without_fit_check(&scene).unwrap();
-    let (network, alive) =
-        (Learned::of_scene(&scene, crate::scene::EstimatorKind::Network).unwrap(), scene.input.alive(&scene.sensor));
+    let (network, alive) = (
+        Learned::of_scene(&scene, crate::spec::scene::EstimatorKind::Network).unwrap(),
+        scene.input.alive(&scene.sensor),
+    );
     let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 9, ..Default::default() }).unwrap();
     let mut asked = 0;
     for number in 0..8 {

@@ -1,0 +1,66 @@
+//! By evidence: a frame estimated by [`crate::estimate::evidence`], as a result of the golden engine.
+//!
+//! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
+//! scene states none: it is found from the frame.
+
+use super::array::{Array, CaseOutcome, EngineInput};
+use super::estimator::{Clipped, Estimator};
+use super::forces::threshold;
+use crate::data::input::Input;
+use crate::estimate::evidence::Evidence;
+use crate::estimate::learned::{Learned, LearnedError};
+use crate::result::checks::{largest_spread, relative_spread};
+use crate::result::reconstruct::{ContactEstimate, Reconstruction};
+use crate::spec::scene::{EstimatorKind, Scene};
+
+/// The estimator `evidence`, with or without a network.
+struct ByEvidence(Evidence);
+
+/// The estimator `kind`, one with evidence.
+///
+/// # Errors
+/// As [`Learned::of_scene`], where the estimator has a network.
+pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, LearnedError> {
+    let mut evidence = Evidence::new(scene);
+    if kind.has_network() {
+        evidence = evidence.advised_by(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
+    }
+    if let Some(shares) = input.noise_shares() {
+        evidence = evidence.with_noise_shares(shares);
+    }
+    Ok(Box::new(ByEvidence(evidence)))
+}
+
+impl Estimator for ByEvidence {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        let noise_MPa = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
+        let estimate = self.0.solve(&input.frame.stress_MPa, noise_MPa);
+        let forces = threshold(estimate.forces_N, array.scene.threshold.min_force_N);
+        let subarrays = vec![array.array_of(input, forces.resultant())];
+        let mut result = array.finish(input.frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
+        result.checks.noise_MPa = Some(estimate.noise_MPa);
+        result.checks.misfit_probability = estimate.misfit_probability;
+        result.checks.shear_spread = shear_spread(&estimate.contacts);
+        result.extra.contacts = Some(estimate.contacts);
+        result
+    }
+
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::AsRead
+    }
+
+    /// Its load does not come from Cz⁺b.
+    fn compares_load(&self) -> bool {
+        false
+    }
+}
+
+/// Standard deviation of the shear over its size, the largest of all contacts with a share of the load. Below a
+/// hundredth of the normal force a shear counts as none, and its standard deviation is taken over that.
+fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
+    let spread = |contact: &ContactEstimate| {
+        let ([x, y, normal], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
+        (normal, Some(relative_spread([x, y], [sx, sy], normal)))
+    };
+    largest_spread(&contacts.iter().map(spread).collect::<Vec<_>>())
+}

@@ -1,0 +1,79 @@
+//! By network: μ as a trained network knows it, in the place of a search; p(μ) is then that of the search.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: b of the whole array | n | MPa |
+//! | out: μ with its standard deviations | 2 | – |
+//! | out: objective, ln of the density at μ | scalar | – |
+//!
+//! With `contacts` the network is evaluated for each contact, `float::contacts::by_network`.
+
+use super::array::{Array, EngineInput};
+use super::by_contacts;
+use super::estimator::{Clipped, Estimator};
+use super::objective::{Estimate, Objective, SearchInput};
+use crate::estimate::learned::{Learned, LearnedError, OneContact};
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::partition::Case;
+use crate::spec::scene::{EstimatorKind, Scene};
+
+/// A network that gives one μ for the whole array.
+struct ByNetwork {
+    network: Learned,
+    alive: Vec<bool>,
+}
+
+/// A network that gives each contact a μ.
+struct ByNetworkOfContacts {
+    network: Learned,
+    alive: Vec<bool>,
+}
+
+/// The estimator with the network that a scene names.
+///
+/// # Errors
+/// As [`Learned::of_scene`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, LearnedError> {
+    let network = Learned::of_scene(scene, EstimatorKind::Network)?;
+    let alive = scene.input.alive(&scene.sensor);
+    Ok(match scene.partition.case {
+        Case::Contacts => Box::new(ByNetworkOfContacts { network, alive }),
+        _ => Box::new(ByNetwork { network, alive }),
+    })
+}
+
+impl Estimator for ByNetwork {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        array.finish(input.frame, array.subarrays(input, array.whole(), self))
+    }
+
+    /// The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::Zero
+    }
+}
+
+impl Estimator for ByNetworkOfContacts {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        by_contacts::by_network(array, input, &self.network, &self.alive)
+    }
+
+    /// As with one μ.
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::Zero
+    }
+}
+
+impl Objective for ByNetwork {
+    /// No candidate is compared: that Σp presses is all that counts.
+    fn score(&self, p: &[f64]) -> Option<f64> {
+        let sum: f64 = p.iter().sum();
+        (sum > 0.0 && sum.is_finite()).then_some(0.0)
+    }
+
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let told = self.network.shear(&OneContact { b: input.b, alive: &self.alive, centre_mm: [0.0; 2] });
+        self.score(&input.family.eval(told.mean))?;
+        Some(Estimate::of_network(&told, input.mu_max))
+    }
+}

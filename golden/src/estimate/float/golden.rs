@@ -1,0 +1,137 @@
+//! The golden engine: an estimator between the input options and the checks of its results.
+//!
+//! | case | per frame |
+//! |---|---|
+//! | rows × columns | each subarray on its own |
+//! | adaptive | the whole array first, to find the contacts; then the case that `adaptive` chooses |
+//! | contacts | the whole array first; then its regions, each with its own μ |
+
+use super::array::{Array, EngineInput};
+use super::error::GoldenError;
+use super::estimator::Estimator;
+use super::{adaptive, by_contacts, by_evidence, by_network, by_subarray};
+use crate::data::frame::Frame;
+use crate::data::input::Input;
+use crate::data::quantise::quantise;
+use crate::data::reception::{full_scale, noise_floor_codes};
+use crate::estimate::deviations::Deviations;
+use crate::estimate::learned::LearnedError;
+use crate::estimate::misfit::Misfit;
+use crate::physics::matrices::Matrices;
+use crate::result::flags::frame_flags;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::partition::Case;
+use crate::spec::scene::{EstimatorKind, Scene};
+
+/// The golden engine of one scene, its matrices computed.
+pub struct Golden {
+    /// The scene's array and its matrices; the scene states the estimator.
+    pub(super) array: Array,
+    /// The scene's input options.
+    pub(super) input: Input,
+    /// Name of the estimator.
+    kind: EstimatorKind,
+    /// What estimates the forces.
+    pub(super) estimator: Box<dyn Estimator>,
+    /// The check of frames for which a network gives μ.
+    pub(super) misfit: Option<Misfit>,
+    /// Standard deviations of a search, where there is a table.
+    pub(super) deviations: Option<Deviations>,
+}
+
+/// The estimator `kind` for a scene with these input options: the table of names.
+fn estimator(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, GoldenError> {
+    Ok(match kind {
+        EstimatorKind::Search => match scene.partition.case {
+            Case::Grid(_) => by_subarray::new(scene)?,
+            Case::Adaptive => adaptive::new(scene),
+            Case::Contacts => by_contacts::new(scene),
+        },
+        EstimatorKind::Network => by_network::new(scene)?,
+        EstimatorKind::Evidence | EstimatorKind::EvidenceNetwork | EstimatorKind::Combined => {
+            by_evidence::new(kind, scene, input)?
+        }
+    })
+}
+
+impl Golden {
+    /// The engine with the scene's estimator, [`Scene::model_estimator`]. Computes the matrices of the scene: milliseconds
+    /// for 20 × 20 taxels, two seconds for the largest subarrays.
+    ///
+    /// Where the scene does not state the estimator and its network was trained for something else, `evidence` takes the
+    /// place of `combined`; [`Golden::estimator`] says so.
+    ///
+    /// # Errors
+    /// Any [`GoldenError`] except `Frame` and `TooStrong`.
+    pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
+        match (Golden::with(scene, scene.model_estimator()), scene.search.estimator) {
+            (Err(GoldenError::Learned(LearnedError::Mismatch { .. })), None) => {
+                Golden::with(scene, EstimatorKind::Evidence)
+            }
+            (built, _) => built,
+        }
+    }
+
+    /// The reference of the scene's hardware: the engine with the hardware's estimator, [`Scene::hardware_estimator`].
+    ///
+    /// # Errors
+    /// As [`Golden::new`].
+    pub fn reference(scene: &Scene) -> Result<Golden, GoldenError> {
+        Golden::with(scene, scene.hardware_estimator())
+    }
+
+    /// The engine with this estimator in the place of the scene's.
+    ///
+    /// # Errors
+    /// As [`Golden::new`].
+    pub fn with(scene: &Scene, kind: EstimatorKind) -> Result<Golden, GoldenError> {
+        let scene = &scene.estimated_by(kind);
+        scene.require_golden()?;
+        let input = Input::new(scene)?;
+        let estimator = estimator(kind, scene, &input)?;
+        let (misfit, deviations) = (Misfit::of_scene(scene, kind)?, Deviations::of_scene(scene, kind)?);
+        Ok(Golden { array: Array::new(scene)?, input, kind, estimator, misfit, deviations })
+    }
+
+    /// The estimator.
+    pub fn estimator(&self) -> EstimatorKind {
+        self.kind
+    }
+
+    /// The scene; it states the estimator.
+    pub fn scene(&self) -> &Scene {
+        &self.array.scene
+    }
+
+    /// The scene's input options with their files.
+    pub fn input(&self) -> &Input {
+        &self.input
+    }
+
+    /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
+    pub fn matrices(&self) -> &Matrices {
+        self.array.matrices()
+    }
+
+    /// Reconstructs calibrated stress. The forces come from the stress, the condition from its codes.
+    ///
+    /// # Errors
+    /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
+    /// finite.
+    pub(super) fn reconstruct_stress(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+        let scene = self.scene();
+        frame.check(scene)?;
+        let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
+        let floor = noise_floor_codes(scene, &codes);
+        let input = EngineInput { frame, codes: &codes.codes, floor, noise_MPa };
+        let mut result = self.estimator.estimate(&self.array, &input);
+        if !result.resultant_N.iter().all(|sum| sum.is_finite()) {
+            let (frame, peak_MPa) = (frame.id.clone(), frame.peak_MPa());
+            return Err(GoldenError::TooStrong { frame, peak_MPa });
+        }
+        result.flags.extend(frame_flags(scene, self.kind, frame, &codes, noise_MPa));
+        result.flags.sort();
+        result.flags.dedup();
+        Ok(result)
+    }
+}
