@@ -2,12 +2,13 @@
 
 use super::*;
 use crate::fixed::Model;
+use crate::flags::Flag;
 use crate::float::Golden;
 use crate::frame::Contact;
 use crate::frame::Frame;
 use crate::generator::generate;
 use crate::reconstruct::Reconstruction;
-use crate::scene::{EstimatorKind, Medium, ObjectiveKind};
+use crate::scene::{EstimatorKind, Medium, ObjectiveKind, Scene};
 use crate::sensor::Sensor;
 
 fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
