@@ -15,11 +15,12 @@ use crate::float::orthogonal::Orthogonal;
 use crate::float::pass::Polynomial;
 use crate::float::GoldenError;
 use crate::frame::{Forces, Frame};
-use crate::matrices::{Matrices, MAX_FLOAT_DEGREE};
+use crate::matrices::Matrices;
 use crate::partition::{subarrays, Subarray};
 use crate::quantise::quantise;
 use crate::reception::{full_scale, noise_floor_codes, receive};
 use crate::scene::Scene;
+use crate::scene::MAX_FLOAT_DEGREE;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 

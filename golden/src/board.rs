@@ -45,7 +45,7 @@ pub use power::Power;
 use reader::Reader;
 
 use crate::adc::CONVERTERS;
-use crate::symmetry::quads::Quads;
+use crate::quads::Quads;
 
 /// The engine of a board; both do the same arithmetic with different schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

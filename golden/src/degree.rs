@@ -27,7 +27,8 @@ use crate::float::pass::Polynomial;
 use crate::float::search::search;
 use crate::frame::{Contact, Frame};
 use crate::generator::{generate, random_contacts, Draw, Shapes};
-use crate::matrices::{Matrices, MatricesError, MAX_DEGREE, MAX_RADIUS};
+use crate::matrices::{Matrices, MatricesError, MAX_RADIUS};
+use crate::scene::MAX_DEGREE;
 use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::Sensor;
 use std::collections::BTreeMap;
@@ -203,7 +204,7 @@ mod tests {
 
     #[test]
     fn the_radius_alone_at_its_edges() {
-        let most = crate::matrices::MAX_FLOAT_DEGREE;
+        let most = crate::scene::MAX_FLOAT_DEGREE;
         assert_eq!(by_radius(0.5, 0.0, MAX_DEGREE), Some(0));
         assert_eq!(by_radius(0.0, 0.6, MAX_DEGREE), Some(1));
         assert_eq!(by_radius(0.187, 0.6, MAX_DEGREE), Some(1));

@@ -46,7 +46,7 @@ mod prior;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{ContactEstimate, Estimate};
+pub use estimate::Estimate;
 pub use estimator::Evidence;
 
 use crate::frame::Forces;

@@ -8,7 +8,7 @@
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
-//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::sliding) |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
@@ -20,13 +20,13 @@
 
 pub mod calibration;
 pub mod known_loads;
-pub mod sliding;
 pub mod tare;
 #[cfg(test)]
 mod tests;
 
 use crate::frame::{Frame, FrameError};
 use crate::scene::{InputSpec, Scene};
+use crate::sliding;
 use calibration::{Calibration, CalibrationError};
 use tare::Tare;
 use thiserror::Error;

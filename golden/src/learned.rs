@@ -36,7 +36,6 @@ mod network;
 mod tests;
 mod training;
 mod trial;
-mod window;
 
 pub use composed::ComposedLayer;
 pub use error::LearnedError;
@@ -46,12 +45,11 @@ pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
 pub use training::{Stage, Training};
 pub use trial::with_network;
-pub use window::{Place, Window};
 
+use crate::quads::Quads;
 use crate::read::bytes_up_to;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::symmetry::quads::Quads;
 use faer::Mat;
 use features::{Features, Readings};
 use network::Network;

@@ -10,9 +10,9 @@ mod error;
 mod format;
 mod header;
 mod identity;
-mod link_kind;
 mod packet;
 mod payload;
+mod rate;
 pub mod slip;
 mod sums;
 #[cfg(test)]
@@ -23,7 +23,6 @@ pub use error::LinkError;
 pub use format::markdown;
 pub use header::c_header;
 pub use identity::{image_bytes, payloads, scene_hash, supports};
-pub use link_kind::LinkKind;
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 

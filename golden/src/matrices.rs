@@ -38,10 +38,6 @@ use thiserror::Error;
 
 /// Maximum taxels of a subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
 pub const MAX_TAXELS: usize = 48 * 48;
-/// Highest degree of the hardware and its bit-true model.
-pub const MAX_DEGREE: usize = 3;
-/// Highest degree of the floating-point model: enough for square taxels with a pitch of half their depth.
-pub const MAX_FLOAT_DEGREE: usize = 8;
 /// r from which on no degree is enough.
 pub const MAX_RADIUS: f64 = 0.9;
 

@@ -10,6 +10,8 @@
 //!
 //! Feeds `receive` of all models. Finite stress is assumed; frames are checked when loaded.
 
+use crate::scene::largest_code;
+
 /// The codes of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Codes {
@@ -21,11 +23,6 @@ pub struct Codes {
     pub full_scale_MPa: f64,
     /// Whether each taxel is beyond full scale and was clamped.
     pub clipped: Vec<bool>,
-}
-
-/// Largest code of `bits` bits: 2^(bits − 1) − 1; `bits` 2 to 32.
-pub fn largest_code(bits: u32) -> i32 {
-    ((1i64 << (bits - 1)) - 1) as i32
 }
 
 impl Codes {

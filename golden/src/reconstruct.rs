@@ -14,13 +14,11 @@
 mod contacts;
 mod extra;
 mod figures;
-mod found_noise;
 mod output;
 
-pub use contacts::FoundContact;
+pub use contacts::{ContactEstimate, FoundContact};
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
-pub use found_noise::FOUND_NOISE_LIMIT;
 pub use output::{shear_sigma_N, Resultant, Wrench};
 
 use crate::checks::Checks;

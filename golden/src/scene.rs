@@ -45,10 +45,10 @@ pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
 use crate::adc::AdcScan;
-use crate::input::sliding;
-use crate::link::LinkKind;
+use crate::link_kind::LinkKind;
 use crate::partition::{subarrays, Case};
 use crate::sensor::Sensor;
+use crate::sliding;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
@@ -229,6 +229,16 @@ pub struct FixedSpec {
     pub lanes: Option<u32>,
 }
 
+/// Highest degree of the hardware and its bit-true model.
+pub const MAX_DEGREE: usize = 3;
+/// Highest degree of the floating-point model: enough for square taxels with a pitch of half their depth.
+pub const MAX_FLOAT_DEGREE: usize = 8;
+
+/// Largest code of `bits` bits: 2^(bits − 1) − 1; `bits` 2 to 32.
+pub fn largest_code(bits: u32) -> i32 {
+    ((1i64 << (bits - 1)) - 1) as i32
+}
+
 /// Whether the hardware checks its coefficient memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CoefficientCheck {
@@ -322,7 +332,7 @@ pub enum MeanKind {
     /// 2^average frames give one result.
     #[default]
     Block,
-    /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::input::sliding`].
+    /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::sliding`].
     Sliding,
 }
 

@@ -6,8 +6,8 @@ use dermis_golden::float::Golden;
 use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::partition::{subarrays, Case};
-use dermis_golden::quantise::largest_code;
 use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::largest_code;
 use dermis_golden::scene::Scene;
 use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::learned::{with_network, Training};
+use dermis_golden::quads::Quads;
 use dermis_golden::scene::Scene;
-use dermis_golden::symmetry::quads::Quads;
 
 /// The model of a sensor of `rows` × `cols` taxels; `more` is the rest of the scene file.
 pub(crate) fn model(rows: usize, cols: usize, more: &str) -> Model {

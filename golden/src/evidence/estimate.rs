@@ -1,22 +1,7 @@
 //! What the evidence says of one frame.
 
 use crate::frame::Forces;
-use serde::{Deserialize, Serialize};
-
-/// One contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ContactEstimate {
-    /// Centre of pressure in mm from the array's centre.
-    pub centre_mm: [f64; 2],
-    /// Ratio of shear to normal force, [x, y].
-    pub mu: [f64; 2],
-    /// Force in N, [x, y, normal].
-    pub force_N: [f64; 3],
-    /// Standard deviation of the force in N, [x, y, normal].
-    pub sigma_N: [f64; 3],
-    /// Covariance of μ, [xx, xy, yy].
-    pub mu_covariance: [f64; 3],
-}
+use crate::reconstruct::ContactEstimate;
 
 /// What one frame says.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,6 +7,7 @@ use crate::flags::Flag;
 use crate::float::Golden;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, DrawnFrame, Draws};
+use crate::reconstruct::ContactEstimate;
 use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, Medium, Scene};
 

@@ -10,10 +10,11 @@ use super::stages::prepare::Scale;
 use crate::deviations::Deviations;
 use crate::frame::Frame;
 use crate::input::Input;
-use crate::matrices::MAX_DEGREE;
-use crate::quantise::{largest_code, quantise, Codes};
+use crate::quantise::{quantise, Codes};
 use crate::reception::full_scale;
+use crate::scene::largest_code;
 use crate::scene::Scene;
+use crate::scene::MAX_DEGREE;
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences.
 #[derive(Clone, Debug)]

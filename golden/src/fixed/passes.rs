@@ -17,7 +17,7 @@ use super::words::network::WordNetwork;
 use super::words::quantised::Quantised;
 use super::words::schedule::{by_limbs, is_transposed, layer, schedule, Product, EXPONENTS};
 use crate::board::EngineKind;
-use crate::symmetry::quads::Quads;
+use crate::quads::Quads;
 
 /// The quads that a stage passes on.
 pub type QuadStream = Vec<[i64; 4]>;

@@ -6,9 +6,10 @@
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use crate::checks::{largest_spread, relative_spread};
-use crate::evidence::{ContactEstimate, Evidence};
+use crate::evidence::Evidence;
 use crate::frame::Frame;
 use crate::partition::Subarray;
+use crate::reconstruct::ContactEstimate;
 use crate::reconstruct::{Reconstruction, SubarrayResult};
 
 impl Golden {

@@ -18,12 +18,13 @@ use crate::flags::{frame_flags, Flag};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
-use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
+use crate::matrices::{Matrices, MatricesError};
 use crate::misfit::Misfit;
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::quantise;
 use crate::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
+use crate::scene::MAX_FLOAT_DEGREE;
 use crate::scene::{EstimatorKind, Form, Scene, SceneError};
 use thiserror::Error;
 

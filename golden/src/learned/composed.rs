@@ -13,8 +13,9 @@
 
 use super::features::{Features, Readings, AMPLITUDE};
 use super::network::{Layer, Parities};
-use super::{Learned, Place};
+use super::Learned;
 use crate::symmetry::folded::EVEN;
+use crate::window::Place;
 use faer::Mat;
 
 /// A layer that takes the parities of b/s, s the power of two above max |b|, or those of the layer before.

@@ -19,12 +19,12 @@
 
 use super::error::LearnedError;
 use super::network::{exchanged, Parities};
-use super::window::Window;
 use crate::influence::Influence;
+use crate::quads::Quads;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
 use crate::symmetry::parity::{has_entry, sign};
-use crate::symmetry::quads::Quads;
+use crate::window::Window;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Col, Mat, Par};
 

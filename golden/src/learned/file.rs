@@ -23,9 +23,9 @@
 use super::error::LearnedError;
 use super::features::Features;
 use super::network::{Layer, Network, OUTPUT_CHANNELS};
-use super::window::Window;
 use crate::partition::Case;
 use crate::scene::{EstimatorKind, Medium, Scene};
+use crate::window::Window;
 use faer::{Mat, RowRef};
 use serde::{Deserialize, Serialize};
 

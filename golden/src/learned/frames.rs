@@ -20,12 +20,12 @@
 //! | out: readings, μ | window × frames, 2 × frames | MPa, of mu_max |
 
 use super::features::Readings;
-use super::window::{Place, Window};
 use crate::generator::draws::{DrawOptions, Draws, Shape};
 use crate::generator::support::{Kernels, Support};
 use crate::generator::GeneratorError;
 use crate::random::Random;
 use crate::scene::Scene;
+use crate::window::{Place, Window};
 use faer::Mat;
 use rayon::prelude::*;
 use std::f64::consts::TAU;

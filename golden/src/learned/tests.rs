@@ -4,6 +4,7 @@ use crate::generator::draws::{DrawOptions, Draws};
 use crate::noise::{shape_study, Candidate, ShapeStudy};
 use crate::partition::Case;
 use crate::scene::EstimatorKind;
+use crate::window::{Place, Window};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();

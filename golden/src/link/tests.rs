@@ -1,4 +1,5 @@
 use super::*;
+use crate::link_kind::LinkKind;
 use crate::scene::Scene;
 use proptest::prelude::*;
 

@@ -3,6 +3,7 @@
 use super::inverse::product;
 use super::*;
 use crate::scene::Scene;
+use crate::scene::MAX_DEGREE;
 use proptest::prelude::*;
 
 /// Rounding of a product of n terms with an inverse of condition κ: n κ ε, here at most 100 · 20 · 2⁻⁵² = 5e-13.

@@ -13,9 +13,9 @@
 //! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
+use super::contacts::ContactEstimate;
 use super::output::{shear_sigma_N, Resultant, Wrench};
 use crate::checks::{largest_spread, relative_spread};
-use crate::evidence::ContactEstimate;
 use crate::frame::Forces;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::inverse::{InverseKind, InverseSpec, Inversion};
 use super::Scene;
-use crate::quantise::largest_code;
+use crate::scene::largest_code;
 
 /// Rounding of the coefficients is kept below 2^−`COEFFICIENTS_SHARE` of the forces.
 const COEFFICIENTS_SHARE: i32 = 7;

@@ -8,9 +8,9 @@ use super::{
     TableStorage, ThresholdSpec, MAX_CONTACTS, PLAUSIBLE_MPA,
 };
 use crate::board::{Board, SEARCH_WIDTHS};
-use crate::link::LinkKind;
-use crate::matrices::MAX_FLOAT_DEGREE;
+use crate::link_kind::LinkKind;
 use crate::partition::{subarrays, Case, Grid};
+use crate::scene::MAX_FLOAT_DEGREE;
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};

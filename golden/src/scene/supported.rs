@@ -37,10 +37,10 @@ use super::{
     CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError,
     TABLE_CODE_BITS,
 };
-use crate::learned::{Place, Window};
-use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
-use crate::symmetry::quads::Quads;
+use crate::quads::Quads;
+use crate::scene::MAX_DEGREE;
+use crate::window::{Place, Window};
 
 /// A value and whether it is rejected.
 pub(super) struct Rule {

@@ -19,7 +19,7 @@
 //! A matrix without the symmetry, such as one with dead taxels, is one block in the basis of the taxels.
 
 use super::parity::{has_entry, sign, FLIP_X, FLIP_Y};
-use super::quads::Quads;
+use crate::quads::Quads;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColMut, ColRef, Mat, Par};
 use std::ops::Range;

@@ -2,10 +2,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`quads`] | the four mirror images of a taxel, one quad |
 //! | [`parity`] | the four parities of a quad: which matrix flips which, and with which sign an image counts |
 //! | [`folded`] | vectors and matrices in the basis of parities |
 
 pub mod folded;
 pub mod parity;
-pub mod quads;

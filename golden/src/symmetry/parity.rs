@@ -6,7 +6,7 @@
 
 use std::ops::{Add, Sub};
 
-use super::quads::Quads;
+use crate::quads::Quads;
 
 /// Bit of the column parity, which Ax flips.
 pub const FLIP_X: usize = 1;

@@ -4,7 +4,8 @@ use std::thread;
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{Identity, LinkKind};
+use dermis_golden::link::Identity;
+use dermis_golden::link_kind::LinkKind;
 use rust_hdl::prelude::*;
 
 use super::board::{Board, BoardOutputs};

@@ -10,9 +10,9 @@
 //! [`cycles`](dermis_golden::fixed::stages::window::cycles), wherever it lies.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::learned;
+use dermis_golden::quads::Quads;
 use dermis_golden::symmetry::parity::hadamard;
-use dermis_golden::symmetry::quads::Quads;
+use dermis_golden::window;
 use rust_hdl::prelude::*;
 
 use super::normalise::left_shift;
@@ -183,7 +183,7 @@ impl<'k> Ports<'k> {
         (0..cycles).fold(value, |value, number| self.k.delay(&format!("{name}_{number}"), value))
     }
 
-    fn window(&self, model: &Model, window: &learned::Window) {
+    fn window(&self, model: &Model, window: &window::Window) {
         let k = self.k;
         let scanned = self.scan(window, model.layout());
         let [code, own, masked] = self.code(model, &scanned);
@@ -217,7 +217,7 @@ impl<'k> Ports<'k> {
     }
 
     /// Scans the window twice: quad by quad, in each the four lanes.
-    fn scan(&self, window: &learned::Window, array: Quads) -> Scanned<'k> {
+    fn scan(&self, window: &window::Window, array: Quads) -> Scanned<'k> {
         let (k, quads) = (self.k, window.quads());
         let scanning = k.state("scanning", Type::unsigned(1), self.rst, 0);
         let counter = |name: &str, limit: usize| k.state(name, Type::unsigned(count_bits(limit)), self.restarts(), 0);

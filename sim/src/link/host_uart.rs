@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{ensure, Result};
-use dermis_golden::link::LinkKind;
+use dermis_golden::link_kind::LinkKind;
 use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 

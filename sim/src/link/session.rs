@@ -7,7 +7,8 @@ use anyhow::{anyhow, bail, Result};
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::input::Input;
-use dermis_golden::link::{Identity, Kind, LinkKind};
+use dermis_golden::link::{Identity, Kind};
+use dermis_golden::link_kind::LinkKind;
 use serialport::SerialPort;
 
 use super::answer::Answer;

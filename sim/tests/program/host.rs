@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::link::LinkKind;
+use dermis_golden::link_kind::LinkKind;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::link::{open, Session};

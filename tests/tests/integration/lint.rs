@@ -5,7 +5,7 @@ use std::process::Command;
 
 use dermis_golden::adc::{AdcScan, CONVERTERS};
 use dermis_golden::fixed::Model;
-use dermis_golden::link::LinkKind;
+use dermis_golden::link_kind::LinkKind;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};

@@ -19,14 +19,15 @@ use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::{Prepare, Scale};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
-use crate::learned::Window;
-use crate::matrices::{Matrices, MAX_DEGREE};
+use crate::matrices::Matrices;
 use crate::misfit::Misfit;
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
+use crate::quads::Quads;
 use crate::scene::Scene;
+use crate::scene::MAX_DEGREE;
 use crate::segment::{self, Segmenter};
 use crate::sensor::Sensor;
-use crate::symmetry::quads::Quads;
+use crate::window::Window;
 
 /// By how much norms of other sets of dead taxels may exceed those of the sets that are looked at; without it one specimen in
 /// four would be refused.

@@ -13,12 +13,12 @@ use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
-use crate::learned::Window;
 use crate::misfit::Misfit;
 use crate::partition::{Case, Grid, Subarray};
+use crate::quads::Quads;
 use crate::scene::{CoefficientCheck, ForceOutput, Scene};
 use crate::segment::Segmenter;
-use crate::symmetry::quads::Quads;
+use crate::window::Window;
 
 /// The hardware of one scene. What differs between partition cases is in [`CasePlan`]; the methods without a case give
 /// that of the first, which with several cases is case 0, the whole array.

@@ -33,7 +33,7 @@ use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::stages::send::LABELS_PER_BEAT;
 use crate::fixed::words::formats::{Formats, HALVINGS};
-use crate::symmetry::quads::Quads;
+use crate::quads::Quads;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;

@@ -8,13 +8,13 @@ use crate::board::EngineKind;
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::Scale;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
-use crate::input::sliding::most_frames;
-use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
+use crate::quads::Quads;
+use crate::scene::MAX_DEGREE;
 use crate::scene::{
     CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableRange, TableStorage,
 };
-use crate::symmetry::quads::Quads;
+use crate::sliding::most_frames;
 
 /// Covers for which writable coefficients are counted where the scene has none, over its own thickness.
 const OTHER_COVERS: [f64; 2] = [0.8, 1.25];

@@ -13,9 +13,10 @@ use super::contents::Plan;
 use super::cycles::Cycles;
 use crate::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::fixed::error::{FitSuggestion, FixedError, Shortage};
-use crate::matrices::{Matrices, MAX_DEGREE};
+use crate::matrices::Matrices;
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;
+use crate::scene::MAX_DEGREE;
 use crate::sensor::MIN_SIDE;
 
 /// The plan, if its board has the resources.

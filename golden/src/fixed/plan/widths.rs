@@ -18,9 +18,9 @@ use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
 use crate::learned::{ComposedLayer, Learned};
 use crate::matrices::Matrices;
+use crate::quads::Quads;
 use crate::scene::{EstimatorKind, Scene};
 use crate::symmetry::parity::{FLIP_X, FLIP_Y};
-use crate::symmetry::quads::Quads;
 
 /// Largest grid coordinate that coarse tiles and candidates beyond the disc reach.
 const REACH: u64 = 4;

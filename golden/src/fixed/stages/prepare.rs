@@ -14,7 +14,7 @@
 //! | b | `input_bits` = `code_bits` + k | that over 2^k |
 //!
 //! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits. A
-//! sliding mean ([`sliding`](crate::input::sliding), with g) is rounded to its k more bits with every frame, which adds as
+//! sliding mean ([`sliding`](crate::sliding), with g) is rounded to its k more bits with every frame, which adds as
 //! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
 //! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
@@ -22,11 +22,12 @@ use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::frame::FrameError;
 use crate::input::calibration::Calibration;
-use crate::input::sliding::gain_shift;
 use crate::input::tare::Tare;
 use crate::input::InputError;
-use crate::quantise::{largest_code, quantise};
+use crate::quantise::quantise;
+use crate::scene::largest_code;
 use crate::scene::{MeanKind, Scene};
+use crate::sliding::gain_shift;
 
 /// Fraction bits of a gain word.
 pub const GAIN_FRACTION: u32 = 16;
@@ -197,8 +198,8 @@ impl Prepare {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::sliding::most_frames;
     use crate::random::Random;
+    use crate::sliding::most_frames;
 
     #[test]
     fn by_hand() {

@@ -27,8 +27,8 @@
 use faer::Mat;
 use serde::Serialize;
 
+use crate::quads::Quads;
 use crate::symmetry::parity::{has_entry, sign, FLIP_X, FLIP_Y};
-use crate::symmetry::quads::Quads;
 
 /// The four Q × Q blocks of a folded matrix that flip the parity by `flip`; row-major, indexed by the target parity.
 #[derive(Clone, Debug, PartialEq)]

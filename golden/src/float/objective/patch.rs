@@ -111,8 +111,9 @@ mod tests {
     use super::*;
     use crate::float::pass::Polynomial;
     use crate::generator::{generate, random_contacts, Draw, Shapes};
-    use crate::matrices::{Matrices, MAX_FLOAT_DEGREE};
+    use crate::matrices::Matrices;
     use crate::scene::Scene;
+    use crate::scene::MAX_FLOAT_DEGREE;
 
     #[test]
     fn several_ellipses_add_up_on_any_body() {

@@ -2,7 +2,7 @@
 
 use dermis_golden::fixed::CasePlan;
 use dermis_golden::partition::Grid;
-use dermis_golden::symmetry::quads::Quads;
+use dermis_golden::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

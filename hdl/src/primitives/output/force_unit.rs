@@ -6,7 +6,7 @@ use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, TABLES};
-use dermis_golden::symmetry::quads::Quads;
+use dermis_golden::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -4,8 +4,8 @@ use dermis_golden::fixed::plan::contents::ContactPlan;
 use dermis_golden::fixed::stages::receive::Received;
 use dermis_golden::fixed::stages::window::{cycles, window, Array, WindowWords};
 use dermis_golden::fixed::words::network::MASKED;
-use dermis_golden::learned::Place;
 use dermis_golden::segment::Segmenter;
+use dermis_golden::window::Place;
 
 use super::*;
 use crate::language::testbench::{
@@ -20,7 +20,7 @@ fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, mor
     let mut model = model(rows, cols, more);
     (model.scene.partition.max_contacts, model.noise_floor) = (contacts, 100);
     let segmenter = Segmenter::new(&model.scene.sensor, 1.0);
-    let window = learned::Window { place: Place::Contact, rows: own[0], cols: own[1] };
+    let window = window::Window { place: Place::Contact, rows: own[0], cols: own[1] };
     model.by_contact = Some(ContactPlan { segmenter, window });
     model
 }
@@ -30,7 +30,7 @@ fn floor_word(model: &Model) -> Word {
     Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64)
 }
 
-fn window_of(model: &Model) -> learned::Window {
+fn window_of(model: &Model) -> window::Window {
     model.by_contact.as_ref().unwrap().window
 }
 

@@ -84,7 +84,7 @@ fn tasks(scene: &Scene) -> Vec<Task> {
     field("inverse_bits", &[18, 20, 22, 24, 28], |s, v| s.fixed.inverse_bits = v);
     field("prune_bits", &[8, 10, 12, 14, 17, 20], |s, v| s.fixed.prune_bits = v);
     field("lanes", &[16, 20, 28, 36, 52, 100, 144], |s, v| s.fixed.lanes = Some(v));
-    for degree in 1..=dermis_golden::matrices::MAX_DEGREE {
+    for degree in 1..=dermis_golden::scene::MAX_DEGREE {
         all.push(("degree", degree.to_string(), Box::new(|_| {}), Some(degree)));
     }
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();

@@ -2,8 +2,8 @@
 //! outlines; or an arrow per contact with the standard deviation of its force.
 
 use anyhow::Result;
-use dermis_golden::evidence::ContactEstimate;
 use dermis_golden::frame::Forces;
+use dermis_golden::reconstruct::ContactEstimate;
 use dermis_golden::reconstruct::SubarrayResult;
 use dermis_golden::sensor::Sensor;
 use plotters::prelude::*;

@@ -2,7 +2,8 @@
 
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::link::slip::{END, IDLE};
-use dermis_golden::link::{Counters, Decoder, Identity, Kind, LinkKind, Packet, PacketError};
+use dermis_golden::link::{Counters, Decoder, Identity, Kind, Packet, PacketError};
+use dermis_golden::link_kind::LinkKind;
 use dermis_golden::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::link::{generate_board, generate_board_changed, BoardDevice};

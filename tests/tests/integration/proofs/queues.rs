@@ -5,7 +5,7 @@ use dermis_golden::fixed::stages::send::{LABELS_PER_BEAT, LABEL_BITS, STATUS_BEA
 use dermis_golden::fixed::words::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
-use dermis_golden::symmetry::quads::Quads;
+use dermis_golden::quads::Quads;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::QUEUE_PLACES;
 use dermis_tests::{variants, with_network};

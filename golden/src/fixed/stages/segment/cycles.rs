@@ -19,9 +19,9 @@
 //! | label the quads and add the moments | 20 Q + 4 |
 //! | middle: for each contact its row and column | 2 (row + column) + 9 |
 
+use crate::quads::Quads;
 use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
 use crate::sensor::Sensor;
-use crate::symmetry::quads::Quads;
 
 /// Width of a tap in the memory of the hardware: a weight up to one.
 pub const TAP_BITS: usize = WEIGHT_BITS as usize + 1;

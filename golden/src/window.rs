@@ -9,13 +9,13 @@
 //! | in: sensor, centre of a contact | – | mm |
 //! | out: taxel of the array for each taxel of the window | window | index, or none |
 
+use crate::quads::Quads;
 use crate::sensor::Sensor;
-use crate::symmetry::quads::Quads;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Number of taxels up to which an array is one window.
-pub(super) const WHOLE_UP_TO: usize = 144;
+pub(crate) const WHOLE_UP_TO: usize = 144;
 /// Distance from the contact's centre to which a window around it reaches, in units of the thickness.
 const REACH: f64 = 5.0;
 /// Largest number of rows and of columns of a window around a contact.
@@ -68,12 +68,12 @@ impl Window {
     }
 
     /// The window as an array of its own.
-    pub(super) fn sensor(&self, sensor: &Sensor) -> Sensor {
+    pub(crate) fn sensor(&self, sensor: &Sensor) -> Sensor {
         Sensor { rows: self.rows, cols: self.cols, ..sensor.clone() }
     }
 
     /// Row and column in the array of the window's first taxel, for a contact at `centre_mm`.
-    pub(super) fn origin(&self, sensor: &Sensor, centre_mm: [f64; 2]) -> [isize; 2] {
+    pub(crate) fn origin(&self, sensor: &Sensor, centre_mm: [f64; 2]) -> [isize; 2] {
         let line =
             |centre: f64, pitch: f64, lines: usize| (centre / pitch + (lines as f64 - 1.0) / 2.0).round() as isize;
         match self.place {
@@ -104,7 +104,7 @@ impl Window {
     }
 
     /// Middle of the window in mm from the array's centre.
-    pub(super) fn middle_mm(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> [f64; 2] {
+    pub(crate) fn middle_mm(&self, sensor: &Sensor, [row0, col0]: [isize; 2]) -> [f64; 2] {
         let middle = |first: isize, own: usize, lines: usize, pitch: f64| {
             (first as f64 + (own as f64 - lines as f64) / 2.0) * pitch
         };

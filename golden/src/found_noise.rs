@@ -9,12 +9,12 @@
 //! | in: calibrated stress of the reconstructed frame | MPa |
 //! | out: standard deviation of the noise, flag `shear-unreliable` | MPa |
 
-use super::Reconstruction;
 use crate::evidence::Evidence;
 use crate::flags::Flag;
 use crate::frame::Frame;
 use crate::input::{Input, InputError};
 use crate::partition::Case;
+use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 
 /// Noise found from a frame, relative to its peak, above which the sparse objective cannot determine the shear. The
