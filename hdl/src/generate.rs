@@ -7,9 +7,9 @@ use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::stages::send::{status_fields, STATUS_BEATS};
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
-use dermis_golden::flags::StatusField;
-use dermis_golden::link::c_header;
-use dermis_golden::partition::Case;
+use dermis_golden::result::flags::StatusField;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::wire::link::c_header;
 use serde::Serialize;
 use serde_json::json;
 
@@ -345,8 +345,8 @@ mod tests {
     use super::*;
     use crate::scenes::model;
     use dermis_golden::fixed::stages::send::{CASE, FRAMES, TABLES_VERSION};
-    use dermis_golden::flags::{Feature, Flag};
-    use dermis_golden::scene::Scene;
+    use dermis_golden::result::flags::{Feature, Flag};
+    use dermis_golden::spec::scene::Scene;
 
     /// The fields of a status in the manifest: of hardware with a feature those that the feature adds, of all others `null`.
     #[test]

@@ -12,17 +12,17 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
-use crate::checks::Checks;
-use crate::errors::Errors;
-use crate::flags::{frame_flags, Flag, FlagSet};
-use crate::float::objective::Estimate;
-use crate::frame::{Forces, Frame};
-use crate::input::Input;
-use crate::partition::Subarray;
-use crate::reception::{noise_floor_codes, receive, Received};
-use crate::reconstruct::{
+use crate::data::frame::{Forces, Frame};
+use crate::data::input::Input;
+use crate::data::reception::{noise_floor_codes, receive, Received};
+use crate::estimate::float::objective::Estimate;
+use crate::result::checks::Checks;
+use crate::result::errors::Errors;
+use crate::result::flags::{frame_flags, Flag, FlagSet};
+use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
+use crate::spec::partition::Subarray;
 
 /// μ as a status has it.
 struct StatusMu {

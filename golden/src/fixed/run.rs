@@ -17,9 +17,9 @@ use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
 use super::stages::send::{labels_to_beats, Status};
 use super::subarray::{SubarrayTrace, Told};
-use crate::board::EngineKind;
-use crate::flags::{Flag, FlagSet};
-use crate::partition::Subarray;
+use crate::result::flags::{Flag, FlagSet};
+use crate::spec::board::EngineKind;
+use crate::spec::partition::Subarray;
 
 /// The words that one stage passed on for a frame, in the hardware's order.
 #[derive(Clone, Debug, PartialEq, Eq)]

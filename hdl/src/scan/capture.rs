@@ -186,7 +186,7 @@ mod tests {
     use crate::language::Change;
     use crate::wire::Word;
     use dermis_golden::fixed::stages::scan::code;
-    use dermis_golden::flags::{Flag, FlagSet};
+    use dermis_golden::result::flags::{Flag, FlagSet};
     use std::collections::VecDeque;
 
     /// Codes of whole channels by the stage.

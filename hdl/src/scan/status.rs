@@ -1,6 +1,6 @@
 //! Marks of a scan in the status of its frame.
 
-use dermis_golden::flags::{StatusField, RAIL, STATUS_BEATS, WRONG_CHANNEL};
+use dermis_golden::result::flags::{StatusField, RAIL, STATUS_BEATS, WRONG_CHANNEL};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

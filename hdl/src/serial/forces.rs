@@ -12,7 +12,7 @@
 use dermis_golden::fixed::plan::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
 use dermis_golden::fixed::stages::send::{CONDITION, FOUND, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::flags::NO_CONTACT;
+use dermis_golden::result::flags::NO_CONTACT;
 use rust_hdl::prelude::*;
 
 use super::pass_sequencer::SATURATION_BITS;

@@ -3,15 +3,15 @@
 use std::time::SystemTime;
 
 use anyhow::Result;
-use dermis_golden::checks::Checks;
+use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::data::input::Input;
 use dermis_golden::fixed::stages::send::{labels_of_beats, status_fields, Status, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::flags::{frame_flags, Feature, Flag, FlagSet};
-use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::input::Input;
-use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
-use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::result::checks::Checks;
+use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
 /// A board's answer to a frame, in LSBs.
@@ -218,7 +218,7 @@ impl PhysicalAnswer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     /// A frame's flags as a host tells them that asked for resultants, or for forces; the statuses are changed on the way.
     fn flags(model: &Model, change: &dyn Fn(&mut Status)) -> [Vec<Flag>; 2] {

@@ -1,7 +1,7 @@
 //! The tables of `dermis flags`: the flags of a result, and the fields of a status.
 
 use dermis_golden::fixed::stages::send::status_fields;
-use dermis_golden::flags::{Flag, StatusField};
+use dermis_golden::result::flags::{Flag, StatusField};
 
 use super::table::aligned;
 

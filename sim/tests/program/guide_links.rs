@@ -200,7 +200,7 @@ fn the_limits_know_both_kinds_of_tables() {
             "[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 2\npitch_y_mm = 2\nthickness_mm = 2\n\
              [input]\nfull_scale_MPa = 1\n[hardware]\ntables = \"{kind}\"\n"
         );
-        dermis_golden::scene::Scene::parse(&text, "s.toml").unwrap().hardware.has_writable_tables()
+        dermis_golden::spec::scene::Scene::parse(&text, "s.toml").unwrap().hardware.has_writable_tables()
     };
     for (kind, writable) in [("rom", false), ("writable", true)] {
         assert_eq!(scene(kind), writable);

@@ -1,7 +1,7 @@
 //! Each flag of a status reaches the result.
 
 use super::*;
-use crate::scene::Scene;
+use crate::spec::scene::Scene;
 
 /// The flags of a frame of eight-by-eight whose statuses are changed on the way.
 fn flags(model: &Model, change: impl Fn(&mut Status)) -> Vec<Flag> {

@@ -14,9 +14,9 @@
 //! whose tag names another channel makes the code the upper end, and raises [`Flag::WrongChannel`].
 //! Dead taxels raise nothing.
 
-use crate::adc::{AdcScan, Converter};
 use crate::fixed::words::arith::round_shift;
-use crate::flags::{Flag, FlagSet};
+use crate::result::flags::{Flag, FlagSet};
+use crate::spec::adc::{AdcScan, Converter};
 
 /// The codes of a scan, and its flags.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -91,7 +91,7 @@ pub fn scan(scan: &AdcScan, code_bits: u32, dead: &[usize], answers: &[u32]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adc::CONVERTERS;
+    use crate::spec::adc::CONVERTERS;
 
     fn spec(converter: usize, converters: usize, average: u32) -> AdcScan {
         AdcScan {

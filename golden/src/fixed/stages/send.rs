@@ -4,7 +4,7 @@
 //! subarray of the chosen case, row-major. Saturations of `forces`, the contact flag and the cycles are those of the
 //! whole frame, the same for every subarray:
 //!
-//! [`Status`] lists the fields of its words, except the bits of flags, which are in the rows of [`crate::flags`];
+//! [`Status`] lists the fields of its words, except the bits of flags, which are in the rows of [`crate::result::flags`];
 //! [`status_fields`] gives all of them, from which the manifest and the guide's table are made.
 //!
 //! With a μ for each contact there are [`label_beats`] between forces and status, and the status of each of
@@ -15,9 +15,9 @@
 //! ([`ln_sigma_word`]); the saturations of `estimate` and `relax` are counted with those of `rescale`.
 
 use super::load::VERSION_BITS;
-use crate::flags::{Feature, Flag, FlagSet, StatusField};
+use crate::result::flags::{Feature, Flag, FlagSet, StatusField};
 
-pub use crate::flags::STATUS_BEATS;
+pub use crate::result::flags::STATUS_BEATS;
 
 /// Width of a label on the stream: 0 or the number of a contact.
 pub const LABEL_BITS: u32 = 4;

@@ -1,6 +1,6 @@
 //! Bits of a word of a status.
 
-use dermis_golden::flags::StatusField;
+use dermis_golden::result::flags::StatusField;
 
 use crate::language::{Builder, Expr};
 

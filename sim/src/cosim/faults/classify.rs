@@ -1,7 +1,7 @@
 //! Classifies a fault by what a receiver of the output stream can notice.
 
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
-use dermis_golden::flags::{Flag, FlagSet};
+use dermis_golden::result::flags::{Flag, FlagSet};
 
 use super::super::drive::{Beat, Recording};
 use super::super::stress::Sample;

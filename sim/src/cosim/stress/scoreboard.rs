@@ -13,7 +13,7 @@ use dermis_golden::fixed::stages::load::Outcome as Loaded;
 use dermis_golden::fixed::stages::prepare::Prepared;
 use dermis_golden::fixed::stages::send::{FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::{Intake, Model};
-use dermis_golden::flags::{StatusField, TABLES_REFUSED};
+use dermis_golden::result::flags::{StatusField, TABLES_REFUSED};
 
 use super::outcome::{Outcome, Violation};
 use super::samples::Sample;

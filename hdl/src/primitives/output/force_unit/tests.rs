@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::forces::{force, mu_word};
-use dermis_golden::flags::StatusField;
+use dermis_golden::result::flags::StatusField;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};

@@ -1,0 +1,108 @@
+//! Checks: the figures behind the flags of a result.
+//!
+//! | field | unit | by |
+//! |---|---|---|
+//! | `full_scale_share` | – | [`Input`](crate::data::input::Input) |
+//! | `peak_MPa`, `mu_share`, `border_share` | MPa, –, – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
+//! | `load_ratio` | – | the golden engine |
+//! | `shape_misfit` | – | the golden engine, with `patch` and `symmetric` |
+//! | `noise_MPa` | MPa | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
+//! | `misfit_probability` | – | the estimators `evidence` and `learned`, where the noise is stated |
+//! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
+//! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
+//!
+//! The flag of a figure, its limit and its words are in the flag's row, [`crate::result::flags`].
+//! A figure is there whenever it can be computed, whether or not its flag is raised.
+
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+/// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
+/// ratio beyond the bound gave 0.95 to 1 on drawn frames of the shipped sensors.
+pub const MU_AT_BOUND: f64 = 0.95;
+/// Share of the array's normal load below which a subarray or contact does not count for the flags of its shear.
+pub const COUNTS_FROM: f64 = 0.05;
+/// Largest difference of `load_ratio` from 1.
+pub const LOAD_MISMATCH: f64 = 0.1;
+/// Probability of what is left unexplained below which the model does not fit: one frame in a thousand.
+pub const MISFIT: f64 = 1e-3;
+/// Noise found from a frame, relative to its peak, that no sensor has: the model does not fit. Real arrays have 0.006 to
+/// 0.027.
+pub const LOUD: f64 = 0.1;
+/// Standard deviation of a shear, over its size, above which it is not resolved.
+pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
+
+/// Ratio to the normal force below which a shear counts as none.
+const NO_SHEAR: f64 = 0.01;
+
+/// Standard deviation `sigma` of the shear, [x, y], over its size. Below 0.01 of `normal` a shear counts as none, and its
+/// standard deviation is taken over that.
+pub(crate) fn relative_spread(shear: [f64; 2], sigma: [f64; 2], normal: f64) -> f64 {
+    sigma[0].hypot(sigma[1]) / shear[0].hypot(shear[1]).max(NO_SHEAR * normal)
+}
+
+/// The largest relative spread of a shear among contacts that count, each with its normal force in N and its spread, where
+/// that is known.
+pub(crate) fn largest_spread(contacts: &[(f64, Option<f64>)]) -> Option<f64> {
+    let total: f64 = contacts.iter().map(|(normal, _)| normal).sum();
+    let counts = contacts.iter().filter(|(normal, _)| *normal >= COUNTS_FROM * total);
+    counts.filter_map(|(_, spread)| *spread).filter(|spread| spread.is_finite()).reduce(f64::max)
+}
+
+/// The figures behind the flags of one result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Checks {
+    /// Largest of the readings, the zeros and the calibrated readings of live taxels, each over the stated full scale;
+    /// `None` if the scene states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full_scale_share: Option<f64>,
+    /// Largest |b| in MPa, of the calibrated mean of the frames, without dead taxels.
+    pub peak_MPa: f64,
+    /// Largest |μ| of a searched subarray or contact over `search.mu_max`; `None` without a search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mu_share: Option<f64>,
+    /// Share of the normal load Σ|fz| in the array's outermost rows and columns; `None` without a force per taxel, a
+    /// load or an interior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub border_share: Option<f64>,
+    /// Normal force over the one of the same stress without shear, Σ Cz⁺b; `None` for other engines than `golden`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_ratio: Option<f64>,
+    /// Root mean square of what the fitted shape leaves of the stress, over what the stated noise and the fit's own
+    /// error explain; the largest of all subarrays. `None` without the objective `patch` or `symmetric`, or where `auto`
+    /// takes `sparse`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_misfit: Option<f64>,
+    /// Standard deviation of the noise in MPa that the estimate rests on: the scene's, else the one found from the
+    /// frame. With `search` the one found from the frame; `None` where nothing looked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_MPa: Option<f64>,
+    /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` with `search`, or
+    /// where no noise is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misfit_probability: Option<f64>,
+    /// What compressive forces at the network's μ leave of the stress, over what they leave of frames like those of its
+    /// training, see [`Misfit`](crate::estimate::misfit::Misfit); `None` where no network gave a μ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network_misfit: Option<f64>,
+    /// Standard deviation of the shear over its size, the largest of all contacts or searched subarrays; `None` with `search`
+    /// where no noise is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shear_spread: Option<f64>,
+}
+
+impl Checks {
+    /// Whether the estimate leaves more than noise explains, of the stated size, else of one that a sensor can have, or more
+    /// than of frames like those of the network's training.
+    pub(crate) fn misfits(&self) -> bool {
+        let unlike = self.network_misfit.is_some_and(|misfit| misfit > 1.0);
+        unlike
+            || match self.misfit_probability {
+                Some(probability) => probability < MISFIT,
+                None => self.noise_MPa.is_some_and(|noise| noise > LOUD * self.peak_MPa),
+            }
+    }
+}
