@@ -1,12 +1,12 @@
 //! Run times of the golden model, matrices and frames, and of the paper's algorithm ([`baseline`]).
 
 use criterion::{criterion_group, criterion_main, Criterion};
-use dermis_golden::baseline::Baseline;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
-use dermis_golden::partition::Case;
-use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::study::baseline::Baseline;
 use std::hint::black_box;
 
 fn reconstruct(criterion: &mut Criterion) {

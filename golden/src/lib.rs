@@ -9,13 +9,13 @@
 //! ```
 //!
 //! For each μ = (μ1, μ2) this determines p, as a polynomial p(μ) = Σ v_ij μ1^i μ2^j with v_00 = Cz⁺ b. Two unknowns
-//! remain per subarray; a search over |μ| ≤ mu_max takes the μ whose p looks most like a contact. [`float`] computes
+//! remain per subarray; a search over |μ| ≤ mu_max takes the μ whose p looks most like a contact. [`estimate`] computes
 //! this in floating point, [`fixed`] bit for bit as the generated hardware does.
 //!
 //! # Example
 //!
 //! ```
-//! use dermis_golden::{frame::Frame, float::Golden, scene::Scene};
+//! use dermis_golden::{data::frame::Frame, estimate::float::Golden, spec::scene::Scene};
 //!
 //! let scene = Scene::builtin("sensor-1")?;
 //! let frame = Frame::shipped(&scene).remove(1);
@@ -36,34 +36,20 @@
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
 //!
-//! | module | content |
+//! Each folder uses itself and those above it in this table:
+//!
+//! | folder | content |
 //! |---|---|
-//! | [`scene`] | sensor, method, number formats and hardware of a run, from TOML |
-//! | [`sensor`], [`partition`] | the taxel array, and its division into subarrays |
-//! | [`adc`] | converters that the hardware reads by itself, and the timing of a scan |
-//! | [`board`] | the device for which hardware is generated |
-//! | [`frame`] | stress on every taxel, with known forces if there are any; JSON, CSV, frames shipped with the crate |
-//! | [`generator`] | frames computed from described or random contacts, with their exact forces |
-//! | [`import`] | recordings of real arrays as scene and frames |
-//! | [`input`] | averaging, calibration and dead taxels of a real sensor |
-//! | [`quantise`], [`reception`] | stress as the codes of a converter; the condition for a search, and centroids |
-//! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
-//! | [`matrices`], [`degree`] | Cz⁺, Ax, Ay of a subarray; how many terms the series in μ needs |
-//! | [`symmetry`] | mirror images of a taxel, and the basis of parities, in which matrices are computed and stored |
-//! | [`segment`] | the contact to which each taxel belongs |
-//! | [`float`] | the stages in floating point, the objectives, and the golden engine that runs them |
-//! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
-//! | [`learned`] | shear by a small network that is trained on the scene's own physics |
-//! | [`reconstruct`] | the result format of all engines |
-//! | [`deviations`] | standard deviations of forces that a search found |
-//! | [`misfit`] | how far a frame is from those of a network's training |
-//! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
+//! | [`spec`] | what is stated beforehand: scene, sensor, partition, board |
+//! | [`physics`] | influence of forces on stress, and its matrices |
+//! | [`data`] | frames, their generator and importers, calibration, codes |
+//! | [`result`] | forces, errors, flags: what all engines return |
+//! | [`estimate`] | forces from stress in floating point; the golden engine |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
-//! | [`link`] | packets between a host and a board |
-//! | [`registers`] | the register map of an engine on a bus |
-//! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
-//! | [`noise`], [`stability`] | studies: errors with noise against the Cramér–Rao bound; errors against conditioning |
-//! | [`gauss`], [`mod@write`] | Gauss–Legendre quadrature; atomic file writing |
+//! | [`wire`] | packets and registers between a computer and the hardware |
+//! | [`study`] | errors against noise, conditioning and the paper |
+//!
+//! Beside them stand [`mod@write`], atomic file writing, and what is private: bounded reading, random numbers.
 //!
 //! # Conventions
 //!
@@ -73,49 +59,17 @@
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]
 
-pub mod adc;
-pub mod baseline;
-pub mod board;
-pub mod bonded;
-pub mod checks;
-pub mod degree;
-pub mod deviations;
-pub mod errors;
-pub mod evidence;
+pub mod data;
+pub mod estimate;
 pub mod fixed;
-pub mod flags;
-pub mod float;
-pub mod found_noise;
-pub mod frame;
-pub mod gauss;
-pub mod generator;
-pub mod import;
-pub mod influence;
-pub mod input;
-pub mod learned;
-pub mod link;
-pub mod link_kind;
-pub mod matrices;
-pub mod misfit;
-pub mod noise;
-pub mod paper;
-pub mod partition;
-pub mod quads;
-pub mod quantise;
-mod read;
-pub mod reception;
-pub mod reconstruct;
-pub mod registers;
-pub mod scene;
-pub mod segment;
-pub mod sensor;
-pub mod sliding;
-pub mod stability;
-pub mod symmetry;
-pub mod window;
+pub mod physics;
+pub mod result;
+pub mod spec;
+pub mod study;
+pub mod wire;
 pub mod write;
 
 mod random;
+mod read;
 #[cfg(test)]
 mod reference;
-mod suggest;

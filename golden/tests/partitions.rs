@@ -1,10 +1,10 @@
 //! Accuracy of the partition cases on the shipped half-space frames with known forces.
 
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::{Case, Grid};
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::{Condition, Form, Scene};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::partition::{Case, Grid};
+use dermis_golden::spec::scene::{Condition, Form, Scene};
 
 const SENSORS: [&str; 3] = ["sensor-1", "sensor-2", "sensor-3"];
 
@@ -70,7 +70,7 @@ fn contacts_tell_contacts_apart() {
     let results = run(&scene("sensor-3", Case::Contacts), &frames);
     let (mut whole, mut own) = (Vec::new(), Vec::new());
     for (frame, result) in frames.iter().zip(&results) {
-        let shear = |contact: &dermis_golden::frame::Contact| contact.tangential_N.unwrap();
+        let shear = |contact: &dermis_golden::data::frame::Contact| contact.tangential_N.unwrap();
         let total: f64 = frame.contacts.iter().map(|contact| length(shear(contact))).sum();
         let truth = frame.resultant_N.unwrap();
         whole.push(length([result.resultant_N[0] - truth[0], result.resultant_N[1] - truth[1]]) / total);

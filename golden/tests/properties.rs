@@ -1,14 +1,14 @@
 //! Properties for any contact: the forces under scaled loads, mirrors, quarter turns, shifts by a pitch and loads in
 //! several subarrays, and the difference between fixed and floating point.
 
+use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
-use dermis_golden::partition::{subarrays, Case};
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::largest_code;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::partition::{subarrays, Case};
+use dermis_golden::spec::scene::largest_code;
+use dermis_golden::spec::scene::Scene;
 use proptest::prelude::*;
 
 /// Steps of the search, in mu_max/384, by which rounding may change μ if two candidates have similar scores.

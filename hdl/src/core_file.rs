@@ -1,6 +1,6 @@
 //! FuseSoC core file (CAPI 2) of generated hardware, through which other designs depend on it by name.
 
-use dermis_golden::board::Family;
+use dermis_golden::spec::board::Family;
 
 use crate::testbench::SUFFIX;
 

@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::EngineKind;
 use rust_hdl::core::probe::Probe;
 use rust_hdl::prelude::*;
 use serde::Serialize;
@@ -321,8 +321,8 @@ impl crate::device::Device for Recorder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::partition::Case;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::partition::Case;
+    use dermis_golden::spec::scene::Scene;
 
     fn model(adaptive: bool) -> Model {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();

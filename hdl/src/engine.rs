@@ -27,8 +27,8 @@
 //! the stages that differ.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::quads::Quads;
-use dermis_golden::scene::Condition;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;

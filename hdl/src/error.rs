@@ -1,6 +1,6 @@
 //! Why a scene has no hardware.
 
-use dermis_golden::link::LinkError;
+use dermis_golden::wire::link::LinkError;
 use thiserror::Error;
 
 use crate::language::KernelError;

@@ -10,8 +10,8 @@ use dermis_golden::fixed::stages::send::{
     FRAMES_SHIFT, STATUS_BEATS, TABLES_SHIFT,
 };
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
-use dermis_golden::link::c_header;
-use dermis_golden::partition::Case;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::wire::link::c_header;
 use serde::Serialize;
 use serde_json::json;
 

@@ -1,7 +1,7 @@
 //! Files for an integrator, beside the generated hardware: testbench, FuseSoC core file, script for Vivado.
 
-use dermis_golden::board::Family;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::Family;
 
 use crate::core_file::core_file;
 use crate::generate::Generated;

@@ -1,9 +1,9 @@
 //! Small scenes for tests, and where their taxels are in the memories.
 
+use dermis_golden::estimate::learned::{with_network, Training};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::learned::{with_network, Training};
-use dermis_golden::quads::Quads;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::scene::Scene;
 
 /// The model of a sensor of `rows` × `cols` taxels; `more` is the rest of the scene file.
 pub(crate) fn model(rows: usize, cols: usize, more: &str) -> Model {

@@ -1,7 +1,7 @@
 //! rust-hdl's own simulation of the engine as a [`Device`].
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::EngineKind;
 use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs};

@@ -211,10 +211,10 @@ streams!(serial::Engine {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::board::EngineKind;
     use dermis_golden::fixed::Model;
-    use dermis_golden::partition::Case;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::board::EngineKind;
+    use dermis_golden::spec::partition::Case;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::Hierarchy;

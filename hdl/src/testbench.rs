@@ -177,7 +177,7 @@ endmodule
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn the_codes_are_those_of_whole_frames_within_their_width() {

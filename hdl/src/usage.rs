@@ -1,8 +1,8 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
-use dermis_golden::board::{Board, EngineKind};
 use dermis_golden::fixed::plan::resources::Memory as Planned;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::{Board, EngineKind};
 use serde::Serialize;
 
 use crate::language::{distributed_luts, Hierarchy, Memory, SEPARATOR};

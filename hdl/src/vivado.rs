@@ -1,7 +1,7 @@
 //! Script for Vivado: synthesis, place and route of the engine alone, with reports. It is not run here; a test runs it
 //! against stand-ins for Vivado's commands.
 
-use dermis_golden::board::Board;
+use dermis_golden::spec::board::Board;
 
 /// Part of the device in full where the board's file states no package: package and speed grade that all devices have.
 const PACKAGE_AND_SPEED: &str = "csg324-1";

@@ -10,10 +10,10 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{anyhow, ensure, Context, Result};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 /// Largest time of a call from Python over that of the same call in Rust.
 const MOST: f64 = 1.2;

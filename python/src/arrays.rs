@@ -1,6 +1,6 @@
 //! Arrays of numbers to and from Python.
 
-use dermis_golden::frame::Forces;
+use dermis_golden::data::frame::Forces;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 

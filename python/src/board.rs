@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use dermis_golden::data::frame::Frame as Stress;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame as Stress;
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
 use dermis_sim::link::{open, require_uart, HostError, Session};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;

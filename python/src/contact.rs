@@ -1,6 +1,6 @@
 //! Contacts as dictionaries, with the keys that a frame file has.
 
-use dermis_golden::frame::Contact;
+use dermis_golden::data::frame::Contact;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -1,6 +1,6 @@
 //! Relative errors of a force, by Eq. 3.
 
-use dermis_golden::errors::Errors as Relative;
+use dermis_golden::result::errors::Errors as Relative;
 use pyo3::prelude::*;
 
 use crate::arrays::vector;

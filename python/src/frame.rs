@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dermis_golden::frame::Frame as Stress;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame as Stress;
+use dermis_golden::spec::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};

@@ -1,9 +1,9 @@
 //! The errors of a scene under noise, as `dermis noise` measures them.
 
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::draws::DrawOptions;
-use dermis_golden::noise::{shape_study, study, Candidate, ShapeStudy, Study};
-use dermis_golden::scene::{EstimatorKind, ObjectiveKind};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::draws::DrawOptions;
+use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind};
+use dermis_golden::study::noise::{shape_study, study, Candidate, ShapeStudy, Study};
 use dermis_sim::commands::noise::{by_name, shapes_named, AVERAGED};
 use pyo3::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction as Solved};
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction as Solved};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;

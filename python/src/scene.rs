@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use dermis_golden::frame::{Frame as Stress, FrameError};
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
-use dermis_golden::scene::Scene as Spec;
+use dermis_golden::data::frame::{Frame as Stress, FrameError};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::spec::scene::Scene as Spec;
 use dermis_sim::engine::{Engine, Models};
 use numpy::PyArray3;
 use pyo3::prelude::*;

@@ -15,9 +15,9 @@ use std::sync::Arc;
 
 use anyhow::{ensure, Context};
 use browser::Browser;
-use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
-use dermis_golden::scene::Scene;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::spec::sensor::Sensor;
 use dermis_sim::live::{Newest, Server, Show};
 use dermis_sim::stream::{Answer, Engine, Outcome};
 use serde_json::json;

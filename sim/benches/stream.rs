@@ -9,8 +9,8 @@ use std::io::{Cursor, Read};
 use std::time::Instant;
 
 use anyhow::ensure;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::stream::{as_lines, run, Engine, Policy, StreamOptions};
 
 /// Least rate of the search, in frames per second.

@@ -8,8 +8,8 @@
 //! | in: reference, other, LSB | N | finite, equal lengths |
 //! | out: [`Difference`] | LSB, fraction | ≥ 0; fractions 0 where the reference has no force |
 
-use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::data::frame::Forces;
+use dermis_golden::result::reconstruct::Reconstruction;
 use serde::Serialize;
 
 /// Difference between two force fields.

@@ -5,9 +5,9 @@
 
 use anyhow::Result;
 use clap::{value_parser, Args, ValueEnum};
-use dermis_golden::frame::Frame;
-use dermis_golden::generator::{self, generate, random_contacts, Draw};
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::generator::{self, generate, random_contacts, Draw};
+use dermis_golden::spec::scene::Scene;
 
 /// Command-line options of the drawn frames.
 #[derive(Args, Clone, Debug)]

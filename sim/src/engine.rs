@@ -9,11 +9,11 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{bail, Error, Result};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 /// Which model computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 /// Definitions of the links of all pages, as Markdown.
 macro_rules! links {
     ($($file:literal $page:ident,)*) => {
-        concat!($("[", $file, "]: crate::guide::", stringify!($page), "\n",)* "[format.md]: dermis_golden::link\n\n")
+        concat!($("[", $file, "]: crate::guide::", stringify!($page), "\n",)* "[format.md]: dermis_golden::wire::link\n\n")
     };
 }
 

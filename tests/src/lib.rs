@@ -38,10 +38,10 @@ mod variants;
 use std::fmt::Display;
 use std::path::PathBuf;
 
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::learned::{self, Training};
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::learned::{self, Training};
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};

@@ -4,7 +4,7 @@
 //! v_00 ── unfold ── segment ── for each contact: window ── network ── μ
 //! p ← v_00 − (Ax (m1∘p) + Ay (m2∘p))                  m: μ of each taxel's contact, as many steps as for one μ
 //! ```
-//! As [`crate::float::contacts`] does it with a network, in words.
+//! As [`crate::estimate::float::contacts`] does it with a network, in words.
 
 use super::passes::{Passes, QuadStream};
 use super::plan::contents::ContactPlan;

@@ -11,17 +11,17 @@ use super::stages::send::{
     FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, FRAMES_SHIFT, STATUS_BEATS, TABLES_REFUSED,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
-use crate::checks::Checks;
-use crate::errors::Errors;
-use crate::flags::{frame_flags, Flag};
-use crate::float::objective::Estimate;
-use crate::frame::{Forces, Frame};
-use crate::input::Input;
-use crate::partition::Subarray;
-use crate::reception::{noise_floor_codes, receive, Received};
-use crate::reconstruct::{
+use crate::data::frame::{Forces, Frame};
+use crate::data::input::Input;
+use crate::data::reception::{noise_floor_codes, receive, Received};
+use crate::estimate::float::objective::Estimate;
+use crate::result::checks::Checks;
+use crate::result::errors::Errors;
+use crate::result::flags::{frame_flags, Flag};
+use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
+use crate::spec::partition::Subarray;
 
 /// μ as a status has it.
 struct StatusMu {

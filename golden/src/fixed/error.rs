@@ -4,15 +4,15 @@ use std::fmt;
 
 use thiserror::Error;
 
-use crate::adc::timing::TimingError;
-use crate::board::BoardError;
-use crate::deviations::DeviationsError;
-use crate::frame::FrameError;
-use crate::input::InputError;
-use crate::learned::LearnedError;
-use crate::matrices::MatricesError;
-use crate::partition::{Case, PartitionError};
-use crate::scene::SceneError;
+use crate::data::frame::FrameError;
+use crate::data::input::InputError;
+use crate::estimate::deviations::DeviationsError;
+use crate::estimate::learned::LearnedError;
+use crate::physics::matrices::MatricesError;
+use crate::spec::adc::timing::TimingError;
+use crate::spec::board::BoardError;
+use crate::spec::partition::{Case, PartitionError};
+use crate::spec::scene::SceneError;
 
 /// A scene without a bit-true model, or a frame without a result.
 #[derive(Debug, Error)]

@@ -7,14 +7,14 @@ use super::plan::cases::{planned, planned_with};
 use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
-use crate::deviations::Deviations;
-use crate::frame::Frame;
-use crate::input::Input;
-use crate::quantise::{quantise, Codes};
-use crate::reception::full_scale;
-use crate::scene::largest_code;
-use crate::scene::Scene;
-use crate::scene::MAX_DEGREE;
+use crate::data::frame::Frame;
+use crate::data::input::Input;
+use crate::data::quantise::{quantise, Codes};
+use crate::data::reception::full_scale;
+use crate::estimate::deviations::Deviations;
+use crate::spec::scene::largest_code;
+use crate::spec::scene::Scene;
+use crate::spec::scene::MAX_DEGREE;
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
     /// ```
-    /// use dermis_golden::{fixed::{Cycles, Model}, frame::Frame, float::Golden, scene::Scene};
+    /// use dermis_golden::{fixed::{Cycles, Model}, data::frame::Frame, estimate::float::Golden, spec::scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let frame = Frame::shipped(&scene).remove(0);
@@ -116,7 +116,7 @@ impl Model {
     /// one of all frames, in MPa.
     ///
     /// # Errors
-    /// [`InputError`](crate::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
+    /// [`InputError`](crate::data::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
     /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
         let input = Input::new(&self.scene)?;
@@ -145,7 +145,7 @@ impl Model {
     /// The codes of a frame of stress, from a converter without input options.
     ///
     /// # Errors
-    /// [`FrameError`](crate::frame::FrameError) if the frame's sensor is not the scene's.
+    /// [`FrameError`](crate::data::frame::FrameError) if the frame's sensor is not the scene's.
     pub fn codes(&self, frame: &Frame) -> Result<Codes, FixedError> {
         frame.check(&self.scene)?;
         Ok(quantise(&frame.stress_MPa, self.formats().code_bits, full_scale(&self.scene, frame)))

@@ -16,8 +16,8 @@ use super::words::formats::Formats;
 use super::words::network::WordNetwork;
 use super::words::quantised::Quantised;
 use super::words::schedule::{by_limbs, is_transposed, layer, schedule, Product, EXPONENTS};
-use crate::board::EngineKind;
-use crate::quads::Quads;
+use crate::spec::board::EngineKind;
+use crate::spec::quads::Quads;
 
 /// The quads that a stage passes on.
 pub type QuadStream = Vec<[i64; 4]>;

@@ -20,8 +20,8 @@ use super::stages::send::{
     FRAMES_SHIFT, TABLES_REFUSED,
 };
 use super::subarray::{SubarrayTrace, Told};
-use crate::board::EngineKind;
-use crate::partition::Subarray;
+use crate::spec::board::EngineKind;
+use crate::spec::partition::Subarray;
 
 /// The words that one stage passed on for a frame, in the hardware's order.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,8 +10,8 @@ use super::plan::contents::{CasePlan, Plan};
 use super::stages::load::{self, Outcome, Tables, VERSION_BITS, WORD_BYTES};
 use super::stages::prepare::{Prepare, Scale};
 use super::words::quantised::Quantised;
-use crate::deviations::Deviations;
-use crate::scene::Scene;
+use crate::estimate::deviations::Deviations;
+use crate::spec::scene::Scene;
 
 impl Plan {
     /// The tables that the hardware holds; `None` unless they are writable.

@@ -1,8 +1,8 @@
 //! A core's top module: an engine between its streams, and its registers behind a bus.
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::registers::{constants, ADDRESS_BITS, REGISTER_BITS};
+use dermis_golden::spec::board::EngineKind;
+use dermis_golden::wire::registers::{constants, ADDRESS_BITS, REGISTER_BITS};
 use rust_hdl::prelude::*;
 
 use super::stream_in::WORD_BYTES;

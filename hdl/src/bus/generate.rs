@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::fixed::Model;
-use dermis_golden::registers::{c_header, constants, system_rdl, REGISTERS};
+use dermis_golden::wire::registers::{c_header, constants, system_rdl, REGISTERS};
 use serde_json::json;
 
 use super::core::hierarchy;

@@ -6,7 +6,7 @@
 //!                         '-------------------'   |
 //!  s_axil or wb <-> axi_lite or wishbone <-> registers <- events of both
 //! ```
-//! The map of the registers is [`dermis_golden::registers`]. `labels` has the identifier of each frame that is under way.
+//! The map of the registers is [`dermis_golden::wire::registers`]. `labels` has the identifier of each frame that is under way.
 
 mod axi_lite;
 mod core;

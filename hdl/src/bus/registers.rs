@@ -1,7 +1,7 @@
 //! The registers of the map, and what they control.
 
 use dermis_golden::fixed::plan::resources::count_bits;
-use dermis_golden::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS, RESET_CYCLES};
+use dermis_golden::wire::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS, RESET_CYCLES};
 use rust_hdl::prelude::*;
 
 use super::tables_in::OCTET_BITS;

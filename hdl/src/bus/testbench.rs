@@ -6,7 +6,7 @@
 //! Register `id` is read over the bus, then one reconstruction is sent at full speed.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::registers::{ID, REGISTER_BITS};
+use dermis_golden::wire::registers::{ID, REGISTER_BITS};
 
 use super::{Bus, CoreShape};
 use crate::manifest::GeneratedFile;

@@ -1,6 +1,6 @@
 //! Wishbone in front of the registers.
 
-use dermis_golden::registers::{ADDRESS_BITS, REGISTER_BITS};
+use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,7 +1,7 @@
 //! A board's pins, independent of the simulator.
 
 #[cfg(doc)]
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
 use rust_hdl::prelude::*;
 
 use crate::scan::ScanPins;

@@ -2,10 +2,10 @@
 
 use std::thread;
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::Identity;
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::board::EngineKind;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::wire::link::Identity;
 use rust_hdl::prelude::*;
 
 use super::board::{Board, BoardOutputs};

@@ -1,6 +1,6 @@
 //! Identity of the board and counters of received and dropped packets, in one memory.
 
-use dermis_golden::link::{Counters, Identity};
+use dermis_golden::wire::link::{Counters, Identity};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,6 +1,6 @@
 //! CRC-32, two bits per cycle: bytes on a link are further apart, and this takes few logic cells.
 
-use dermis_golden::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
+use dermis_golden::wire::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

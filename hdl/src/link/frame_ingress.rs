@@ -1,6 +1,6 @@
 //! Frame ingress: from the payload bytes of a frame's packet to the engine's input stream, while they arrive.
 
-use dermis_golden::link::code_bytes;
+use dermis_golden::wire::link::code_bytes;
 use rust_hdl::prelude::*;
 
 use super::Shape;

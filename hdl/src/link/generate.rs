@@ -1,8 +1,8 @@
 //! Generation of a board's top module as files.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::slip::IDLE;
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::wire::link::slip::IDLE;
 
 use super::board_top::board_top;
 use crate::error::HdlError;

@@ -9,7 +9,7 @@
 //! Of an engine that scans its array itself, `s_axis` has images of tables only, and a `frame_gate` before `m_axis` passes the
 //! frames that are asked for.
 //!
-//! The packets are those of [`dermis_golden::link`]. Any block that carries bytes both ways can replace the UART or the
+//! The packets are those of [`dermis_golden::wire::link`]. Any block that carries bytes both ways can replace the UART or the
 //! SPI slave; a board has one of them.
 //!
 //! `board_top`, `packet_link` and `uart` connect blocks by `#[hdl_gen]`; each other block is one
@@ -62,9 +62,9 @@ pub use uart::Uart;
 pub use uart_receiver::UartReceiver;
 pub use uart_transmitter::UartTransmitter;
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{image_bytes, payloads, supports, Counters, Identity, Kind};
+use dermis_golden::spec::board::EngineKind;
+use dermis_golden::wire::link::{image_bytes, payloads, supports, Counters, Identity, Kind};
 
 /// Properties of a scene on which its packets depend.
 #[derive(Clone, Debug, PartialEq, Eq)]

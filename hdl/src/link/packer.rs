@@ -1,6 +1,6 @@
 //! From the words of an answer to the bytes of its packet.
 
-use dermis_golden::link::ANSWER;
+use dermis_golden::wire::link::ANSWER;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

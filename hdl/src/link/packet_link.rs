@@ -1,6 +1,6 @@
 //! Between the bytes of a link and the engine's streams.
 
-use dermis_golden::link::Identity;
+use dermis_golden::wire::link::Identity;
 use rust_hdl::prelude::*;
 
 use super::{

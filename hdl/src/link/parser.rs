@@ -1,6 +1,6 @@
 //! From the bytes of packets to requests: checks header, length and CRC.
 
-use dermis_golden::link::{code_bytes, Header, Kind, OVERHEAD};
+use dermis_golden::wire::link::{code_bytes, Header, Kind, OVERHEAD};
 use rust_hdl::prelude::*;
 
 use super::Shape;

@@ -1,6 +1,6 @@
 //! Queue of the requests that the board has accepted and not answered yet.
 
-use dermis_golden::link::Kind;
+use dermis_golden::wire::link::Kind;
 use rust_hdl::prelude::*;
 
 use super::{Shape, COUNTERS, FORCES, IDENTITY, RESULTANTS};

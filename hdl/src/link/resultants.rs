@@ -209,7 +209,7 @@ fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::link::Sums;
+    use dermis_golden::wire::link::Sums;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

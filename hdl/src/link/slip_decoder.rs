@@ -1,6 +1,6 @@
 //! SLIP decoder: from the bytes of the link to the bytes of packets.
 
-use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
+use dermis_golden::wire::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -85,7 +85,7 @@ fn kernel() -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::link::slip::{unescape, SPECIAL};
+    use dermis_golden::wire::link::slip::{unescape, SPECIAL};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

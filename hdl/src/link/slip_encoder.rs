@@ -1,6 +1,6 @@
 //! SLIP encoder: from the bytes of packets to the bytes of the link.
 
-use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
+use dermis_golden::wire::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -93,7 +93,7 @@ fn kernel(registered: bool) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::link::slip::{escape, SPECIAL};
+    use dermis_golden::wire::link::slip::{escape, SPECIAL};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

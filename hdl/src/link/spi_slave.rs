@@ -1,6 +1,6 @@
 //! SPI slave: between the bytes of the link and an SPI controller, whose clock is a domain of its own.
 
-use dermis_golden::link::slip::IDLE;
+use dermis_golden::wire::link::slip::IDLE;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,6 +1,6 @@
 //! UART: between the bytes of the link and its two lines.
 
-use dermis_golden::link::Identity;
+use dermis_golden::wire::link::Identity;
 use rust_hdl::prelude::*;
 
 use super::{UartReceiver, UartTransmitter};

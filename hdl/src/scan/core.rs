@@ -1,9 +1,9 @@
 //! Top module of a scan: sequencer, capture, engine, status; with writable tables, the way of their images, and codes behind the
 //! forces.
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::EngineKind;
 use rust_hdl::prelude::*;
 
 use super::pins::{Beat, ScanInputs, ScanOutputs, ScanPins, Scanner};

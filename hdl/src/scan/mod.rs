@@ -7,7 +7,7 @@
 //! With writable tables, `scan_tables` stands before the engine and lets their images in, and `scan_codes` behind
 //! `scan_status` lets the codes follow the forces.
 //!
-//! Nothing of it is in a scene whose codes come as a stream. The converters are [`dermis_golden::adc`], the arithmetic is
+//! Nothing of it is in a scene whose codes come as a stream. The converters are [`dermis_golden::spec::adc`], the arithmetic is
 //! [`dermis_golden::fixed::stages::scan`].
 
 mod capture;
@@ -31,9 +31,9 @@ pub use simulate::scan_simulator;
 pub use status::ScanStatus;
 pub use tables::ScanTables;
 
-use dermis_golden::adc::timing::Timing;
-use dermis_golden::adc::AdcScan;
 use dermis_golden::fixed::Model;
+use dermis_golden::spec::adc::timing::Timing;
+use dermis_golden::spec::adc::AdcScan;
 
 use crate::error::HdlError;
 

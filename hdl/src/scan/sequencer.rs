@@ -1,7 +1,7 @@
 //! Sequencer of a scan: rows, settling times, channels and samples as frames on the converters' serial bus.
 
-use dermis_golden::adc::timing::Timing;
 use dermis_golden::fixed::plan::resources::count_bits;
+use dermis_golden::spec::adc::timing::Timing;
 use rust_hdl::prelude::*;
 
 use super::Shape;
@@ -210,7 +210,7 @@ pub(super) mod tests {
     use crate::language::testbench::{block_subject, check, check_with_defects, Reference, Subject};
     use crate::language::Change;
     use crate::wire::Word;
-    use dermis_golden::adc::{AdcScan, CONVERTERS};
+    use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
 
     /// A small scan at 100 MHz.
     pub fn shape(converter: usize, converters: usize, average: u32, dead: &[usize]) -> Shape {

@@ -5,7 +5,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::plan::serial::{floor_bits, product_bits, word_bits, SLOT};
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Condition;
+use dermis_golden::spec::scene::Condition;
 use rust_hdl::prelude::*;
 
 use super::{

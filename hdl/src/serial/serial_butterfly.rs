@@ -11,7 +11,7 @@ use crate::wire::Wire;
 /// ```text
 /// word, valid (four of a quad) --> four accumulators --> transformed, one after the other
 /// ```
-/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::symmetry::parity::hadamard). The first
+/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::physics::symmetry::parity::hadamard). The first
 /// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
 #[derive(dermis_hdl_derive::Block)]
 pub struct SerialButterfly {
@@ -88,7 +88,7 @@ fn kernel(bits: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::symmetry::parity::hadamard;
+    use dermis_golden::physics::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

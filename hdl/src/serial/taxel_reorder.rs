@@ -1,7 +1,7 @@
 //! Table between the two orders of the taxels: row-major on the streams, quad by quad in the engine.
 
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

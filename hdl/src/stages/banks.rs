@@ -153,7 +153,7 @@ fn kernel(inputs: &[(&str, usize)], outputs: &[(Of, &str, usize)], cases: usize)
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Pipeline};

@@ -4,9 +4,9 @@
 
 use dermis_golden::fixed::stages::choose::{is_beside_boundary, quarters, CUT_SHIFT};
 use dermis_golden::fixed::Model;
-use dermis_golden::partition::Grid;
-use dermis_golden::scene::Condition;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::spec::partition::Grid;
+use dermis_golden::spec::scene::Condition;
+use dermis_golden::spec::sensor::Sensor;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -186,7 +186,7 @@ fn differ<'k>([above, below]: [Expr<'k>; 2], grid: Grid) -> Expr<'k> {
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::stages::choose::FrameStats;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -15,7 +15,7 @@
 //! | `TELL` | one status per cycle, that of the taxels without a contact first |
 
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Condition;
+use dermis_golden::spec::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -5,7 +5,7 @@
 
 use dermis_golden::fixed::stages::send::{LABELS_PER_BEAT, LABEL_BITS};
 use dermis_golden::fixed::Model;
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -6,7 +6,7 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};

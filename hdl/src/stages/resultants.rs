@@ -3,8 +3,8 @@
 use dermis_golden::fixed::stages::resultants::{Summed, POSITION_BITS, SUM_BITS};
 use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::fixed::Model;
-use dermis_golden::partition::Grid;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::spec::partition::Grid;
+use dermis_golden::spec::sensor::Sensor;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -299,7 +299,7 @@ fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::stages::resultants::{half_pitches, Record};
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

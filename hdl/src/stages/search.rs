@@ -8,7 +8,7 @@
 
 use dermis_golden::fixed::plan::cycles::{coarse_period, values_delay, SET_UP, SHORTEST_SWEEP};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};

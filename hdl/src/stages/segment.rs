@@ -29,7 +29,7 @@
 use dermis_golden::fixed::stages::segment::cycles::Segmentation;
 use dermis_golden::fixed::stages::segment::word_shift;
 use dermis_golden::fixed::Model;
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

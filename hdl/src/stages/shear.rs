@@ -5,11 +5,11 @@
 //! ```
 //! p is kept as it leaves `relax`. From `start` on one quad leaves per cycle: those for Ax, then those for Ay.
 
+use dermis_golden::estimate::segment::NONE;
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
 use dermis_golden::fixed::stages::shear::{LATENCY, MEAN};
 use dermis_golden::fixed::Model;
-use dermis_golden::segment::NONE;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -196,7 +196,7 @@ mod tests {
 
     use dermis_golden::fixed::stages::shear::{cycles, shear};
     use dermis_golden::fixed::words::formats::Formats;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};

@@ -76,7 +76,7 @@ fn kernel(ports: &SearchPorts, vectors: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Reference};

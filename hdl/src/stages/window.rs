@@ -10,9 +10,9 @@
 //! [`cycles`](dermis_golden::fixed::stages::window::cycles), wherever it lies.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::quads::Quads;
-use dermis_golden::symmetry::parity::hadamard;
-use dermis_golden::window;
+use dermis_golden::physics::symmetry::parity::hadamard;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::window;
 use rust_hdl::prelude::*;
 
 use super::normalise::left_shift;

@@ -5,15 +5,15 @@
 //!
 //! | | | |
 //! |---|---|---|
-//! | out: request | bytes with SLIP framing, sequence, CRC-32 | [`dermis_golden::link`] |
+//! | out: request | bytes with SLIP framing, sequence, CRC-32 | [`dermis_golden::wire::link`] |
 //! | in: bytes of the board | in pieces of any length | |
 //! | out: answer | [`dermis_result`] | N |
 
 use std::mem::MaybeUninit;
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
+use dermis_golden::wire::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
 use dermis_sim::link::{check_identity, Answer, PhysicalAnswer};
 
 use crate::guard::{attempt, copy, dermis_status, exclusive, free, guarded, place, reference, room, values, Error};

@@ -5,9 +5,9 @@
 use std::ffi::{c_char, CString};
 use std::sync::OnceLock;
 
-use dermis_golden::flags::Flag;
-use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::data::frame::Forces;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use dermis_sim::link::PhysicalAnswer;
 
 use crate::guard::{attempt, copy, dermis_status, free, guarded, place, reference, room, Error};

@@ -2,8 +2,8 @@
 
 use std::ffi::c_char;
 
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::engine::{Engine, Models};
 
 use crate::guard::{attempt, dermis_status, free, guarded, place, reference, text, values, Error};

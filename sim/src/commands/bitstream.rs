@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::{ensure, Result};
 use clap::Args;
-use dermis_golden::board::SEARCH_WIDTHS;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::SEARCH_WIDTHS;
+use dermis_golden::spec::scene::Scene;
 
 use crate::flow::baseline::{with_search_width, Baselines};
 use crate::flow::bitstream::{make, Effort};

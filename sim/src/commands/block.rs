@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::describe::{block, block_source, block_verilog, blocks};
 

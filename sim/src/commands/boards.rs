@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use dermis_golden::board::{Board, Device};
+use dermis_golden::spec::board::{Board, Device};
 
 use crate::report::{self, BoardList, NamedBoard};
 

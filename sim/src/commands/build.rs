@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::bus::{generate_core, Bus, CoreShape, WIDTHS};
 use dermis_hdl::explain::explain;

@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 use anyhow::{anyhow, Result};
 use clap::Args;
-use dermis_golden::frame::Frame;
-use dermis_golden::input::known_loads::{KnownLoad, LoadFit, Residual};
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::known_loads::{KnownLoad, LoadFit, Residual};
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use serde::Serialize;
 

@@ -9,10 +9,10 @@ use std::path::Path;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::float::Golden;
-use dermis_golden::noise::expected::{expected, Expectation, StatedNoise};
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::study::noise::expected::{expected, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
 
 use super::inputs::{estimator_instead, BoardOverride};

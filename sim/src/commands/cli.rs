@@ -14,8 +14,8 @@ use std::process::ExitCode;
 use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand};
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::matrices::cache;
-use dermis_golden::scene::Scene;
+use dermis_golden::physics::matrices::cache;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::HdlError;
 
 use super::inputs::BoardOverride;
@@ -235,7 +235,7 @@ fn print(text: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::board::Board;
+    use dermis_golden::spec::board::Board;
     use dermis_golden::write::FileError;
 
     #[test]

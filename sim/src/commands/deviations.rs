@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{bail, Result};
 use clap::Args;
-use dermis_golden::deviations::Deviations;
-use dermis_golden::noise::{deviations_coverage, measure_deviations};
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::estimate::deviations::Deviations;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_golden::study::noise::{deviations_coverage, measure_deviations};
 use dermis_golden::write::write;
 
 use super::inputs::beside;

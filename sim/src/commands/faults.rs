@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use clap::{value_parser, Args};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use crate::cosim::faults::{inject_faults, Row};
 use crate::cosim::hardware::Hardware;

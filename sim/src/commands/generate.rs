@@ -10,10 +10,10 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
-use dermis_golden::frame::{Contact, Frame};
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::{generate, random_contacts, Draw};
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::{Contact, Frame};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::{generate, random_contacts, Draw};
+use dermis_golden::spec::scene::Scene;
 
 use crate::drawn_frames::Shapes;
 use dermis_golden::write::write;

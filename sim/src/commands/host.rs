@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{bail, Context, Result};
 use clap::Args;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::reception::full_scale;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::link::{Counters, Identity, Kind};
-use dermis_golden::reception::full_scale;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::wire::link::{Counters, Identity, Kind};
 use dermis_golden::write::write;
 
 use super::inputs::{frames_of, resolve, BoardOverride};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
-use dermis_golden::import::{load, Crop, Format, Settings, Summary, Unit};
+use dermis_golden::data::import::{load, Crop, Format, Settings, Summary, Unit};
 
 use crate::report::document::percent_text;
 

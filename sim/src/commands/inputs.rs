@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{bail, Result};
 use clap::Args;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 
 /// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";

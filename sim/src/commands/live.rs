@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_estimator, BoardOverride};
 use super::reconstruct_stream::{open, SoftwareEngine};

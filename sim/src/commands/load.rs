@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 
 use super::inputs::BoardOverride;

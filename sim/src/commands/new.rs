@@ -10,9 +10,9 @@ use std::str::FromStr;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
-use dermis_golden::board::Board;
-use dermis_golden::float::Golden;
-use dermis_golden::scene::{Scene, SearchSpec};
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::{Scene, SearchSpec};
 use dermis_golden::write::write;
 
 /// Arguments of `dermis new`.

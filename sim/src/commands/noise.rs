@@ -9,10 +9,10 @@
 
 use anyhow::{anyhow, Result};
 use clap::Args;
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::draws::{DrawOptions, Shape};
-use dermis_golden::noise::{sensitivities, shape_study, study, unlike_study, Candidate, ShapeStudy, Study};
-use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::study::noise::{sensitivities, shape_study, study, unlike_study, Candidate, ShapeStudy, Study};
 
 use crate::progress::Progress;
 use crate::report::{self, Format};

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_estimator, resolve_one, BoardOverride};
 use super::reconstruct_stream::StreamArguments;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args, ValueEnum};
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_estimator;
 use crate::jobs::{Interrupt, Interrupted};
@@ -123,7 +123,7 @@ pub(super) enum SoftwareEngine {
 pub(super) fn open(source: &Source, scene: &Scene, baud: Option<u32>) -> Result<(Box<dyn Read + Send>, String)> {
     let baud = match baud {
         Some(baud) => Some(baud),
-        None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
+        None => dermis_golden::spec::board::Board::load(&scene.hardware.board)?.uart_baud,
     };
     let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
     if let Some(address) = address {

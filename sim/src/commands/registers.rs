@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dermis_golden::registers::{c_header, system_rdl, REGISTERS};
+use dermis_golden::wire::registers::{c_header, system_rdl, REGISTERS};
 
 use crate::report;
 

@@ -5,9 +5,9 @@ use std::thread::available_parallelism;
 
 use anyhow::Result;
 use clap::{value_parser, Args};
-use dermis_golden::import::Imported;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::{Condition, Scene};
+use dermis_golden::data::import::Imported;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{Condition, Scene};
 
 use super::inputs::scenes_or;
 use crate::jobs::Interrupt;

@@ -2,7 +2,7 @@
 //!
 //! | arguments | prints |
 //! |---|---|
-//! | no scenes | the table of [`dermis_golden::stability::settings`] |
+//! | no scenes | the table of [`dermis_golden::study::stability::settings`] |
 //! | scenes | one row for each |
 //! | `--extreme` | results on extreme frames of each scene, by default sensor-1 |
 //! | `--plot FILE` | additionally writes error against condition number as SVG |
@@ -11,9 +11,9 @@ use std::path::PathBuf;
 
 use anyhow::{ensure, Result};
 use clap::Args;
-use dermis_golden::scene::Scene;
-use dermis_golden::stability::extreme::{frames, outcome};
-use dermis_golden::stability::{measure, settings, Setting};
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::study::stability::extreme::{frames, outcome};
+use dermis_golden::study::stability::{measure, settings, Setting};
 
 use crate::progress::Progress;
 use crate::report::{self, Format};

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use clap::Args;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::{Scene, TableStorage};
+use dermis_golden::spec::scene::{Scene, TableStorage};
 
 use crate::cosim::hardware::Hardware;
 use crate::cosim::stress::{stress, Outcome};

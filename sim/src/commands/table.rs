@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::{bail, Result};
 use clap::Args;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
 
 use super::inputs::scenes_or;
 use crate::cosim::hardware::Simulator;

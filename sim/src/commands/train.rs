@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{bail, Result};
 use clap::Args;
-use dermis_golden::learned::{Learned, Stage, Training};
-use dermis_golden::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::estimate::learned::{Learned, Stage, Training};
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_golden::study::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 use dermis_golden::write::write;
 
 use super::inputs::beside;
@@ -133,8 +133,9 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let bar = Progress::steps(&format!("{}: errors on fresh frames", scene.name), 0);
     let rows = shape_study(&scene, &study, &|done, total| bar.set_of(done as u64, total as u64))?;
     text.push_str(&report::shapes(&rows, report::Format::Markdown)?);
-    let better =
-        |row: &dermis_golden::noise::ShapeRow| row.estimator == "none" || row.summary.tangential.median.value < 1.0;
+    let better = |row: &dermis_golden::study::noise::ShapeRow| {
+        row.estimator == "none" || row.summary.tangential.median.value < 1.0
+    };
     Ok((text, rows.iter().all(better)))
 }
 

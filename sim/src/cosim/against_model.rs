@@ -8,9 +8,9 @@
 //! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first mismatches of each frame and their total number |
 //! | a [`Device`] with its tap names | [`Times`] of every frame |
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::program::issued;
 use dermis_golden::fixed::{Cycles, Model, Stage, Trace};
+use dermis_golden::spec::board::EngineKind;
 use dermis_hdl::device::Device;
 
 use super::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};

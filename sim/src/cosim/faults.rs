@@ -23,7 +23,7 @@ pub mod interval;
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{bail, Result};
-use dermis_golden::frame::Frame;
+use dermis_golden::data::frame::Frame;
 use dermis_hdl::state::{StateElement, StorageClass, CLASSES};
 use serde::Serialize;
 

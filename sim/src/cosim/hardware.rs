@@ -9,10 +9,10 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::device::{Device, Tap};
 use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};

@@ -13,8 +13,8 @@
 //! Without pins, link and oscillator.
 
 use anyhow::{anyhow, bail, Result};
-use dermis_golden::board::{Board, Power};
-use dermis_golden::frame::Frame;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::board::{Board, Power};
 use dermis_hdl::device::Device;
 use dermis_hdl::state::{StateElement, StorageClass};
 use serde::Serialize;

@@ -20,7 +20,7 @@ mod tables;
 mod testbench;
 
 use anyhow::Result;
-use dermis_golden::frame::Frame;
+use dermis_golden::data::frame::Frame;
 
 pub use outcome::{Outcome, Violation};
 pub(crate) use samples::{shipped_samples, synthetic_samples, Sample};

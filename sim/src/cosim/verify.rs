@@ -12,15 +12,15 @@
 use std::path::Path;
 
 use anyhow::Result;
-use dermis_golden::board::Board;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::plan::contact_cycles::Course;
 use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::Scene;
 
 use super::against_model::{run, DeviceUnderTest, Vector};
 use super::drive::{Stimulus, Times};

@@ -20,10 +20,10 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, Result};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::plan::program::listing;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, VarType, Writer};
 

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::tools::ToolError;
-use dermis_golden::board::Board;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 
 /// Name of the file, beside the board's.

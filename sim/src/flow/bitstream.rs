@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
-use dermis_golden::board::Board;
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::link::generate_board;
 
@@ -64,7 +64,7 @@ struct Design<'a> {
 /// Makes the bitstream of `model` in the folder `<build_dir>/<scene>/<board>`.
 ///
 /// # Errors
-/// [`BoardError`](dermis_golden::board::BoardError): a board without pins or with files that do not suit it.
+/// [`BoardError`](dermis_golden::spec::board::BoardError): a board without pins or with files that do not suit it.
 /// [`ToolError`]: a tool is missing or failed; no seed that could be routed, a clock that differs from the board's file.
 pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     let (scene, board) = (&model.scene, &model.board);
@@ -103,7 +103,7 @@ pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
 /// Checks that the converters of a scan are on the board.
 ///
 /// # Errors
-/// [`BoardError`](dermis_golden::board::BoardError) with those of the board and of the scene.
+/// [`BoardError`](dermis_golden::spec::board::BoardError) with those of the board and of the scene.
 fn require_converters(model: &Model) -> Result<()> {
     let Some(scan) = model.scene.hardware.adc_scan else { return Ok(()) };
     let wants = vec![scan.converter.name; scan.converters];
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn the_median_of_two_seeds_is_the_slower_one() {
         let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
-        let routing = flow(dermis_golden::board::Family::Ecp5).routing.unwrap();
+        let routing = flow(dermis_golden::spec::board::Family::Ecp5).routing.unwrap();
         let clocks = |seeds: &[(u32, Placed)]| {
             let achieved = summarise_seeds(&routing, seeds, &seeds[1].1);
             [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]

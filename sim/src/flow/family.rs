@@ -1,6 +1,6 @@
 //! Tools, commands and cell names of each device family.
 
-use dermis_golden::board::{Board, Family};
+use dermis_golden::spec::board::{Board, Family};
 
 use super::tools::Tool;
 

@@ -11,7 +11,7 @@
 //! row 2   9 ...   \__/  13 ...    of the device; if all but one are needed, the middle one stays free
 //! ```
 
-use dermis_golden::board::MultiplierBlocks;
+use dermis_golden::spec::board::MultiplierBlocks;
 use serde_json::{json, Value};
 
 use super::register_packing::MULTIPLIER;

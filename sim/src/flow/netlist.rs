@@ -9,7 +9,7 @@
 use std::fs;
 use std::path::Path;
 
-use dermis_golden::board::Family;
+use dermis_golden::spec::board::Family;
 use dermis_golden::write::write;
 use dermis_hdl::{Generated, GeneratedFile};
 

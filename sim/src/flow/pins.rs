@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{anyhow, Result};
-use dermis_golden::board::{Board, Family};
+use dermis_golden::spec::board::{Board, Family};
 use serde_json::Value;
 
 use super::synthesis::run;
@@ -19,7 +19,7 @@ const PORTS: &str = "ports.json";
 /// `read_verilog` for the board's own files, whose outermost module is `top`.
 ///
 /// # Errors
-/// [`BoardError`](dermis_golden::board::BoardError) with the ports without a site, or without an outermost module; Verilog
+/// [`BoardError`](dermis_golden::spec::board::BoardError) with the ports without a site, or without an outermost module; Verilog
 /// that Yosys refuses.
 pub fn check_pins(board: &Board, folder: &Path, read: &str, top: &str, pins: &str) -> Result<()> {
     match run(folder, format!("read_verilog {read}; proc; write_json {PORTS}"), "ports.log") {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use dermis_golden::board::Family;
+use dermis_golden::spec::board::Family;
 use dermis_golden::write::write;
 use serde_json::Value;
 

@@ -4,18 +4,18 @@ use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use anyhow::Result;
-use dermis_golden::checks::Checks;
+use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::data::input::Input;
 use dermis_golden::fixed::stages::send::{
     labels_of_beats, Status, FLAG_CHANNEL, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS,
     FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, STATUS_BEATS, TABLES_REFUSED,
 };
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::flags::{frame_flags, Flag};
-use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::input::Input;
-use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
-use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::result::checks::Checks;
+use dermis_golden::result::flags::{frame_flags, Flag};
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
 /// A board's answer to a frame, in LSBs.

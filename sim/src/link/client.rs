@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
+use dermis_golden::wire::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
 
 use super::answer::Answer;
 use super::error::{HostError, IdentityError};
@@ -178,7 +178,7 @@ pub fn check_identity(model: &Model, bytes: &[u8]) -> Result<Identity, IdentityE
     }
     let has = Identity::of_bytes(bytes).ok_or(IdentityError::Length { bytes: bytes.len() })?;
     let sensor = &model.scene.sensor;
-    let wants = dermis_golden::link::scene_hash(model);
+    let wants = dermis_golden::wire::link::scene_hash(model);
     if has.scene == wants {
         return Ok(has);
     }

@@ -1,6 +1,6 @@
 //! SPI controller of a simulated board.
 
-use dermis_golden::link::slip::IDLE;
+use dermis_golden::wire::link::slip::IDLE;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 
 /// Bits of [`BoardDevice`]'s inputs.

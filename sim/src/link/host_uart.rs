@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use anyhow::{ensure, Result};
-use dermis_golden::link_kind::LinkKind;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 
 /// Bits per byte on the line, with start and stop bit.

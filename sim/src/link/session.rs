@@ -4,11 +4,11 @@ use std::cell::RefCell;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::Input;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::input::Input;
-use dermis_golden::link::{Identity, Kind};
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::wire::link::{Identity, Kind};
 use serialport::SerialPort;
 
 use super::answer::Answer;
@@ -176,7 +176,7 @@ pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn a_tare_of_the_host_takes_the_place_of_the_scenes() {

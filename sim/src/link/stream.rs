@@ -4,8 +4,8 @@ use std::io::{BufRead, ErrorKind, Read, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
 use serde::Serialize;
 use serde_json::Value;
 

@@ -10,10 +10,10 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Result;
-use dermis_golden::frame::{Contact, Forces, Frame};
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::generate;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::{Contact, Forces, Frame};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::generate;
+use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
 use crate::stream::{seconds, Answer, Engine, Outcome, Output};

@@ -1,7 +1,7 @@
 //! A result as the page gets it.
 
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 use super::newest::Newest;

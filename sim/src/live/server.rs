@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use serde_json::json;
 
 use super::finger::{Finger, Hand};

@@ -1,7 +1,7 @@
 //! The contacts of a result: what the live page draws and a recording holds as wrenches.
 
-use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::{FoundContact, Reconstruction, Resultant, SubarrayResult};
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::{FoundContact, Reconstruction, Resultant, SubarrayResult};
 
 /// The contacts that the estimator tells apart, else the resultants; the whole array as one contact where it is one subarray
 /// with a contact.
@@ -32,9 +32,9 @@ fn deviating(own: &SubarrayResult, contact: FoundContact) -> FoundContact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::float::Golden;
-    use dermis_golden::frame::Frame;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::data::frame::Frame;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn estimated_contacts_come_first_and_one_subarray_is_one_contact() {

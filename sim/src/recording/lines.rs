@@ -90,9 +90,9 @@ mod tests {
     use super::*;
     use crate::recording::Recorder;
     use crate::stream::{Answer, Outcome};
-    use dermis_golden::float::Golden;
-    use dermis_golden::frame::Frame;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::data::frame::Frame;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::Scene;
     use std::io::{BufRead, BufReader};
 
     /// A recording of the scene's first frame, received at these seconds.

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Error, Result};
-use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::data::frame::Forces;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::sensor::Sensor;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::board::{Board, Device, EngineKind};
+use dermis_golden::spec::board::{Board, Device, EngineKind};
 use serde::Serialize;
 
 use super::table::aligned;

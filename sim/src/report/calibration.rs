@@ -1,6 +1,6 @@
 //! What `dermis calibrate` prints: the fields for the scene, and the residuals of the loads.
 
-use dermis_golden::input::known_loads::LoadFit;
+use dermis_golden::data::input::known_loads::LoadFit;
 
 use super::table::{markdown, significant_digits};
 

@@ -1,9 +1,9 @@
 //! What `dermis check` finds, as JSON and as text.
 
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::noise::expected::StatedNoise;
-use dermis_golden::noise::ShapeRow;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::spec::sensor::Sensor;
+use dermis_golden::study::noise::expected::StatedNoise;
+use dermis_golden::study::noise::ShapeRow;
 use dermis_hdl::usage::{total, StageUsage, Usage};
 use serde::Serialize;
 

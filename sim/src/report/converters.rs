@@ -1,6 +1,6 @@
 //! The table of `dermis converters`.
 
-use dermis_golden::adc::{Converter, CONVERTERS};
+use dermis_golden::spec::adc::{Converter, CONVERTERS};
 
 use super::table::markdown;
 

@@ -1,6 +1,6 @@
 //! The table of standard deviations of a search, as text.
 
-use dermis_golden::deviations::Deviations;
+use dermis_golden::estimate::deviations::Deviations;
 
 use super::table::markdown;
 

@@ -1,7 +1,7 @@
 //! The error table as Markdown, CSV and JSON.
 
 use anyhow::Result;
-use dermis_golden::errors::Errors;
+use dermis_golden::result::errors::Errors;
 use serde::Serialize;
 
 use super::csv::quoted;
@@ -249,7 +249,7 @@ mod tests {
     use super::super::tabulate::{BitTrueErrors, SubarrayRow};
     use super::*;
     use crate::compare::Difference;
-    use dermis_golden::flags::Flag;
+    use dermis_golden::result::flags::Flag;
     use serde_json::Value;
 
     fn part(mu: [f64; 2], both_signs: bool) -> SubarrayRow {

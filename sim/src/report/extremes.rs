@@ -1,8 +1,8 @@
 //! Results on extreme frames, for `dermis stability --extreme` (Markdown, CSV, JSON) and for the report.
 
 use anyhow::Result;
-use dermis_golden::flags::Flag;
-use dermis_golden::stability::extreme::{Outcome, Row};
+use dermis_golden::result::flags::Flag;
+use dermis_golden::study::stability::extreme::{Outcome, Row};
 use serde_json::json;
 
 use super::csv::quoted;
@@ -97,8 +97,8 @@ fn names(flags: &[Flag]) -> String {
 mod tests {
     use super::super::csv_reader;
     use super::*;
-    use dermis_golden::scene::Scene;
-    use dermis_golden::stability::extreme::{frames, outcome};
+    use dermis_golden::spec::scene::Scene;
+    use dermis_golden::study::stability::extreme::{frames, outcome};
 
     #[test]
     fn extremes_in_every_format() {

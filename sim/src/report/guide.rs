@@ -10,10 +10,10 @@
 use std::path::Path;
 
 use anyhow::{anyhow, Result};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::{Condition, Scene};
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{Condition, Scene};
 use dermis_hdl::describe::Trace;
 use dermis_hdl::language::SEPARATOR;
 

@@ -1,8 +1,8 @@
 //! A board's answers as text.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, supports, Kind};
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::wire::link::{payloads, supports, Kind};
 
 use super::network;
 use super::table::{aligned, significant_digits};

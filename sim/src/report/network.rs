@@ -1,7 +1,7 @@
 //! Time of a frame's packets on a gigabit network, for a core behind UDP (`python/litex`).
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, supports, Kind};
+use dermis_golden::wire::link::{payloads, supports, Kind};
 use serde::Deserialize;
 
 /// The packets, as the host's and the core's side in Python read them too.
@@ -66,7 +66,7 @@ pub(super) fn times(model: &Model) -> Vec<(u32, Vec<Option<f64>>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn times_by_hand() {

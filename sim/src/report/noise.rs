@@ -1,7 +1,7 @@
 //! The noise table as Markdown, CSV and JSON.
 
 use anyhow::Result;
-use dermis_golden::noise::{Row, Spread};
+use dermis_golden::study::noise::{Row, Spread};
 
 use super::table::{aligned, markdown, percent};
 use super::Format;

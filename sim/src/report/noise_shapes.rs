@@ -1,10 +1,10 @@
 //! The tables of `dermis noise --shapes` and `--unlike`.
 
 use anyhow::Result;
-use dermis_golden::noise::coverage::Coverage;
-use dermis_golden::noise::outcome::Summary;
-use dermis_golden::noise::statistic::{ErrorSpread, Interval};
-use dermis_golden::noise::{SensitivityRow, ShapeRow, UnlikeRow};
+use dermis_golden::study::noise::coverage::Coverage;
+use dermis_golden::study::noise::outcome::Summary;
+use dermis_golden::study::noise::statistic::{ErrorSpread, Interval};
+use dermis_golden::study::noise::{SensitivityRow, ShapeRow, UnlikeRow};
 
 use super::table::{aligned, percent};
 use super::Format;
@@ -300,7 +300,7 @@ fn csv(rows: &[ShapeRow]) -> String {
 mod tests {
     use super::super::csv_reader;
     use super::*;
-    use dermis_golden::noise::BoundSpread;
+    use dermis_golden::study::noise::BoundSpread;
 
     fn row(estimator: &str, noise: f64, covered: bool) -> ShapeRow {
         let interval = |value: f64| Interval { value, low: value / 2.0, high: value * 2.0 };

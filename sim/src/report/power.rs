@@ -1,6 +1,6 @@
 //! The tables of `dermis power`.
 
-use dermis_golden::paper::powers;
+use dermis_golden::study::paper::powers;
 
 use super::document::two_digits;
 use super::table::aligned;

@@ -1,6 +1,6 @@
 //! The table of `dermis registers`.
 
-use dermis_golden::registers::{Field, REGISTERS};
+use dermis_golden::wire::registers::{Field, REGISTERS};
 
 use super::table::aligned;
 

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use dermis_golden::flags::Flag;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::sensor::Sensor;
 
 use super::table::{percent, significant_digits};
 use crate::compare::Difference;

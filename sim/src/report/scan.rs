@@ -1,6 +1,6 @@
 //! What `dermis cosim` says of a scan by the hardware.
 
-use dermis_golden::flags::Flag;
+use dermis_golden::result::flags::Flag;
 use serde::Serialize;
 
 use super::table::{differences, markdown};

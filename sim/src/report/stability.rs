@@ -1,8 +1,8 @@
 //! Error against condition number, for `dermis stability` (Markdown, CSV, JSON) and for the report.
 
 use anyhow::Result;
-use dermis_golden::scene::Medium;
-use dermis_golden::stability::{FormatErrors, Row, Spectrum};
+use dermis_golden::spec::scene::Medium;
+use dermis_golden::study::stability::{FormatErrors, Row, Spectrum};
 
 use super::csv::quoted;
 use super::data::markdown;
@@ -163,8 +163,8 @@ fn csv(rows: &[Row]) -> String {
 mod tests {
     use super::super::csv_reader;
     use super::*;
-    use dermis_golden::scene::Scene;
-    use dermis_golden::stability::{measure, Setting};
+    use dermis_golden::spec::scene::Scene;
+    use dermis_golden::study::stability::{measure, Setting};
 
     fn rows() -> Vec<Row> {
         let scene = Scene::builtin("eight-by-eight").unwrap();

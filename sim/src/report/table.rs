@@ -1,6 +1,6 @@
 //! Markdown tables, aligned for reading in a terminal, and the tables of `dermis cosim` and `dermis table --cosim`.
 
-use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::result::reconstruct::Reconstruction;
 
 use super::{CosimReport, BUDGET_US};
 use crate::compare::median;

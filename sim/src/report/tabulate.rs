@@ -17,16 +17,16 @@
 //! where the hardware does not support the case.
 
 use anyhow::Result;
-use dermis_golden::errors::Errors;
+use dermis_golden::data::frame::{Contact, Forces, Frame};
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::flags::Flag;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::{Contact, Forces, Frame};
-use dermis_golden::paper::table_2;
-use dermis_golden::partition::{subarrays, Case, PartitionError};
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::{Reconstruction, Region};
-use dermis_golden::scene::Scene;
+use dermis_golden::result::errors::Errors;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::{Reconstruction, Region};
+use dermis_golden::spec::partition::{subarrays, Case, PartitionError};
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::study::paper::table_2;
 use serde::Serialize;
 
 use crate::compare::{difference, Difference};

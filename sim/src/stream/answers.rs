@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
+use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
 
 use super::line;
@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn a_sliding_mean_is_refused_by_its_field() {
         let mut scene = scene();
-        scene.input.mean = dermis_golden::scene::MeanKind::Sliding;
+        scene.input.mean = dermis_golden::spec::scene::MeanKind::Sliding;
         scene.input.average = 2;
         let error = Engine::new(&scene, false).err().unwrap().to_string();
         assert!(error.contains("input.mean = \"sliding\""), "{error}");

@@ -2,8 +2,8 @@
 
 use std::io::{self, BufRead, Read};
 
-use dermis_golden::frame::{csv_hint, Frame};
-use dermis_golden::sensor::Sensor;
+use dermis_golden::data::frame::{csv_hint, Frame};
+use dermis_golden::spec::sensor::Sensor;
 use serde::Deserialize;
 use serde_json::Value;
 

@@ -12,7 +12,7 @@
 //!
 //! | out, one line each | |
 //! |---|---|
-//! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far; then the fields of [`Reconstruction`](dermis_golden::reconstruct::Reconstruction) |
+//! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far; then the fields of [`Reconstruction`](dermis_golden::result::reconstruct::Reconstruction) |
 //! | refusal | `line`, `error`; the stream goes on |
 //!
 //! With `input.average = k` 2^k frames give one result. A line is at most [`LONGEST_LINE`] bytes, so a queue of N lines

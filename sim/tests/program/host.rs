@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::link_kind::LinkKind;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::link::{open, Session};
 use dermis_sim::link::{ChannelFaults, NoisyChannel, PseudoTerminal};

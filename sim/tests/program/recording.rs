@@ -4,8 +4,8 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::scene::Scene;
 use rustix::process::{kill_process, Pid, Signal};
 use serde_json::{json, Value};
 

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use serde_json::Value;
 
 fn dermis(work: &Path, args: &[&str]) -> Command {

@@ -5,9 +5,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
 
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::spec::scene::Scene;
 use serde_json::Value;
 
 const SCENE: &str = "eight-by-eight";

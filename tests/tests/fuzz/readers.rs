@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use dermis_golden::board::Board;
-use dermis_golden::frame::Frame;
-use dermis_golden::import::{import, Format, Settings, Unit};
-use dermis_golden::input::calibration::Calibration;
-use dermis_golden::link::Decoder;
-use dermis_golden::scene::Scene;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::import::{import, Format, Settings, Unit};
+use dermis_golden::data::input::calibration::Calibration;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::spec::sensor::Sensor;
+use dermis_golden::wire::link::Decoder;
 use dermis_hdl::manifest;
 
 /// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.

@@ -5,7 +5,7 @@
 //! `dermis study input-bits` prints the table. Median tangential errors are compared with `baselines/accuracy.csv`:
 //! exactly with the compiler and on the processor of its last renewal, else within 0.2 points.
 
-use dermis_golden::float::Golden;
+use dermis_golden::estimate::float::Golden;
 use dermis_sim::report::study::{input_bits, tangential};
 use dermis_tests::{baseline, scene};
 

@@ -3,10 +3,10 @@
 
 use std::fs;
 
-use dermis_golden::board::Family;
 use dermis_golden::fixed::plan::resources::Resources;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::Family;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate, generate_changed, Generated};
 use dermis_sim::flow::synthesis::{commands, NETLIST};

@@ -3,13 +3,13 @@
 
 use std::collections::BTreeSet;
 
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::quantise::quantise;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::stages::choose::{FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::{Case, Grid};
-use dermis_golden::quantise::quantise;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::partition::{Case, Grid};
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
 use dermis_sim::compare::median;

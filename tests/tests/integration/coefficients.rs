@@ -1,13 +1,13 @@
 //! The coefficient check: no false alarm on the shipped frames, every tried flip of a bit in the coefficient memory
 //! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::plan::check::undetected;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::stages::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::flags::Flag;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::{CoefficientCheck, Scene};
+use dermis_golden::result::flags::Flag;
+use dermis_golden::spec::scene::{CoefficientCheck, Scene};
 use dermis_hdl::{generate, usage::total};
 use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};

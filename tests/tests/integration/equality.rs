@@ -2,9 +2,9 @@
 //! Verilog (full speed, back to back, and with stalls after an interrupted frame) and rust-hdl's own simulation
 //! against the bit-true model, on every shipped frame, with exact cycle counts, none above those of the committed table.
 
-use dermis_golden::flags::Flag;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::hardware::Simulator;
 use dermis_sim::cosim::verify::{verify, Verified};
 use dermis_sim::cosim::QUICK_SCENES;

@@ -1,7 +1,7 @@
 //! Disabled features are not in the Verilog, and the reported saving is the difference of two builds.
 
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::usage::total;

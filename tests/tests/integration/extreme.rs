@@ -1,10 +1,10 @@
-//! Extreme frames in hardware: the codes of every one of [`dermis_golden::stability::extreme::frames`], through the generated
+//! Extreme frames in hardware: the codes of every one of [`dermis_golden::study::stability::extreme::frames`], through the generated
 //! Verilog (full speed and with stalls) and rust-hdl's simulation, against the bit-true model, to the bit and the cycle.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Scene;
-use dermis_golden::stability::extreme::frames;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::study::stability::extreme::frames;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::Vector;

@@ -3,7 +3,7 @@
 
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::state::StorageClass;
 use dermis_sim::cosim::faults::{inject_faults, Shares};
 use dermis_sim::cosim::hardware::Hardware;

@@ -4,13 +4,13 @@
 
 use std::ops::Deref;
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::send::FLAG_FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::frame::Frame;
-use dermis_golden::link::{
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::wire::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
-use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};

@@ -3,11 +3,11 @@
 
 use std::process::Command;
 
-use dermis_golden::adc::{AdcScan, CONVERTERS};
 use dermis_golden::fixed::Model;
-use dermis_golden::link_kind::LinkKind;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::{Condition, TableStorage};
+use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{Condition, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;

@@ -1,9 +1,9 @@
 //! The netlist after synthesis computes the same bits in the same cycles, and the test finds a defect that simulation
 //! of the Verilog cannot: a constant whose sign two tools read differently.
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{Findings, Vector};

@@ -1,8 +1,8 @@
 //! The estimate of power: what changes in the simulated Verilog, times the energies of the device.
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::state::StorageClass;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::cosim::power::{count_toggles, energies, estimate_power, Toggles};

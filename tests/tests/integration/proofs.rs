@@ -35,8 +35,8 @@
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
-use dermis_golden::quads::Quads;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::FORCE_STEPS;
 

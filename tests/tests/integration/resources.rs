@@ -7,10 +7,10 @@ use std::fs;
 use std::path::Path;
 use std::thread::scope;
 
-use dermis_golden::board::Family;
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::Family;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::usage::{total, Usage};
 use dermis_hdl::{generate, Generated};

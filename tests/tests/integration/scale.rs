@@ -2,8 +2,8 @@
 //! random frames of small sensors with random gaps and back-pressure on both streams.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;

@@ -1,11 +1,11 @@
 //! Scan by the hardware: codes and beats equal the bit-true model to the bit in Verilator and in rust-hdl's simulation, with
 //! converters modelled from their data sheet, none of whose times is broken; what faults of the wires do; seeded defects.
 
-use dermis_golden::adc::{AdcScan, CONVERTERS};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::flags::Flag;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::{Scene, TableStorage};
+use dermis_golden::result::flags::Flag;
+use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
+use dermis_golden::spec::scene::{Scene, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::generate_board;

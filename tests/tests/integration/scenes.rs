@@ -3,9 +3,9 @@
 //! A few go through Verilator and rust-hdl's simulation; many random ones through rust-hdl's simulation alone, which
 //! needs no compiler.
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;

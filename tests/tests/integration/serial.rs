@@ -1,9 +1,9 @@
 //! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator;
 //! scenes that it does not support are rejected by field.
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};

@@ -2,9 +2,9 @@
 //! lost or invented, and the frame after any disturbance is correct. Longer with `DERMIS_STRESS_CYCLES` (`make
 //! stress`).
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
 use dermis_sim::cosim::hardware::Hardware;

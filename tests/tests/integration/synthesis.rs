@@ -1,7 +1,7 @@
 //! Yosys accepts the generated Verilog as hardware: every signal has exactly one driver, and there is no latch.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link_kind::LinkKind;
+use dermis_golden::spec::link_kind::LinkKind;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::tools::{folder_of, yosys};

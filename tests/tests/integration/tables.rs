@@ -3,10 +3,10 @@
 
 use std::fs;
 
+use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::load::{beats, Outcome};
 use dermis_golden::fixed::Model;
-use dermis_golden::input::calibration::Calibration;
-use dermis_golden::scene::{Scene, TableStorage};
+use dermis_golden::spec::scene::{Scene, TableStorage};
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
 use dermis_sim::cosim::drive::Stimulus;

@@ -1,15 +1,15 @@
+use crate::data::frame::Frame;
+use crate::data::generator::draws::{DrawOptions, Draws};
+use crate::estimate::float::Golden;
+use crate::estimate::learned::{with_network, Learned, OneContact, Training};
 use crate::fixed::stages::receive::mask;
 use crate::fixed::stages::send::{Status, FLAG_FOUND, STATUS_BEATS};
 use crate::fixed::subarray::SubarrayTrace;
 use crate::fixed::words::formats::MU_STEPS;
 use crate::fixed::Model;
-use crate::flags::Flag;
-use crate::float::Golden;
-use crate::frame::Frame;
-use crate::generator::draws::{DrawOptions, Draws};
-use crate::learned::{with_network, Learned, OneContact, Training};
-use crate::reconstruct::{Reconstruction, Region};
-use crate::scene::{ForceOutput, Scene};
+use crate::result::flags::Flag;
+use crate::result::reconstruct::{Reconstruction, Region};
+use crate::spec::scene::{ForceOutput, Scene};
 use tempfile::NamedTempFile;
 
 /// A scene of 13 × 18 taxels with a network of a few steps: as good as any to compare the models.

@@ -2,7 +2,7 @@
 
 use crate::fixed::plan::contents::Plan;
 use crate::fixed::stages::resultants::Record;
-use crate::reconstruct::{Region, Resultant, Wrench};
+use crate::result::reconstruct::{Region, Resultant, Wrench};
 
 /// The records of a frame.
 pub struct Records {

@@ -12,22 +12,22 @@ use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::specimens::specimens;
 use super::widths::{widths, Shape};
-use crate::adc::timing::Timing;
-use crate::board::{Board, EngineKind};
+use crate::estimate::misfit::Misfit;
+use crate::estimate::segment::{self, Segmenter};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::{Prepare, Scale};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
-use crate::matrices::Matrices;
-use crate::misfit::Misfit;
-use crate::partition::{subarrays, Case, PartitionError, Subarray};
-use crate::quads::Quads;
-use crate::scene::Scene;
-use crate::scene::MAX_DEGREE;
-use crate::segment::{self, Segmenter};
-use crate::sensor::Sensor;
-use crate::window::Window;
+use crate::physics::matrices::Matrices;
+use crate::spec::adc::timing::Timing;
+use crate::spec::board::{Board, EngineKind};
+use crate::spec::partition::{subarrays, Case, PartitionError, Subarray};
+use crate::spec::quads::Quads;
+use crate::spec::scene::Scene;
+use crate::spec::scene::MAX_DEGREE;
+use crate::spec::sensor::Sensor;
+use crate::spec::window::Window;
 
 /// By how much norms of other sets of dead taxels may exceed those of the sets that are looked at; without it one specimen in
 /// four would be refused.

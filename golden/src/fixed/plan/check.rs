@@ -78,7 +78,7 @@ pub fn undetected(case: &CasePlan) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::fixed::plan::cases::planned;
-    use crate::scene::Scene;
+    use crate::spec::scene::Scene;
 
     #[test]
     fn by_hand() {

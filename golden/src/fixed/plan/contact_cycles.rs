@@ -65,12 +65,12 @@ impl ContactCycles {
 
 #[cfg(test)]
 mod tests {
+    use crate::data::generator::draws::{DrawOptions, DrawnFrame, Draws};
+    use crate::estimate::learned::{with_network, Training};
     use crate::fixed::plan::cycles::Cycles;
     use crate::fixed::Model;
-    use crate::generator::draws::{DrawOptions, DrawnFrame, Draws};
-    use crate::learned::{with_network, Training};
-    use crate::partition::Case;
-    use crate::scene::{EstimatorKind, Scene};
+    use crate::spec::partition::Case;
+    use crate::spec::scene::{EstimatorKind, Scene};
 
     /// At 100 MHz every frame is within its millisecond, whatever is found; eight frames of up to four drawn contacts take less.
     #[test]

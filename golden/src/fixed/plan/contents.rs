@@ -2,8 +2,8 @@
 
 use super::resources::Resources;
 use super::storage::Storage;
-use crate::adc::timing::Timing;
-use crate::board::{Board, EngineKind};
+use crate::estimate::misfit::Misfit;
+use crate::estimate::segment::Segmenter;
 use crate::fixed::stages::choose::FrameStats;
 use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::Prepare;
@@ -13,12 +13,12 @@ use crate::fixed::stages::segment::cycles::Segmentation;
 use crate::fixed::stages::send::{label_beats, STATUS_BEATS};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::Quantised;
-use crate::misfit::Misfit;
-use crate::partition::{Case, Grid, Subarray};
-use crate::quads::Quads;
-use crate::scene::{CoefficientCheck, ForceOutput, Scene};
-use crate::segment::Segmenter;
-use crate::window::Window;
+use crate::spec::adc::timing::Timing;
+use crate::spec::board::{Board, EngineKind};
+use crate::spec::partition::{Case, Grid, Subarray};
+use crate::spec::quads::Quads;
+use crate::spec::scene::{CoefficientCheck, ForceOutput, Scene};
+use crate::spec::window::Window;
 
 /// The hardware of one scene. What differs between partition cases is in [`CasePlan`]; the methods without a case give
 /// that of the first, which with several cases is case 0, the whole array.

@@ -28,12 +28,12 @@ use super::contact_cycles::{ContactCycles, Course};
 use super::contents::{CasePlan, Plan};
 use super::serial;
 use super::timeline::{whole, Timeline, RELAX, UNFOLD};
-use crate::board::EngineKind;
 use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::stages::send::LABELS_PER_BEAT;
 use crate::fixed::words::formats::{Formats, HALVINGS};
-use crate::quads::Quads;
+use crate::spec::board::EngineKind;
+use crate::spec::quads::Quads;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;

@@ -4,17 +4,17 @@
 
 use super::cases::{planned, planned_with};
 use super::contents::{CasePlan, Plan};
-use crate::board::EngineKind;
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::Scale;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
-use crate::partition::{subarrays, Case};
-use crate::quads::Quads;
-use crate::scene::MAX_DEGREE;
-use crate::scene::{
+use crate::spec::board::EngineKind;
+use crate::spec::partition::{subarrays, Case};
+use crate::spec::quads::Quads;
+use crate::spec::scene::MAX_DEGREE;
+use crate::spec::scene::{
     CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableRange, TableStorage,
 };
-use crate::sliding::most_frames;
+use crate::spec::sliding::most_frames;
 
 /// Covers for which writable coefficients are counted where the scene has none, over its own thickness.
 const OTHER_COVERS: [f64; 2] = [0.8, 1.25];

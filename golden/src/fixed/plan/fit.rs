@@ -4,11 +4,11 @@ use super::resources::Resources;
 use super::serial;
 use super::storage::{storage_order, LaidOut, Storage};
 use super::widths::{Shape, Widths};
-use crate::board::{Board, EngineKind};
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{Kind, Matrix};
-use crate::scene::Scene;
+use crate::spec::board::{Board, EngineKind};
+use crate::spec::scene::Scene;
 
 /// Fewest lanes per parity; with fewer, the lanes would wait for the accumulators to be shifted out.
 const MIN_LANES: usize = 4;

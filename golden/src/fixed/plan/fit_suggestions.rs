@@ -11,13 +11,13 @@
 use super::cases::planned;
 use super::contents::Plan;
 use super::cycles::Cycles;
-use crate::degree::{CUBIC_FROM, SERIES_TOLERANCE};
+use crate::estimate::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::fixed::error::{FitSuggestion, FixedError, Shortage};
-use crate::matrices::Matrices;
-use crate::partition::{Case, Grid};
-use crate::scene::Scene;
-use crate::scene::MAX_DEGREE;
-use crate::sensor::MIN_SIDE;
+use crate::physics::matrices::Matrices;
+use crate::spec::partition::{Case, Grid};
+use crate::spec::scene::Scene;
+use crate::spec::scene::MAX_DEGREE;
+use crate::spec::sensor::MIN_SIDE;
 
 /// The plan, if its board has the resources.
 ///

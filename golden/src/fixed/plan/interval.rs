@@ -17,8 +17,8 @@ use super::contact_cycles::{ContactCycles, Course};
 use super::contents::{CasePlan, Plan};
 use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
-use crate::board::EngineKind;
 use crate::fixed::stages::{choose, resultants};
+use crate::spec::board::EngineKind;
 
 /// Cycles from the hand-over of a frame's last subarray, or from the end of the last frame, to the next frame.
 const BEGIN: u64 = 2;

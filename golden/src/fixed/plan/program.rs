@@ -7,11 +7,11 @@
 //! | out: [`Instruction`]s | one per product and group of rows | words of the memories |
 
 use super::contents::{CasePlan, Plan};
-use crate::board::EngineKind;
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::schedule::{
     operand_number, sections, Axis, Kind, Matrix, Operand, Product, Section, Target, EXPONENTS,
 };
+use crate::spec::board::EngineKind;
 use serde::Serialize;
 
 /// The products of one group of rows of a matrix with a vector.
@@ -194,7 +194,7 @@ fn operand(formats: &Formats, product: &Product) -> String {
 mod tests {
     use super::*;
     use crate::fixed::Model;
-    use crate::scene::Scene;
+    use crate::spec::scene::Scene;
 
     /// Every product of every accumulation is in the program once per group of rows, and every word of the coefficient
     /// memory is read.
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(of("eight-by-eight", "v_11"), ["−Ay · v_10", "−Ax · v_01"]);
         // Square taxels in a square subarray: Ay is Ax transposed.
         let mut square = Scene::builtin("sensor-4").unwrap();
-        square.partition.case = crate::partition::Case::numbered(1).unwrap();
+        square.partition.case = crate::spec::partition::Case::numbered(1).unwrap();
         let listed = listing(&Model::new(&square).unwrap());
         assert!(listed.iter().any(|own| own.result == "v_01" && own.operand == "v_00, x and y exchanged"));
         let model = Model::new(&Scene::builtin("eight-by-eight-contacts").unwrap()).unwrap();

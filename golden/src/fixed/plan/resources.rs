@@ -21,7 +21,7 @@
 use serde::Serialize;
 
 use super::storage::{word_bits, LaidOut, Storage};
-use crate::board::Board;
+use crate::estimate::segment::{Segmenter, BASINS, WEIGHT_BITS, WIDTH, WORD_BITS};
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
@@ -29,8 +29,8 @@ use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use crate::fixed::words::network::POSITION_BITS as MU_BITS;
 use crate::fixed::words::schedule::sections;
-use crate::scene::{ForceOutput, Scene};
-use crate::segment::{Segmenter, BASINS, WEIGHT_BITS, WIDTH, WORD_BITS};
+use crate::spec::board::Board;
+use crate::spec::scene::{ForceOutput, Scene};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;

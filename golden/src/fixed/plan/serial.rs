@@ -1,6 +1,6 @@
 //! The serial engine: the same stages and arithmetic on four lanes, one taxel after the other.
 //!
-//! For devices of a few thousand logic cells ([`EngineKind::Serial`](crate::board::EngineKind)). The bit-true model is
+//! For devices of a few thousand logic cells ([`EngineKind::Serial`](crate::spec::board::EngineKind)). The bit-true model is
 //! that of the parallel engine; this file has what differs: memories, multipliers and cycles. At 8×8 and degree 3 on an
 //! iCE40UP5K:
 //!
@@ -17,11 +17,11 @@
 
 use super::resources::{count_bits, Holds, Memory, Resources};
 use super::storage::{LaidOut, Storage};
-use crate::board::Board;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, EPSILON_SHIFT, HALVINGS};
 use crate::fixed::words::quantised::{coefficient, Quantised};
 use crate::fixed::words::schedule::{schedule, Kind, Matrix, Operand, Product};
+use crate::spec::board::Board;
 
 /// Cycles per polynomial and sweep: one for each (i, j) with i, j ≤ 3, also beyond the degree.
 pub const SLOT: u64 = 16;

@@ -4,8 +4,8 @@
 //! dead taxel changes those around it, most at the edge. The hardware serves whatever needs no wider word than these
 //! specimens; [`requantised`](super::cases::requantised) checks it for each that is loaded.
 
-use crate::scene::Scene;
-use crate::sensor::Sensor;
+use crate::spec::scene::Scene;
+use crate::spec::sensor::Sensor;
 
 /// The scene's array with the thinnest, a middle and the thickest cover, each without dead taxels, with one and with the most;
 /// empty where all specimens have the same coefficients.

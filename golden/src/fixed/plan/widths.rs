@@ -5,7 +5,7 @@
 
 use faer::Mat;
 
-use crate::board::{Board, EngineKind};
+use crate::estimate::learned::{ComposedLayer, Learned};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::send::LN_SIGMA_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
@@ -16,11 +16,11 @@ use crate::fixed::words::formats::{
 use crate::fixed::words::network::WordNetwork;
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
-use crate::learned::{ComposedLayer, Learned};
-use crate::matrices::Matrices;
-use crate::quads::Quads;
-use crate::scene::{EstimatorKind, Scene};
-use crate::symmetry::parity::{FLIP_X, FLIP_Y};
+use crate::physics::matrices::Matrices;
+use crate::physics::symmetry::parity::{FLIP_X, FLIP_Y};
+use crate::spec::board::{Board, EngineKind};
+use crate::spec::quads::Quads;
+use crate::spec::scene::{EstimatorKind, Scene};
 
 /// Largest grid coordinate that coarse tiles and candidates beyond the disc reach.
 const REACH: u64 = 4;

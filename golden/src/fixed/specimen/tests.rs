@@ -1,10 +1,10 @@
 use super::*;
+use crate::data::frame::Frame;
+use crate::data::input::calibration::Calibration;
 use crate::fixed::words::formats::HALVINGS;
-use crate::frame::Frame;
-use crate::input::calibration::Calibration;
-use crate::matrices::Matrices;
+use crate::physics::matrices::Matrices;
 use crate::random::Random;
-use crate::reconstruct::Reconstruction;
+use crate::result::reconstruct::Reconstruction;
 
 const HARDWARE: &str = "
 name = \"hardware\"
@@ -73,16 +73,16 @@ fn a_refused_image_leaves_the_tables_and_a_broken_one_no_force() {
     other[0] ^= 1;
     assert_eq!(hardware.load(&other), Outcome::Refused);
     assert_eq!(hardware.run(&codes).beats, before.beats);
-    assert!(flags(&hardware).contains(&crate::flags::Flag::TablesRefused));
+    assert!(flags(&hardware).contains(&crate::result::flags::Flag::TablesRefused));
     let mut broken = image.clone();
     broken[30] ^= 1;
     assert_eq!(hardware.load(&broken), Outcome::Broken);
     assert!(hardware.run(&codes).beats.iter().all(|force| *force == [0; 3]));
     // A refused image does not make tables whole.
     assert_eq!((hardware.load(&other), hardware.tables_outcome), (Outcome::Refused, Outcome::Broken));
-    assert!(flags(&hardware).contains(&crate::flags::Flag::TablesIncomplete));
+    assert!(flags(&hardware).contains(&crate::result::flags::Flag::TablesIncomplete));
     assert_eq!(hardware.load(&image), Outcome::Whole);
-    assert!(!flags(&hardware).contains(&crate::flags::Flag::TablesIncomplete));
+    assert!(!flags(&hardware).contains(&crate::result::flags::Flag::TablesIncomplete));
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn an_image_ends_as_the_stream_says() {
 #[test]
 fn errors_are_expected_and_features_counted_of_writable_hardware_too() {
     use crate::fixed::plan::feature_costs::features;
-    use crate::noise::expected::{expected, Expectation, StatedNoise};
+    use crate::study::noise::expected::{expected, Expectation, StatedNoise};
     let (_folder, scene) = specimen(1.0);
     let asked = Expectation { peak_MPa: None, draws: 2, seed: 1, with_hardware: true };
     let noise = StatedNoise::of(&scene, None).unwrap();

@@ -9,7 +9,7 @@
 //! "Beside" means two rows on each side of the boundary of cases 1 and 3, two columns on each side of the boundary of
 //! cases 1 and 2; |c| is the ones' complement magnitude of [`magnitude_bits`].
 //!
-//! This is the hardware's rule. The golden model's `adaptive` ([`crate::reconstruct`]) first finds the contacts, solves
+//! This is the hardware's rule. The golden model's `adaptive` ([`crate::result::reconstruct`]) first finds the contacts, solves
 //! every case and takes the one nearest to them, which hardware cannot do before it has solved the frame. Median e_t of
 //! 60 drawn frames solved by the floating-point model (`cargo test --release -p dermis-tests --test integration
 //! the_choice_is_measured -- --nocapture`, which also prints the other shares):
@@ -32,9 +32,9 @@
 //! | out | index of the case in the order built, case 0 first |
 
 use crate::fixed::words::arith::magnitude_bits;
-use crate::partition::Grid;
-use crate::scene::Condition;
-use crate::sensor::Sensor;
+use crate::spec::partition::Grid;
+use crate::spec::scene::Condition;
+use crate::spec::sensor::Sensor;
 
 /// Fraction of the frame's largest code from which stress beside a boundary counts as a contact, as a right shift.
 pub const CUT_SHIFT: u32 = 2;

@@ -9,12 +9,12 @@
 //! outputs are counted. ln σ is in units of 1/384, σ in units of mu_max.
 
 use super::pass::Vector;
+use crate::estimate::learned::LN_SIGMA;
+pub use crate::estimate::learned::PLACES as OUTPUTS;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::{Formats, MU_STEPS};
 use crate::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};
-use crate::learned::LN_SIGMA;
-pub use crate::learned::PLACES as OUTPUTS;
-use crate::symmetry::parity::hadamard;
+use crate::physics::symmetry::parity::hadamard;
 
 /// Times that a position may be reduced; a word of [`POSITION_BITS`] on both axes is in the disc after 22.
 pub const REDUCTIONS: usize = 24;
@@ -115,8 +115,8 @@ mod tests {
 
     #[test]
     fn negative_images_are_zero_and_large_ones_saturate() {
-        let mut scene = crate::scene::Scene::builtin("sensor-1").unwrap();
-        scene.search.estimator = crate::scene::EstimatorKind::Learned;
+        let mut scene = crate::spec::scene::Scene::builtin("sensor-1").unwrap();
+        scene.search.estimator = crate::spec::scene::EstimatorKind::Learned;
         let model = crate::fixed::Model::new(&scene).unwrap();
         let formats = model.formats();
         let largest = (1i64 << formats.image_bits()) - 1;

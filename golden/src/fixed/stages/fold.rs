@@ -3,7 +3,7 @@
 //! One butterfly per quad, unnormalised: `input_bits` in, `input_bits + 2` out. The two bits are exact growth: nothing
 //! is rounded and nothing overflows. Only the even-even sum reaches −4·2^(input_bits − 1), which fits.
 
-use crate::symmetry::parity::hadamard;
+use crate::physics::symmetry::parity::hadamard;
 
 /// Folds quads of normalised codes, `input_bits` wide, into quads of parities, `input_bits + 2` wide.
 pub fn fold(quads: &[[i64; 4]]) -> Vec<[i64; 4]> {

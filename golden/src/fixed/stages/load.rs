@@ -11,7 +11,7 @@
 //! | then … | coefficient of a lane, 18 bits signed | that of the next lane, 18 bits signed |
 //! | last | 0, 16 bits | CRC-32 |
 //!
-//! Coefficients are there if [`TableRange`](crate::scene::TableRange) has some: word after word of their memory, in each two
+//! Coefficients are there if [`TableRange`](crate::spec::scene::TableRange) has some: word after word of their memory, in each two
 //! lanes at a time.
 //!
 //! One byte is a beat, which is no code: its top bit differs from the next ([`beats`]). The image's last has `tlast`.
@@ -131,7 +131,7 @@ impl Tables {
 }
 
 /// The beats of an image on the input stream, as codes: just beyond the largest of `code_bits` bits, of which there are
-/// [`TABLE_CODE_BITS`](crate::scene::TABLE_CODE_BITS) or more.
+/// [`TABLE_CODE_BITS`](crate::spec::scene::TABLE_CODE_BITS) or more.
 pub fn beats(image: &[u8], code_bits: u32) -> Vec<i32> {
     image.iter().map(|&byte| 1 << (code_bits - 1) | i32::from(byte)).collect()
 }
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_byte_is_no_code() {
-        for bits in [crate::scene::TABLE_CODE_BITS, BITS] {
+        for bits in [crate::spec::scene::TABLE_CODE_BITS, BITS] {
             let all: Vec<u8> = (0..=255).collect();
             for (beat, byte) in beats(&all, bits).into_iter().zip(all) {
                 let [top, next] = [bits, bits - 1].map(|bit| beat >> bit & 1);

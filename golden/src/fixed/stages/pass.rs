@@ -20,7 +20,7 @@ use crate::fixed::words::formats::Formats;
 use crate::fixed::words::network::ONE;
 use crate::fixed::words::quantised::{coefficient, Quantised};
 use crate::fixed::words::schedule::{Axis, Matrix, Operand, Product};
-use crate::quads::Quads;
+use crate::spec::quads::Quads;
 
 /// A folded input or v_ij, four parities per quad.
 pub type Vector = Vec<[i64; 4]>;

@@ -14,20 +14,20 @@
 //! | b | `input_bits` = `code_bits` + k | that over 2^k |
 //!
 //! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits. A
-//! sliding mean ([`sliding`](crate::sliding), with g) is rounded to its k more bits with every frame, which adds as
+//! sliding mean ([`sliding`](crate::spec::sliding), with g) is rounded to its k more bits with every frame, which adds as
 //! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
 //! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
+use crate::data::frame::FrameError;
+use crate::data::input::calibration::Calibration;
+use crate::data::input::tare::Tare;
+use crate::data::input::InputError;
+use crate::data::quantise::quantise;
 use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
-use crate::frame::FrameError;
-use crate::input::calibration::Calibration;
-use crate::input::tare::Tare;
-use crate::input::InputError;
-use crate::quantise::quantise;
-use crate::scene::largest_code;
-use crate::scene::{MeanKind, Scene};
-use crate::sliding::gain_shift;
+use crate::spec::scene::largest_code;
+use crate::spec::scene::{MeanKind, Scene};
+use crate::spec::sliding::gain_shift;
 
 /// Fraction bits of a gain word.
 pub const GAIN_FRACTION: u32 = 16;
@@ -199,7 +199,7 @@ impl Prepare {
 mod tests {
     use super::*;
     use crate::random::Random;
-    use crate::sliding::most_frames;
+    use crate::spec::sliding::most_frames;
 
     #[test]
     fn by_hand() {

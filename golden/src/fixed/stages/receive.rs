@@ -11,7 +11,7 @@
 //! codes.
 
 use crate::fixed::words::arith::magnitude_bits;
-use crate::scene::Condition;
+use crate::spec::scene::Condition;
 
 /// Magnitude and signs of a subarray's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

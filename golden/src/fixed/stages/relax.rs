@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn sums_saturate_and_are_counted() {
-        let model = crate::fixed::Model::new(&crate::scene::Scene::builtin("sensor-1-noisy").unwrap()).unwrap();
+        let model = crate::fixed::Model::new(&crate::spec::scene::Scene::builtin("sensor-1-noisy").unwrap()).unwrap();
         let formats = model.formats();
         let (least, most) = range(formats.vector_bits);
         let (sums, operands, saturations) = relax(formats, &[[most, least, 32, -7]], &[[1, -1, 15, 7]]);

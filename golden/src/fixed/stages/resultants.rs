@@ -14,7 +14,7 @@
 //! contact, then the contacts, that with the largest load first. The host divides.
 
 use super::forces::Force;
-use crate::sensor::Sensor;
+use crate::spec::sensor::Sensor;
 
 /// Largest number of sums in a record.
 pub const SUMS: usize = 10;

@@ -15,8 +15,8 @@
 //! Dead taxels raise nothing.
 
 use super::send::{FLAG_CHANNEL, FLAG_RAIL};
-use crate::adc::{AdcScan, Converter};
 use crate::fixed::words::arith::round_shift;
+use crate::spec::adc::{AdcScan, Converter};
 
 /// The codes of a scan, and its flags.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -92,7 +92,7 @@ pub fn scan(scan: &AdcScan, code_bits: u32, dead: &[usize], answers: &[u32]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adc::CONVERTERS;
+    use crate::spec::adc::CONVERTERS;
 
     fn spec(converter: usize, converters: usize, average: u32) -> AdcScan {
         AdcScan {

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 use crate::fixed::words::arith::bit_length;
 use crate::fixed::words::formats::{EPSILON_SHIFT, HALVINGS, LOG_FRACTION, LOG_TABLE_BITS};
 use crate::fixed::words::schedule::EXPONENTS;
-use crate::quads::Quads;
+use crate::spec::quads::Quads;
 
 /// Centres of the coarse tiles: each a diagonal step from the one before, all 29 points of the disc within reach of ±1.
 pub const COARSE_CENTRES: [[i32; 2]; 8] = [[1, 1], [0, 2], [-1, 1], [-2, 0], [-1, -1], [0, -2], [1, -1], [2, 0]];

@@ -6,15 +6,15 @@
 //! | out: contact of each taxel | taxels, row-major | [`NONE`], else 1 … in the order of their loads |
 //! | out: middle of each contact | row, column | taxels |
 //!
-//! The compressive part of p₀ is brought to [`WORD_BITS`] bits and [segmented](crate::segment). Of more contacts than the
+//! The compressive part of p₀ is brought to [`WORD_BITS`] bits and [segmented](crate::estimate::segment). Of more contacts than the
 //! scene allows those with the largest loads, sums of the smoothed words, remain; of equal ones the first. The middle is the
 //! taxel nearest to the centre of the words that are not smoothed, ties up: (2 Σ w·line + Σ w) / (2 Σ w), rounded down.
 
 pub mod cycles;
 
+use crate::estimate::segment::{Segmenter, NONE, WORD_BITS};
 use crate::fixed::words::formats::Formats;
-use crate::segment::{Segmenter, NONE, WORD_BITS};
-use crate::sensor::Sensor;
+use crate::spec::sensor::Sensor;
 use cycles::{Counts, Segmentation};
 
 /// The contacts of a frame.
@@ -68,7 +68,7 @@ pub fn segment(sensor: &Sensor, segmenter: &Segmenter, words: &[i64], most: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::segment::WIDTH;
+    use crate::estimate::segment::WIDTH;
 
     fn array() -> Sensor {
         Sensor { rows: 12, cols: 20, pitch_x_mm: 2.0, pitch_y_mm: 2.0, thickness_mm: 2.0 }

@@ -8,10 +8,10 @@
 //! `fold`, unnormalised: without a μ, both together return the operand. What does not fit is saturated and counted.
 
 use super::pass::{times, Vector};
+use crate::estimate::segment::NONE;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::Formats;
-use crate::segment::NONE;
-use crate::symmetry::parity::hadamard;
+use crate::physics::symmetry::parity::hadamard;
 
 /// Cycles from the cycle in which all quads of p are there to the first operand.
 pub const LATENCY: u64 = 9;
@@ -48,7 +48,7 @@ pub fn shear(formats: &Formats, p: &[[i64; 4]], labels: &[[usize; 4]], positions
 mod tests {
     use super::super::pass::scaled;
     use super::*;
-    use crate::scene::Scene;
+    use crate::spec::scene::Scene;
     use proptest::prelude::*;
     use std::sync::LazyLock;
 

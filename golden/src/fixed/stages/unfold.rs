@@ -5,7 +5,7 @@
 //! while the search counts μ in thirds of mu_max, so v_ij is divided by 4^(i+j): a shift, rounded half up.
 
 use crate::fixed::words::arith::round_shift;
-use crate::symmetry::parity::hadamard;
+use crate::physics::symmetry::parity::hadamard;
 
 /// Unfolds one v_ij of total degree `degree = i + j` from parities to taxels, in quarters of the parities' LSB.
 pub fn unfold(parities: &[[i64; 4]], degree: u32) -> Vec<[i64; 4]> {

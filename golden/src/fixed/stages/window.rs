@@ -13,9 +13,9 @@ use super::pass::{high_limbs, Vector};
 use super::receive::{receive, Received};
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::network::MASKED;
-use crate::quads::Quads;
-use crate::sensor::Sensor;
-use crate::window::Window;
+use crate::spec::quads::Quads;
+use crate::spec::sensor::Sensor;
+use crate::spec::window::Window;
 
 /// The window of a contact.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -78,9 +78,9 @@ pub fn window(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
-    use crate::symmetry::parity::hadamard;
-    use crate::window::Place;
+    use crate::physics::symmetry::parity::hadamard;
+    use crate::spec::scene::Scene;
+    use crate::spec::window::Place;
 
     /// A window in the corner: what is beyond the array is masked, its own loudest code sets the shift.
     #[test]

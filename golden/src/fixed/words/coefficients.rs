@@ -9,7 +9,7 @@
 //! and takes a quarter of the coefficients and products of M. Rows and columns that lie on a middle line vanish in the
 //! odd parities.
 //!
-//! A matrix without some of its taxels ([`crate::matrices::Matrices::without`]) has no mirror symmetry. In the basis of
+//! A matrix without some of its taxels ([`crate::physics::matrices::Matrices::without`]) has no mirror symmetry. In the basis of
 //! parities it has all 16 blocks, four for each flip f = p XOR p', and the transform is exact again:
 //! ```text
 //! y_{p'}(i) = Σ_f Σ_j B_{p',f}(i, j) f_{p' XOR f}(j)
@@ -27,8 +27,8 @@
 use faer::Mat;
 use serde::Serialize;
 
-use crate::quads::Quads;
-use crate::symmetry::parity::{has_entry, sign, FLIP_X, FLIP_Y};
+use crate::physics::symmetry::parity::{has_entry, sign, FLIP_X, FLIP_Y};
+use crate::spec::quads::Quads;
 
 /// The four Q × Q blocks of a folded matrix that flip the parity by `flip`; row-major, indexed by the target parity.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,9 +149,9 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32, all_flips: bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::matrices::Matrices;
-    use crate::sensor::Sensor;
-    use crate::symmetry::parity::hadamard;
+    use crate::physics::matrices::Matrices;
+    use crate::physics::symmetry::parity::hadamard;
+    use crate::spec::sensor::Sensor;
 
     /// Folding, multiplying by blocks and unfolding is the dense product, for even and odd sizes.
     #[test]

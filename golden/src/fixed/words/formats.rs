@@ -26,7 +26,7 @@
 use serde::Serialize;
 
 use super::coefficients::Flips;
-use crate::quads::Quads;
+use crate::spec::quads::Quads;
 
 /// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
 pub const MULTIPLIER_BITS: u32 = 18;

@@ -19,7 +19,7 @@
 
 use super::coefficients::Flipped;
 use super::formats::{Formats, MULTIPLIER_BITS, MU_STEPS};
-use crate::learned::ComposedLayer;
+use crate::estimate::learned::ComposedLayer;
 use faer::Mat;
 
 /// The operand of the biases.

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::load;
-use dermis_golden::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
+use dermis_golden::wire::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
 
 use super::*;
 use crate::language::testbench::{block_subject, check_with_defects, Reference, Subject};

@@ -1,6 +1,6 @@
 //! Lane mask of a quad, or of a part of it: which lanes hold distinct taxels.
 
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,8 +1,8 @@
 //! Quad address and lane of a taxel.
 
 use dermis_golden::fixed::CasePlan;
-use dermis_golden::partition::Grid;
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::partition::Grid;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,6 +1,6 @@
 //! Quad address of a v_ij, with transposed results put back in place.
 
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -65,7 +65,7 @@ fn less<'k>(a: Expr<'k>, b: Expr<'k>) -> Expr<'k> {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::symmetry::parity::hadamard;
+    use dermis_golden::physics::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Pipeline};

@@ -75,7 +75,7 @@ fn kernel(bits: usize, degrees: &[u32]) -> Kernel {
 mod tests {
     use dermis_golden::fixed::words::arith::round_shift;
     use dermis_golden::fixed::words::schedule::EXPONENTS;
-    use dermis_golden::symmetry::parity::hadamard;
+    use dermis_golden::physics::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, random_word, Pipeline};

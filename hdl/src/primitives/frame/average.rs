@@ -1,7 +1,7 @@
 //! Sums of 2^k frames, taxel by taxel, or their sliding mean.
 
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::scene::MeanKind;
+use dermis_golden::spec::scene::MeanKind;
 use rust_hdl::prelude::*;
 
 use super::sliding_mean;

@@ -6,8 +6,8 @@ use dermis_golden::fixed::stages::load::{
 use dermis_golden::fixed::stages::prepare::GAIN_BITS;
 use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
 use dermis_golden::fixed::Plan;
-use dermis_golden::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::wire::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

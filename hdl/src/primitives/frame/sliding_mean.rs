@@ -10,7 +10,7 @@
 //! starts again with the next frame. A missing `tlast` is missing behind the mean too, and changes nothing else.
 
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::sliding::gain_shift;
+use dermis_golden::spec::sliding::gain_shift;
 
 use crate::language::{Builder, Contents, Expr, Kernel, Type};
 use crate::primitives::address::counter::count_bits;

@@ -5,7 +5,7 @@ use dermis_golden::fixed::stages::resultants::Summed;
 use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT, TABLES_SHIFT};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

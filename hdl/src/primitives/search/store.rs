@@ -3,7 +3,7 @@
 use dermis_golden::fixed::plan::cycles::split_latency;
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::Formats;
-use dermis_golden::quads::Quads;
+use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use dermis_golden::fixed::words::arith::{bit_length, magnitude_bits, round_shift, saturate};
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
-use dermis_golden::symmetry::parity::FLIP_X;
+use dermis_golden::physics::symmetry::parity::FLIP_X;
+use dermis_golden::spec::scene::Scene;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};

@@ -263,7 +263,7 @@ fn sweeps_and_comparisons_are_those_of_the_state_machine() {
     let scene =
         "name = \"walk\"\n[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n\
                  [hardware]\nboard = \"icebreaker\"\n";
-    let scene = dermis_golden::scene::Scene::parse(scene, "walk.toml").unwrap();
+    let scene = dermis_golden::spec::scene::Scene::parse(scene, "walk.toml").unwrap();
     let formats = dermis_golden::fixed::Model::new(&scene).unwrap().formats().clone();
     let block = SearchSequencer::new(&formats);
     let kernel = block.kernel.kernel();

@@ -4,8 +4,8 @@
 //! 0. One that is gone holds the one it is part of, which has a smaller number. One that has been taken from the list, in the
 //! order of the loads, holds its contact.
 
+use dermis_golden::estimate::segment::SMALL;
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::segment::SMALL;
 
 use super::control::*;
 use super::walk::Order;

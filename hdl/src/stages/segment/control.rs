@@ -2,9 +2,9 @@
 
 use std::cell::RefCell;
 
+use dermis_golden::estimate::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
-use dermis_golden::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 
 use crate::language::{concat, Builder, Contents, Expr, MemoryPort, Net, Type};
 use crate::primitives::count_bits;

@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::board::Board;
+use dermis_golden::estimate::segment::{Segmenter, WIDTH, WORD_BITS};
 use dermis_golden::fixed::plan::resources::{segment_memories, segment_multipliers};
 use dermis_golden::fixed::stages::segment::cycles::MOST;
 use dermis_golden::fixed::stages::segment::{segment, Segmented};
-use dermis_golden::quads::Quads;
-use dermis_golden::segment::{Segmenter, WIDTH, WORD_BITS};
-use dermis_golden::sensor::Sensor;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::sensor::Sensor;
 
 use super::*;
 use crate::language::testbench::{block_subject, check, check_with_defects, random_word, Reference};

@@ -2,7 +2,7 @@
 //!
 //! A direction is 0 for the taxel itself, 1 to 8 for its neighbours in the order of their addresses.
 
-use dermis_golden::segment::FLOOR;
+use dermis_golden::estimate::segment::FLOOR;
 
 use super::control::*;
 use crate::language::{Expr, Type};

@@ -1,11 +1,11 @@
 use std::collections::VecDeque;
 
+use dermis_golden::estimate::segment::Segmenter;
 use dermis_golden::fixed::plan::contents::ContactPlan;
 use dermis_golden::fixed::stages::receive::Received;
 use dermis_golden::fixed::stages::window::{cycles, window, Array, WindowWords};
 use dermis_golden::fixed::words::network::MASKED;
-use dermis_golden::segment::Segmenter;
-use dermis_golden::window::Place;
+use dermis_golden::spec::window::Place;
 
 use super::*;
 use crate::language::testbench::{

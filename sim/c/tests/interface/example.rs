@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::link::PseudoTerminal;
 use tempfile::TempDir;

@@ -43,7 +43,7 @@ fn the_committed_header_is_the_generated_one() {
 #[test]
 fn c_and_cpp_take_it_beside_the_header_of_the_packets() {
     let own = tempfile::tempdir().unwrap();
-    fs::write(own.path().join("dermis_link.h"), dermis_golden::link::c_header()).unwrap();
+    fs::write(own.path().join("dermis_link.h"), dermis_golden::wire::link::c_header()).unwrap();
     let both = own.path().join("both");
     fs::write(&both, "#include \"dermis.h\"\n#include \"dermis_link.h\"\n").unwrap();
     for (compiler, language, standard) in [("cc", "c", "-std=c11"), ("c++", "c++", "-std=c++11")] {

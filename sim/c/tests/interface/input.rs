@@ -7,9 +7,9 @@ use dermis_c::guard::{dermis_last_error, dermis_status, dermis_version, guarded}
 use dermis_c::link::*;
 use dermis_c::result::*;
 use dermis_c::scene::*;
-use dermis_golden::flags::Flag;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::spec::scene::Scene;
 
 /// The text of the last error on this thread.
 pub fn last_error() -> String {

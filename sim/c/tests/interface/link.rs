@@ -8,10 +8,10 @@ use dermis_c::guard::dermis_status;
 use dermis_c::link::*;
 use dermis_c::result::*;
 use dermis_c::scene::*;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::link::{codes_of_bytes, Beat, Decoder, Identity, Kind, Packet, Sums};
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::wire::link::{codes_of_bytes, Beat, Decoder, Identity, Kind, Packet, Sums};
 
 use super::input::{last_error, scene, stress};
 

@@ -1,9 +1,9 @@
 //! The array before its converters: a voltage per taxel, and faults of its wires.
 
 use anyhow::{ensure, Result};
-use dermis_golden::adc::AdcScan;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
+use dermis_golden::spec::adc::AdcScan;
 
 /// Largest noise of a sample in the co-simulation, in LSBs of the converter.
 pub(super) const NOISE_LSB: f64 = 3.0;
@@ -163,7 +163,7 @@ pub(super) fn volts(model: &Model, frame: &Frame) -> Result<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::adc::CONVERTERS;
+    use dermis_golden::spec::adc::CONVERTERS;
 
     #[test]
     fn a_fault_of_what_is_not_there_is_refused() {

@@ -1,8 +1,8 @@
 //! A board that scans its array, with the array and its converters.
 
 use anyhow::{bail, Result};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::scan::ScanPins;
 

@@ -11,7 +11,7 @@
 //! A row or channel that has not settled yet gives the voltages of the one before. The output is inverted until its delay
 //! is over, so that a sample taken too early is wrong.
 
-use dermis_golden::adc::{AdcScan, Converter};
+use dermis_golden::spec::adc::{AdcScan, Converter};
 use dermis_hdl::scan::ScanPins;
 
 use super::array::Array;

@@ -8,7 +8,7 @@
 //!                        '--> violations of the data sheet's times ------------------------------'
 //! ```
 //! Both ways take an answer from the same function of row, channel and number of the frame on the bus; by plan these are
-//! those of the sequence that `dermis_golden::adc` states, in the simulation those that the pins said in time.
+//! those of the sequence that `dermis_golden::spec::adc` states, in the simulation those that the pins said in time.
 
 mod array;
 mod board;

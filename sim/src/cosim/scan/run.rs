@@ -4,12 +4,12 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{bail, Result};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::scan::{beats, rail, scan as codes_of, Scanned};
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::scan::{generate_scan, scan_simulator, ScanDevice, ScanInputs};
 use serde::Serialize;
 

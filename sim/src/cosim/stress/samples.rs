@@ -1,9 +1,9 @@
 //! Input frames of the experiments with the model's results: a scene's shipped frames and synthetic ones.
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::prepare::Prepared;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::frame::Frame;
 
 /// Largest number of shipped frames used.
 const SHIPPED: usize = 4;

@@ -1,7 +1,7 @@
 //! The clock by which cycles are converted to time, and its origin.
 
-use dermis_golden::board::Board;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::board::Board;
+use dermis_golden::spec::scene::Scene;
 
 use crate::flow::baseline::Baselines;
 

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use anyhow::{anyhow, Result};
-use dermis_golden::baseline::Baseline;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model, Trace};
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::{subarrays, Case};
-use dermis_golden::scene::{EstimatorKind, Scene};
+use dermis_golden::spec::partition::{subarrays, Case};
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_golden::study::baseline::Baseline;
 use dermis_hdl::generate;
 
 use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};

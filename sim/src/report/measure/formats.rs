@@ -1,9 +1,9 @@
 //! Number formats: errors and resources of candidate formats of a scene on the same frames.
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use crate::compare::{median, quantile};
 

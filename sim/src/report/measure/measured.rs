@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use dermis_golden::baseline::Baseline;
-use dermis_golden::errors::Errors;
+use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{Model, Trace};
-use dermis_golden::float::Golden;
-use dermis_golden::frame::{Forces, Frame};
-use dermis_golden::partition::Case;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::{Condition, Scene};
+use dermis_golden::result::errors::Errors;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{Condition, Scene};
+use dermis_golden::study::baseline::Baseline;
 use dermis_hdl::usage::StageUsage;
 
 use super::clock::clock;

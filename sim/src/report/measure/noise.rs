@@ -1,11 +1,11 @@
 //! Measurement of error against noise for the report.
 
 use anyhow::Result;
-use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::draws::DrawOptions;
-use dermis_golden::noise::{shape_study, Candidate, ShapeRow, ShapeStudy};
-use dermis_golden::partition::Case;
-use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::draws::DrawOptions;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
+use dermis_golden::study::noise::{shape_study, Candidate, ShapeRow, ShapeStudy};
 
 use super::measured::{Measured, Options};
 use crate::progress::Progress;

@@ -3,10 +3,10 @@
 //! margin = Π(μ*) − max Π(μ) over |μ − μ*| ≥ mu_max/8, in bits: the advantage of the best μ over clearly different
 //! ones. It is small where shear and uneven pressure are hard to distinguish.
 
+use dermis_golden::estimate::float::objective::{Objective, Sparse};
+use dermis_golden::estimate::float::pass::Polynomial;
 use dermis_golden::fixed::stages::search::COARSE_CENTRES;
 use dermis_golden::fixed::words::formats::{HALVINGS, MU_STEPS};
-use dermis_golden::float::objective::{Objective, Sparse};
-use dermis_golden::float::pass::Polynomial;
 
 use super::measured::{ContactCount, Measured};
 

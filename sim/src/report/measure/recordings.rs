@@ -6,12 +6,12 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::import::Imported;
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::import::Imported;
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::result::reconstruct::Reconstruction;
 
 use super::clock::clock;
 use crate::compare::{comparable_forces, difference, median, Difference};

@@ -1,9 +1,9 @@
 //! Measurements of numerical stability for the report: error against condition number, extreme frames.
 
 use anyhow::Result;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::InverseKind;
-use dermis_golden::stability::{self, extreme, settings, Setting};
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::InverseKind;
+use dermis_golden::study::stability::{self, extreme, settings, Setting};
 
 use super::measured::{Measured, Options};
 use crate::jobs::parallel;

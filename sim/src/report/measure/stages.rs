@@ -22,20 +22,20 @@
 //! Stage `forces` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
 use anyhow::{bail, Result};
-use dermis_golden::board::EngineKind;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::pass::Polynomial;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::stages::pass::join_limbs;
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
 use dermis_golden::fixed::words::arith::bit_length;
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, vectors, EXPONENTS};
 use dermis_golden::fixed::{Model, Trace};
-use dermis_golden::float::pass::Polynomial;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
-use dermis_golden::symmetry::parity::hadamard;
+use dermis_golden::physics::symmetry::parity::hadamard;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::board::EngineKind;
+use dermis_golden::spec::scene::Scene;
 
 use super::measured::Measured;
 
@@ -188,7 +188,8 @@ impl<'a> FloatReference<'a> {
         golden: &'a Reconstruction,
         trace: &'a Trace,
     ) -> Self {
-        let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
+        let stress =
+            |part: &dermis_golden::spec::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
         let family = |b: Vec<f64>| Polynomial::of_degree(engine.matrices(), &b, model.formats().degree);
         FloatReference {
             model,
@@ -379,8 +380,8 @@ mod tests {
     use super::super::{measure, Options};
     use super::*;
     use crate::jobs::Interrupt;
-    use dermis_golden::partition::Case;
-    use dermis_golden::scene::Condition;
+    use dermis_golden::spec::partition::Case;
+    use dermis_golden::spec::scene::Condition;
 
     #[test]
     fn every_stage_is_near_its_float_in_every_case() {

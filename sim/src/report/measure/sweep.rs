@@ -1,10 +1,10 @@
 //! Parameter sweeps: one field of a scene changed at a time; effect on errors, cycles and resources.
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::{Cycles, FixedError, Model};
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
 
 use super::measured::Options;
 use crate::compare::{median, quantile};
@@ -84,13 +84,13 @@ fn tasks(scene: &Scene) -> Vec<Task> {
     field("inverse_bits", &[18, 20, 22, 24, 28], |s, v| s.fixed.inverse_bits = v);
     field("prune_bits", &[8, 10, 12, 14, 17, 20], |s, v| s.fixed.prune_bits = v);
     field("lanes", &[16, 20, 28, 36, 52, 100, 144], |s, v| s.fixed.lanes = Some(v));
-    for degree in 1..=dermis_golden::scene::MAX_DEGREE {
+    for degree in 1..=dermis_golden::spec::scene::MAX_DEGREE {
         all.push(("degree", degree.to_string(), Box::new(|_| {}), Some(degree)));
     }
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     for case in scene.cases_of(&numbered) {
         let change = move |scene: &mut Scene| scene.partition.case = case;
-        if dermis_golden::partition::subarrays(case, &scene.sensor).is_ok() {
+        if dermis_golden::spec::partition::subarrays(case, &scene.sensor).is_ok() {
             all.push(("case", case.to_string(), Box::new(change), None));
         }
     }

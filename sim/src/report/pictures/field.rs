@@ -2,10 +2,10 @@
 //! outlines; or an arrow per contact with the standard deviation of its force.
 
 use anyhow::Result;
-use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::ContactEstimate;
-use dermis_golden::reconstruct::SubarrayResult;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::data::frame::Forces;
+use dermis_golden::result::reconstruct::ContactEstimate;
+use dermis_golden::result::reconstruct::SubarrayResult;
+use dermis_golden::spec::sensor::Sensor;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -264,9 +264,9 @@ fn bar(area: &Area, map: &Map, [minus, plus]: [&str; 2], unit: &str, peak: &str)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::float::Golden;
-    use dermis_golden::frame::Frame;
-    use dermis_golden::scene::Scene;
+    use dermis_golden::data::frame::Frame;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::Scene;
 
     #[test]
     fn centroids_of_compression_and_tension_differ_in_shape_and_colour() {

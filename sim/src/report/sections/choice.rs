@@ -6,9 +6,9 @@
 //! whose median shear error is at most 1.25 e + 0.5 %, where e is the smallest error of the candidates.
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate;
 use dermis_hdl::usage::{total, Usage};
 

@@ -1,9 +1,9 @@
 //! Stress and forces of a frame: truth, golden and bit-true model, side by side on the same scale.
 
 use anyhow::Result;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Forces;
-use dermis_golden::scene::EstimatorKind;
+use dermis_golden::data::frame::Forces;
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::spec::scene::EstimatorKind;
 
 use super::super::document::{Item, Picture, Section};
 use super::super::measure::Measured;

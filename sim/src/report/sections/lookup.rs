@@ -1,7 +1,7 @@
 //! Finds scenes, cases and frames among the measurements.
 
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::Case;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::spec::partition::Case;
 
 use super::super::measure::{ContactCount, Measured};
 

@@ -1,8 +1,8 @@
 //! The report's first page: error against noise beside error against run time, for the first scene; then scenes with a network.
 
 use anyhow::Result;
-use dermis_golden::noise::statistic::ErrorSpread;
-use dermis_golden::noise::ShapeRow;
+use dermis_golden::study::noise::statistic::ErrorSpread;
+use dermis_golden::study::noise::ShapeRow;
 
 use super::super::document::{percent, text_cell, two_digits, Cell, Item, Picture, Section, Table};
 use super::super::measure::{Measured, NoiseStudy};

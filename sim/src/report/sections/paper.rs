@@ -4,12 +4,12 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::words::schedule::vectors;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::matrices::cache;
-use dermis_golden::paper::conclusions;
-use dermis_golden::partition::Case;
+use dermis_golden::physics::matrices::cache;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::study::paper::conclusions;
 
 use super::super::document::{
     count, empty_cell, percent, seconds, text_cell, two_digits, Cell, Item, Picture, Section, Table,
@@ -146,10 +146,11 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         }
         all.push(repeats);
     }
-    let published = dermis_golden::paper::run_times();
+    let published = dermis_golden::study::paper::run_times();
     let printed = |m: &Measured| {
-        let same =
-            |p: &&dermis_golden::paper::RunTime| p.sensor.contains("48x48") && p.case == Some(m.scene.partition.case);
+        let same = |p: &&dermis_golden::study::paper::RunTime| {
+            p.sensor.contains("48x48") && p.case == Some(m.scene.partition.case)
+        };
         published.iter().find(same).map(|p| p.seconds)
     };
     let group = |(m, repeats): (&&Measured, &[f64; REPEATS])| {

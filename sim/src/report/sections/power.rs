@@ -1,7 +1,7 @@
 //! Estimated power of the recommended designs, beside the published one.
 
 use anyhow::Result;
-use dermis_golden::paper::powers;
+use dermis_golden::study::paper::powers;
 
 use super::super::document::{count, decimal, empty_cell, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{BitTrue, Measured, Options};

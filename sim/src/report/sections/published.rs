@@ -1,10 +1,10 @@
 //! Comparison with published figures: Table 2 and run times, from the files in `golden/data/paper`.
 
-use dermis_golden::errors::{Errors, SMALLEST_SHARE};
-use dermis_golden::paper::{run_times, table_2, RunTime};
-use dermis_golden::partition::Case;
-use dermis_golden::scene::Condition;
-use dermis_golden::sensor::Sensor;
+use dermis_golden::result::errors::{Errors, SMALLEST_SHARE};
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Condition;
+use dermis_golden::spec::sensor::Sensor;
+use dermis_golden::study::paper::{run_times, table_2, RunTime};
 
 use super::super::document::{
     count, empty_cell, median_percent, percent, percent_text, seconds, text_cell, two_digits, Cell, Item, Section,

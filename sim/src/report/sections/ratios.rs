@@ -40,8 +40,8 @@ pub fn ratios(measured: &[Measured]) -> Result<Section> {
     })
 }
 
-fn rows(m: &Measured, result: &dermis_golden::reconstruct::Reconstruction) -> Vec<Vec<Cell>> {
-    let row = |(k, part): (usize, &dermis_golden::reconstruct::SubarrayResult)| {
+fn rows(m: &Measured, result: &dermis_golden::result::reconstruct::Reconstruction) -> Vec<Vec<Cell>> {
+    let row = |(k, part): (usize, &dermis_golden::result::reconstruct::SubarrayResult)| {
         vec![
             text_cell(m.scene.name.clone()),
             text_cell(case_text(m.scene.partition.case)),
@@ -66,7 +66,7 @@ pub(super) fn picture(
     let groups = own.iter().flat_map(|m| {
         let case = m.scene.partition.case;
         let parts = &m.golden[frame(m)].subarrays;
-        let group = move |(k, part): (usize, &dermis_golden::reconstruct::SubarrayResult)| {
+        let group = move |(k, part): (usize, &dermis_golden::result::reconstruct::SubarrayResult)| {
             (format!("case {case}, SA{}", k + 1), part.mu.map(Some).to_vec())
         };
         parts.iter().enumerate().map(group)

@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use dermis_golden::flags::Flag;
-use dermis_golden::import::Summary;
-use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::data::import::Summary;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::result::reconstruct::Reconstruction;
 
 use super::super::document::{
     count, decimal, empty_cell, median_percent, percent, seconds, text_cell, Cell, Item, Picture, Section, Table,

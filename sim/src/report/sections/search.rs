@@ -1,7 +1,7 @@
 //! The search for μ: Π over the disc of μ, and the margin of its maximum as a measure of confidence.
 
 use anyhow::Result;
-use dermis_golden::partition::Case;
+use dermis_golden::spec::partition::Case;
 
 use super::super::document::{decimal, percent, text_cell, two_digits, Item, Picture, Section, Table};
 use super::super::measure::{objective_map, ContactCount, Measured, ObjectiveMap};

@@ -1,8 +1,8 @@
 //! Numerical stability: error against condition number, and extreme frames.
 
 use anyhow::{anyhow, Result};
-use dermis_golden::scene::InverseKind;
-use dermis_golden::stability::{extreme, FormatErrors, Row};
+use dermis_golden::spec::scene::InverseKind;
+use dermis_golden::study::stability::{extreme, FormatErrors, Row};
 
 use super::super::document::{Item, Picture, Section};
 use super::super::extremes::extremes_table;
@@ -91,8 +91,8 @@ fn picture(rows: &[Row]) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::scene::Scene;
-    use dermis_golden::stability::{measure, Setting};
+    use dermis_golden::spec::scene::Scene;
+    use dermis_golden::study::stability::{measure, Setting};
 
     #[test]
     fn every_format_has_its_marks() {

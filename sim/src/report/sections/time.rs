@@ -1,7 +1,7 @@
 //! Error against run time of all engines in all cases, with the Pareto front and the 1 ms budget.
 
 use anyhow::Result;
-use dermis_golden::frame::Frame;
+use dermis_golden::data::frame::Frame;
 
 use super::super::document::{
     count, empty_cell, percent, seconds, seconds_text, text_cell, two_digits, Cell, Item, Picture, Section, Table,

@@ -2,11 +2,11 @@
 //! `contacts`, which has one per contact, on drawn frames of two to four contacts.
 
 use anyhow::{ensure, Result};
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::partition::Case;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::Scene;
 
 use super::super::table::{aligned, percent};
 use super::super::tabulate::{contact_shears, shear_over_all};

@@ -1,10 +1,10 @@
 //! Dead taxels: errors of both models with taxels left out, and the latency that they cost, on drawn frames of one contact.
 
 use anyhow::{ensure, Result};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::float::Golden;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 use super::super::table::{aligned, percent};
 use super::drawn::{one_contact, tangential};

@@ -1,9 +1,9 @@
 //! Drawn frames of the studies, and their error.
 
 use anyhow::Result;
-use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 use crate::compare::median;
 use crate::drawn_frames::{DrawnFrames, Shapes};

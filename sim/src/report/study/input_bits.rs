@@ -2,13 +2,13 @@
 //! model on the same codes, on drawn frames of one contact.
 
 use anyhow::Result;
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::quantise::quantise;
+use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
-use dermis_golden::float::Golden;
-use dermis_golden::frame::Frame;
-use dermis_golden::quantise::quantise;
-use dermis_golden::reception::full_scale;
-use dermis_golden::reconstruct::Reconstruction;
-use dermis_golden::scene::Scene;
+use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 
 use super::super::table::{aligned, percent};
 use super::drawn::{one_contact, tangential};

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::scene::Scene;
 
 use super::super::host::link_times;
 use crate::progress::Progress;

@@ -1,10 +1,10 @@
 //! The link over SPI: a controller with rates from 1 MHz to the highest allowed, and transactions that end anywhere.
 
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::link::slip::{END, IDLE};
-use dermis_golden::link::{Counters, Decoder, Identity, Kind, Packet, PacketError};
-use dermis_golden::link_kind::LinkKind;
-use dermis_golden::scene::Scene;
+use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::scene::Scene;
+use dermis_golden::wire::link::slip::{END, IDLE};
+use dermis_golden::wire::link::{Counters, Decoder, Identity, Kind, Packet, PacketError};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::{generate_board, generate_board_changed, BoardDevice};
 use dermis_sim::cosim::hardware::Simulator;

@@ -19,9 +19,9 @@
 //! | label the quads and add the moments | 20 Q + 4 |
 //! | middle: for each contact its row and column | 2 (row + column) + 9 |
 
-use crate::quads::Quads;
-use crate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
-use crate::sensor::Sensor;
+use crate::estimate::segment::{neighbours, Basins, Join, Segmenter, BASINS, NONE, WEIGHT_BITS, WORD_BITS};
+use crate::spec::quads::Quads;
+use crate::spec::sensor::Sensor;
 
 /// Width of a tap in the memory of the hardware: a weight up to one.
 pub const TAP_BITS: usize = WEIGHT_BITS as usize + 1;
@@ -180,7 +180,7 @@ fn cleared(basins: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::segment::WIDTH;
+    use crate::estimate::segment::WIDTH;
 
     /// Taps cover a line from its first place to its last, in windows that move by at most one place.
     #[test]

@@ -1,0 +1,166 @@
+//! Errors of frames; each names file, field and value.
+
+use crate::spec::sensor::{Sensor, SensorError};
+use thiserror::Error;
+
+/// A frame cannot be used.
+#[derive(Debug, Error)]
+pub enum FrameError {
+    /// The file cannot be read as text.
+    #[error("{file}: cannot be read: {source}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file is larger than a frame may be; it is rejected before it is read.
+    #[error("{file}: over {limit} bytes, too large for a frame")]
+    TooLarge {
+        /// Path as given.
+        file: String,
+        /// Largest size in bytes.
+        limit: u64,
+    },
+    /// A folder has no frame.
+    #[error("{file}: has no frames; their file names end in .json or .csv")]
+    NoFrames {
+        /// Path as given.
+        file: String,
+    },
+    /// The file name ends in neither `.json` nor `.csv`.
+    #[error("{file}: a frame's file name ends in .json or .csv")]
+    UnknownKind {
+        /// Path as given.
+        file: String,
+    },
+    /// The text is not valid JSON, is truncated, or a value has the wrong type.
+    #[error("{file}, line {line}, column {column}{}: {message}", in_field(field))]
+    Json {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// Path of the field, if known.
+        field: Option<String>,
+        /// Error of the JSON reader.
+        message: String,
+    },
+    /// A value is out of range.
+    #[error("{file}: {field} = {value} is not allowed; it must be {allowed}")]
+    WrongValue {
+        /// Path as given.
+        file: String,
+        /// The field.
+        field: &'static str,
+        /// The value found.
+        value: f64,
+        /// The allowed values, in words.
+        allowed: &'static str,
+    },
+    /// The file has no sensor, and no scene was given to take one from.
+    #[error("{file}: no sensor in the file; name a scene")]
+    NoSensor {
+        /// Path as given.
+        file: String,
+    },
+    /// A size of the frame's sensor is out of range.
+    #[error("{file}: sensor.{source}")]
+    Sensor {
+        /// Path as given.
+        file: String,
+        /// Field, value and what is allowed.
+        source: SensorError,
+    },
+    /// A field has more or fewer values than the sensor has taxels.
+    #[error("{file}: {field} has {got} values, wanted {wanted}")]
+    WrongCount {
+        /// Path as given.
+        file: String,
+        /// The field.
+        field: String,
+        /// Number of values found.
+        got: usize,
+        /// Number of values expected.
+        wanted: usize,
+    },
+    /// A value is NaN or infinite.
+    #[error("{file}: {field}[{index}] = {value} is not a finite number")]
+    NotFinite {
+        /// Path as given.
+        file: String,
+        /// The field.
+        field: String,
+        /// Index in the field, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A CSV cell is not a finite number.
+    #[error("{file}, line {line}, value {column}: {value:?} is not a finite number{hint}")]
+    CsvValue {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// Position in the line, from 1.
+        column: usize,
+        /// The text found.
+        value: String,
+        /// A likely reason, or empty.
+        hint: &'static str,
+    },
+    /// A CSV line has more or fewer values than the sensor has columns.
+    #[error("{file}, line {line}: {got} values, wanted {wanted}{hint}")]
+    CsvRagged {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// Number of values found.
+        got: usize,
+        /// Number of columns of the sensor.
+        wanted: usize,
+        /// A likely reason, or empty.
+        hint: &'static str,
+    },
+    /// The frame's sensor is not the scene's.
+    #[error(
+        "frame {frame} and scene {scene} disagree: the frame's sensor is {frame_sensor}, the scene's is {scene_sensor}"
+    )]
+    SensorMismatch {
+        /// The frame's id.
+        frame: String,
+        /// The scene's name.
+        scene: String,
+        /// Sensor of the frame.
+        frame_sensor: Box<Sensor>,
+        /// Sensor of the scene.
+        scene_sensor: Box<Sensor>,
+    },
+}
+
+/// The field's path as it follows line and column.
+fn in_field(field: &Option<String>) -> String {
+    field.as_ref().map_or(String::new(), |field| format!(", {field}"))
+}
+
+/// Checks a number of values.
+pub(super) fn check_count(file: &str, field: &str, got: usize, wanted: usize) -> Result<(), FrameError> {
+    if got == wanted {
+        return Ok(());
+    }
+    Err(FrameError::WrongCount { file: file.to_string(), field: field.to_string(), got, wanted })
+}
+
+/// Checks that all values are finite; the error names the first that is not.
+pub(super) fn check_finite(file: &str, field: &str, values: &[f64]) -> Result<(), FrameError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => {
+            Err(FrameError::NotFinite { file: file.to_string(), field: field.to_string(), index, value: values[index] })
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Frames in JSON. Only `stress_MPa` is required; unknown fields are ignored, at the top level and in every object.
+
+use super::{Contact, Forces, Frame, FrameError};
+use crate::spec::scene::{Medium, Scene};
+use crate::spec::sensor::Sensor;
+use serde::{Deserialize, Serialize};
+
+/// The fields of a file as read.
+#[derive(Deserialize)]
+struct Raw {
+    id: Option<String>,
+    medium: Option<Medium>,
+    source: Option<String>,
+    sensor: Option<Sensor>,
+    contacts: Option<Vec<Contact>>,
+    resultant_N: Option<[f64; 3]>,
+    cell_forces_N: Option<Forces>,
+    stress_MPa: Vec<f64>,
+    notes: Option<String>,
+}
+
+/// The fields of a file as written.
+#[derive(Serialize)]
+struct Written<'a> {
+    id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    medium: Option<Medium>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<&'a str>,
+    sensor: &'a Sensor,
+    contacts: &'a [Contact],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    resultant_N: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cell_forces_N: Option<&'a Forces>,
+    stress_MPa: &'a [f64],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    notes: Option<&'a str>,
+}
+
+impl Frame {
+    /// The frame as JSON that [`Frame::load`] reads back unchanged, on one line.
+    pub fn to_json(&self) -> String {
+        let written = Written {
+            id: &self.id,
+            medium: self.medium,
+            source: self.source.as_deref(),
+            sensor: &self.sensor,
+            contacts: &self.contacts,
+            resultant_N: self.resultant_N,
+            cell_forces_N: self.cell_forces_N.as_ref(),
+            stress_MPa: &self.stress_MPa,
+            notes: self.notes.as_deref(),
+        };
+        // Numbers, texts and lists of them can always be written as JSON.
+        serde_json::to_string(&written).unwrap_or_default()
+    }
+}
+
+/// Reads a frame; `stem` is its id if the text has none, and the scene's sensor is taken if the text has none.
+pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let raw: Raw = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let path = error.path().to_string();
+        // The reader calls the top level "."; where it cannot tell an entry's name, it writes "?".
+        let field = (path != "." && !path.contains('?')).then_some(path);
+        wrong(file, field, error.inner())
+    })?;
+    reader.end().map_err(|error| wrong(file, None, &error))?;
+    if let Some(Medium::BondedLayer { poisson: value }) = raw.medium.filter(|medium| !is_possible(medium)) {
+        let (file, allowed) = (file.to_string(), Medium::POISSON_ALLOWED);
+        return Err(FrameError::WrongValue { file, field: "medium.poisson", value, allowed });
+    }
+    let sensor = raw.sensor.or_else(|| scene.map(|scene| scene.sensor.clone()));
+    let sensor = sensor.ok_or_else(|| FrameError::NoSensor { file: file.to_string() })?;
+    sensor.check().map_err(|source| {
+        let file = file.to_string();
+        FrameError::Sensor { file, source }
+    })?;
+    let frame = Frame {
+        id: raw.id.unwrap_or_else(|| stem.to_string()),
+        medium: raw.medium,
+        source: raw.source,
+        sensor,
+        contacts: raw.contacts.unwrap_or_default(),
+        resultant_N: raw.resultant_N,
+        cell_forces_N: raw.cell_forces_N,
+        stress_MPa: raw.stress_MPa,
+        notes: raw.notes,
+    };
+    frame.check_values(file)?;
+    Ok(frame)
+}
+
+/// Whether the medium's Poisson ratio is in range.
+fn is_possible(medium: &Medium) -> bool {
+    match *medium {
+        Medium::HalfSpace => true,
+        Medium::BondedLayer { poisson } => Medium::allows_poisson(poisson),
+    }
+}
+
+/// The reader's error with line and column stated once, in the terms of JSON.
+fn wrong(file: &str, field: Option<String>, error: &serde_json::Error) -> FrameError {
+    let (line, column) = (error.line(), error.column());
+    let text = error.to_string();
+    let message = text.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&text);
+    // At a line's very start the reader counts column 0.
+    FrameError::Json { file: file.to_string(), line, column: column.max(1), field, message: in_json_words(message) }
+}
+
+/// Replaces Rust type names in a message by JSON terms.
+fn in_json_words(message: &str) -> String {
+    let Some((before, expected)) = message.split_once("expected ") else {
+        return message.to_string();
+    };
+    let expected = match expected {
+        "f64" => "a number",
+        "usize" => "a whole number",
+        "a sequence" => "a list",
+        _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
+        other => other,
+    };
+    let before = before.replace("type: map", "type: object").replace("type: sequence", "type: list");
+    format!("{before}expected {}", expected.replace("an array of length", "a list of length"))
+}

@@ -1,0 +1,139 @@
+//! Reading frames from files, with a limit on their size.
+
+use super::{csv, json, Frame, FrameError};
+use crate::spec::scene::Scene;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read};
+use std::path::Path;
+
+/// Largest frame file in bytes: 64 MB.
+pub const LARGEST_FILE: u64 = 64 << 20;
+
+impl Frame {
+    /// Reads a frame from a `.json` or `.csv` file. A CSV file, or a JSON file without a sensor, takes the scene's;
+    /// [`Frame::check`] compares the sensors if both exist.
+    ///
+    /// # Errors
+    /// Any [`FrameError`] except `SensorMismatch`.
+    pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        let parser = parser(path)?;
+        Frame::parsed(parser, &read(path, &file)?, path, scene)
+    }
+
+    /// Reads every frame of a recording: of a folder the `.json` and `.csv` files in the order of their names, of a CSV
+    /// file one frame after the other, of a JSON file its frame.
+    ///
+    /// ```
+    /// use dermis_golden::{data::frame::Frame, spec::scene::Scene, spec::sensor::Sensor};
+    ///
+    /// let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
+    /// let scene = Scene::of_sensor(&sensor, "small");
+    /// let folder = tempfile::tempdir()?;
+    /// std::fs::write(folder.path().join("zero.csv"), "0.01, 0.02\n-0.01, 0\n0, 0.01\n0, 0\n")?;
+    /// let frames = Frame::load_all(folder.path(), Some(&scene))?;
+    /// assert_eq!((frames.len(), frames[1].stress_MPa[1]), (2, 0.01));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Frame::load`]; [`FrameError::NoFrames`] for a folder without frames.
+    pub fn load_all(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        if path.is_dir() {
+            let unreadable = |source| FrameError::Unreadable { file: file.clone(), source };
+            let entries =
+                std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(unreadable)?;
+            let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).collect();
+            files.retain(|path| parser(path).is_ok());
+            files.sort();
+            let frames: Vec<Vec<Frame>> =
+                files.iter().map(|path| Frame::load_all(path, scene)).collect::<Result<_, _>>()?;
+            let frames = frames.concat();
+            return if frames.is_empty() { Err(FrameError::NoFrames { file }) } else { Ok(frames) };
+        }
+        if is_csv(path) {
+            let text = read(path, &file)?;
+            return csv::parse_all(without_mark(&text), &file, &stem(path), scene);
+        }
+        Ok(vec![Frame::load(path, scene)?])
+    }
+
+    /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
+    ///
+    /// ```
+    /// use dermis_golden::{data::frame::Frame, spec::scene::Scene, spec::sensor::Sensor};
+    ///
+    /// let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
+    /// let scene = Scene::of_sensor(&sensor, "small");
+    /// let csv = Frame::parse("a.csv", "0.01, 0.02\n-0.01, 0\n", Some(&scene))?;
+    /// assert_eq!(csv.stress_MPa, [0.01, 0.02, -0.01, 0.0]);
+    /// let json = Frame::parse("a.json", &csv.to_json(), None)?;
+    /// assert_eq!(json, csv);
+    /// let error = Frame::parse("b.csv", "0.01, x\n0, 0\n", Some(&scene)).unwrap_err();
+    /// assert_eq!(error.to_string(), "b.csv, line 1, value 2: \"x\" is not a finite number");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Frame::load`], except those of the file system.
+    pub fn parse(name: impl AsRef<Path>, text: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+        let name = name.as_ref();
+        Frame::parsed(parser(name)?, text, name, scene)
+    }
+
+    fn parsed(parser: Parser, text: &str, path: &Path, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+        parser(without_mark(text), &path.display().to_string(), &stem(path), scene)
+    }
+}
+
+/// Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// The file's name without its ending.
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn is_csv(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+}
+
+/// Text, file, its stem, scene.
+type Parser = fn(&str, &str, &str, Option<&Scene>) -> Result<Frame, FrameError>;
+
+/// The parser for a file's kind, by its extension.
+fn parser(path: &Path) -> Result<Parser, FrameError> {
+    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+    match extension.as_ref().and_then(|extension| extension.to_str()) {
+        Some("json") => Ok(json::parse),
+        Some("csv") => Ok(csv::parse),
+        _ => Err(FrameError::UnknownKind { file: path.display().to_string() }),
+    }
+}
+
+/// The file's text. Files without a stated size, such as pipes, are read up to the limit.
+fn read(path: &Path, file: &str) -> Result<String, FrameError> {
+    let unreadable = |source: Error| {
+        let file = file.to_string();
+        FrameError::Unreadable { file, source }
+    };
+    let too_large = || {
+        let file = file.to_string();
+        FrameError::TooLarge { file, limit: LARGEST_FILE }
+    };
+    let handle = File::open(path).map_err(unreadable)?;
+    if handle.metadata().map_err(unreadable)?.len() > LARGEST_FILE {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    handle.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(too_large());
+    }
+    String::from_utf8(bytes).map_err(|error| unreadable(Error::new(ErrorKind::InvalidData, error)))
+}

@@ -1,0 +1,115 @@
+//! The scene and the frames of a recording.
+//!
+//! Without a stated cover the scene has no search (`mu_max = 0`): films have no elastic cover of known thickness, so no
+//! shear can be known. Its taxels lie [`BARE_DEPTH`] of the smaller pitch deep, where a force is stress times area.
+//! On dead taxels it is what the neighbours' forces suggest, see `matrices::masked`. With a stated thickness the search is left at its default, and an array that reads no tension
+//! is `unipolar`.
+
+use super::crop::Window;
+use super::error::ImportError;
+use super::measure::Codes;
+use super::recording::Recording;
+use super::summary::{FrameRecord, Summary};
+use crate::data::frame::Frame;
+use crate::spec::scene::Scene;
+use crate::spec::sensor::Sensor;
+use std::fmt::Write as _;
+
+/// Depth of the taxels of a film without cover, over the smaller pitch.
+pub const BARE_DEPTH: f64 = 0.1;
+
+/// What the scene's text needs besides the summary.
+pub(super) struct Facts<'a> {
+    pub sensor: &'a Sensor,
+    /// Whether the user stated the thickness of a cover.
+    pub covered: bool,
+    /// Whether no reading is negative.
+    pub unipolar: bool,
+    /// Dead taxels in the window, row-major; empty if there are none.
+    pub dead: &'a [bool],
+}
+
+/// The scene's TOML text and the scene that it parses to.
+pub(super) fn scene(summary: &Summary, facts: &Facts) -> Result<(String, Scene), ImportError> {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_scene(&mut text, summary, facts);
+    let scene = Scene::parse(&text, &format!("{}.toml", summary.name))?;
+    Ok((text, scene))
+}
+
+fn write_scene(text: &mut String, summary: &Summary, facts: &Facts) -> std::fmt::Result {
+    let (sensor, window) = (facts.sensor, &summary.window);
+    let name = toml::Value::String(summary.name.clone());
+    writeln!(
+        text,
+        "# Written by dermis import: rows {} to {}, columns {} to {} of the recording, stress in MPa.",
+        window.row0,
+        window.row0 + window.rows - 1,
+        window.col0,
+        window.col0 + window.cols - 1
+    )?;
+    writeln!(text, "name = {name}\n\n[sensor]\nrows = {}\ncols = {}", sensor.rows, sensor.cols)?;
+    writeln!(text, "pitch_x_mm = {}\npitch_y_mm = {}", sensor.pitch_x_mm, sensor.pitch_y_mm)?;
+    let remark = if facts.covered { "" } else { "       # no cover is known: a tenth of the pitch" };
+    writeln!(text, "thickness_mm = {}{remark}\n\n[search]", sensor.thickness_mm)?;
+    if !facts.covered {
+        writeln!(text, "mu_max = 0               # without a cover of known thickness no shear can be found")?;
+    }
+    let floor = noise_floor(summary);
+    writeln!(text, "noise_floor_MPa = {floor:.2e}\n\n[input]\nfull_scale_MPa = {}", summary.full_scale_MPa)?;
+    if facts.covered && facts.unipolar {
+        writeln!(text, "unipolar = true")?;
+    }
+    let dead = facts.dead.iter().enumerate().filter(|(_, dead)| **dead);
+    let dead: Vec<String> = dead.map(|(k, _)| format!("[{}, {}]", k / sensor.cols, k % sensor.cols)).collect();
+    if !dead.is_empty() {
+        writeln!(text, "dead = [")?;
+        for line in dead.chunks(12) {
+            writeln!(text, "  {},", line.join(", "))?;
+        }
+        writeln!(text, "]")?;
+    }
+    Ok(())
+}
+
+/// Standard deviation of a reading: the measured noise, at least that of rounding to the step.
+fn noise_floor(summary: &Summary) -> f64 {
+    let Codes { step_MPa, .. } = summary.codes;
+    let rounding = step_MPa.unwrap_or(0.0) / 12f64.sqrt();
+    let measured = summary.noise.loaded_MPa.or(summary.noise.empty_MPa).unwrap_or(0.0);
+    measured.max(rounding)
+}
+
+/// The frames of a window in MPa, with their records.
+pub(super) fn frames(
+    recording: &Recording,
+    window: Window,
+    sensor: &Sensor,
+    name: &str,
+    per_MPa: f64,
+) -> Result<(Vec<Frame>, Vec<FrameRecord>), ImportError> {
+    let area_mm2 = sensor.pitch_x_mm * sensor.pitch_y_mm;
+    let digits = recording.frames.len().to_string().len().max(4);
+    let frame = |(index, raw): (usize, &super::recording::RawFrame)| {
+        let id = format!("{name}-{:0digits$}", index + 1);
+        let stress: Vec<f64> = window.indices(recording.cols).map(|k| raw.values[k] / per_MPa).collect();
+        let normal_N = area_mm2 * stress.iter().sum::<f64>();
+        let outside_N = area_mm2 / per_MPa * raw.values.iter().sum::<f64>() - normal_N;
+        let mut frame = Frame::from_stress(&id, sensor, stress)?;
+        let time = raw.time_s.map_or(String::new(), |seconds| format!(", {seconds:.4} s"));
+        frame.source = Some(format!("recording, frame {}{time}", raw.number));
+        let record = FrameRecord {
+            file: format!("frames/{id}.json"),
+            number: raw.number,
+            time_s: raw.time_s,
+            normal_N,
+            // Differences of sums as small as their rounding are none.
+            outside_N: if outside_N.abs() <= 1e-9 * normal_N.abs() { 0.0 } else { outside_N },
+            device_N: raw.device.map(|figure| figure.force_N(area_mm2 / per_MPa)),
+        };
+        Ok((frame, record))
+    };
+    let all = recording.frames.iter().enumerate().map(frame).collect::<Result<Vec<_>, ImportError>>()?;
+    Ok(all.into_iter().unzip())
+}

@@ -1,0 +1,239 @@
+//! The formats on excerpts of real recordings (`data/recordings`), on arrays that NumPy wrote, and on damaged files.
+
+use super::*;
+use crate::estimate::float::Golden;
+
+const ISCAN: &[u8] = include_bytes!("../../../data/recordings/iscan-finger.csv");
+const FSCAN: &[u8] = include_bytes!("../../../data/recordings/fscan-walk.asf");
+const EMED: &[u8] = include_bytes!("../../../data/recordings/emed-step.lst");
+
+/// 1 MPa for a count of 255.
+fn counts() -> Settings {
+    Settings { full_scale_MPa: Some(1.0), ..Settings::default() }
+}
+
+fn message(file: &str, bytes: &[u8], settings: &Settings) -> String {
+    import(file, bytes, settings).err().map(|error| error.to_string()).unwrap()
+}
+
+#[test]
+fn tekscan_counts_with_pads_and_raw_sums() {
+    let imported = import("iscan-finger.csv", ISCAN, &counts()).unwrap();
+    let (summary, sensor) = (&imported.summary, &imported.scene.sensor);
+    assert_eq!((summary.format, summary.unit, summary.array), (Format::Tekscan, Unit::Raw, [28, 28]));
+    assert_eq!(summary.device.as_deref(), Some("Tekscan 6900"));
+    // Four pads of 11×11 with a gap of two; the lines without sensels around them are left out.
+    assert_eq!(summary.window, Window { row0: 2, col0: 2, rows: 24, cols: 24 });
+    assert_eq!((summary.missing, imported.scene.input.dead.len()), (24 * 24 - 4 * 11 * 11, 24 * 24 - 4 * 11 * 11));
+    assert_eq!((sensor.pitch_x_mm, sensor.pitch_y_mm, sensor.thickness_mm), (1.27, 1.27, 0.127));
+    // "Frame 60, 5.96,, …": the sums of the file's lines are those of the readings.
+    let first = &summary.frames[0];
+    assert_eq!((summary.frames.len(), first.number, first.time_s), (24, 60, Some(5.96)));
+    for (frame, record) in imported.frames.iter().zip(&summary.frames) {
+        let closure = record.closure().unwrap();
+        assert!(closure.abs() < 1e-12, "{}: {closure}", frame.id);
+        let force = 1.27 * 1.27 * frame.stress_MPa.iter().sum::<f64>();
+        assert!((force - record.normal_N).abs() < 1e-12 * force);
+    }
+    assert_eq!(summary.outside_share(), 0.0);
+    // Counts of 8 bits in steps of one.
+    assert!((summary.codes.step_MPa.unwrap() * 255.0 - 1.0).abs() < 1e-12);
+    assert_eq!((summary.codes.bits, summary.codes.at_full_scale), (Some(8), 0));
+}
+
+#[test]
+fn tekscan_in_kilopascal_around_the_foot() {
+    let imported = import("fscan-walk.asf", FSCAN, &Settings { crop: Crop::Contact, ..Settings::default() }).unwrap();
+    let summary = &imported.summary;
+    assert_eq!((summary.unit, summary.array, summary.full_scale_MPa), (Unit::KiloPa, [60, 21], 1.51473));
+    assert_eq!((summary.frames.len(), summary.frames[1].time_s), (12, Some(0.032)));
+    assert!(summary.window.rows < 60 && summary.window.cols < 21, "{:?}", summary.window);
+    // Row 24 of the first frame, "0,0,18,36,59,42,…" kPa.
+    let Window { row0, col0, cols, .. } = summary.window;
+    let first = &imported.frames[0];
+    let own = |row: usize, col: usize| first.stress_MPa[(row - row0) * cols + col - col0];
+    assert_eq!([own(23, 2), own(23, 3), own(23, 4)], [0.018, 0.036, 0.059]);
+    // The heel and its margin have the whole load.
+    assert!(summary.outside_share() < 0.01, "{}", summary.outside_share());
+    // Without a force in the file there is no closure.
+    assert_eq!(summary.closure(), None);
+}
+
+#[test]
+fn novel_pictures_close_to_the_printed_force() {
+    let imported = import("emed-step.lst", EMED, &Settings::default()).unwrap();
+    let summary = &imported.summary;
+    assert_eq!((summary.format, summary.unit, summary.array), (Format::Lst, Unit::KiloPa, [54, 22]));
+    assert_eq!((summary.frames.len(), summary.frames[0].number, summary.frames[0].time_s), (8, 30, Some(0.29)));
+    // Forces are printed in steps of N/8.
+    let [largest, _] = summary.closure().unwrap();
+    assert!(largest < 1e-3, "{largest}");
+    assert!(summary.frames.iter().all(|frame| frame.device_N.unwrap() > 700.0 && frame.outside_N == 0.0));
+    assert!(imported.scene.input.dead.is_empty());
+    // On a tenth of the area the same forces take N/cm²; on a quarter no unit explains them.
+    let pitch = |cm: &str| decoded(EMED).replace("0.500x0.500 cm", &format!("{cm}x{cm} cm"));
+    let tenth = import("emed.lst", pitch("0.1581").as_bytes(), &Settings::default()).unwrap();
+    assert_eq!((tenth.summary.unit, tenth.scene.sensor.pitch_x_mm), (Unit::NewtonPerCm2, 1.581));
+    let quarter = message("emed.lst", pitch("0.25").as_bytes(), &Settings::default());
+    assert!(quarter.starts_with("emed.lst: the unit is missing; give it with --units"), "{quarter}");
+}
+
+#[test]
+fn without_a_cover_there_is_normal_force_and_no_shear() {
+    let settings = Settings { frames: Some([3, 4]), ..counts() };
+    let imported = import("iscan-finger.csv", ISCAN, &settings).unwrap();
+    assert_eq!((imported.scene.search.mu_max, imported.scene.input.unipolar), (0.0, false));
+    assert_eq!(imported.summary.frames[0].number, 62);
+    let result = Golden::new(&imported.scene).unwrap().run(&imported.frames[0]).unwrap();
+    assert_eq!(&result.resultant_N[..2], &[0.0, 0.0]);
+    // At a depth of a tenth of the pitch a force is stress times area; those on dead taxels come from the neighbours'.
+    let cols = imported.scene.sensor.cols;
+    let is_dead = |k: usize| imported.scene.input.dead.contains(&[k / cols, k % cols]);
+    let alive: f64 = result.forces_N.fz.iter().enumerate().filter(|(k, _)| !is_dead(*k)).map(|(_, force)| force).sum();
+    let share = alive / imported.summary.frames[0].normal_N;
+    assert!((share - 1.0).abs() < 0.01, "{share}");
+    // The finger lies over the gap between the pads.
+    assert!(result.resultant_N[2] > 1.01 * alive, "{} {alive}", result.resultant_N[2]);
+    // Stated to read 0, they have no force.
+    let zero = import("iscan-finger.csv", ISCAN, &Settings { missing_as_zero: true, ..settings.clone() }).unwrap();
+    assert_eq!((zero.summary.missing, zero.scene.input.dead.len()), (imported.summary.missing, 0));
+    let result = Golden::new(&zero.scene).unwrap().run(&zero.frames[0]).unwrap();
+    assert!((result.resultant_N[2] / imported.summary.frames[0].normal_N - 1.0).abs() < 0.01);
+    let covered = import("iscan-finger.csv", ISCAN, &Settings { thickness_mm: Some(2.0), ..settings }).unwrap();
+    assert!(covered.scene.search.mu_max > 0.0 && covered.scene.input.unipolar);
+    assert_eq!(covered.scene.sensor.thickness_mm, 2.0);
+}
+
+#[test]
+fn saved_and_opened_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = Settings { name: Some("finger 1".into()), frames: Some([1, 2]), ..counts() };
+    let imported = import("iscan-finger.csv", ISCAN, &settings).unwrap();
+    let path = imported.save(&folder.path().join("a/b")).unwrap();
+    assert_eq!(path, folder.path().join("a/b/finger 1.toml"));
+    let opened = Imported::open(&folder.path().join("a/b")).unwrap();
+    assert_eq!(
+        (&opened.scene, &opened.frames, &opened.summary),
+        (&imported.scene, &imported.frames, &imported.summary)
+    );
+    let summary = folder.path().join("a/b/recording.json");
+    std::fs::write(&summary, "{\"name\": 1}").unwrap();
+    let error = Imported::open(&folder.path().join("a/b")).unwrap_err().to_string();
+    assert!(error.contains("recording.json, line 1, column 10"), "{error}");
+    let error = Imported::open(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("recording.json: cannot be read"), "{error}");
+}
+
+/// Unit and pitch of the arrays below.
+fn stated() -> Settings {
+    Settings { unit: Some(Unit::MegaPa), pitch_mm: Some([2.0, 3.0]), ..Settings::default() }
+}
+
+#[test]
+fn arrays_that_numpy_wrote() {
+    macro_rules! array {
+        ($name:literal) => {
+            include_bytes!(concat!("../../../data/recordings/numpy/", $name, ".npy"))
+        };
+    }
+    let a = |frame: usize, k: usize| 100.0 * frame as f64 + 10.0 * (k / 4) as f64 + (k % 4) as f64;
+    let lines = Settings { size: Some([3, 4]), ..stated() };
+    type Value = fn(f64) -> f64;
+    let cases: [(&str, &[u8], Settings, usize, Value); 6] = [
+        ("i2", array!("i2"), stated(), 0, |a| a - 5.0),
+        ("f4-fortran", array!("f4-fortran"), stated(), 0, |a| a),
+        ("f8-big", array!("f8-big"), stated(), 0, |a| a / 8.0),
+        ("u1-lines", array!("u1-lines"), lines.clone(), 0, |a| a),
+        ("f2-frame", array!("f2-frame"), stated(), 1, |a| a / 16.0),
+        ("i8-lines-fortran", array!("i8-lines-fortran"), lines, 0, |a| -a),
+    ];
+    for (name, bytes, settings, first, value) in cases {
+        let imported = import("a.npy", bytes, &settings).unwrap();
+        let dead = if name == "f4-fortran" { 1 } else { 0 };
+        assert_eq!(imported.summary.missing, dead, "{name}");
+        assert_eq!(imported.frames.len(), if first == 0 { 2 } else { 1 }, "{name}");
+        for (index, frame) in imported.frames.iter().enumerate() {
+            for (k, stress) in frame.stress_MPa.iter().enumerate().take(12 - dead) {
+                assert_eq!(*stress, value(a(first + index, k)), "{name} {index} {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn plain_csv_with_times_names_and_missing_values() {
+    let settings = Settings { size: Some([2, 3]), ..stated() };
+    let read = |text: &str| import("p.csv", text.as_bytes(), &settings).unwrap();
+    let plain = read("0,1,2,3,4,5\n\n6,7,8,9,10,11\n");
+    assert_eq!(plain.frames[1].stress_MPa, [6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+    for text in [
+        "# a remark\ntime;a;b;c;d;e;f\n0,5;0,25;1;2;3;;5\n",
+        "0.5\t0.25\t1\t2\t3\tNaN\t5\n",
+        "0.5  0.25 1 2   3 B 5\n",
+        "0.5,0.25,1,2,3,,5",
+    ] {
+        let imported = read(text);
+        assert_eq!(imported.frames[0].stress_MPa, [0.25, 1.0, 2.0, 3.0, 0.0, 5.0], "{text}");
+        assert_eq!((imported.summary.frames[0].time_s, imported.scene.input.dead), (Some(0.5), vec![[1, 1]]), "{text}");
+    }
+}
+
+#[test]
+fn what_is_missing_or_wrong_is_named() {
+    let none = Settings::default();
+    let tekscan = |from: &str, to: &str| decoded(ISCAN).replacen(from, to, 1);
+    let cases = [
+        (message("a.bin", b"0,1", &none), "a.bin: the format is not recognised; give it with --format"),
+        (message("a.csv", ISCAN, &none), "a.csv: the full scale is missing; raw counts have no stress"),
+        (message("a.csv", tekscan("ROWS 28", "ROWS x").as_bytes(), &counts()), "a.csv: ROWS = x is not allowed"),
+        (message("a.csv", tekscan("ROWS 28\n", "").as_bytes(), &counts()), "a.csv: ROWS is missing"),
+        (
+            message("a.csv", tekscan("UNITS raw", "UNITS bar").as_bytes(), &counts()),
+            "a.csv: UNITS = bar is not allowed",
+        ),
+        (
+            message("a.csv", tekscan("B,B,0,0", "B,B,0,x").as_bytes(), &counts()),
+            "a.csv, line 31, value 17: \"x\" is not allowed; it must be a number",
+        ),
+        (
+            message("a.csv", tekscan("B,B,0,0", "B,B,0").as_bytes(), &counts()),
+            "a.csv, line 31: \"B,B,5,0,0,0,0,0,0,0,0,0,0,B,B,0,0,0,0,0,\" is not allowed; it must be 28 values",
+        ),
+        (message("a.csv", &ISCAN[..ISCAN.len() / 2], &counts()), "a.csv, line 3"),
+        (message("a.lst", &EMED[..2000], &none), "a.lst, line "),
+        (message("a.npy", b"\x93NUMPY\x01\x00", &none), "a.npy: the NumPy header = cut off is not allowed"),
+        (message("a.csv", b"1,2,3,4", &Settings { size: Some([2, 2]), ..none.clone() }), "a.csv: the unit is missing"),
+        (
+            message("a.csv", b"1,2,3", &Settings { size: Some([2, 2]), ..stated() }),
+            "a.csv, line 1: \"1,2,3\" is not allowed; it must be 4 values, --size 2x2, not 3",
+        ),
+        (
+            message("a.csv", ISCAN, &Settings { frames: Some([20, 25]), ..counts() }),
+            "a.csv: --frames = 20..25 is not allowed; it must be within 1..24",
+        ),
+        (
+            message("a.csv", ISCAN, &Settings { crop: Crop::Lines { rows: [0, 28], cols: [0, 9] }, ..counts() }),
+            "a.csv: --crop = 0..28,0..9 is not allowed; it must be rows within 0..27",
+        ),
+        (message("a.csv", ISCAN, &Settings { name: Some("../up".into()), ..counts() }), "../up.toml: name = \"../up\""),
+    ];
+    for (message, start) in cases {
+        assert!(message.starts_with(start), "{message}\nwanted {start}");
+    }
+}
+
+#[test]
+fn arrays_larger_than_a_scene_are_cropped_around_the_contact_or_refused() {
+    let mut taxels = vec!["0"; 60 * 60];
+    taxels[60 * 20 + 30] = "0.5";
+    let settings = Settings { size: Some([60, 60]), ..stated() };
+    let imported = import("large.csv", taxels.join(",").as_bytes(), &settings).unwrap();
+    assert_eq!(imported.summary.window, Window { row0: 18, col0: 28, rows: 5, cols: 5 });
+    let all = message("large.csv", ["0.5"; 60 * 60].join(",").as_bytes(), &settings);
+    assert!(
+        all.starts_with("large.csv: size = 60×60 is not allowed; it must be at least 2×2 and at most 2304"),
+        "{all}"
+    );
+    let unloaded = message("large.csv", ["0"; 60 * 60].join(",").as_bytes(), &settings);
+    assert!(unloaded.contains("the contact is missing"), "{unloaded}");
+}

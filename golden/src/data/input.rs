@@ -1,0 +1,187 @@
+//! Input: from the readings of a real sensor to stress.
+//!
+//! ```text
+//!    frames ── average ── calibrate ── (unipolar: tension for clipped readings) ── stress ── engine ── forces
+//!                          b = gain · (reading − zero),  zero = the tare frame, else the table's offset
+//! ```
+//!
+//! | `[input]` | meaning |
+//! |---|---|
+//! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
+//! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
+//! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
+//! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
+//! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::estimate::float`] |
+//!
+//! The table is made from recordings under known loads by [`known_loads`].
+//!
+//! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
+
+pub mod calibration;
+pub mod known_loads;
+pub mod tare;
+#[cfg(test)]
+mod tests;
+
+use crate::data::frame::{Frame, FrameError};
+use crate::spec::scene::{InputSpec, Scene};
+use crate::spec::sliding;
+use calibration::{Calibration, CalibrationError};
+use tare::Tare;
+use thiserror::Error;
+
+/// A scene's input options with their files loaded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// Zero and gain of each taxel, if the scene has a table or a tare frame.
+    scale: Option<(Vec<f64>, Vec<f64>)>,
+    /// Standard deviation of a calibrated frame in MPa as the scene states it, else 0.
+    stated_noise_MPa: f64,
+    /// The same of each taxel, from tare frames, and the number of those; `None` where the scene states it.
+    taxel_noise_MPa: Option<(Vec<f64>, usize)>,
+    spec: InputSpec,
+}
+
+/// Input options or frames cannot be used.
+#[derive(Debug, Error)]
+pub enum InputError {
+    /// The calibration table cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// The tare frame, or a frame to average, cannot be used.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The number of frames is not 2^k.
+    #[error("scene {scene}: input.average = {average} takes {wanted} frames at a time, got {got}")]
+    Count {
+        /// The scene's name.
+        scene: String,
+        /// k.
+        average: u32,
+        /// 2^k.
+        wanted: usize,
+        /// Number of frames given.
+        got: usize,
+    },
+}
+
+impl Input {
+    /// Loads the calibration table and the tare frame that the scene names.
+    ///
+    /// # Errors
+    /// [`InputError`] if the table or tare frame cannot be read or does not fit the sensor.
+    pub fn new(scene: &Scene) -> Result<Input, InputError> {
+        let spec = &scene.input;
+        let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
+        let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
+        let stated_noise_MPa = scene.search.noise_floor_MPa;
+        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec: spec.clone() };
+        if table.is_none() && tare.is_none() {
+            return Ok(input);
+        }
+        let Calibration { offset, gain } = table.unwrap_or_else(|| Calibration::identity(scene.sensor.taxels()));
+        let Some(Tare { zero, spread, frames: taken }) = tare else {
+            return Ok(Input { scale: Some((offset, gain)), ..input });
+        };
+        let noise = |spread: Vec<f64>| (spread.iter().zip(&gain).map(|(s, gain)| s * gain.abs()).collect(), taken);
+        let taxel_noise_MPa = spread.filter(|_| stated_noise_MPa == 0.0).map(noise);
+        Ok(Input { taxel_noise_MPa, scale: Some((zero, gain)), ..input })
+    }
+
+    /// Standard deviation in MPa of a taxel of a calibrated mean, of a sliding one of many frames: as the scene states it,
+    /// else as the tare frames show it, the root mean square over the taxels; 0 if neither does.
+    pub fn noise_MPa(&self) -> f64 {
+        self.noise_of_mean_MPa(usize::MAX)
+    }
+
+    /// The same for the mean of the `frames` frames so far, at least one; a block always has its 2^k.
+    pub fn noise_of_mean_MPa(&self, frames: usize) -> f64 {
+        let share = self.spec.variance_share(frames);
+        match &self.taxel_noise_MPa {
+            // The zero has noise of its own, that of a mean of the tare frames.
+            Some((noise, taken)) => root_mean_square(noise) * (share + 1.0 / *taken as f64).sqrt(),
+            None => self.stated_noise_MPa * share.sqrt(),
+        }
+    }
+
+    /// The noise of each taxel over that of [`Input::noise_MPa`], where tare frames show it and the scene does not state
+    /// it; row-major.
+    pub fn noise_shares(&self) -> Option<Vec<f64>> {
+        let (noise, _) = self.taxel_noise_MPa.as_ref()?;
+        let mean = root_mean_square(noise);
+        Some(noise.iter().map(|noise| noise / mean).collect())
+    }
+
+    /// The mean of frames, each checked against the scene. Of a block of 2^k frames, id and known forces are those of the
+    /// first; of a sliding mean, of all frames since the start, those of the last.
+    ///
+    /// # Errors
+    /// [`InputError::Count`] unless there are 2^k frames, of a sliding mean at least one; [`InputError::Frame`] if one is
+    /// not of the scene's sensor.
+    pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
+        let (average, wanted, got) = (self.spec.average, self.spec.frames_per_result(), frames.len());
+        let ([first, ..], [.., last]) = (frames, frames) else {
+            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
+        };
+        frames.iter().try_for_each(|frame| frame.check(scene))?;
+        if self.spec.slides() {
+            let mut mean = vec![0.0; first.stress_MPa.len()];
+            for (number, frame) in (1..).zip(frames) {
+                sliding::add(&mut mean, &frame.stress_MPa, number, average);
+            }
+            return Ok(Frame { stress_MPa: mean, ..last.clone() });
+        }
+        if got != wanted {
+            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
+        }
+        let mut mean = first.clone();
+        for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
+            // Divided before adding, so that the sum does not overflow.
+            *b = frames.iter().map(|frame| frame.stress_MPa[index] / got as f64).sum();
+        }
+        Ok(mean)
+    }
+
+    /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
+    pub fn zero(&self) -> Option<&[f64]> {
+        self.scale.as_ref().map(|(zero, _)| zero.as_slice())
+    }
+
+    /// The largest share of the stated full scale that the frames of one reconstruction reach; `None` if the scene
+    /// states none. Counted are, of every live taxel, each reading and its zero at the largest gain, as the converter's
+    /// code holds them, and each calibrated reading.
+    pub fn full_scale_share(&self, readings: &[Frame]) -> Option<f64> {
+        let full_scale_MPa = self.spec.full_scale_MPa?;
+        let unity = (Vec::new(), Vec::new());
+        let (zeros, gains) = self.scale.as_ref().unwrap_or(&unity);
+        let (zero, gain) = (|k: usize| *zeros.get(k).unwrap_or(&0.0), |k: usize| *gains.get(k).unwrap_or(&1.0));
+        let largest_gain = gains.iter().map(|gain| gain.abs()).reduce(f64::max).unwrap_or(1.0);
+        let share = |frame: &Frame| {
+            let live = |k: &usize| !self.spec.is_dead([*k / frame.sensor.cols, *k % frame.sensor.cols]);
+            let stress = |k: usize| {
+                let reading = frame.stress_MPa[k];
+                let code = largest_gain * reading.abs().max(zero(k).abs());
+                code.max((gain(k) * (reading - zero(k))).abs())
+            };
+            (0..frame.stress_MPa.len()).filter(live).map(stress).fold(0.0, f64::max) / full_scale_MPa
+        };
+        Some(readings.iter().map(share).fold(0.0, f64::max))
+    }
+
+    /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
+    /// frame. Dead taxels become 0.
+    pub fn calibrate(&self, frame: &Frame) -> Frame {
+        let mut frame = frame.clone();
+        if let Some((zero, gain)) = &self.scale {
+            for (b, (zero, gain)) in frame.stress_MPa.iter_mut().zip(zero.iter().zip(gain)) {
+                *b = gain * (*b - zero);
+            }
+        }
+        frame.mask_dead(&self.spec.dead)
+    }
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}

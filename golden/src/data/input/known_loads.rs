@@ -1,0 +1,311 @@
+//! Known loads: offset and gain of every taxel from recordings under known uniform stresses.
+//!
+//! The readings r of a taxel under the stresses s_1 … s_n, each the mean of its frames, are fitted by
+//!
+//! ```text
+//! r = offset + s / gain          least squares, every load with the same weight
+//! ```
+//!
+//! with the error in r, since the stress is known. What the table is worth is told by loads that had no part in it: each
+//! load in turn is left out, the table of the others is applied to its readings, and the difference from its stress is its
+//! residual. The smallest and the largest load are extrapolated then.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: loads | stress, frames of readings | MPa, unit of the readings |
+//! | out: table | offset, gain per taxel | unit of the readings, MPa per unit |
+//! | out: residuals | mean, root mean square, largest per load | MPa |
+//! | out: noise | root mean square over the taxels, of one frame | MPa |
+//! | out: dead taxels | list | row, column |
+
+use super::calibration::Calibration;
+use crate::data::frame::{Frame, FrameError};
+use crate::spec::scene::Scene;
+use serde::Serialize;
+use thiserror::Error;
+
+/// A taxel is dead where its reading changes by less than this share of the median taxel's, or the other way.
+const DEAD_SHARE: f64 = 0.1;
+/// Fewest loads for residuals: two for the table, one left out.
+const FEWEST_FOR_RESIDUALS: usize = 3;
+
+/// Readings under a known uniform stress.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownLoad {
+    /// The stress on every taxel in MPa.
+    pub stress_MPa: f64,
+    /// Frames of readings, at least one.
+    pub frames: Vec<Frame>,
+}
+
+/// What a load shows of the table of the other loads.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Residual {
+    /// The load's stress in MPa.
+    pub stress_MPa: f64,
+    /// Number of its frames.
+    pub frames: usize,
+    /// Mean over the live taxels, in MPa.
+    pub mean_MPa: f64,
+    /// Root mean square over the live taxels, in MPa.
+    pub rms_MPa: f64,
+    /// The largest, with its sign, in MPa.
+    pub largest_MPa: f64,
+    /// Its taxel, [row, col].
+    pub taxel: [usize; 2],
+}
+
+/// A calibration and what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadFit {
+    /// Offset and gain of each taxel; a dead one has the median gain.
+    pub table: Calibration,
+    /// Taxels whose reading does not follow the load, [row, col].
+    pub dead: Vec<[usize; 2]>,
+    /// Standard deviation of a live taxel in one frame in MPa; `None` if no load has two frames.
+    pub noise_MPa: Option<f64>,
+    /// Largest gain times largest reading in MPa: the least `input.full_scale_MPa`.
+    pub full_scale_MPa: f64,
+    /// Residuals of the loads, each left out of the table that it is compared with; empty with two different loads.
+    pub residuals: Vec<Residual>,
+}
+
+/// Recordings give no calibration.
+#[derive(Debug, Error)]
+pub enum LoadError {
+    /// A frame is not of the scene's sensor.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The loads are too few or all the same.
+    #[error("{different} different loads: a calibration takes at least two")]
+    TooFew {
+        /// Number of different stresses.
+        different: usize,
+    },
+    /// The readings are the same under all loads.
+    #[error("the readings of most taxels do not change from {low} to {high} MPa")]
+    NoChange {
+        /// Smallest stress in MPa.
+        low: f64,
+        /// Largest stress in MPa.
+        high: f64,
+    },
+    /// A value is not finite.
+    #[error("the readings are too large: gain or offset of taxel {row},{col} is not finite")]
+    NotFinite {
+        /// Row of the taxel.
+        row: usize,
+        /// Its column.
+        col: usize,
+    },
+}
+
+impl LoadFit {
+    /// Fits the table of the scene's sensor.
+    ///
+    /// ```
+    /// use dermis_golden::data::frame::Frame;
+    /// use dermis_golden::data::input::known_loads::{KnownLoad, LoadFit};
+    /// use dermis_golden::spec::scene::Scene;
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let load = |stress_MPa: f64| -> Result<KnownLoad, Box<dyn std::error::Error>> {
+    ///     let frame = Frame::from_stress("counts", &scene.sensor, vec![120.0 + stress_MPa / 0.0005; 64])?;
+    ///     Ok(KnownLoad { stress_MPa, frames: vec![frame] })
+    /// };
+    /// let fit = LoadFit::new(&scene, &[load(0.0)?, load(0.1)?, load(0.2)?])?;
+    /// assert!((fit.table.gain[63] - 0.0005).abs() < 1e-12 && (fit.table.offset[0] - 120.0).abs() < 1e-9);
+    /// assert!(fit.dead.is_empty() && fit.residuals.iter().all(|residual| residual.rms_MPa < 1e-12));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`LoadError`]
+    pub fn new(scene: &Scene, loads: &[KnownLoad]) -> Result<LoadFit, LoadError> {
+        loads.iter().flat_map(|load| &load.frames).try_for_each(|frame| frame.check(scene))?;
+        let taxels = scene.sensor.taxels();
+        let place = |k: usize| [k / scene.sensor.cols, k % scene.sensor.cols];
+        let means: Vec<(f64, Vec<f64>)> =
+            loads.iter().map(|load| (load.stress_MPa, mean(&load.frames, taxels))).collect();
+        let all: Vec<&(f64, Vec<f64>)> = means.iter().collect();
+        if different(&all) < 2 {
+            return Err(LoadError::TooFew { different: different(&all) });
+        }
+        let (table, live) = table(&all, taxels);
+        if live.iter().filter(|live| **live).count() * 2 < taxels {
+            let stresses = || loads.iter().map(|load| load.stress_MPa);
+            let (low, high) = (stresses().fold(f64::INFINITY, f64::min), stresses().fold(f64::NEG_INFINITY, f64::max));
+            return Err(LoadError::NoChange { low, high });
+        }
+        let finite = |k: &usize| table.gain[*k].is_finite() && table.offset[*k].is_finite() && table.gain[*k] != 0.0;
+        if let Some(k) = (0..taxels).find(|k| !finite(k)) {
+            let [row, col] = place(k);
+            return Err(LoadError::NotFinite { row, col });
+        }
+        let residual = |left_out: usize| -> Option<Residual> {
+            let others: Vec<&(f64, Vec<f64>)> =
+                means.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, mean)| mean).collect();
+            let (others, _) = (different(&others) >= 2).then(|| self::table(&others, taxels))?;
+            let (stress_MPa, readings) = &means[left_out];
+            let off = |k: usize| others.gain[k] * (readings[k] - others.offset[k]) - stress_MPa;
+            let live: Vec<usize> = (0..taxels).filter(|&k| live[k]).collect();
+            let sum = |of: fn(f64) -> f64| live.iter().map(|&k| of(off(k))).sum::<f64>() / live.len() as f64;
+            let largest = live.iter().copied().max_by(|&a, &b| off(a).abs().total_cmp(&off(b).abs()))?;
+            Some(Residual {
+                stress_MPa: *stress_MPa,
+                frames: loads[left_out].frames.len(),
+                mean_MPa: sum(|off| off),
+                rms_MPa: sum(|off| off * off).sqrt(),
+                largest_MPa: off(largest),
+                taxel: place(largest),
+            })
+        };
+        let enough = different(&all) >= FEWEST_FOR_RESIDUALS;
+        let residuals = (0..loads.len()).filter(|_| enough).filter_map(residual).collect();
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+        let readings = &mut loads.iter().flat_map(|load| &load.frames).flat_map(|frame| {
+            let live = &live;
+            frame.stress_MPa.iter().enumerate().filter(|(k, _)| live[*k]).map(|(_, reading)| *reading)
+        });
+        Ok(LoadFit {
+            noise_MPa: noise(loads, &means, &table, &live),
+            full_scale_MPa: largest(&mut table.gain.iter().copied()) * largest(readings),
+            dead: (0..taxels).filter(|&k| !live[k]).map(place).collect(),
+            table,
+            residuals,
+        })
+    }
+}
+
+/// The mean reading of each taxel.
+fn mean(frames: &[Frame], taxels: usize) -> Vec<f64> {
+    let share = |k: usize| frames.iter().map(|frame| frame.stress_MPa[k] / frames.len() as f64).sum();
+    (0..taxels).map(share).collect()
+}
+
+/// Number of different stresses.
+fn different(means: &[&(f64, Vec<f64>)]) -> usize {
+    let mut stresses: Vec<f64> = means.iter().map(|(stress, _)| *stress).collect();
+    stresses.sort_by(f64::total_cmp);
+    stresses.dedup();
+    stresses.len()
+}
+
+/// Table and live taxels of at least two different loads.
+fn table(means: &[&(f64, Vec<f64>)], taxels: usize) -> (Calibration, Vec<bool>) {
+    let count = means.len() as f64;
+    let centre = means.iter().map(|(stress, _)| stress / count).sum::<f64>();
+    let spread: f64 = means.iter().map(|(stress, _)| (stress - centre).powi(2)).sum();
+    let middle = |k: usize| means.iter().map(|(_, readings)| readings[k] / count).sum::<f64>();
+    // Against the first load, so that equal readings give exactly 0; the sum of the stresses' differences is 0.
+    let change =
+        |k: usize| means.iter().map(move |(stress, readings)| (stress - centre) * (readings[k] - means[0].1[k]));
+    let slope = |k: usize| change(k).sum::<f64>() / spread;
+    let slopes: Vec<f64> = (0..taxels).map(slope).collect();
+    let mut sorted = slopes.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[taxels / 2];
+    let live: Vec<bool> = slopes.iter().map(|slope| median != 0.0 && slope / median > DEAD_SHARE).collect();
+    let used = |k: usize| if live[k] { slopes[k] } else { median };
+    let gain = (0..taxels).map(|k| 1.0 / used(k)).collect();
+    let offset = (0..taxels).map(|k| middle(k) - if live[k] { slopes[k] * centre } else { 0.0 }).collect();
+    (Calibration { offset, gain }, live)
+}
+
+/// Standard deviation of a live taxel around the mean of its load.
+fn noise(loads: &[KnownLoad], means: &[(f64, Vec<f64>)], table: &Calibration, live: &[bool]) -> Option<f64> {
+    let (mut squares, mut degrees) = (0.0, 0usize);
+    for (load, (_, mean)) in loads.iter().zip(means) {
+        let taxels = || (0..live.len()).filter(|&k| live[k]);
+        let square = |frame: &Frame| -> f64 {
+            taxels().map(|k| (table.gain[k] * (frame.stress_MPa[k] - mean[k])).powi(2)).sum()
+        };
+        squares += load.frames.iter().map(square).sum::<f64>();
+        degrees += taxels().count() * (load.frames.len() - 1);
+    }
+    (degrees > 0).then(|| (squares / degrees as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    const STRESSES: [f64; 4] = [0.0, 0.05, 0.1, 0.2];
+
+    /// Offset and gain of a taxel, all different.
+    fn truth(k: usize) -> (f64, f64) {
+        (100.0 + k as f64, 5e-4 * (1.0 + 0.01 * k as f64))
+    }
+
+    /// Counts under `STRESSES` by `reading` of taxel and stress, with noise in MPa.
+    fn loads(scene: &Scene, noise_MPa: f64, reading: impl Fn(usize, f64) -> f64) -> Vec<KnownLoad> {
+        let mut random = Random::new(4);
+        let mut frame = |stress: f64| {
+            let counts = (0..64).map(|k| reading(k, stress) + random.normal() * noise_MPa / truth(k).1).collect();
+            Frame::from_stress("counts", &scene.sensor, counts).unwrap()
+        };
+        let load = |stress_MPa| KnownLoad { stress_MPa, frames: (0..20).map(|_| frame(stress_MPa)).collect() };
+        STRESSES.map(load).into()
+    }
+
+    fn linear(k: usize, stress: f64) -> f64 {
+        truth(k).0 + stress / truth(k).1
+    }
+
+    #[test]
+    fn offset_gain_and_noise_come_back() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let fit = LoadFit::new(&scene, &loads(&scene, 2e-4, linear)).unwrap();
+        for k in 0..64 {
+            let (offset, gain) = truth(k);
+            assert!((fit.table.gain[k] / gain - 1.0).abs() < 2e-3 && (fit.table.offset[k] - offset).abs() < 0.5);
+        }
+        let noise = fit.noise_MPa.unwrap();
+        assert!((noise / 2e-4 - 1.0).abs() < 0.05 && fit.dead.is_empty(), "{noise}");
+        // A mean of 20 frames, and the table of as many.
+        assert!(fit.residuals.len() == 4 && fit.residuals.iter().all(|r| r.rms_MPa < 2e-4 && r.rms_MPa > 2e-5));
+        let text = fit.table.to_csv(&scene.sensor);
+        assert_eq!(Calibration::parse(&text, "table.csv", &scene.sensor).unwrap(), fit.table);
+    }
+
+    #[test]
+    fn a_curved_characteristic_shows_in_the_residuals() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let curved = |k: usize, stress: f64| linear(k, stress - 0.5 * stress * stress);
+        let residuals = LoadFit::new(&scene, &loads(&scene, 0.0, curved)).unwrap().residuals;
+        // The line through s − s²/2 at 0, 0.1 and 0.2 is 0.00167 + 0.9 s; at 0.05 the readings are 0.04875.
+        let off = (0.04875 - 0.005 / 3.0) / 0.9 - 0.05;
+        assert!((residuals[1].mean_MPa - off).abs() < 1e-9, "{residuals:?}");
+        assert!(residuals.iter().all(|r| r.rms_MPa > 5e-4), "{residuals:?}");
+    }
+
+    #[test]
+    fn dead_taxels_are_listed_and_leave_the_others_alone() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let reading = |k: usize, stress: f64| match k {
+            9 => 77.0,
+            18 => 100.0 - stress / 5e-4,
+            _ => linear(k, stress),
+        };
+        let fit = LoadFit::new(&scene, &loads(&scene, 0.0, reading)).unwrap();
+        assert_eq!(fit.dead, [[1, 1], [2, 2]]);
+        assert!(fit.residuals.iter().all(|residual| residual.rms_MPa < 1e-12));
+        assert!((fit.full_scale_MPa - truth(63).1 * (163.0 + 0.2 / truth(0).1)).abs() < 0.1);
+        let text = fit.table.to_csv(&scene.sensor);
+        assert!(Calibration::parse(&text, "table.csv", &scene.sensor).is_ok());
+    }
+
+    #[test]
+    fn too_few_loads_and_readings_without_change_are_refused() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let all = loads(&scene, 0.0, linear);
+        assert!(LoadFit::new(&scene, &all[..2]).unwrap().residuals.is_empty());
+        for (few, different) in [(&all[..1], 1), (&[all[1].clone(), all[1].clone()][..], 1), (&[][..], 0)] {
+            assert!(matches!(LoadFit::new(&scene, few), Err(LoadError::TooFew { different: d }) if d == different));
+        }
+        let still = loads(&scene, 0.0, |_, _| 5.0);
+        let text = LoadFit::new(&scene, &still).unwrap_err().to_string();
+        assert_eq!(text, "the readings of most taxels do not change from 0 to 0.2 MPa");
+    }
+}

@@ -1,0 +1,114 @@
+//! Tare: frames read without contact. Their mean is the zero of each taxel, their spread its noise.
+//!
+//! ```text
+//! zero_t = mean of the frames          s²_t = (ν s̄² + Σ (reading − zero)²)/(ν + n − 1),  s̄² the mean over the taxels
+//! ```
+//!
+//! The spread of one taxel over a few frames is itself uncertain: it counts as n − 1 readings beside ν = 8 of the whole
+//! array; a dead taxel takes s̄. An array that reads zero without contact, because it reads no tension or its converter is coarse, tells
+//! nothing of its noise; then there is no spread.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: frames | n × taxels | readings |
+//! | out: zero | taxels | readings |
+//! | out: spread | taxels | readings, standard deviation of one frame |
+
+use crate::data::frame::{Frame, FrameError};
+use crate::spec::scene::Scene;
+use std::path::Path;
+
+/// ν: readings of the whole array that stand beside those of a taxel.
+const PRIOR: f64 = 8.0;
+/// Smallest number of frames whose spread is used.
+const LEAST_FRAMES: usize = 8;
+/// Share of the live taxels that must vary for the spread to be used.
+const LEAST_VARYING: f64 = 0.5;
+
+/// The readings without contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tare {
+    /// Mean reading of each taxel.
+    pub zero: Vec<f64>,
+    /// Standard deviation of one frame's readings, a value per taxel; `None` if the frames do not show it.
+    pub spread: Option<Vec<f64>>,
+    /// Number of frames.
+    pub frames: usize,
+}
+
+impl Tare {
+    /// Reads the frames of a file or folder, as [`Frame::load_all`] does.
+    ///
+    /// # Errors
+    /// [`FrameError`] if there is none, or one is not of the scene's sensor.
+    pub fn load(path: &Path, scene: &Scene) -> Result<Tare, FrameError> {
+        let frames = Frame::load_all(path, Some(scene))?;
+        frames.iter().try_for_each(|frame| frame.check(scene))?;
+        Ok(Tare::of(&frames, scene))
+    }
+
+    /// Of frames of the scene's sensor, at least one.
+    fn of(frames: &[Frame], scene: &Scene) -> Tare {
+        let (taxels, count) = (scene.sensor.taxels(), frames.len());
+        // Divided before adding, so that the sum does not overflow.
+        let mean = |k: usize| frames.iter().map(|frame| frame.stress_MPa[k] / count as f64).sum::<f64>();
+        let zero: Vec<f64> = (0..taxels).map(mean).collect();
+        let square = |k: usize| frames.iter().map(|frame| (frame.stress_MPa[k] - zero[k]).powi(2)).sum::<f64>();
+        let squares: Vec<f64> = (0..taxels).map(square).collect();
+        let cols = scene.sensor.cols;
+        let live: Vec<usize> = (0..taxels).filter(|k| !scene.input.is_dead([k / cols, k % cols])).collect();
+        // Not by the squares, which rounding makes positive.
+        let varies = |k: usize| frames.iter().any(|frame| frame.stress_MPa[k] != frames[0].stress_MPa[k]);
+        let varying = live.iter().filter(|&&k| varies(k)).count();
+        let freedom = count.saturating_sub(1) as f64;
+        let shown = count >= LEAST_FRAMES && varying as f64 >= LEAST_VARYING * live.len() as f64;
+        let spread = shown.then(|| {
+            let common = live.iter().map(|&k| squares[k]).sum::<f64>() / (freedom * live.len() as f64);
+            let of = |(k, square): (usize, &f64)| match live.binary_search(&k) {
+                Ok(_) => ((PRIOR * common + square) / (PRIOR + freedom)).sqrt(),
+                Err(_) => common.sqrt(),
+            };
+            squares.iter().enumerate().map(of).collect()
+        });
+        Tare { zero, spread, frames: count }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn frames(count: usize, reading: impl Fn(usize, f64) -> f64) -> (Scene, Vec<Frame>) {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let mut random = Random::new(3);
+        let one = |_| {
+            let stress = (0..64).map(|k| reading(k, random.normal())).collect();
+            Frame::from_stress("zero", &scene.sensor, stress).unwrap()
+        };
+        let frames = (0..count).map(one).collect();
+        (scene, frames)
+    }
+
+    /// Half of the taxels are three times as noisy: 100 frames show each one's noise to a fifth, and its zero.
+    #[test]
+    fn zero_and_spread_of_each_taxel() {
+        let sigma = |k: usize| if k < 32 { 0.01 } else { 0.03 };
+        let (scene, frames) = frames(100, |k, normal| 0.5 + sigma(k) * normal);
+        let tare = Tare::of(&frames, &scene);
+        let spread = tare.spread.unwrap();
+        for (k, (zero, spread)) in tare.zero.iter().zip(&spread).enumerate() {
+            assert!((zero - 0.5).abs() < 0.4 * sigma(k), "{k}: {zero}");
+            assert!((spread / sigma(k) - 1.0).abs() < 0.25, "{k}: {spread}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_vary_tells_no_noise() {
+        let (scene, zeros) = frames(100, |_, _| 0.25);
+        let tare = Tare::of(&zeros, &scene);
+        assert!((tare.zero[9] - 0.25).abs() < 1e-12 && tare.spread.is_none());
+        let (scene, few) = frames(LEAST_FRAMES - 1, |_, normal| normal);
+        assert_eq!(Tare::of(&few, &scene).spread, None);
+    }
+}

@@ -1,0 +1,21 @@
+//! Estimate: from stress to forces in floating point.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`float`] | the stages in floating point, the objectives, and the golden engine that runs them |
+//! | [`degree`] | how many terms the series in μ needs |
+//! | [`segment`] | the contact to which each taxel belongs |
+//! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
+//! | [`learned`] | shear by a small network that is trained on the scene's own physics |
+//! | [`deviations`] | standard deviations of forces that a search found |
+//! | [`misfit`] | how far a frame is from those of a network's training |
+//! | [`found_noise`] | the noise of a frame where neither scene nor tare frames state it |
+
+pub mod degree;
+pub mod deviations;
+pub mod evidence;
+pub mod float;
+pub mod found_noise;
+pub mod learned;
+pub mod misfit;
+pub mod segment;

@@ -1,0 +1,375 @@
+//! Fit: the rounds of one frame, from its stress to the contacts.
+//!
+//! Every round takes the pressure of the last one as the envelope, finds μ and the pressure anew, and where they are not
+//! known the noise and the readings of clipped taxels. In the first rounds the contacts are segmented anew as well.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: b | taxels | of its peak |
+//! | out: [`Estimate`] | – | N per MPa of the peak |
+
+mod advice;
+
+use super::ascent::{ascend, Top};
+use super::contact::forces;
+use super::envelope::{envelope, from_stress};
+use super::estimate::Estimate;
+use super::estimator::Evidence;
+use super::model::{Design, Products, Readings};
+use super::prior::factor;
+use super::{clipped, noise};
+use crate::data::frame::Forces;
+use crate::estimate::segment::{neighbours, segment, WIDTH};
+use crate::result::reconstruct::ContactEstimate;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par, Scale};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// Smallest standard deviation of a reading.
+const FLOOR: f64 = 1e-4;
+/// Largest first noise where it is not known.
+const UNKNOWN: f64 = 0.02;
+/// Largest number of rounds.
+const ROUNDS: usize = 16;
+/// Smallest number of rounds: the envelope has left the first, too wide one.
+const LEAST_ROUNDS: usize = 4;
+/// Square of the distance of two μ, in standard deviations, below which contacts that touch are one: the 95 % quantile
+/// of two unknowns.
+const SAME_MU: f64 = 6.0;
+/// Rounds after which the regions of the contacts are kept.
+const SEGMENTED: usize = 6;
+/// Standard deviation of μ over the one under a known envelope, on drawn frames of sensor-1.
+const ENVELOPE_FACTOR: f64 = 1.1;
+/// Times per round that noise and clipped readings are found anew.
+const PASSES: usize = 2;
+/// Steps of the ascent.
+const STEPS: usize = 4;
+/// Change of μ per round, in units of mu_max, below which the rounds end.
+const SETTLED: f64 = 1e-3;
+
+/// One frame.
+pub(super) struct Fit<'a> {
+    scene: &'a Evidence,
+    b: &'a [f64],
+    /// The taxels that are read.
+    taxels: Vec<usize>,
+    /// Which of them read zero because they read no tension.
+    clipped: Vec<usize>,
+    readings: Readings,
+    sigma: f64,
+    /// Whether sigma is known.
+    stated: bool,
+    /// Pressure on each cell.
+    p: Vec<f64>,
+    /// Contact of each cell.
+    labels: Vec<usize>,
+    /// μ of each contact.
+    mu: Vec<[f64; 2]>,
+}
+
+/// The contacts under their envelopes.
+struct Regions {
+    /// Cells of each contact.
+    cells: Vec<Vec<usize>>,
+    /// F of each contact.
+    factors: Vec<Mat<f64>>,
+    design: Design,
+}
+
+/// The contacts with their μ.
+struct Found {
+    regions: Regions,
+    /// The posterior at their μ.
+    top: Top,
+    /// Covariance of all μ.
+    covariance: Mat<f64>,
+}
+
+impl Regions {
+    /// p = F w on all `count` cells.
+    fn pressure(&self, w: &[f64], count: usize) -> Vec<f64> {
+        let (mut p, mut first) = (vec![0.0; count], 0);
+        for (cells, factor) in self.cells.iter().zip(&self.factors) {
+            for (k, &cell) in cells.iter().enumerate() {
+                p[cell] = (0..factor.ncols()).map(|i| factor[(k, i)] * w[first + i]).sum();
+            }
+            first += factor.ncols();
+        }
+        p
+    }
+
+    /// For each contact, the load of every coefficient.
+    fn loads(&self) -> Vec<Vec<f64>> {
+        let mut first = 0;
+        let load = |factor: &Mat<f64>| {
+            let mut own = vec![0.0; self.design.rank()];
+            for i in 0..factor.ncols() {
+                own[first + i] = factor.col(i).iter().sum();
+            }
+            first += factor.ncols();
+            own
+        };
+        self.factors.iter().map(load).collect()
+    }
+}
+
+impl<'a> Fit<'a> {
+    /// A fit that has not begun; `stated` is the noise in units of the peak, if it is known.
+    pub fn new(scene: &'a Evidence, b: &'a [f64], stated: Option<f64>) -> Fit<'a> {
+        let alive = b.iter().zip(&scene.alive).filter_map(|(b, alive)| alive.then_some(*b));
+        let sigma = stated.unwrap_or_else(|| noise::first(alive).min(UNKNOWN)).max(FLOOR);
+        let p = from_stress(&scene.cells, b, &scene.alive, sigma);
+        let taxels = scene.window(&p, sigma);
+        let is_clipped = |k: &usize| scene.unipolar && b[taxels[*k]] <= 0.0;
+        let clipped = (0..taxels.len()).filter(is_clipped).collect();
+        let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
+        let (labels, mu) = (vec![0; p.len()], vec![[0.0; 2]]);
+        Fit { scene, b, taxels, clipped, readings, sigma, stated: stated.is_some(), p, labels, mu }
+    }
+
+    /// The estimate; `None` if the model is not representable.
+    pub fn run(mut self) -> Option<Estimate> {
+        let (mut round, mut joined) = (0, false);
+        let (regions, top) = loop {
+            round += 1;
+            if round <= SEGMENTED && !joined {
+                self.segment();
+            }
+            let before = self.mu.clone();
+            let regions = self.regions();
+            let top = self.ascend(&regions.design, STEPS)?;
+            self.mu.clone_from(&top.mu);
+            self.p = regions.pressure(&top.posterior.w, self.p.len());
+            let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
+            let most = before.iter().zip(&self.mu).map(moved).fold(0.0, f64::max);
+            let settled = most <= SETTLED * self.scene.prior.mu_max && before.len() == self.mu.len();
+            if round == ROUNDS {
+                break (regions, top);
+            }
+            if round >= LEAST_ROUNDS {
+                match self.similar_pair(&top) {
+                    Some((a, b)) => {
+                        self.join(a, b);
+                        joined = true;
+                    }
+                    None if settled => break (regions, top),
+                    None => (),
+                }
+            }
+        };
+        let unknowns = 2 * top.mu.len();
+        let searched = self.scene.prior.mu_max > 0.0;
+        let covariance = match searched {
+            true => self.scene.prior.covariance(&top.slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR),
+            false => Mat::zeros(unknowns, unknowns),
+        };
+        let mut found = Found { regions, top, covariance };
+        if let Some(adviser) = &self.scene.adviser {
+            found = self.advised(adviser, found)?;
+        }
+        self.estimate(&found, round)
+    }
+
+    /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
+    fn segment(&mut self) {
+        let cells = &self.scene.cells;
+        let loaded = envelope(cells, &self.p, self.scene.length_mm, self.sigma);
+        let p: Vec<f64> = self.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
+        let segments = segment(&cells.grid, &p, WIDTH);
+        let mut strongest: Vec<Option<usize>> = vec![None; segments.count];
+        let loaded = segments.labels.iter().enumerate().filter(|(cell, _)| p[*cell] > 0.0);
+        for (cell, label) in loaded.filter_map(|(cell, label)| Some((cell, (*label)?))) {
+            if strongest[label].is_none_or(|other| p[cell] > p[other]) {
+                strongest[label] = Some(cell);
+            }
+        }
+        // Regions without a loaded cell are no contacts.
+        let kept: Vec<usize> = (0..segments.count).filter(|&label| strongest[label].is_some()).collect();
+        let mu_of = |&label: &usize| strongest[label].map_or([0.0; 2], |cell| self.mu[self.labels[cell]]);
+        self.mu = kept.iter().map(mu_of).collect();
+        let number = |label: &Option<usize>| kept.iter().position(|kept| Some(*kept) == *label).unwrap_or(0);
+        self.labels = segments.labels.iter().map(number).collect();
+    }
+
+    /// Two contacts that touch and whose μ the stress does not tell apart: parts of one, such as a ring.
+    fn similar_pair(&self, top: &Top) -> Option<(usize, usize)> {
+        if self.mu.len() < 2 || self.scene.prior.mu_max == 0.0 {
+            return None;
+        }
+        let covariance = self.scene.prior.covariance(&top.slope)?;
+        let distance = |&(a, b): &(usize, usize)| {
+            let spread = |i: usize, j: usize| {
+                let of = |k: usize, l: usize| covariance[(2 * k + i, 2 * l + j)];
+                of(a, a) + of(b, b) - of(a, b) - of(b, a)
+            };
+            let off = [self.mu[a][0] - self.mu[b][0], self.mu[a][1] - self.mu[b][1]];
+            let [xx, xy, yy] = [spread(0, 0), spread(0, 1), spread(1, 1)];
+            let determinant = xx * yy - xy * xy;
+            (yy * off[0] * off[0] - 2.0 * xy * off[0] * off[1] + xx * off[1] * off[1]) / determinant
+        };
+        let grid = &self.scene.cells.grid;
+        let loaded = |cell: &usize| self.p[*cell] > 0.0;
+        let pairs = (0..self.p.len()).filter(loaded).flat_map(|cell| {
+            let other = neighbours(grid, cell).filter(loaded);
+            other.map(move |other| (self.labels[cell], self.labels[other]))
+        });
+        let near = pairs.filter(|(a, b)| a < b).filter(|pair| distance(pair) <= SAME_MU);
+        near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Makes contact `b` a part of contact `a`.
+    fn join(&mut self, a: usize, b: usize) {
+        for label in &mut self.labels {
+            *label = if *label == b { a } else { *label - usize::from(*label > b) };
+        }
+        self.mu.remove(b);
+    }
+
+    /// The contacts under envelopes of the last pressure.
+    fn regions(&self) -> Regions {
+        let (cells, length) = (&self.scene.cells, self.scene.length_mm);
+        let (mut of_contact, mut factors) = (Vec::new(), Vec::new());
+        for contact in 0..self.mu.len() {
+            let inside = |cell: usize| self.labels[cell] == contact;
+            let p: Vec<f64> = (0..self.p.len()).map(|cell| if inside(cell) { self.p[cell] } else { 0.0 }).collect();
+            let e = envelope(cells, &p, length, self.sigma);
+            let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && inside(cell)).collect();
+            let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
+            factors.push(factor(cells, &own, &on_own, length));
+            of_contact.push(own);
+        }
+        let design = self.design(&of_contact, &factors);
+        Regions { cells: of_contact, factors, design }
+    }
+
+    /// S: the stress of every column of every factor, for shear along x and y and normal force.
+    fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
+        let n = self.taxels.len();
+        let rank: usize = factors.iter().map(Mat::ncols).sum();
+        let mut s = Mat::zeros(n, 3 * rank);
+        let mut contact = Vec::with_capacity(rank);
+        for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
+            let mut influence = [0, 1, 2].map(|_| Mat::zeros(n, own.len()));
+            for (column, &cell) in own.iter().enumerate() {
+                for (row, &taxel) in self.taxels.iter().enumerate() {
+                    let [x, y, z] = self.scene.cells.influence(taxel, cell);
+                    for (matrix, value) in influence.iter_mut().zip([z, x, y]) {
+                        matrix[(row, column)] = value;
+                    }
+                }
+            }
+            for (block, matrix) in influence.iter().enumerate() {
+                let columns = s.subcols_mut(block * rank + contact.len(), factor.ncols());
+                matmul(columns, Accum::Replace, matrix, factor, 1.0, Par::Seq);
+            }
+            contact.extend(vec![k; factor.ncols()]);
+        }
+        Design { s, contact }
+    }
+
+    /// Standard deviation of a taxel.
+    fn noise(&self, taxel: usize) -> f64 {
+        (self.sigma * self.scene.noise_shares[taxel]).max(FLOOR)
+    }
+
+    /// Readings and precision of the taxels that are not clipped.
+    fn weigh(&mut self) {
+        for (k, &taxel) in self.taxels.iter().enumerate() {
+            let b = self.b[taxel];
+            if !(self.scene.unipolar && b <= 0.0) {
+                let (noise, gain) = (self.noise(taxel), self.scene.gain_spread * b);
+                self.readings.y[k] = b;
+                self.readings.precision[k] = 1.0 / (noise * noise + gain * gain);
+            }
+        }
+    }
+
+    /// The largest posterior of μ under the present envelopes within `steps` steps, with the noise and the clipped readings
+    /// that go with it; without a step the posterior at the present μ.
+    fn ascend(&mut self, design: &Design, steps: usize) -> Option<Top> {
+        let prior = self.scene.prior;
+        self.weigh();
+        let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, steps)?;
+        if self.clipped.is_empty() && self.stated {
+            return Some(top);
+        }
+        for _ in 0..PASSES {
+            let stress = design.stress(&top.posterior, &top.mu);
+            if !self.stated {
+                self.sigma = (self.sigma * noise::ratio(&self.readings, &self.clipped, &stress)).clamp(FLOOR, 1.0);
+                self.weigh();
+            }
+            for &k in &self.clipped {
+                let noise = self.noise(self.taxels[k]);
+                clipped::update(&mut self.readings, k, stress[k], noise);
+            }
+            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps)?;
+        }
+        Some(top)
+    }
+
+    /// Centre of pressure of the cells of a contact in mm from the array's centre.
+    fn centre_mm(&self, own: &[usize]) -> [f64; 2] {
+        let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
+        let mut moment = [0.0; 2];
+        for &cell in own {
+            let place = self.scene.cells.position_mm(cell);
+            (0..2).for_each(|axis| moment[axis] += self.p[cell].max(0.0) / pressed * place[axis]);
+        }
+        moment
+    }
+
+    /// The result of the last round.
+    fn estimate(&self, found: &Found, rounds: usize) -> Option<Estimate> {
+        let Found { regions, top, covariance } = found;
+        let cells = &self.scene.cells;
+        let products = Products::new(&regions.design, &self.readings);
+        let forces = forces(&products, top, covariance, &regions.loads());
+        let mut on_taxels = Forces::zeros(self.b.len());
+        let mut contacts = Vec::with_capacity(forces.len());
+        for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
+            let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
+            for &cell in own {
+                // Contacts do not pull: the pressures below zero go to the others.
+                let share = self.p[cell].max(0.0) / pressed;
+                let taxel = cells.taxel_of(cell);
+                let [fx, fy, fz] = force.force_N.map(|force| share * force);
+                on_taxels.fx[taxel] += fx;
+                on_taxels.fy[taxel] += fy;
+                on_taxels.fz[taxel] += fz;
+            }
+            let contact = ContactEstimate {
+                centre_mm: self.centre_mm(own),
+                mu: top.mu[k],
+                force_N: force.force_N,
+                sigma_N: force.sigma_N,
+                mu_covariance: force.mu_covariance,
+            };
+            contacts.push(contact);
+        }
+        let known = self.taxels.len() - self.clipped.len();
+        let misfit_probability = self.stated.then(|| chi_square_tail(top.posterior.square, known as f64));
+        let (noise_MPa, rank) = (self.sigma, regions.design.rank());
+        Some(Estimate { contacts, forces_N: on_taxels, noise_MPa, misfit_probability, rounds, rank })
+    }
+}
+
+/// Probability that χ² with `freedom` degrees of freedom exceeds `value` (Wilson and Hilferty 1931).
+fn chi_square_tail(value: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    let z = ((value / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
+    0.5 * libm::erfc(z * FRAC_1_SQRT_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chi_square_tail;
+
+    /// Tabulated quantiles of χ².
+    #[test]
+    fn tails_by_table() {
+        for (freedom, value, tail) in [(10.0, 18.307, 0.05), (100.0, 135.807, 0.01), (100.0, 99.334, 0.5)] {
+            assert!((chi_square_tail(value, freedom) / tail - 1.0).abs() < 0.02, "{freedom} {value}");
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Prior: which pressures of a contact are expected before its stress is looked at.
+//!
+//! ```text
+//! p = e ∘ (β z + α g)        z ~ N(0, 1),  g ~ N(0, k),  k_ij = exp(−|r_i − r_j|²/2ℓ²)
+//! ```
+//!
+//! e is the envelope, the expected size of the pressure on each cell; z the load, which β leaves nearly free; g the
+//! shape, smooth over ℓ. The covariance e∘(β² + α² k)∘e has few large eigenvalues: a pivoted Cholesky factor F with
+//! r columns, p = F w with w ~ N(0, 1), leaves out less than 1e-4 of the largest variance on any cell.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: envelope e | cells of a contact | N |
+//! | out: F | cells × r | N |
+
+use super::cells::Cells;
+use faer::Mat;
+
+/// β, standard deviation of the load in units of the envelope's.
+const LOAD: f64 = 3.0;
+/// α, standard deviation of the shape in units of the envelope.
+const SHAPE: f64 = 2.0;
+/// Largest variance left out, in units of the largest variance of the shape.
+const REMAINDER: f64 = 1e-4;
+
+/// The factor F for cells `active` with envelope `envelope` in N, smooth over `length_mm`.
+pub(super) fn factor(cells: &Cells, active: &[usize], envelope: &[f64], length_mm: f64) -> Mat<f64> {
+    let count = active.len();
+    let places: Vec<[f64; 2]> = active.iter().map(|&cell| cells.position_mm(cell)).collect();
+    let mut left: Vec<f64> = envelope.iter().map(|e| (SHAPE * e).powi(2)).collect();
+    let largest = left.iter().copied().fold(0.0, f64::max);
+    let mut columns: Vec<Vec<f64>> = vec![envelope.iter().map(|e| LOAD * e).collect()];
+    while columns.len() <= count {
+        let Some(pivot) = (0..count).max_by(|&a, &b| left[a].total_cmp(&left[b])) else { break };
+        if left[pivot] <= REMAINDER * largest {
+            break;
+        }
+        let root = left[pivot].sqrt();
+        let covariance = |cell: usize| {
+            let ([x, y], [u, v]) = (places[cell], places[pivot]);
+            let square = ((x - u).powi(2) + (y - v).powi(2)) / (length_mm * length_mm);
+            SHAPE * SHAPE * envelope[cell] * envelope[pivot] * (-0.5 * square).exp()
+        };
+        let mut next: Vec<f64> = (0..count).map(covariance).collect();
+        for column in &columns[1..] {
+            let weight = column[pivot];
+            next.iter_mut().zip(column).for_each(|(next, c)| *next -= weight * c);
+        }
+        next.iter_mut().for_each(|next| *next /= root);
+        left.iter_mut().zip(&next).for_each(|(left, c)| *left = (*left - c * c).max(0.0));
+        left[pivot] = 0.0;
+        columns.push(next);
+    }
+    Mat::from_fn(count, columns.len(), |cell, column| columns[column][cell])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::scene::{Medium, Scene};
+
+    /// F Fᵀ is the covariance to the stated remainder.
+    #[test]
+    fn factor_has_the_covariance() {
+        let cells = Cells::new(&Scene::builtin("sensor-1").unwrap().sensor, Medium::HalfSpace, 2.0);
+        let active: Vec<usize> = (200..260).collect();
+        let envelope: Vec<f64> = (0..60).map(|k| 0.1 + f64::from(k % 7)).collect();
+        let f = factor(&cells, &active, &envelope, 2.0);
+        assert!(f.ncols() < 60, "{}", f.ncols());
+        let largest = (SHAPE * 6.1f64).powi(2);
+        for i in 0..60 {
+            for j in 0..60 {
+                let ([x, y], [u, v]) = (cells.position_mm(active[i]), cells.position_mm(active[j]));
+                let k = (-((x - u).powi(2) + (y - v).powi(2)) / 8.0).exp();
+                let wanted = envelope[i] * envelope[j] * (LOAD * LOAD + SHAPE * SHAPE * k);
+                let got: f64 = (0..f.ncols()).map(|c| f[(i, c)] * f[(j, c)]).sum();
+                assert!((got - wanted).abs() <= REMAINDER * largest, "{i} {j}: {got} {wanted}");
+            }
+        }
+    }
+}

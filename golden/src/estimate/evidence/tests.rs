@@ -1,0 +1,268 @@
+//! The estimator as a whole, on drawn frames: errors, standard deviations and flags. The full figures are those of
+//! `dermis noise --shapes`; the limits here are those of few frames.
+
+use super::*;
+use crate::data::generator::converter::Converter;
+use crate::data::generator::draws::{DrawOptions, DrawnFrame, Draws};
+use crate::estimate::float::Golden;
+use crate::result::checks::NOT_RESOLVED;
+use crate::result::flags::Flag;
+use crate::result::reconstruct::ContactEstimate;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::scene::{EstimatorKind, Medium, Scene};
+
+fn scene(name: &str) -> Scene {
+    let mut scene = Scene::builtin(name).unwrap();
+    scene.search.estimator = EstimatorKind::Evidence;
+    scene
+}
+
+/// Results of `frames` drawn frames; the noise, a share of the peak, is stated if it is above 0.
+fn results(
+    scene: &Scene,
+    frames: u64,
+    noise: f64,
+    contacts: usize,
+    converter: Converter,
+) -> Vec<(DrawnFrame, Reconstruction)> {
+    let golden = Golden::new(scene).unwrap();
+    let draws = Draws::new(scene, DrawOptions { contacts, seed: 5, ..Default::default() }).unwrap();
+    let one = |number| {
+        let drawn = draws.frame(number).unwrap();
+        let frame = drawn.read(&Converter { noise, seed: number, ..converter.clone() }).unwrap();
+        let result = golden.run_with_noise(&frame, noise * drawn.peak_MPa()).unwrap();
+        (drawn, result)
+    };
+    (0..frames).map(one).collect()
+}
+
+/// e_t of each result, sorted.
+fn shear_errors(results: &[(DrawnFrame, Reconstruction)]) -> Vec<f64> {
+    let error = |(drawn, result): &(DrawnFrame, Reconstruction)| {
+        crate::result::errors::Errors::new(drawn.total_N, result.resultant_N).tangential.unwrap()
+    };
+    let mut errors: Vec<f64> = results.iter().map(error).collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+#[test]
+fn any_shape_without_noise() {
+    for medium in [Medium::HalfSpace, Medium::BondedLayer { poisson: 0.48 }] {
+        let scene = Scene { medium, ..scene("sensor-1") };
+        let results = results(&scene, 10, 0.0, 1, Converter::default());
+        let errors = shear_errors(&results);
+        assert!(errors[5] < 0.015 && errors[9] < 0.04, "{medium}: {errors:?}");
+        for (drawn, result) in &results {
+            assert!((result.resultant_N[2] / drawn.total_N[2] - 1.0).abs() < 0.03, "{}", result.frame);
+            assert!(!result.flags.contains(&Flag::ShearNotResolved), "{}", result.frame);
+        }
+    }
+}
+
+/// The limits of the table for 0.2 % of noise, and standard deviations that cover what they should, with and without
+/// tension.
+#[test]
+fn noise_and_standard_deviations() {
+    for unipolar in [false, true] {
+        let mut scene = scene("sensor-1");
+        scene.input.unipolar = unipolar;
+        let results = results(&scene, 30, 0.002, 1, Converter { unipolar, ..Default::default() });
+        let errors = shear_errors(&results);
+        assert!(errors[15] < 0.14 && errors[26] < 0.35, "{errors:?}");
+        let (mut within, mut all) = (0, 0);
+        for (drawn, result) in &results {
+            let contacts = result.extra.contacts.as_ref().unwrap();
+            for axis in 0..3 {
+                let off = (result.resultant_N[axis] - drawn.total_N[axis]).abs();
+                assert!(off < 6.0 * contacts[0].sigma_N[axis].max(1e-3 * drawn.total_N[2]), "{}", result.frame);
+                all += 1;
+                within += usize::from(off < contacts[0].sigma_N[axis]);
+            }
+        }
+        let share = within as f64 / all as f64;
+        // 68 %, and three standard deviations of 90 draws.
+        assert!((0.53..0.84).contains(&share), "{share}");
+    }
+}
+
+#[test]
+fn each_contact_has_its_own_shear() {
+    let results = results(&scene("sensor-3"), 4, 5e-4, 2, Converter::default());
+    for (drawn, result) in &results {
+        let contacts = result.extra.contacts.as_ref().unwrap();
+        assert_eq!(contacts.len(), 2, "{}", result.frame);
+        for truth in &drawn.truth {
+            let far = |contact: &&ContactEstimate| {
+                (contact.centre_mm[0] - truth.centre_mm[0]).hypot(contact.centre_mm[1] - truth.centre_mm[1])
+            };
+            let found = contacts.iter().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+            assert!(far(&found) < 1.0);
+            for axis in 0..2 {
+                let off = (found.force_N[axis] - truth.force_N[axis]).abs();
+                assert!(off < 5.0 * found.sigma_N[axis], "{} {axis}: {off} {:?}", result.frame, found.sigma_N);
+            }
+        }
+    }
+}
+
+/// A frame of another scale has the forces of that scale, and noise that is not stated is found.
+#[test]
+fn scale_and_unknown_noise() {
+    let scene = scene("sensor-1");
+    let draws = Draws::new(&scene, DrawOptions::default()).unwrap();
+    let drawn = draws.frame(3).unwrap();
+    let frame = drawn.read(&Converter { noise: 0.01, ..Default::default() }).unwrap();
+    let evidence = Evidence::new(&scene);
+    let one = evidence.solve(&frame.stress_MPa, None);
+    let found = one.noise_MPa / drawn.peak_MPa();
+    assert!((0.008..0.012).contains(&found) && one.misfit_probability.is_none(), "{found}");
+    let larger: Vec<f64> = frame.stress_MPa.iter().map(|b| 1024.0 * b).collect();
+    let other = evidence.solve(&larger, None);
+    for (a, b) in one.contacts.iter().zip(&other.contacts) {
+        assert_eq!((a.mu, a.force_N.map(|force| 1024.0 * force)), (b.mu, b.force_N));
+    }
+}
+
+#[test]
+fn without_a_reading_above_zero_there_is_no_contact() {
+    let scene = scene("eight-by-eight");
+    let evidence = Evidence::new(&scene);
+    for b in [0.0, -1.0] {
+        let estimate = evidence.solve(&[b; 64], None);
+        assert!(estimate.contacts.is_empty() && estimate.forces_N.fz.iter().all(|force| *force == 0.0));
+    }
+    // The smallest and largest numbers are no reason to stop.
+    for b in [f64::MIN_POSITIVE, 1e300] {
+        let mut stress = [0.0; 64];
+        stress[27] = b;
+        assert!(evidence.solve(&stress, Some(b / 100.0)).contacts.iter().all(|own| own.mu[0].is_finite()));
+    }
+}
+
+/// Dead taxels read anything.
+#[test]
+fn dead_taxels_are_not_read() {
+    let mut scene = scene("sensor-1");
+    scene.input.dead = vec![[4, 5], [5, 5]];
+    let draws = Draws::new(&scene, DrawOptions::default()).unwrap();
+    let frame = draws.frame(1).unwrap().frame;
+    let evidence = Evidence::new(&scene);
+    let mut other = frame.stress_MPa.clone();
+    other[45] = 1e3;
+    other[55] = -1e3;
+    assert_eq!(evidence.solve(&frame.stress_MPa, None), evidence.solve(&other, None));
+}
+
+/// Tare frames tell zero and noise of each taxel: the right half of the array is five times as noisy. The bit-true model
+/// takes the same noise for its flag.
+#[test]
+fn noise_of_each_taxel_from_tare_frames() {
+    let mut scene = scene("sensor-1");
+    let drawn = Draws::new(&scene, DrawOptions::default()).unwrap().frame(0).unwrap();
+    let peak = drawn.peak_MPa();
+    let sigma = |taxel: usize| peak * if taxel % 10 < 5 { 0.001 } else { 0.005 };
+    let mut random = crate::random::Random::new(9);
+    let mut read = |stress: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        (0..100).map(|taxel| stress(taxel) + 0.1 * peak + sigma(taxel) * random.normal()).collect()
+    };
+    let line = |row: &[f64]| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let zeros: Vec<String> = (0..40).flat_map(|_| read(&|_| 0.0).chunks(10).map(line).collect::<Vec<_>>()).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("zeros.csv");
+    std::fs::write(&path, zeros.join("\n")).unwrap();
+    scene.input.tare = Some(path);
+    scene.input.full_scale_MPa = Some(2.0 * peak);
+    let stress = read(&|taxel| drawn.exact_MPa[taxel]);
+    let frame = crate::data::frame::Frame::from_stress("read", &scene.sensor, stress).unwrap();
+    let result = Golden::new(&scene).unwrap().run(&frame).unwrap();
+    let expected = peak * ((0.001f64.powi(2) + 0.005f64.powi(2)) / 2.0 * (1.0 + 1.0 / 40.0)).sqrt();
+    let found = result.checks.noise_MPa.unwrap();
+    assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    assert!(result.checks.misfit_probability.unwrap() > 0.01, "{:?}", result.checks);
+    // One noise for all does not fit: the right half is too loud for it.
+    let one = Scene {
+        search: crate::spec::scene::SearchSpec { noise_floor_MPa: 0.001 * peak, ..scene.search.clone() },
+        ..scene.clone()
+    };
+    let other = Golden::new(&one).unwrap().run(&frame).unwrap();
+    assert!(other.flags.contains(&Flag::Misfit), "{:?}", other.checks);
+    let fixed = crate::fixed::Model::new(&scene).unwrap().reconstruct(&frame).unwrap();
+    assert!(fixed.flags.contains(&Flag::ShearUnreliable), "{:?}", fixed.flags);
+}
+
+/// A bonded layer read as a half-space does not fit, and 2 % of noise does not resolve a small shear.
+#[test]
+fn flags_with_their_figures() {
+    let layer = Scene { medium: Medium::BondedLayer { poisson: 0.48 }, ..scene("sensor-1") };
+    let drawn = Draws::new(&layer, DrawOptions::default()).unwrap().frame(0).unwrap();
+    let golden = Golden::new(&scene("sensor-1")).unwrap();
+    let result = golden.run_with_noise(&drawn.frame, 1e-4 * drawn.peak_MPa()).unwrap();
+    assert!(result.flags.contains(&Flag::Misfit), "{:?}", result.checks);
+    let small = DrawOptions { ratio: [0.05, 0.06], ..Default::default() };
+    let drawn = Draws::new(&scene("sensor-1"), small).unwrap().frame(0).unwrap();
+    let frame = drawn.read(&Converter { noise: 0.02, ..Default::default() }).unwrap();
+    let result = golden.run_with_noise(&frame, 0.02 * drawn.peak_MPa()).unwrap();
+    assert!(result.flags.contains(&Flag::ShearNotResolved) && result.checks.shear_spread.unwrap() > NOT_RESOLVED);
+}
+
+/// A cover five times as thick as the smaller pitch: a contact narrower than the cover is not made wider.
+#[test]
+fn thick_cover() {
+    let mut scene = scene("sensor-1");
+    scene.sensor.thickness_mm = 10.0;
+    let results = results(&scene, 10, 0.0, 1, Converter::default());
+    let errors = shear_errors(&results);
+    assert!(errors[5] < 0.01 && errors[9] < 0.03, "{errors:?}");
+    for (drawn, result) in &results {
+        let sigma = result.extra.contacts.as_ref().unwrap()[0].sigma_N;
+        for axis in 0..2 {
+            let off = (result.resultant_N[axis] - drawn.total_N[axis]).abs();
+            assert!(off < 3.0 * sigma[axis], "{} {axis}: {off} {sigma:?}", result.frame);
+        }
+    }
+}
+
+/// More shear than `search.mu_max` admits never comes without a flag, whether noise is stated or not.
+#[test]
+fn shear_beyond_the_bound_is_flagged() {
+    let scene = scene("sensor-1");
+    let golden = Golden::new(&scene).unwrap();
+    let bound = scene.search.mu_max;
+    for ratio in [1.5, 3.0, 50.0] {
+        let options = DrawOptions { ratio: [ratio * bound, 1.01 * ratio * bound], ..Default::default() };
+        let draws = Draws::new(&scene, options).unwrap();
+        for number in 0..6 {
+            let drawn = draws.frame(number).unwrap();
+            for noise in [0.0, 0.001] {
+                let result = golden.run_with_noise(&drawn.frame, noise * drawn.peak_MPa()).unwrap();
+                let told = [Flag::MuAtBound, Flag::Misfit, Flag::NoContact];
+                assert!(result.flags.iter().any(|flag| told.contains(flag)), "{ratio} {number} {:?}", result.checks);
+            }
+        }
+    }
+}
+
+#[test]
+fn refused_by_field() {
+    let layer = "[medium]\nkind = \"bonded-layer\"\npoisson = 0.48\n[search]\nestimator = \"evidence\"";
+    for (text, thickness, field) in [
+        ("[search]\nestimator = \"evidence\"", 1.3, "sensor.thickness_mm"),
+        (layer, 2.5, "sensor.thickness_mm"),
+        ("[search]\nestimator = \"evidence\"\nobjective = \"patch\"", 3.0, "search.objective"),
+        ("[search]\nestimator = \"evidence\"\nmu_max = 0", 3.0, "search.mu_max"),
+        ("[search]\nestimator = \"evidence\"\n[partition]\ncase = 1", 3.0, "partition.case"),
+        ("[search]\nestimator = \"evidence\"\nform = \"orthogonal\"", 3.0, "search.form"),
+    ] {
+        let pitches = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4\npitch_y_mm = 4\n";
+        let scene = Scene::parse(&format!("{pitches}thickness_mm = {thickness}\n{text}"), "mine.toml").unwrap();
+        let error = Golden::new(&scene).err().unwrap().to_string();
+        assert!(error.contains(field), "{error}");
+        // `auto` takes the other estimator.
+        let auto = Scene {
+            search: crate::spec::scene::SearchSpec { estimator: EstimatorKind::Auto, ..scene.search },
+            ..scene
+        };
+        assert!(auto.estimator() == EstimatorKind::Search && Golden::new(&auto).is_ok(), "{field}");
+    }
+}

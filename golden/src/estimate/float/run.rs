@@ -1,0 +1,158 @@
+//! Run: the entry points of the golden engine. They apply the input options before the engine and the output options
+//! after it.
+//!
+//! | option | here |
+//! |---|---|
+//! | `input.average`, `input.mean` | [`Golden::run_averaged`]; [`Golden::run`] takes an averaged frame |
+//! | `input.calibration`, `input.tare` | readings to stress |
+//! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
+//! | `output.forces` | resultants instead of forces per taxel |
+
+use super::forces::force;
+use super::golden::{Golden, GoldenError};
+use super::pass::Polynomial;
+use super::unipolar::{fill_clipped, misfit};
+use crate::data::frame::Frame;
+use crate::physics::matrices::Matrices;
+use crate::result::checks::Checks;
+use crate::result::reconstruct::{Reconstruction, Unipolar};
+use crate::spec::partition::Subarray;
+use crate::spec::scene::{EstimatorKind, ForceOutput, Scene};
+
+impl Golden {
+    /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
+    ///
+    /// ```
+    /// use dermis_golden::{data::frame::Frame, estimate::float::Golden, spec::scene::Scene};
+    ///
+    /// let scene = Scene::builtin("sensor-1")?;
+    /// let golden = Golden::new(&scene)?;
+    /// let frame = Frame::shipped(&scene).into_iter().find(|frame| frame.id == "S1-hs-hertz").ok_or("no frame")?;
+    /// let result = golden.run(&frame)?;
+    /// let error = result.error.ok_or("no known forces")?;
+    /// assert!(error.tangential.unwrap() < 0.03 && error.normal.unwrap() < 0.01);
+    /// // Shear is proportional to pressure, by the μ that the estimator found.
+    /// let mu = result.subarrays[0].mu;
+    /// let bound = 1e-12 * result.resultant_N[2];
+    /// assert!((0..100).all(|k| (result.forces_N.fx[k] - mu[0] * result.forces_N.fz[k]).abs() < bound));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
+    /// finite.
+    pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
+        self.run_with_noise(frame, self.input.noise_MPa())
+    }
+
+    /// Reconstructs one frame with the given standard deviation of the noise in MPa instead of the scene's noise floor.
+    ///
+    /// # Errors
+    /// As [`Golden::run`].
+    pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+        self.run_readings(std::slice::from_ref(frame), frame, noise_MPa)
+    }
+
+    /// Reconstructs `mean`, the average of the frames `readings`.
+    fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+        mean.check(&self.scene)?;
+        let frame = self.input.calibrate(mean);
+        // Evidence takes clipped readings as they are, and its load does not come from Cz⁺b.
+        let searched = self.evidence.is_none();
+        let (filled, report) = match (self.scene.input.unipolar && searched, self.scene.estimator()) {
+            (false, _) => (frame.clone(), None),
+            // The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
+            (true, EstimatorKind::Network) => (clipped(&frame), None),
+            (true, _) => self.filled(&frame),
+        };
+        let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
+        let misfit = |report| Unipolar { misfit: misfit(&self.scene, &frame, &result.forces_N), ..report };
+        result.extra.unipolar = report.map(misfit);
+        let checks = Checks {
+            full_scale_share: self.input.full_scale_share(readings),
+            network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
+            load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
+            ..result.figures(&self.scene, &frame)
+        };
+        result.add_checks(&self.scene, checks);
+        if let Some(deviations) = &self.deviations {
+            deviations.add(&mut result, &self.scene, &frame, noise_MPa);
+        }
+        Ok(match self.scene.output.forces {
+            ForceOutput::Taxels => result,
+            ForceOutput::Resultants => result.with_resultants(&self.scene.sensor),
+        })
+    }
+
+    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless both press.
+    fn load_ratio(&self, frame: &Frame, result: &Reconstruction) -> Option<f64> {
+        let scene = &self.scene;
+        let normal = |(part, matrices): (&Subarray, &Matrices)| {
+            let family = Polynomial::of_degree(matrices, &part.gather(&scene.sensor, &frame.stress_MPa), 0);
+            force(family.v(0, 0), [0.0; 2], scene.threshold.min_force_N).fz.iter().sum::<f64>()
+        };
+        let without_shear: f64 = self.parts().map(normal).sum();
+        let ratio = result.resultant_N[2] / without_shear;
+        (without_shear > 0.0 && ratio > 0.0).then_some(ratio)
+    }
+
+    /// The frame with tension in place of clipped readings, and its report without the misfit.
+    fn filled(&self, frame: &Frame) -> (Frame, Option<Unipolar>) {
+        let Scene { sensor, input, search, .. } = &self.scene;
+        let mut filled = clipped(frame);
+        let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
+        for (part, matrices) in self.parts() {
+            let b = part.gather(sensor, &filled.stress_MPa);
+            let dead = part.local_indices(&input.dead);
+            let clipped: Vec<usize> = (0..b.len()).filter(|k| b[*k] == 0.0 && !dead.contains(k)).collect();
+            report.clipped += clipped.len();
+            let own = fill_clipped(matrices, b, clipped, search.mu_max);
+            report.pulled += own.stress_MPa.iter().filter(|b| **b < 0.0).count();
+            report.evaluations += own.evaluations;
+            part.scatter(sensor, &own.stress_MPa, &mut filled.stress_MPa);
+        }
+        (filled, Some(report))
+    }
+
+    /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
+    /// first. With a sliding mean the frames are all those since the start, and known forces those of the last.
+    ///
+    /// ```
+    /// use dermis_golden::{data::frame::Frame, data::generator::converter::Converter, estimate::float::Golden, spec::scene::Scene};
+    ///
+    /// let mut scene = Scene::builtin("sensor-1")?;
+    /// scene.input.average = 4;
+    /// let frame = Frame::shipped(&scene).remove(1);
+    /// let noisy = |seed| Converter { noise: 0.01, seed, ..Default::default() }.convert(&frame).unwrap();
+    /// let frames: Vec<Frame> = (0..16).map(noisy).collect();
+    /// let golden = Golden::new(&scene)?;
+    /// let normal = golden.run_averaged(&frames)?.error.and_then(|error| error.normal);
+    /// assert!(normal.ok_or("no known forces")? < 0.03);
+    /// assert!(golden.run_averaged(&frames[1..]).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
+    pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
+        let mean = self.input.average(&self.scene, frames)?;
+        let mut result = self.run_readings(frames, &mean, self.input.noise_of_mean_MPa(frames.len()))?;
+        result.extra.mean_frames = self.scene.input.frames_held(frames.len());
+        Ok(result)
+    }
+
+    /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
+    ///
+    /// # Errors
+    /// [`GoldenError::Input`] unless there are 2^k frames, of a sliding mean at least one, all of the scene's sensor.
+    pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
+        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
+    }
+}
+
+/// The frame as a unipolar array reads it: no tension.
+fn clipped(frame: &Frame) -> Frame {
+    let mut clipped = frame.clone();
+    clipped.stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
+    clipped
+}

@@ -1,0 +1,215 @@
+//! Learned: the ratio μ of shear to normal force by a small network, trained on the scene's own physics.
+//!
+//! Frames with known forces cost nothing: contacts are drawn, their stress is computed, noise is added. A perceptron that
+//! has seen some ten million of them knows which μ such stress has on average, and how far that may be off. Where noise
+//! hides the exact shape of the pressure it is better than what is computed for one frame; without noise it is not.
+//!
+//! ```text
+//! b, mask ── window ── features ── network ── μ1, μ2 and their σ ── evidence at that μ: forces, misfit, flags
+//! training:  frames ── features ── network ── loss ── Adam        file: weights of 12 bits, signature
+//! ```
+//!
+//! | file | step |
+//! |---|---|
+//! | `window` | the taxels that are read |
+//! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
+//! | `network` | layers with the mirror symmetry |
+//! | `frames`, `training` | drawn frames; loss and Adam |
+//! | `file` | bytes, signature |
+//! | `trial` | a network of a few steps, for tests |
+//! | `composed` | the layers as plain matrices of the stress, for the hardware |
+//!
+//! A mirrored frame has the mirrored μ because no layer can do otherwise; in parities that costs a quarter of the products.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: stress of one contact | taxels | MPa |
+//! | out: μ with standard deviations | 2 | – |
+
+mod composed;
+mod error;
+mod features;
+mod file;
+mod frames;
+mod network;
+#[cfg(test)]
+mod tests;
+mod training;
+mod trial;
+
+pub use composed::ComposedLayer;
+pub use error::LearnedError;
+pub use file::Signature;
+pub(crate) use frames::{GAINS, NOISE, RATIO};
+pub(crate) use network::LN_SIGMA;
+pub use network::PLACES;
+pub use training::{Stage, Training};
+pub use trial::with_network;
+
+use crate::read::bytes_up_to;
+use crate::spec::quads::Quads;
+use crate::spec::scene::Scene;
+use crate::spec::sensor::Sensor;
+use faer::Mat;
+use features::{Features, Readings};
+use network::Network;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Largest file of a network in bytes.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// Networks that are part of the program: `search.network` without its folder, and bytes.
+const SHIPPED: [(&str, &[u8]); 4] = [
+    ("dermis:sensor-1", include_bytes!("../../scenes/sensor-1.network")),
+    ("dermis:sensor-1-unipolar", include_bytes!("../../scenes/sensor-1-unipolar.network")),
+    ("dermis:sensor-3-contacts", include_bytes!("../../scenes/sensor-3-contacts.network")),
+    ("dermis:eight-by-eight-contacts", include_bytes!("../../scenes/eight-by-eight-contacts.network")),
+];
+
+/// A trained network, ready for the array of a scene.
+pub struct Learned {
+    signature: Signature,
+    sensor: Sensor,
+    features: Features,
+    network: Network,
+}
+
+/// μ as the network knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian {
+    /// Mean of μ, [x, y].
+    pub mean: [f64; 2],
+    /// Standard deviation of μ, [x, y].
+    pub sigma: [f64; 2],
+}
+
+/// The stress of one contact.
+pub struct OneContact<'a> {
+    /// Stress on every taxel of the array, that of other contacts taken out.
+    pub b: &'a [f64],
+    /// Which taxels are not dead.
+    pub alive: &'a [bool],
+    /// Centre of pressure in mm from the array's centre.
+    pub centre_mm: [f64; 2],
+}
+
+/// A finished training.
+pub struct Trained {
+    /// The network, its weights as the file has them.
+    pub learned: Learned,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Mean loss of the first and of the last twentieth of the steps.
+    pub loss: [f64; 2],
+}
+
+impl Learned {
+    /// Trains a network for a scene; `progress` is told what is done.
+    ///
+    /// # Errors
+    /// [`LearnedError::Option`], [`LearnedError::Frames`], [`LearnedError::NotConverged`] or [`LearnedError::Diverged`].
+    pub fn train(
+        scene: &Scene,
+        training: &Training,
+        progress: &(dyn Fn(Stage) + Sync),
+    ) -> Result<Trained, LearnedError> {
+        let signature = Signature::of(scene);
+        let (network, losses) = training::train(scene, signature.window, training, progress)?;
+        let bytes = file::encode(&network, &signature)?;
+        let learned = Learned::from_bytes(scene, &bytes, "the trained network")?;
+        Ok(Trained { learned, bytes, loss: [losses.first, losses.last] })
+    }
+
+    /// The network that a scene names with `search.network`: a file, or `dermis:NAME`, a part of the program.
+    ///
+    /// # Errors
+    /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`], [`LearnedError::Damaged`] or
+    /// [`LearnedError::Mismatch`].
+    pub fn of_scene(scene: &Scene) -> Result<Learned, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        Learned::from_bytes(scene, &bytes, &file)
+    }
+
+    /// The limit of [`crate::estimate::misfit`] of the network that a scene names; `None` for a file without one.
+    ///
+    /// # Errors
+    /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`] or [`LearnedError::Damaged`].
+    pub fn misfit_limit(scene: &Scene) -> Result<Option<f64>, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        file::limit(&bytes, &file)
+    }
+
+    /// The bytes of the network that a scene names, with this limit of [`crate::estimate::misfit`]; its weights stay as they are.
+    ///
+    /// # Errors
+    /// As [`Learned::misfit_limit`].
+    pub fn with_misfit_limit(scene: &Scene, limit: f64) -> Result<Vec<u8>, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        file::with_limit(&bytes, limit, &file)
+    }
+
+    /// The network in the bytes of a file, for a scene; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`LearnedError::Damaged`] or [`LearnedError::Mismatch`].
+    pub fn from_bytes(scene: &Scene, bytes: &[u8], file: &str) -> Result<Learned, LearnedError> {
+        let (network, signature) = file::decode(bytes, file)?;
+        signature.check(scene, file)?;
+        let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
+        Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
+    }
+
+    /// What the network was trained for.
+    pub fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    /// Number of weights.
+    pub fn weights(&self) -> usize {
+        self.network.widths().windows(2).map(|pair| Quads::LANES * pair[0] * pair[1]).sum()
+    }
+
+    /// μ of one contact.
+    pub fn shear(&self, contact: &OneContact) -> Gaussian {
+        let window = self.signature.window;
+        let n = window.taxels();
+        let origin = window.origin(&self.sensor, contact.centre_mm);
+        let taxels = window.taxels_of(&self.sensor, origin);
+        let mut readings = Readings { b: Mat::zeros(n, 1), masked: Mat::zeros(n, 1) };
+        for (own, taxel) in taxels.iter().enumerate() {
+            let b = taxel.filter(|taxel| contact.alive[*taxel]).map(|taxel| contact.b[taxel]);
+            // A unipolar array reads no tension, also where that of another contact was taken out.
+            let b = b.map(|b| if self.signature.unipolar { b.max(0.0) } else { b } as f32);
+            readings.b[(own, 0)] = b.unwrap_or(0.0);
+            readings.masked[(own, 0)] = if b.is_some() { 0.0 } else { 1.0 };
+        }
+        let (mean, sigma) = self.network.shear(self.features.of(&readings))[0];
+        let of_scene = |values: [f64; 2]| values.map(|value| value * self.signature.mu_max);
+        let mut found = Gaussian { mean: of_scene(mean), sigma: of_scene(sigma) };
+        let size = found.mean[0].hypot(found.mean[1]);
+        if size > self.signature.mu_max {
+            found.mean = found.mean.map(|mu| mu * self.signature.mu_max / size);
+        }
+        found
+    }
+}
+
+/// The bytes of the network that a scene names, and the name for errors.
+fn bytes_of(scene: &Scene) -> Result<(Cow<'static, [u8]>, String), LearnedError> {
+    let Some(path) = &scene.search.network else {
+        return Err(LearnedError::NoNetwork { scene: scene.name.clone() });
+    };
+    let file = path.display().to_string();
+    match SHIPPED.iter().find(|(name, _)| path.file_name().is_some_and(|file| file == *name)) {
+        Some((name, bytes)) => Ok((Cow::Borrowed(bytes), (*name).to_owned())),
+        None => Ok((Cow::Owned(read(path, &file)?), file)),
+    }
+}
+
+/// The bytes of a file.
+fn read(path: &Path, file: &str) -> Result<Vec<u8>, LearnedError> {
+    let unreadable = |source| LearnedError::Unreadable { file: file.to_owned(), source };
+    let too_large = || LearnedError::Damaged { file: file.to_owned(), reason: "it is too large".to_owned() };
+    bytes_up_to(LARGEST_FILE, path).map_err(unreadable)?.ok_or_else(too_large)
+}

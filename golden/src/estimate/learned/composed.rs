@@ -1,0 +1,187 @@
+//! Composed: the layers of a network as plain matrices of the stress.
+//!
+//! Everything before the first ReLU is linear in b/s and the mask. The mask of the whole array is known when the hardware is
+//! built: the first layer takes the stress alone, the mask is part of its bias. A window around a contact is masked where it
+//! reaches beyond the array: its first layer takes the mask as well.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: network, taxels that are not dead | – | – |
+//! | out: weights of each layer and parity | outputs × inputs | – |
+//! | out: weights of the mask in the first layer, of a window around a contact | outputs × quads | – |
+//! | out: biases of each layer and parity | outputs | – |
+
+use super::features::{Features, Readings, AMPLITUDE};
+use super::network::{Layer, Parities};
+use super::Learned;
+use crate::physics::symmetry::folded::EVEN;
+use crate::spec::window::Place;
+use faer::Mat;
+
+/// A layer that takes the parities of b/s, s the power of two above max |b|, or those of the layer before.
+#[derive(Clone, Debug)]
+pub struct ComposedLayer {
+    /// Weights of each parity, outputs × inputs.
+    pub weights: [Mat<f64>; 4],
+    /// Weights of the parities of the mask, outputs × quads; in the first layer for a window around a contact.
+    pub mask: Option<[Mat<f64>; 4]>,
+    /// Biases of each parity, one per output.
+    pub bias: [Vec<f64>; 4],
+    /// Largest output of any image on drawn frames.
+    pub largest: f64,
+}
+
+impl Learned {
+    /// The layers for an array with these taxels alive, row-major; those of a window around a contact are the same for all.
+    pub fn composed(&self, alive: &[bool]) -> Vec<ComposedLayer> {
+        let mut layers: Vec<ComposedLayer> = self.network.layers.iter().map(plain).collect();
+        if self.signature.window.place == Place::Contact {
+            if let (Some(own), Some(first)) = (layers.first_mut(), self.network.layers.first()) {
+                own.weights = self.features.composed(&first.weights);
+                own.mask = Some(self.features.of_mask(&first.weights));
+            }
+            return layers;
+        }
+        let masked = Mat::from_fn(alive.len(), 1, |taxel, _| if alive[taxel] { 0.0 } else { 1.0 });
+        let empty = self.features.of(&Readings { b: Mat::zeros(alive.len(), 1), masked });
+        if let (Some(own), Some(first)) = (layers.first_mut(), self.network.layers.first()) {
+            own.weights = self.features.composed(&first.weights);
+            for (parity, bias) in own.bias.iter_mut().enumerate() {
+                let of_mask = &first.weights[parity] * &empty[parity];
+                bias.iter_mut().zip(of_mask.col(0).iter()).for_each(|(bias, mask)| *bias += f64::from(*mask));
+            }
+        }
+        layers
+    }
+}
+
+fn wide(own: faer::MatRef<f32>) -> Mat<f64> {
+    Mat::from_fn(own.nrows(), own.ncols(), |row, col| f64::from(own[(row, col)]))
+}
+
+/// A layer without a change.
+fn plain(layer: &Layer) -> ComposedLayer {
+    let bias = |parity: usize| {
+        let counts = if parity == EVEN { 1.0 } else { 0.0 };
+        layer.bias.iter().map(|bias| counts * f64::from(*bias)).collect()
+    };
+    ComposedLayer {
+        weights: layer.weights.each_ref().map(|own| wide(own.as_ref())),
+        mask: None,
+        bias: std::array::from_fn(bias),
+        largest: f64::from(layer.largest),
+    }
+}
+
+impl Features {
+    /// The weights of the mask in a layer of the inputs.
+    fn of_mask(&self, weights: &Parities) -> [Mat<f64>; 4] {
+        let (first, count) = (self.inverse[0].ncols() + self.inverse[0].nrows(), self.inverse[0].ncols());
+        weights.each_ref().map(|own| wide(own.subcols(first, count)))
+    }
+
+    /// The weights of a layer of the inputs as weights of the parities of b/s.
+    fn composed(&self, weights: &Parities) -> [Mat<f64>; 4] {
+        std::array::from_fn(|parity| {
+            let (own, inverse) = (&weights[parity], &self.inverse[parity]);
+            let (q, deconvolved) = (inverse.ncols(), inverse.nrows());
+            let of_both = own.subcols(0, q) + own.subcols(q, deconvolved) * inverse;
+            Mat::from_fn(own.nrows(), q, |row, col| f64::from(AMPLITUDE * of_both[(row, col)]))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::network::exchanged;
+    use super::super::{Network, OneContact, Training};
+    use super::*;
+    use crate::spec::scene::Scene;
+
+    /// The outputs of the layers for the parities of b/s, and of the mask where the first layer takes it.
+    fn outputs(layers: &[ComposedLayer], mut inputs: Parities, mask: Option<&Parities>) -> Mat<f32> {
+        let product = |own: &Mat<f64>, inputs: &Mat<f32>, row: usize| -> f64 {
+            (0..own.ncols()).map(|col| own[(row, col)] * f64::from(inputs[(col, 0)])).sum()
+        };
+        for (index, layer) in layers.iter().enumerate() {
+            inputs = std::array::from_fn(|parity| {
+                Mat::from_fn(layer.bias[0].len(), 1, |row, _| {
+                    let of_mask =
+                        layer.mask.as_ref().zip(mask).map(|(own, mask)| product(&own[parity], &mask[parity], row));
+                    let sum = product(&layer.weights[parity], &inputs[parity], row) + of_mask.unwrap_or(0.0);
+                    (sum + layer.bias[parity][row]) as f32
+                })
+            });
+            if index + 1 < layers.len() {
+                let images = exchanged(&inputs).map(|own| Mat::from_fn(own.nrows(), 1, |k, _| own[(k, 0)].max(0.0)));
+                inputs = exchanged(&images);
+            }
+        }
+        Network::outputs(&inputs)
+    }
+
+    /// Around a contact the first layer takes the mask; the window has middle lines.
+    #[test]
+    fn composed_layers_take_the_mask_of_a_window() {
+        let mut scene = Scene::builtin("sensor-3").unwrap();
+        scene.search.estimator = crate::spec::scene::EstimatorKind::Learned;
+        let training = Training { steps: 30, batch: 16, contacts: 60, hidden: vec![16, 8], ..Training::default() };
+        let learned = Learned::train(&scene, &training, &|_| ()).unwrap().learned;
+        let mut random = crate::random::Random::new(6);
+        let b: Vec<f64> = (0..400).map(|_| random.normal()).collect();
+        let alive: Vec<bool> = (0..400).map(|taxel| taxel % 7 != 3).collect();
+        let window = learned.signature.window;
+        for [row, col] in [[9, 9], [1, 17]] {
+            let centre_mm = scene.sensor.position_mm(row, col);
+            let told = learned.shear(&OneContact { b: &b, alive: &alive, centre_mm });
+            let taxels = window.taxels_of(&scene.sensor, window.origin(&scene.sensor, centre_mm));
+            let taxels: Vec<Option<usize>> = taxels.into_iter().map(|t| t.filter(|t| alive[*t])).collect();
+            let peak = taxels.iter().flatten().map(|t| b[*t].abs()).fold(0.0, f64::max);
+            let s = 2f64.powf(peak.log2().floor() + 1.0);
+            let quads = window.quads();
+            let parities = |of: &dyn Fn(Option<usize>) -> f64| {
+                let image = |lane| Mat::from_fn(quads.len(), 1, |quad, _| of(taxels[quads.taxel(quad, lane)]) as f32);
+                exchanged(&std::array::from_fn(image))
+            };
+            let (stress, mask) =
+                (parities(&|t| t.map_or(0.0, |t| b[t] / s)), parities(&|t| if t.is_none() { 1.0 } else { 0.0 }));
+            let found = outputs(&learned.composed(&alive), stress, Some(&mask));
+            for axis in [0, 1] {
+                let [mu, ln] = [0, 2].map(|first| f64::from(found[(first + axis, 0)]));
+                assert!((mu * scene.search.mu_max - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
+                assert!((ln.exp() * scene.search.mu_max - told.sigma[axis]).abs() < 1e-4, "{ln} {told:?}");
+            }
+        }
+    }
+
+    /// The composed layers give the μ of the network, also with dead taxels.
+    #[test]
+    fn composed_layers_are_the_network() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let learned = Learned::of_scene(&scene).unwrap();
+        let frame = crate::data::frame::Frame::shipped(&scene).remove(1);
+        for dead in [vec![], vec![37, 5]] {
+            let alive: Vec<bool> = (0..100).map(|taxel| !dead.contains(&taxel)).collect();
+            let contact = OneContact { b: &frame.stress_MPa, alive: &alive, centre_mm: [0.0; 2] };
+            let told = learned.shear(&contact);
+            let peak = (0..100).filter(|t| alive[*t]).map(|t| frame.stress_MPa[t].abs()).fold(0.0, f64::max);
+            let s = 2f64.powf(peak.log2().floor() + 1.0);
+            let quads = learned.signature.window.quads();
+            let image = |lane| {
+                Mat::from_fn(quads.len(), 1, |quad, _| {
+                    let taxel = quads.taxel(quad, lane);
+                    if alive[taxel] {
+                        (frame.stress_MPa[taxel] / s) as f32
+                    } else {
+                        0.0
+                    }
+                })
+            };
+            let found = outputs(&learned.composed(&alive), exchanged(&std::array::from_fn(image)), None);
+            for axis in [0, 1] {
+                let mu = f64::from(found[(axis, 0)]) * scene.search.mu_max;
+                assert!((mu - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,219 @@
+use super::*;
+use crate::data::generator::draws::{DrawOptions, Draws};
+use crate::estimate::float::Golden;
+use crate::spec::partition::Case;
+use crate::spec::scene::EstimatorKind;
+use crate::spec::window::{Place, Window};
+use crate::study::noise::{shape_study, Candidate, ShapeStudy};
+
+fn scene(name: &str) -> Scene {
+    let mut scene = Scene::builtin(name).unwrap();
+    scene.search.estimator = EstimatorKind::Learned;
+    scene
+}
+
+fn small(steps: usize) -> Training {
+    Training { steps, batch: 128, contacts: 40.max(2 * steps), hidden: vec![24, 12], ..Default::default() }
+}
+
+fn trained(scene: &Scene, steps: usize) -> Trained {
+    Learned::train(scene, &small(steps), &|_| ()).unwrap()
+}
+
+fn ask(learned: &Learned, b: &[f64], alive: &[bool], centre_mm: [f64; 2]) -> Gaussian {
+    learned.shear(&OneContact { b, alive, centre_mm })
+}
+
+fn near(a: Gaussian, b: Gaussian, sign: [f64; 2]) -> bool {
+    (0..2).all(|k| (a.mean[k] - sign[k] * b.mean[k]).abs() < 1e-4 && (a.sigma[k] - b.sigma[k]).abs() < 1e-4)
+}
+
+/// A network of seconds: the loss falls, and on fresh frames the shear is better than none.
+#[test]
+fn a_small_network_learns() {
+    let scene = scene("sensor-1");
+    let training = Training { rate: 5e-3, contacts: 1500, ..small(1000) };
+    let Trained { learned, loss: [first, last], bytes } = Learned::train(&scene, &training, &|_| ()).unwrap();
+    assert!(last < first - 0.8, "loss {first} {last}");
+    assert!(bytes.len() < 2 * learned.weights(), "{} bytes", bytes.len());
+    let draws = Draws::new(&scene, DrawOptions { seed: 77, ..Default::default() }).unwrap();
+    let mut errors: Vec<f64> = Vec::new();
+    for number in 0..60 {
+        let drawn = draws.frame(number).unwrap();
+        let found = ask(&learned, &drawn.exact_MPa, &[true; 100], [0.0; 2]);
+        let [x, y, normal] = drawn.total_N;
+        let off = [0, 1].map(|axis| found.mean[axis] - [x, y][axis] / normal);
+        errors.push(off[0].hypot(off[1]) * normal / x.hypot(y));
+    }
+    errors.sort_by(f64::total_cmp);
+    assert!(errors[30] < 0.7 && errors[48] < 1.0, "median {}, four of five {}", errors[30], errors[48]);
+}
+
+/// The network that the program carries, on fresh frames at three levels of noise.
+#[test]
+fn the_shipped_network_is_accurate() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    let study = ShapeStudy {
+        levels: vec![5e-4, 2e-3, 1e-2],
+        draws: 40,
+        candidates: vec![Candidate::Estimator(EstimatorKind::Learned), Candidate::Estimator(EstimatorKind::Auto)],
+        ..Default::default()
+    };
+    let rows = shape_study(&scene, &study, &|_, _| ()).unwrap();
+    for (row, most) in rows.chunks(3).zip([0.06, 0.13, 0.42]) {
+        for own in &row[1..] {
+            let median = own.summary.tangential.median.value;
+            assert!(median < most, "{} at {}: {median}", own.estimator, own.noise);
+        }
+    }
+}
+
+#[test]
+fn equal_seeds_give_equal_files() {
+    let scene = scene("eight-by-eight");
+    let bytes = |seed: u64| Learned::train(&scene, &Training { seed, ..small(3) }, &|_| ()).unwrap().bytes;
+    assert_eq!(bytes(1), bytes(1));
+    assert_ne!(bytes(1), bytes(2));
+}
+
+/// Load, mirror image and dead taxels: what cannot matter does not.
+#[test]
+fn answers_follow_the_symmetries() {
+    let scene = scene("sensor-1");
+    let learned = trained(&scene, 20).learned;
+    let drawn = Draws::new(&scene, DrawOptions::default()).unwrap().frame(4).unwrap();
+    let b = &drawn.exact_MPa;
+    let found = ask(&learned, b, &[true; 100], [0.0; 2]);
+    assert!(found.mean.iter().all(|mu| mu.abs() > 1e-3), "{found:?}");
+    let heavy: Vec<f64> = b.iter().map(|b| 8.0 * b).collect();
+    assert!(near(found, ask(&learned, &heavy, &[true; 100], [0.0; 2]), [1.0; 2]));
+    let quads = learned.signature.window.quads();
+    for across in 0..4 {
+        let image = |t: usize| {
+            let at = quads.locate(t / 10, t % 10);
+            b[quads.taxel(at.address, at.lane ^ across)]
+        };
+        let image: Vec<f64> = (0..100).map(image).collect();
+        let sign = [1, 2].map(|axis| if across & axis != 0 { -1.0 } else { 1.0 });
+        assert!(near(ask(&learned, &image, &[true; 100], [0.0; 2]), found, sign), "{across}");
+    }
+    let mut alive = vec![true; 100];
+    alive[44] = false;
+    let mut stuck = b.clone();
+    stuck[44] = 9.0;
+    assert_eq!(ask(&learned, b, &alive, [0.0; 2]), ask(&learned, &stuck, &alive, [0.0; 2]));
+}
+
+/// Where a network alone gives the μ of each contact, it has a window around each also on a small array; one that reads the
+/// whole array would give all of them the same μ. The adviser of `evidence`, which takes the others out, takes either.
+#[test]
+fn several_contacts_need_a_window_around_each() {
+    let mut scene = scene("sensor-1");
+    let whole = trained(&scene, 10).bytes;
+    scene.partition.case = Case::Contacts;
+    let Trained { learned, bytes, .. } = trained(&scene, 10);
+    assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
+    let fits = |scene: &Scene, bytes: &[u8]| Learned::from_bytes(scene, bytes, "n").map(|_| ());
+    assert!(fits(&scene, &whole).is_ok() && fits(&scene, &bytes).is_ok());
+    scene.search.estimator = EstimatorKind::Network;
+    assert!(fits(&scene, &bytes).is_ok());
+    let error = fits(&scene, &whole).unwrap_err();
+    assert!(matches!(&error, LearnedError::Mismatch { field: "sensor.rows and cols", .. }), "{error}");
+}
+
+/// On a small array four contacts do not always fit; then fewer are drawn.
+#[test]
+fn as_many_contacts_are_drawn_as_fit() {
+    let mut scene = scene("sensor-1");
+    scene.partition.case = Case::Contacts;
+    let options = DrawOptions { contacts: 4, seed: 1, ..Default::default() };
+    let draws = Draws::new(&scene, options).unwrap();
+    assert!((0..15).any(|frame| draws.contacts(4 * frame + 3).is_err()));
+    let training = Training { contacts: 60, seed: 1, ..small(2) };
+    assert!(Learned::train(&scene, &training, &|_| ()).is_ok());
+}
+
+/// A network for windows serves every place, and every array of that pitch.
+#[test]
+fn a_window_moves_with_its_contact() {
+    let scene = scene("sensor-3");
+    let Trained { learned, bytes, .. } = trained(&scene, 10);
+    assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
+    let mut larger = scene.clone();
+    (larger.sensor.rows, larger.sensor.cols) = (24, 22);
+    let other = Learned::from_bytes(&larger, &bytes, "n").unwrap();
+    let stress = |cols: usize, at: [usize; 2]| {
+        let mut b = vec![0.0; 24 * 22];
+        for (k, value) in [0.2, 1.0, 0.3, 0.1, 0.7, -0.2].iter().enumerate() {
+            b[(at[0] + k / 3) * cols + at[1] + k % 3] = *value;
+        }
+        b
+    };
+    let alive = vec![true; 24 * 22];
+    let at = |learned: &Learned, cols: usize, place: [usize; 2]| {
+        let [row, col] = place;
+        let centre = learned.sensor.position_mm(row, col + 1);
+        ask(learned, &stress(cols, place), &alive, centre)
+    };
+    let first = at(&learned, 20, [8, 8]);
+    assert_eq!(first, at(&learned, 20, [10, 9]));
+    assert_eq!(first, at(&other, 22, [11, 12]));
+    // Half of the window is beyond the edge.
+    assert_ne!(first, at(&learned, 20, [0, 0]));
+}
+
+#[test]
+fn what_cannot_be_used_is_named() {
+    let message = |scene: &Scene| match Golden::new(scene) {
+        Err(error) => error.to_string(),
+        Ok(_) => String::new(),
+    };
+    let mut scene = scene("sensor-1");
+    scene.search.network = None;
+    assert!(message(&scene).contains("search.network is missing"), "{}", message(&scene));
+    scene.search.network = Some("nowhere/none.network".into());
+    assert!(message(&scene).starts_with("nowhere/none.network: search.network cannot be read"), "{}", message(&scene));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.network");
+    std::fs::write(&path, trained(&scene, 2).bytes).unwrap();
+    scene.search.network = Some(path.clone());
+    assert_eq!(message(&scene), "");
+    scene.input.unipolar = true;
+    assert!(message(&scene).contains("input.unipolar = false, the scene has true"), "{}", message(&scene));
+    scene.search.estimator = EstimatorKind::Auto;
+    assert_eq!(message(&scene), "");
+    scene.search.estimator = EstimatorKind::Learned;
+    scene.input.unipolar = false;
+    scene.partition.case = crate::spec::partition::Case::numbered(1).unwrap();
+    assert!(message(&scene).contains("partition.case"), "{}", message(&scene));
+    scene.partition.case = crate::spec::partition::Case::WHOLE;
+    std::fs::write(&path, b"dermis network 1\n").unwrap();
+    assert!(message(&scene).contains("not a network of this version"), "{}", message(&scene));
+}
+
+/// In words the network gives nearly the same μ, σ and forces as the golden model with the same estimator.
+#[test]
+fn in_words_the_network_is_nearly_the_same() {
+    let scene = scene("sensor-1");
+    let (model, golden) = (crate::fixed::Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+    let draws = Draws::new(&scene, DrawOptions { seed: 78, ..Default::default() }).unwrap();
+    let mut differences: Vec<f64> = Vec::new();
+    for number in 0..40 {
+        let frame = draws.frame(number).unwrap().frame;
+        let (float, fixed) = (golden.run(&frame).unwrap(), model.reconstruct(&frame).unwrap());
+        let [mu, own] = [&float, &fixed].map(|result| result.subarrays[0].mu);
+        differences.push((mu[0] - own[0]).hypot(mu[1] - own[1]));
+        let [normal, own] = [&float, &fixed].map(|result| result.resultant_N[2]);
+        assert!((own / normal - 1.0).abs() < 2e-3, "{number}: {normal} {own}");
+        let [spread, own] = [&float, &fixed].map(|result| result.checks.shear_spread.unwrap());
+        assert!((own / spread - 1.0).abs() < 0.3, "{number}: {spread} {own}");
+        assert_eq!(float.flags, fixed.flags, "{number}");
+    }
+    differences.sort_by(f64::total_cmp);
+    assert!(
+        differences[20] < 0.01 && differences[39] < 0.04,
+        "median {}, largest {}",
+        differences[20],
+        differences[39]
+    );
+}

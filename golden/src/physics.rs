@@ -1,0 +1,14 @@
+//! Physics: how forces on the elastic cover cause stress at the taxels, as matrices.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
+//! | [`gauss`] | Gauss–Legendre quadrature |
+//! | [`matrices`] | Cz⁺, Ax, Ay of a subarray |
+//! | [`symmetry`] | the basis of parities, in which matrices are computed and stored |
+
+pub mod bonded;
+pub mod gauss;
+pub mod influence;
+pub mod matrices;
+pub mod symmetry;

@@ -1,0 +1,84 @@
+//! Loading scenes: built-in ones by name, others from files.
+
+use super::{Scene, SceneError};
+use crate::spec::suggest::{distance, nearest};
+use std::io::Read;
+
+/// Largest scene file in bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+/// Built-in scenes: name and TOML text.
+const BUILTINS: [(&str, &str); 9] = [
+    ("sensor-1", include_str!("../../../scenes/sensor-1.toml")),
+    ("sensor-1-noisy", include_str!("../../../scenes/sensor-1-noisy.toml")),
+    ("sensor-1-unipolar", include_str!("../../../scenes/sensor-1-unipolar.toml")),
+    ("sensor-2", include_str!("../../../scenes/sensor-2.toml")),
+    ("sensor-3", include_str!("../../../scenes/sensor-3.toml")),
+    ("sensor-3-contacts", include_str!("../../../scenes/sensor-3-contacts.toml")),
+    ("sensor-4", include_str!("../../../scenes/sensor-4.toml")),
+    ("eight-by-eight", include_str!("../../../scenes/eight-by-eight.toml")),
+    ("eight-by-eight-contacts", include_str!("../../../scenes/eight-by-eight-contacts.toml")),
+];
+
+impl Scene {
+    /// Names of the built-in scenes.
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTINS.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// The built-in scene called `name`; see [`Scene::builtin_names`].
+    ///
+    /// ```
+    /// use dermis_golden::spec::scene::Scene;
+    ///
+    /// let scene = Scene::builtin("sensor-1")?;
+    /// assert_eq!((scene.sensor.rows, scene.sensor.cols, scene.search.mu_max), (10, 10, 0.6));
+    /// let error = Scene::builtin("sensor1").unwrap_err().to_string();
+    /// assert!(error.ends_with("did you mean \"sensor-1\"?"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SceneError::NotFound`], which suggests the most similar name.
+    pub fn builtin(name: &str) -> Result<Scene, SceneError> {
+        match BUILTINS.iter().find(|(builtin, _)| *builtin == name) {
+            Some((name, text)) => Scene::parse(text, name),
+            None => Err(not_found(name)),
+        }
+    }
+
+    /// Loads a scene by built-in name or by path; a built-in name takes precedence over a file of that name.
+    ///
+    /// # Errors
+    /// Any [`SceneError`] except `NotAvailable`.
+    pub fn load(name_or_path: &str) -> Result<Scene, SceneError> {
+        let builtin = BUILTINS.iter().any(|(name, _)| *name == name_or_path);
+        if builtin || !std::path::Path::new(name_or_path).exists() {
+            return Scene::builtin(name_or_path);
+        }
+        let text = read(name_or_path).map_err(|source| {
+            let file = name_or_path.to_string();
+            SceneError::Unreadable { file, source }
+        })?;
+        if text.len() as u64 > LARGEST_FILE {
+            let file = name_or_path.to_string();
+            return Err(SceneError::TooLarge { file, limit: LARGEST_FILE });
+        }
+        Scene::parse(&text, name_or_path)
+    }
+}
+
+/// The file's text, read up to one byte beyond the limit so that the caller can tell it is too large.
+fn read(path: &str) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    String::from_utf8(bytes).map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
+}
+
+fn not_found(name: &str) -> SceneError {
+    let builtins = Scene::builtin_names();
+    // A built-in scene is often taken for a file of that name.
+    let word = name.strip_suffix(".toml").unwrap_or(name);
+    let nearest = nearest(builtins.iter().copied(), |builtin| distance(word, builtin));
+    SceneError::NotFound { name: name.to_string(), nearest, builtins }
+}

@@ -1,0 +1,359 @@
+//! Scenes that are read, filled with defaults or rejected; each message names file, field and value.
+
+use super::*;
+use crate::spec::partition::Grid;
+
+const SENSOR: &str = "[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 2.0\npitch_y_mm = 4\nthickness_mm = 3.0\n";
+
+fn with(more: &str) -> Result<Scene, SceneError> {
+    Scene::parse(&format!("{SENSOR}{more}"), "my.toml")
+}
+
+fn message(more: &str) -> String {
+    with(more).unwrap_err().to_string()
+}
+
+#[test]
+fn everything_but_the_sensor_has_a_default() {
+    let scene = with("").unwrap();
+    assert_eq!(scene.name, "my");
+    let default = Scene::of_sensor(&scene.sensor, "my");
+    assert_eq!(scene, default);
+    assert_eq!(
+        scene.fixed,
+        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20, lanes: None }
+    );
+    assert_eq!((scene.search.mu_max, scene.hardware.board.as_str()), (0.6, "ulx3s-85f"));
+    assert!(scene.require_supported().is_ok());
+}
+
+#[test]
+fn every_field_is_read() {
+    let more = r#"
+        [medium]
+        kind = "bonded-layer"
+        poisson = 0.4
+        [partition]
+        rows = 2
+        cols = 5
+        condition = "both-signs"
+        [search]
+        objective = "patch"
+        mu_max = 1
+        noise_floor_MPa = 0.001
+        form = "orthogonal"
+        degree = 5
+        [inverse]
+        kind = "tikhonov"
+        level = 1e-4
+        [threshold]
+        min_force_N = 0.01
+        [fixed]
+        input_bits = 16
+        data_bits = 16
+        coef_bits = 14
+        inverse_bits = 18
+        [hardware]
+        board = "ulx3s-85f"
+        link = "spi"
+        coefficient_check = "signature"
+        [input]
+        full_scale_MPa = 0.25
+        average = 6
+        mean = "sliding"
+        calibration = "table.csv"
+        tare = "zero.json"
+        dead = [[3, 4], [0, 9], [3, 4]]
+        unipolar = true
+        plausible_MPa = 2.5
+        [output]
+        forces = "resultants""#;
+    let scene = with(more).unwrap();
+    assert_eq!(scene.medium, Medium::BondedLayer { poisson: 0.4 });
+    assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
+    assert_eq!(scene.partition.condition, Condition::BothSigns);
+    assert_eq!(scene.hardware.coefficient_check, CoefficientCheck::Signature);
+    assert_eq!(scene.hardware.link.name(), "spi");
+    assert_eq!(scene.search.objective, ObjectiveKind::Patch);
+    assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
+    assert_eq!((scene.search.form, scene.search.degree), (Form::Orthogonal, Some(5)));
+    assert_eq!(scene.inverse, InverseSpec { kind: InverseKind::Tikhonov, level: Some(1e-4) });
+    assert_eq!(scene.threshold.min_force_N, 0.01);
+    assert_eq!(
+        scene.fixed,
+        FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18, prune_bits: 20, lanes: None }
+    );
+    let input = InputSpec {
+        full_scale_MPa: Some(0.25),
+        average: 6,
+        mean: MeanKind::Sliding,
+        calibration: Some("table.csv".into()),
+        tare: Some("zero.json".into()),
+        dead: vec![[0, 9], [3, 4]],
+        unipolar: true,
+        gain_spread: 0.0,
+        plausible_MPa: 2.5,
+    };
+    assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
+    let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
+    assert_eq!(beside.input.tare, Some("rig/zero.json".into()));
+}
+
+#[test]
+fn builtins_are_complete_and_distinct() {
+    for name in Scene::builtin_names() {
+        let scene = Scene::load(name).unwrap();
+        assert_eq!(scene.name, name);
+        assert!(scene.require_supported().is_ok(), "{name}");
+    }
+}
+
+#[test]
+fn an_unknown_scene_names_the_nearest() {
+    let text = Scene::load("sensor1").unwrap_err().to_string();
+    assert!(text.contains("eight-by-eight") && text.ends_with("did you mean \"sensor-1\"?"), "{text}");
+    let text = Scene::load("missing/sensor-3.toml").unwrap_err().to_string();
+    assert!(text.ends_with("eight-by-eight-contacts)"), "{text}");
+    let text = Scene::load("sensor-3.toml").unwrap_err().to_string();
+    assert!(text.ends_with("did you mean \"sensor-3\"?"), "{text}");
+    // Better none than a wrong one.
+    for name in ["nope.toml", "sensor-9", "pad"] {
+        let text = Scene::load(name).unwrap_err().to_string();
+        assert!(!text.contains("did you mean"), "{text}");
+    }
+}
+
+#[test]
+fn unknown_fields_name_the_nearest() {
+    let cases = [
+        ("[search]\nmu_maks = 1", "unknown field search.mu_maks; the nearest valid field is search.mu_max"),
+        ("[fixed]\nmu_max = 1", "unknown field fixed.mu_max; the nearest valid field is search.mu_max"),
+        ("[serach]\nmu_max = 1", "unknown field serach; the nearest valid field is search"),
+        ("[input]\nfull_scale = 1", "unknown field input.full_scale; the nearest valid field is input.full_scale_MPa"),
+        // As near to pitch_x_mm as to pitch_y_mm.
+        ("[threshold]\npitch_mm = 1", "unknown field threshold.pitch_mm; [threshold] has min_force_N"),
+        ("[taxel]\nrows = 1", "unknown field taxel; a scene has name, [sensor], [medium], [partition], [search], [inverse], [threshold], [fixed], [hardware], [hardware.adc_scan], [hardware.table_range], [input], [output]"),
+    ];
+    for (more, wanted) in cases {
+        assert_eq!(message(more), format!("my.toml: {wanted}"));
+    }
+}
+
+#[test]
+fn wrong_values_name_what_is_allowed() {
+    let cases = [
+        ("[search]\nmu_max = nan", "search.mu_max = nan"),
+        ("[search]\nmu_max = 2.1", "it must be 0, or a number from 0.001 to 2"),
+        ("[search]\nmu_max = 0.0009", "search.mu_max = 0.0009 is not allowed"),
+        ("[search]\nmu_max = -0.1", "search.mu_max = -0.1 is not allowed"),
+        ("[search]\nnoise_floor_MPa = inf", "search.noise_floor_MPa = inf"),
+        ("[search]\nobjective = \"spares\"", "\"sparse\" or \"compressive\""),
+        ("[inverse]\nkind = \"svd\"", "it must be \"tsvd\" or \"tikhonov\" or \"exact\""),
+        ("[inverse]\nlevel = 1", "inverse.level = 1 is not allowed; it must be a number above 0 and below 1"),
+        ("[inverse]\nkind = \"exact\"\nlevel = 0.1", "left out with inverse.kind = \"exact\""),
+        ("[threshold]\nmin_force_N = -1", "threshold.min_force_N = -1"),
+        ("[fixed]\ndata_bits = 0", "fixed.data_bits = 0 is not allowed; it must be a whole number from 12 to 18"),
+        ("[fixed]\ndata_bits = 63", "fixed.data_bits = 63"),
+        ("[fixed]\ncoef_bits = 16\ninverse_bits = 15", "from 16 to 32"),
+        ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
+        ("[hardware]\nlink = \"i2c\"", "\"uart\" or \"spi\""),
+        ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
+        ("[hardware]\nsearch_width = 3", "hardware.search_width = 3 is not allowed; it must be 4, 2 or 1"),
+        ("[hardware]\nboard = \"ulx4m\"", "\"colorlight-i5\" or \"colorlight-i9\" or \"icebreaker\" or \"ulx3s-85f\""),
+        ("[input]\nfull_scale_MPa = 0", "above 0"),
+        ("[input]\naverage = 13", "from 0 to 12"),
+        (
+            "[input]\naverage = 2\nmean = \"box\"",
+            "input.mean = \"box\" is not allowed; it must be \"block\" or \"sliding\"",
+        ),
+        (
+            "[input]\nmean = \"sliding\"",
+            "input.mean = \"sliding\" is not allowed; it must be \"block\", or input.average from",
+        ),
+        ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
+        ("[input]\ndead = [3]", "a list of [row, col]"),
+        ("[input]\nunipolar = 1", "true or false"),
+        ("[search]\ndegree = 9", "a whole number from 1 to 8"),
+        ("[input]\nplausible_MPa = 0", "a number above 0"),
+        ("[input]\ntare = 1", "the name of a file"),
+        ("[output]\nforces = \"all\"", "\"taxels\" or \"resultants\""),
+        ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),
+        ("[partition]\nrows = 3\ncols = 1", "3 subarrays do not divide 10 rows"),
+        ("[partition]\nrows = 2", "partition.cols is missing"),
+        ("[partition]\ncase = 0\nrows = 2", "left out beside rows and cols"),
+        ("[partition]\ncases = [1, 2]", "partition.cases = [1, 2] is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0]", "partition.cases = [0] is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0, 1, 1]", "a list of 0 and others of 1, 2 and 3, each once"),
+        ("[partition]\ncases = [0, 4]", "a list of 0 and others of 1, 2 and 3, each once"),
+        ("[partition]\ncases = 1", "partition.cases = 1 is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0, 1]\ncase = 1", "left out beside rows, cols and any case but \"adaptive\""),
+        ("[partition]\ncases = [0, 1]\nrows = 2", "left out beside rows, cols and any case but \"adaptive\""),
+        ("[medium]\npoisson = 0.3", "left out unless"),
+        ("[medium]\nkind = \"bonded-layer\"\npoisson = 0.5", "medium.poisson = 0.5"),
+    ];
+    for (more, wanted) in cases {
+        let text = message(more);
+        assert!(text.starts_with("my.toml: ") && text.contains(wanted), "{text}");
+    }
+    let flat = "name = 3\n[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 0\npitch_y_mm = 4\nthickness_mm = 3\n";
+    let text = Scene::parse(flat, "flat.toml").unwrap_err().to_string();
+    assert!(text.contains("sensor.pitch_x_mm = 0 is not allowed"), "{text}");
+    let text = Scene::parse("sensor = 1", "s.toml").unwrap_err().to_string();
+    assert!(text.contains("sensor = 1 is not allowed; it must be a table"), "{text}");
+    let text = Scene::parse("", "s.toml").unwrap_err().to_string();
+    assert!(text.contains("sensor.rows is missing"), "{text}");
+}
+
+#[test]
+fn the_least_mu_max_still_has_formats() {
+    for mu_max in ["0", "0.001"] {
+        let scene = with(&format!("[search]\nmu_max = {mu_max}")).unwrap();
+        assert!(crate::fixed::Model::new(&scene).is_ok(), "{mu_max}");
+    }
+}
+
+#[test]
+fn names_can_stand_in_paths_and_comments() {
+    let named = |name: &str| Scene::parse(&format!("name = {name:?}\n{SENSOR}"), "my.toml");
+    for name in ["a", "Sensor 1", "probe-2_b.v3", "größe", &"x".repeat(64)] {
+        assert_eq!(named(name).unwrap().name, name);
+    }
+    let long = "x".repeat(65);
+    for name in ["", ".", "..", ".hidden", " a", "a ", "a/b", "a\\b", "a\nb", "a\"b", "*", long.as_str()] {
+        let text = named(name).unwrap_err().to_string();
+        assert!(text.starts_with("my.toml: name = ") && text.contains("1 to 64 letters"), "{text}");
+    }
+    // A scene without a name takes that of its file.
+    let text = Scene::parse(SENSOR, "folder/my (2).toml").unwrap_err().to_string();
+    assert!(text.starts_with("folder/my (2).toml: name = \"my (2)\" is not allowed"), "{text}");
+}
+
+#[test]
+fn cases_are_listed_or_all_that_divide() {
+    let choices = |more: &str| {
+        let scene = with(more).unwrap();
+        assert_eq!(scene.partition.case, Case::Adaptive);
+        assert!(scene.require_supported().is_ok() && scene.require_golden().is_ok());
+        scene.partition.choices(&scene.sensor).iter().map(Case::to_string).collect::<String>()
+    };
+    assert_eq!(choices("[partition]\ncase = \"adaptive\""), "0123");
+    assert_eq!(choices("[partition]\ncases = [3, 0]"), "03");
+    assert_eq!(choices("[partition]\ncase = \"adaptive\"\ncases = [0, 1, 2]"), "012");
+    let odd = SENSOR.replace("rows = 10", "rows = 9");
+    let error = Scene::parse(&format!("{odd}[partition]\ncases = [0, 1]"), "my.toml").unwrap_err().to_string();
+    assert!(
+        error.contains("partition.cases = [0, 1]") && error.contains("2 subarrays do not divide 9 rows"),
+        "{error}"
+    );
+    let neither = odd.replace("cols = 10", "cols = 9");
+    let scene = Scene::parse(&format!("{neither}[partition]\ncase = \"adaptive\""), "my.toml").unwrap();
+    let error = scene.require_supported().unwrap_err().to_string();
+    assert!(error.contains("no other of the paper's cases divides the array"), "{error}");
+}
+
+#[test]
+fn choices_not_built_yet_say_so() {
+    let cases = [
+        ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
+        ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, adaptive, rows and"),
+        (
+            "[partition]\ncase = \"contacts\"\ncondition = \"both-signs\"\n[search]\nestimator = \"learned\"",
+            "partition.condition = both-signs; available: loaded, with contacts",
+        ),
+        ("[partition]\ncase = \"adaptive\"\n[search]\nmu_max = 0", "search.mu_max = 0; available: above 0, with"),
+        (
+            "[partition]\ncases = [0, 1]\n[output]\nforces = \"resultants\"",
+            "output.forces = resultants; available: taxels",
+        ),
+        (
+            "[input]\ndead = [[0, 1]]\n[partition]\ncase = 1",
+            "input.dead = [[0, 1]]; available: none, or partition.case = 0 or contacts",
+        ),
+        ("[input]\ndead = [[0, 1]]\n[partition]\ncases = [0, 1]", "input.dead = [[0, 1]]; available: none, or"),
+        (
+            "[partition]\ncase = \"adaptive\"\n[hardware]\nsearch_width = 2",
+            "hardware.search_width = 2; available: 4, with adaptive",
+        ),
+        ("[input]\nunipolar = true", "input.unipolar"),
+        ("[search]\ndegree = 4", "search.degree"),
+        ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
+        ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
+    ];
+    for (more, wanted) in cases {
+        let text = with(more).unwrap().require_supported().unwrap_err().to_string();
+        assert!(text.contains("not available yet") && text.contains(wanted), "{text}");
+    }
+}
+
+#[test]
+fn the_golden_model_rejects_unsupported_combinations() {
+    let orthogonal = "[search]\nform = \"orthogonal\"\n";
+    let patch = "[search]\nobjective = \"patch\"\n";
+    let cases = [
+        (format!("[partition]\ncase = \"adaptive\"\n{patch}"), "search.objective = patch; available: sparse, with"),
+        (format!("{orthogonal}[input]\ndead = [[0, 1]]"), "input.dead = [[0, 1]]; available: none, with"),
+        (format!("{orthogonal}[input]\ndead = [[0, 1], [2, 3]]"), "input.dead = [[0, 1], …]; available: none, with"),
+        (format!("{orthogonal}[input]\nunipolar = true"), "input.unipolar = true; available: false, with"),
+        // Of several rejected values the first in the order of the schema is reported.
+        (format!("{orthogonal}[input]\nunipolar = true\ndead = [[0, 1]]"), "input.dead"),
+    ];
+    for (more, wanted) in cases {
+        let text = with(&more).unwrap().require_golden().unwrap_err().to_string();
+        assert!(text.contains("not available yet") && text.contains(wanted), "{text}");
+    }
+    for more in [patch, orthogonal, "[medium]\nkind = \"bonded-layer\"", "[input]\nunipolar = true\ndead = [[0, 1]]"] {
+        assert!(with(more).unwrap().require_golden().is_ok(), "{more}");
+    }
+}
+
+#[test]
+fn syntax_errors_name_the_line() {
+    let text = message("[search]\nmu_max = = 1");
+    assert!(text.starts_with("my.toml, line 8: "), "{text}");
+}
+
+#[test]
+fn files_are_read_and_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.toml");
+    let name = path.to_str().unwrap();
+    std::fs::write(&path, SENSOR).unwrap();
+    assert_eq!(Scene::load(name).unwrap().name, "own");
+    std::fs::write(&path, vec![b'#'; (1 << 20) + 1]).unwrap();
+    assert!(matches!(Scene::load(name), Err(SceneError::TooLarge { .. })));
+    std::fs::write(&path, [0xff, 0xfe]).unwrap();
+    assert!(matches!(Scene::load(name), Err(SceneError::Unreadable { .. })));
+    let folder = folder.path().to_str().unwrap();
+    assert!(matches!(Scene::load(folder), Err(SceneError::Unreadable { .. })));
+}
+
+#[test]
+fn auto_takes_the_network_in_hardware_where_noise_can_be() {
+    let chosen = |change: fn(&mut Scene)| {
+        let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
+        scene.search.estimator = EstimatorKind::Auto;
+        (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (1e-4, Some(0.1));
+        change(&mut scene);
+        assert_eq!(scene.for_hardware().search.estimator, scene.chosen_for_hardware().0);
+        scene.chosen_for_hardware()
+    };
+    assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network".to_owned()));
+    // Without a full scale nothing says that the noise is small.
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.full_scale_MPa) = (1e-8, None)).0, EstimatorKind::Network);
+    type Change = fn(&mut Scene);
+    let searched: [(Change, &str); 6] = [
+        (|s| s.search.network = None, "names no network"),
+        (|s| s.search.noise_floor_MPa = 0.0, "states no noise"),
+        (|s| s.search.noise_floor_MPa = 9e-7, "below 1e-5 of full scale"),
+        (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = 1"),
+        (|s| s.search.mu_max = 0.0, "mu_max"),
+        (|s| s.hardware.search_width = Some(2), "search_width"),
+    ];
+    for (change, why) in searched {
+        let (taken, reason) = chosen(change);
+        assert!(taken == EstimatorKind::Search && reason.contains(why), "{why}: {reason}");
+    }
+    // Of a mean of 64 frames more noise is allowed in each.
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (7e-6, 6)).0, EstimatorKind::Search);
+    assert_eq!(chosen(|s| s.search.noise_floor_MPa = 1.1e-6).0, EstimatorKind::Network);
+}
