@@ -20,9 +20,9 @@ pub use set::FlagSet;
 pub use status_field::{Feature, StatusField, STATUS_BEATS};
 
 use crate::data::frame::Frame;
-use crate::data::quantise::{largest_code, Codes};
+use crate::data::quantise::Codes;
 use crate::result::checks::{Checks, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED};
-use crate::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
+use crate::spec::scene::{largest_code, EstimatorKind, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
