@@ -283,8 +283,13 @@ impl Checks {
     /// The flags that the figures raise.
     pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
         let raised = |flag: Flag| (flag, flag.row().rule.is_some_and(|rule| rule(self, scene)));
-        FlagSet::raised(Flag::ALL.map(raised)).iter()
+        only_raised(Flag::ALL.map(raised))
     }
+}
+
+/// The flags that are marked as raised.
+fn only_raised<const N: usize>(all: [(Flag, bool); N]) -> impl Iterator<Item = Flag> {
+    all.into_iter().filter_map(|(flag, raised)| raised.then_some(flag))
 }
 
 fn noise_figure(noise_MPa: f64, peak_MPa: f64) -> String {
@@ -320,7 +325,7 @@ pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) 
         (Flag::MediumMismatch, medium_differs),
         (Flag::ShearUnreliable, shear_unreliable(scene, frame, codes, noise_MPa)),
     ];
-    FlagSet::raised(all).iter().collect()
+    only_raised(all).collect()
 }
 
 /// With known forces: the cells carry less than the load. Without: the largest |b| is in the outermost rows or columns

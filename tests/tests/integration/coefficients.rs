@@ -79,7 +79,8 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
     let recording = record(device.as_mut(), 0, &[play], Stimulus::FullSpeed, 100_000);
     assert_eq!(recording.beats.len(), beats);
     let status: Vec<[i32; 3]> = recording.beats[forces..].iter().map(|beat| beat.data).collect();
-    Status::all(&status).all(|status| status.flags().contains(Flag::CoefficientsDamaged))
+    let mut all = Status::all(&status);
+    all.all(|status| status.flags().contains(Flag::CoefficientsDamaged))
 }
 
 #[test]
