@@ -6,10 +6,10 @@
 //!
 //! [`result`] is the one way by which the programs and the interfaces to other languages get a result.
 
-use crate::fixed::{FixedError, Model};
-use crate::estimate::float::{Golden, GoldenError};
 use crate::data::frame::Frame;
 use crate::data::input::Input;
+use crate::estimate::float::{Golden, GoldenError};
+use crate::fixed::{FixedError, Model};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
 use std::error::Error;

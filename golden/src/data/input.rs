@@ -8,7 +8,7 @@
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
-//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::spec::sliding) |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |

@@ -24,6 +24,7 @@ use crate::cosim::verilator::VerilatorError;
 use crate::flow::tools::ToolError;
 use crate::jobs::Interrupted;
 use crate::link::{HostError, IdentityError, PseudoTerminal};
+use crate::report;
 
 /// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
 #[derive(Parser, Debug)]
@@ -97,6 +98,10 @@ enum Command {
     Block(super::block::Arguments),
     /// Print the register map of a core, as `dermis build --bus` generates one.
     Registers(super::registers::Arguments),
+    /// Print the flags of a result, what to do about each, and the fields of the hardware's status.
+    #[command(after_help = "Example:
+  dermis flags                      a row per flag, then a row per field")]
+    Flags,
     /// Print the converters that a scene can scan its array with.
     Converters(super::converters::Arguments),
     /// Make the image of a specimen's tables for hardware with writable tables.
@@ -211,6 +216,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
         Command::Registers(arguments) => Ok((super::registers::run(arguments)?, true)),
+        Command::Flags => Ok((report::flags(), true)),
         Command::Converters(arguments) => Ok((super::converters::run(arguments)?, true)),
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),

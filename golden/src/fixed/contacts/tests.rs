@@ -3,7 +3,7 @@ use crate::data::generator::draws::{DrawOptions, Draws};
 use crate::estimate::float::Golden;
 use crate::estimate::learned::{with_network, Learned, OneContact, Training};
 use crate::fixed::stages::receive::mask;
-use crate::fixed::stages::send::{Status, FLAG_FOUND, STATUS_BEATS};
+use crate::fixed::stages::send::{Status, STATUS_BEATS};
 use crate::fixed::subarray::SubarrayTrace;
 use crate::fixed::words::formats::MU_STEPS;
 use crate::fixed::Model;
@@ -133,10 +133,10 @@ fn nothing_and_the_largest_codes() {
     let largest = (1 << (model.formats().code_bits - 1)) - 1;
     for codes in [vec![0; 234], vec![-largest; 234], vec![largest; 234]] {
         let trace = model.run(&codes);
-        let found: Vec<Status> = trace.status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
+        let found: Vec<Status> = Status::all(&trace.status).collect();
         assert_eq!(found.len(), 8);
         // Pressure alone is a contact.
-        let contacts = found.iter().filter(|status| status.flags & FLAG_FOUND != 0).count();
+        let contacts = found.iter().filter(|status| status.found).count();
         assert_eq!(contacts == 0, codes[0] <= 0, "{contacts} contacts for {}", codes[0]);
     }
     let quiet = Frame {

@@ -6,8 +6,9 @@ use crate::data::frame::Frame;
 use crate::data::generator::generate;
 use crate::estimate::float::Golden;
 use crate::fixed::Model;
+use crate::result::flags::Flag;
 use crate::result::reconstruct::Reconstruction;
-use crate::spec::scene::{EstimatorKind, Medium, ObjectiveKind};
+use crate::spec::scene::{EstimatorKind, Medium, ObjectiveKind, Scene};
 use crate::spec::sensor::Sensor;
 
 fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {

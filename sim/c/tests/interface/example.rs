@@ -92,7 +92,7 @@ fn wanted(result: &Reconstruction, cols: usize) -> BTreeMap<String, Vec<u64>> {
     let forces = &result.forces_N;
     let of_taxel = |k: usize| bits(&[(k / cols) as f64, (k % cols) as f64, forces.fx[k], forces.fy[k], forces.fz[k]]);
     let contacts = result.extra.contacts.iter().flatten();
-    let flags: u32 = result.flags.iter().map(|flag| dermis_c::result::bit(*flag)).sum();
+    let flags: u32 = result.flags.iter().map(|flag| flag.bit()).sum();
     BTreeMap::from([
         ("resultant".to_owned(), bits(&result.resultant_N)),
         ("flags".to_owned(), bits(&[f64::from(flags)])),
