@@ -1,6 +1,5 @@
 //! Why a scene has no hardware.
 
-use dermis_golden::fixed::FixedError;
 use dermis_golden::wire::link::LinkError;
 use thiserror::Error;
 
@@ -19,9 +18,6 @@ pub enum HdlError {
         /// The hardware that would be needed.
         what: &'static str,
     },
-    /// A variant of the scene has no bit-true model.
-    #[error(transparent)]
-    Fixed(#[from] FixedError),
     /// The scene's link cannot be built.
     #[error(transparent)]
     Link(#[from] LinkError),

@@ -62,7 +62,7 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(CasePlan::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&usage(&Model::of_plan(dropped.design.clone())?)?);
+        let needs = total(&usage(&model.variant(dropped.design.clone()))?);
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()

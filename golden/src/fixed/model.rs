@@ -83,6 +83,12 @@ impl Model {
         Model::of_plan(plan)
     }
 
+    /// A variant of this hardware, of which resources are counted: the files that the plan names need not exist. Its input
+    /// options are those of this model.
+    pub fn variant(&self, plan: Plan) -> Self {
+        Model { plan, input: self.input.clone(), deviations: None }
+    }
+
     /// The plan, whose tables change while the engine runs.
     pub(super) fn plan_mut(&mut self) -> &mut Plan {
         &mut self.plan

@@ -428,7 +428,7 @@ fn the_layers_of_sim_are_in_order() {
     in_order(
         &modules("dermis_sim", "sim"),
         &[],
-        &["flow", "cosim", "stream", "recording", "link", "report", "live", "commands"],
+        &["flow", "cosim", "engine", "stream", "recording", "link", "report", "live", "commands"],
         false,
     );
 }
