@@ -8,7 +8,7 @@
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
-//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::spec::sliding) |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
@@ -187,6 +187,8 @@ impl Input {
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
     /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
+        #[cfg(test)]
+        tests::CALIBRATIONS.with(|count| count.set(count.get() + 1));
         let mut frame = frame.clone();
         if let Some((zero, gain)) = &self.scale {
             for (b, (zero, gain)) in frame.stress_MPa.iter_mut().zip(zero.iter().zip(gain)) {

@@ -1,23 +1,19 @@
 //! Checks: the figures behind the flags of a result.
 //!
-//! | field | unit | flag | raised when | by |
-//! |---|---|---|---|---|
-//! | `full_scale_share` | – | `saturated` | a reading rounds to the last code of `input.full_scale_MPa` | [`Input`](crate::data::input::Input) |
-//! | `peak_MPa` | MPa | `implausible-stress` | above `input.plausible_MPa` | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `border_share` | – | none; beside `load-outside` | – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
-//! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::estimate::found_noise::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
-//! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
-//! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
-//! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
-//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
-//! | `plateau` | – | `clipped` | above [`PLATEAU`] | all, [`readings`] |
-//! | `line_share` | – | `line-fault` | above [`LINE`] | all, [`readings`] |
-//! | `constant_share` | – | `taxel-constant` | above [`CONSTANT`] | streams, [`history`] |
-//! | `torn_share` | – | `torn-frame` | above [`TORN`] | streams, [`history`] |
+//! | field | unit | by |
+//! |---|---|---|
+//! | `full_scale_share` | – | [`Input`](crate::data::input::Input) |
+//! | `peak_MPa`, `mu_share`, `border_share` | MPa, –, – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
+//! | `load_ratio` | – | the golden engine |
+//! | `shape_misfit` | – | the golden engine, with `patch` and `symmetric` |
+//! | `noise_MPa` | MPa | the estimators with evidence, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
+//! | `misfit_probability` | – | the estimators with evidence, where the noise is stated |
+//! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
+//! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
+//! | `plateau`, `line_share` | – | all, [`readings`] |
+//! | `constant_share`, `torn_share` | – | streams, [`history`] |
 //!
+//! The flag of a figure, its limit and its words are in the flag's row, [`crate::result::flags`].
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
 pub mod history;
@@ -25,8 +21,6 @@ pub mod readings;
 #[cfg(test)]
 mod tests;
 
-use crate::result::flags::Flag;
-use crate::spec::scene::Scene;
 use serde::{Deserialize, Serialize};
 
 /// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
@@ -129,41 +123,9 @@ pub struct Checks {
 }
 
 impl Checks {
-    /// The figure behind a flag, in words; `None` for flags without one.
-    pub fn figure(&self, flag: Flag) -> Option<String> {
-        match flag {
-            Flag::Saturated => self.full_scale_share.map(|share| format!("{share:.3} of full scale")),
-            Flag::MuAtBound => self.mu_share.map(|share| format!("{share:.3} of mu_max")),
-            Flag::ImplausibleStress => Some(format!("{:.3} MPa", self.peak_MPa)),
-            Flag::LoadOutside => {
-                self.border_share.map(|share| format!("{:.1} % of the load at the border", 1e2 * share))
-            }
-            Flag::LoadMismatch => self.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
-            Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
-            Flag::ShearNotResolved => {
-                self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
-            }
-            Flag::ShearUnreliable => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
-            Flag::Misfit => match (self.misfit_probability, self.network_misfit) {
-                (probability, Some(misfit)) if misfit > 1.0 || probability.is_none() => {
-                    Some(format!("misfit {misfit:.3} times that of frames like the training"))
-                }
-                (Some(probability), _) => Some(format!("probability {probability:.1e}")),
-                _ => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
-            },
-            Flag::Clipped => self.plateau.map(|plateau| format!("by chance in e^-{plateau:.0} of the frames")),
-            Flag::LineFault => self.line_share.map(|share| format!("beside {:.0} % of the range", 1e2 * share)),
-            Flag::TaxelConstant => {
-                self.constant_share.map(|share| format!("beside a change of {:.0} % of the range", 1e2 * share))
-            }
-            Flag::TornFrame => self.torn_share.map(|share| format!("{:.0} % of the range", 1e2 * share)),
-            _ => None,
-        }
-    }
-
     /// Whether the estimate leaves more than noise explains, of the stated size, else of one that a sensor can have, or more
     /// than of frames like those of the network's training.
-    fn misfits(&self) -> bool {
+    pub(crate) fn misfits(&self) -> bool {
         let unlike = self.network_misfit.is_some_and(|misfit| misfit > 1.0);
         unlike
             || match self.misfit_probability {
@@ -171,29 +133,4 @@ impl Checks {
                 None => self.noise_MPa.is_some_and(|noise| noise > LOUD * self.peak_MPa),
             }
     }
-
-    /// The flags that the figures raise.
-    pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
-        let above = |figure: Option<f64>, limit: f64| figure.is_some_and(|figure| figure > limit);
-        let last_code = 1.0 - 0.5 / f64::from(crate::spec::scene::largest_code(scene.fixed.input_bits));
-        [
-            (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
-            (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
-            (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
-            (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
-            (Flag::Misfit, self.misfits()),
-            (Flag::ShearNotResolved, self.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED)),
-            (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
-            (Flag::Clipped, above(self.plateau, PLATEAU)),
-            (Flag::LineFault, above(self.line_share, LINE)),
-            (Flag::TaxelConstant, above(self.constant_share, CONSTANT)),
-            (Flag::TornFrame, above(self.torn_share, TORN)),
-        ]
-        .into_iter()
-        .filter_map(|(flag, raised)| raised.then_some(flag))
-    }
-}
-
-fn noise_figure(noise_MPa: f64, peak_MPa: f64) -> String {
-    format!("noise {:.3} % of the peak", 1e2 * noise_MPa / peak_MPa)
 }

@@ -11,12 +11,14 @@
 //! | out: wrench | 3, 3 | N, N mm |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod contact_estimate;
 mod contacts;
 mod extra;
 mod figures;
 mod output;
 
-pub use contacts::{ContactEstimate, FoundContact};
+pub use contact_estimate::ContactEstimate;
+pub use contacts::FoundContact;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use output::{shear_sigma_N, Resultant, Wrench};

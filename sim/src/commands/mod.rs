@@ -32,7 +32,7 @@
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
 //! | [`mod@study`] | `dermis study`: comparisons shown in the guide |
 //! | [`table`] | `dermis table`: errors of scenes in the paper's cases |
-//! | [`train`] | `dermis train`: a network for the learned estimator |
+//! | [`train`] | `dermis train`: a network for the estimators that have one |
 
 pub mod bitstream;
 pub mod block;

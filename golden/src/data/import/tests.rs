@@ -159,7 +159,7 @@ fn stated() -> Settings {
 fn arrays_that_numpy_wrote() {
     macro_rules! array {
         ($name:literal) => {
-            include_bytes!(concat!("../../data/recordings/numpy/", $name, ".npy"))
+            include_bytes!(concat!("../../../data/recordings/numpy/", $name, ".npy"))
         };
     }
     let a = |frame: usize, k: usize| 100.0 * frame as f64 + 10.0 * (k / 4) as f64 + (k % 4) as f64;
