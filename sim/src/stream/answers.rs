@@ -342,8 +342,8 @@ mod tests {
             csv(&frame)
         };
         let input: String = (1..=10).map(line).collect();
-        for fixed in [false, true] {
-            let (_, answers) = answers(&scene, fixed, input.clone(), ALL, true);
+        for name in EngineName::SOFTWARE {
+            let (_, answers) = answers(&scene, name, input.clone(), ALL, true);
             let has = |answer: &Value| answer["flags"].as_array().unwrap().contains(&Value::from("taxel-constant"));
             assert_eq!((has(&answers[6]), has(&answers[9])), (false, true), "{answers:?}");
             assert!(answers[9]["checks"]["constant_share"].as_f64() > Some(0.06));

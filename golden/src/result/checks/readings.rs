@@ -240,7 +240,7 @@ mod tests {
 
     /// Both models raise the same flags of a frame's readings.
     fn both(scene: &Scene, frame: &Frame) -> [bool; 2] {
-        let golden = Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap();
+        let golden = Golden::reference(scene).unwrap().run(frame).unwrap();
         let fixed = Model::new(scene).unwrap().reconstruct(frame).unwrap();
         assert_eq!((golden.checks.plateau, golden.checks.line_share), (fixed.checks.plateau, fixed.checks.line_share));
         [Flag::Clipped, Flag::LineFault].map(|flag| {
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn clipped_readings_and_faulty_lines_are_flagged_by_both_models() {
-        let scene = Scene::builtin("eight-by-eight").unwrap().for_hardware();
+        let scene = Scene::builtin("eight-by-eight").unwrap();
         let exact = press(&scene.sensor, 5.0, 8.0, [1.5, 0.7]);
         assert_eq!(both(&scene, &exact), [false; 2]);
         let changed = |change: &dyn Fn(&mut Vec<f64>)| {

@@ -248,10 +248,13 @@ impl Engines<'_> {
             }
             other => other?,
         };
-        let scene = if engine == Engine::Fixed { &self.fixed.scene } else { self.scene };
+        let (scene, estimator, input) = match engine {
+            Engine::Fixed => (&self.fixed.scene, self.fixed.estimator(), self.fixed.input()),
+            Engine::Golden | Engine::Stated => (self.scene, self.golden.estimator(), self.golden.input()),
+        };
         let (mut in_stream, mut history) = (result.clone(), History::new(scene));
         frames.iter().for_each(|frame| in_stream.add_history(scene, &mut history, std::slice::from_ref(frame)));
-        result.find_noise(scene, last).map_err(GoldenError::from)?;
+        result.find_noise(scene, estimator, input, last);
         Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
     }
 
