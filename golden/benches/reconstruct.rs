@@ -15,7 +15,7 @@ fn reconstruct(criterion: &mut Criterion) {
         let frame = &Frame::shipped(&scene)[0];
         for estimator in [EstimatorKind::Search, EstimatorKind::Evidence] {
             let mut own = scene.clone();
-            own.search.estimator = estimator;
+            own.search.estimator = Some(estimator);
             // Evidence refuses pitches as large as sensor-4's.
             let Ok(golden) = Golden::new(&own) else { continue };
             criterion.bench_function(&format!("golden frame {name}, {}", estimator.name()), |bencher| {
@@ -35,7 +35,7 @@ fn beyond(criterion: &mut Criterion) {
     {
         let mut scene = Scene::builtin(name).expect("the scene is built in");
         (scene.partition.case, scene.search.objective) = (case, objective);
-        scene.search.estimator = EstimatorKind::Search;
+        scene.search.estimator = Some(EstimatorKind::Search);
         let golden = Golden::new(&scene).expect("the scene has matrices");
         for shapes in [Shapes::Elliptic, Shapes::Other] {
             let count = if case == Case::Contacts { 3 } else { 1 };

@@ -60,6 +60,7 @@
 #![allow(non_snake_case)]
 
 pub mod data;
+pub mod engine;
 pub mod estimate;
 pub mod fixed;
 pub mod physics;

@@ -15,7 +15,7 @@ fn scene(sensor: &str, case: Case) -> Scene {
 }
 
 fn run(scene: &Scene, frames: &[Frame]) -> Vec<Reconstruction> {
-    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let golden = Golden::reference(scene).unwrap();
     frames.iter().map(|frame| golden.run(frame).unwrap()).collect()
 }
 

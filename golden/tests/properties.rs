@@ -24,7 +24,7 @@ fn drawn(scene: &Scene, seed: u64) -> Frame {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
+    Golden::reference(scene).unwrap().run(frame).unwrap()
 }
 
 /// The frame with the stress of taxel `from(row, col)` at each taxel.
@@ -101,7 +101,7 @@ proptest! {
     fn one_pitch_aside(seed in 0u64..1000) {
         let mut scene = Scene::builtin("sensor-3").unwrap();
         scene.search.mu_max = 0.0;
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         let (cols, pitch) = (scene.sensor.cols, scene.sensor.pitch_x_mm);
         let draw = Draw { count: 1, shapes: Shapes::Elliptic, touching: false, seed };
         let mut contacts = random_contacts(&scene.sensor, draw);
@@ -128,7 +128,7 @@ proptest! {
         scene.partition.case = Case::numbered(1).unwrap();
         scene.input.full_scale_MPa = Some(10.0);
         let frame = drawn(&scene, seed);
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         let model = Model::new(&scene).unwrap();
         let engines: [&dyn Fn(&Frame) -> Forces; 2] =
             [&|frame| golden.run(frame).unwrap().forces_N, &|frame| model.reconstruct(frame).unwrap().forces_N];
@@ -155,7 +155,7 @@ proptest! {
         let mut scene = scene();
         scene.search.mu_max = 0.0;
         let frame = drawn(&scene, seed);
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         let model = Model::new(&scene).unwrap();
         let (float, fixed) = (golden.run(&frame).unwrap().forces_N.fz, model.reconstruct(&frame).unwrap().forces_N.fz);
         let (matrices, peak, n) = (golden.matrices(), frame.peak_MPa(), float.len());

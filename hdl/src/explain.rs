@@ -69,11 +69,11 @@ pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
         match with_feature {
             None => {}
             Some(Err(error)) => impossible = Some(error.to_string()),
-            Some(Ok(plan)) => saved = Some(difference(&needs(&plan.into())?, &own)),
+            Some(Ok(plan)) => saved = Some(difference(&needs(&model.variant(plan))?, &own)),
         }
         let costs = match without_feature {
             None => None,
-            Some(plan) => Some(difference(&own, &needs(&plan.into())?)),
+            Some(plan) => Some(difference(&own, &needs(&model.variant(plan))?)),
         };
         Ok(Explained { feature: name, setting, present, saved, costs, impossible })
     };

@@ -5,11 +5,9 @@ use std::collections::BTreeMap;
 use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
-use dermis_golden::fixed::stages::send::{
-    CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, FLAG_TABLES,
-    FRAMES_SHIFT, STATUS_BEATS, TABLES_SHIFT,
-};
+use dermis_golden::fixed::stages::send::{status_fields, STATUS_BEATS};
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
+use dermis_golden::result::flags::StatusField;
 use dermis_golden::spec::partition::Case;
 use dermis_golden::wire::link::c_header;
 use serde::Serialize;
@@ -64,7 +62,7 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(CasePlan::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&usage(&Model::from(dropped.design.clone()))?);
+        let needs = total(&usage(&model.variant(dropped.design.clone()))?);
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()
@@ -276,6 +274,16 @@ fn resources(usage: &StageUsage, memories: &[PlacedMemory]) -> serde_json::Value
     })
 }
 
+/// Where the bits and numbers of a status are that not every hardware has: a mask, or the lowest bit of a number; `null` where
+/// this one does not have them.
+fn status_masks(model: &Model) -> BTreeMap<String, Option<u32>> {
+    let entry = |field: StatusField| {
+        let (name, value) = field.manifest_entry()?;
+        Some((name, field.feature.is_in(&model.scene).then_some(value)))
+    };
+    status_fields().into_iter().filter_map(entry).collect()
+}
+
 fn manifest(
     model: &Model,
     top: &str,
@@ -315,17 +323,7 @@ fn manifest(
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
             "threshold_lsb": model.threshold,
-            "flags": {
-                "condition": FLAG_CONDITION,
-                "found": FLAG_FOUND,
-                "no_contact": FLAG_NO_CONTACT,
-                "framing": FLAG_FRAMING,
-                "coefficients": model.has_coefficient_check().then_some(FLAG_COEFFICIENTS),
-                "tables": model.has_writable_tables().then_some(FLAG_TABLES),
-                "tables_shift": model.has_writable_tables().then_some(TABLES_SHIFT),
-                "case_shift": model.chooses().then_some(CASE_SHIFT),
-                "frames_shift": model.scene.input.slides().then_some(FRAMES_SHIFT),
-            },
+            "flags": status_masks(model),
         },
         "sizes": {
             "quads": f.quads,
@@ -340,4 +338,48 @@ fn manifest(
         "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),
         "dropped": model.chooses().then_some(dropped),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::model;
+    use dermis_golden::fixed::stages::send::{CASE, FRAMES, TABLES_VERSION};
+    use dermis_golden::result::flags::{Feature, Flag};
+    use dermis_golden::spec::scene::Scene;
+
+    /// The fields of a status in the manifest: of hardware with a feature those that the feature adds, of all others `null`.
+    #[test]
+    fn the_manifest_has_each_field_of_the_status() {
+        let scan = "[input]\nfull_scale_MPa = 0.5\n[hardware]\nsource = \"adc-scan\"\n[hardware.adc_scan]\n\
+                    converter = \"max11125\"\nsclk_MHz = 12.5\nperiod_us = 1000\n";
+        let scenes = [
+            (Feature::Always, model(4, 4, "")),
+            (Feature::CoefficientCheck, model(4, 4, "[hardware]\ncoefficient_check = \"signature\"\n")),
+            (Feature::Adaptive, model(8, 8, "[partition]\ncases = [0, 1]\n")),
+            (Feature::SlidingMean, model(4, 4, "[input]\nfull_scale_MPa = 0.5\naverage = 1\nmean = \"sliding\"\n")),
+            (
+                Feature::WritableTables,
+                model(4, 4, "[input]\nfull_scale_MPa = 0.5\n[hardware]\ntables = \"writable\"\n"),
+            ),
+            (Feature::Scan, model(4, 4, scan)),
+            (Feature::Contacts, Model::new(&Scene::builtin("eight-by-eight-contacts").unwrap()).unwrap()),
+        ];
+        for (feature, model) in &scenes {
+            let masks = status_masks(model);
+            let with = [Feature::Always, *feature];
+            for flag in Flag::ALL {
+                let Some(bit) = flag.status_bit() else { continue };
+                let wanted = with.contains(&bit.feature).then_some(bit.mask());
+                assert_eq!(masks.get(bit.name), Some(&wanted), "{flag:?}, {feature:?}");
+            }
+            for field in [CASE, FRAMES, TABLES_VERSION] {
+                let wanted = with.contains(&field.feature).then_some(field.low);
+                assert_eq!(masks.get(&format!("{}_shift", field.name)), Some(&wanted), "{feature:?}");
+            }
+        }
+        // And it is what the file says.
+        let (_, plain) = &scenes[0];
+        assert_eq!(generate(plain).unwrap().manifest["output"]["flags"], json!(status_masks(plain)));
+    }
 }

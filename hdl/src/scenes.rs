@@ -20,7 +20,7 @@ fn scene(rows: usize, cols: usize, more: &str) -> Scene {
 
 /// The model of such a sensor with a network of these hidden layers, hardly trained; `more` adds to table `[search]`.
 pub(crate) fn learned(rows: usize, cols: usize, hidden: &[usize], more: &str) -> Model {
-    let scene = scene(rows, cols, &format!("[search]\nestimator = \"learned\"\n{more}"));
+    let scene = scene(rows, cols, &format!("[search]\nestimator = \"network\"\n{more}"));
     let (scene, _file) = with_network(scene, &Training::trial(hidden)).unwrap();
     Model::new(&scene).unwrap()
 }

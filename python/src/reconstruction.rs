@@ -156,7 +156,7 @@ impl Reconstruction {
         self.result.extra.wrench.map(|wrench| array(py, wrench.moment_Nmm))
     }
 
-    /// The contacts: with standard deviations of the force from the estimators "evidence" and "learned"; with
+    /// The contacts: with standard deviations of the force from the estimators with evidence; with
     /// partition.case = "contacts" of mu and of the shear, where the estimator has them; None where the contacts are not told
     /// apart.
     #[getter]

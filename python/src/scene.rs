@@ -6,7 +6,7 @@ use dermis_golden::data::frame::{Frame as Stress, FrameError};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::spec::scene::Scene as Spec;
-use dermis_sim::engine::{Engine, Models};
+use dermis_sim::engine::{self, EngineName, Engines};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -21,12 +21,12 @@ use crate::reconstruction::{Reconstruction, Reconstructions};
 #[pyclass(frozen, module = "dermis")]
 pub struct Scene {
     spec: Spec,
-    models: Models,
+    engines: Engines,
 }
 
 impl Scene {
     fn new(spec: Spec) -> Scene {
-        Scene { spec, models: Models::default() }
+        Scene { spec, engines: Engines::default() }
     }
 
     /// The scene itself.
@@ -141,7 +141,13 @@ impl Scene {
     /// Name of the estimator that the floating-point model takes, as in search.estimator.
     #[getter]
     fn estimator(&self) -> &'static str {
-        self.spec.estimator().name()
+        self.spec.model_estimator().name()
+    }
+
+    /// Name of the estimator that the hardware and its bit-true model take, as in hardware.estimator.
+    #[getter]
+    fn hardware_estimator(&self) -> &'static str {
+        self.spec.hardware_estimator().name()
     }
 
     /// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean.
@@ -204,10 +210,10 @@ impl Scene {
         engine: &str,
         find_noise: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let engine: Engine = engine.parse().map_err(model)?;
+        let name = EngineName::software(engine).map_err(model)?;
         let Frames { frames, single } = self::frames(&self.spec, frames)?;
-        let ready = py.detach(|| self.models.ready(engine, &self.spec, &frames)).map_err(model)?;
-        let one = |frames: &[Stress]| py.detach(|| ready.reconstruct(&self.spec, frames, find_noise)).map_err(model);
+        let engine = py.detach(|| self.engines.engine(name, &self.spec, &frames)).map_err(model)?;
+        let one = |frames: &[Stress]| py.detach(|| engine::result(&*engine, frames, find_noise.into())).map_err(model);
         if single {
             let result = Reconstruction::new(Arc::new(one(&frames)?), self.lengths());
             return Ok(Bound::new(py, result)?.into_any());

@@ -16,10 +16,11 @@ use std::sync::Arc;
 use anyhow::{ensure, Context};
 use browser::Browser;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_sim::live::{Newest, Server, Show};
-use dermis_sim::stream::{Answer, Engine, Outcome};
+use dermis_sim::stream::{Answer, Outcome};
 use serde_json::json;
 
 const MOST_MS: f64 = 8.0;
@@ -50,10 +51,10 @@ const DRAW: &str = "(async () => {
 
 fn main() -> anyhow::Result<()> {
     let sensor = Sensor { rows: 20, cols: 20, pitch_x_mm: 3.0, pitch_y_mm: 3.0, thickness_mm: 2.5 };
-    let scene = Scene::of_sensor(&sensor, "20x20").for_hardware();
+    let scene = Scene::of_sensor(&sensor, "20x20");
     let contacts = random_contacts(&sensor, Draw { count: 3, shapes: Shapes::Elliptic, touching: false, seed: 1 });
     let frame = &generate("three contacts", &sensor, scene.medium, &contacts)?;
-    let result = &Engine::new(&scene, false)?.reconstruct(std::slice::from_ref(frame))?;
+    let result = &Golden::reference(&scene)?.run(frame)?;
     let newest = Arc::new(Newest::default());
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
     let (frames, received) = (std::slice::from_ref(frame), &[received_s][..]);

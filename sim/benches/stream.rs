@@ -6,25 +6,27 @@
 //! The estimator `search` must answer at least [`LEAST`] frames of 10×10 taxels per second; the scene's own takes longer.
 
 use std::io::{Cursor, Read};
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::ensure;
 use dermis_golden::data::frame::Frame;
-use dermis_golden::spec::scene::Scene;
-use dermis_sim::stream::{as_lines, run, Engine, Policy, StreamOptions};
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_sim::engine::EngineName;
+use dermis_sim::stream::{as_lines, run, Policy, StreamOptions};
 
 /// Least rate of the search, in frames per second.
 const LEAST: f64 = 2000.0;
 
-fn rate(scene: &Scene, fixed: bool, frames: usize) -> anyhow::Result<f64> {
-    let engine = Engine::new(scene, fixed)?;
+fn rate(scene: &Scene, name: EngineName, frames: usize) -> anyhow::Result<f64> {
+    let engine = name.engine(scene, None, Path::new(""))?;
     let shipped = Frame::shipped(scene);
     let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     let text: String = shipped.iter().cycle().take(frames).map(line).collect();
     let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
     let options = StreamOptions { queue: 64, policy: Policy::All };
     let begin = Instant::now();
-    let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink(), false))?;
+    let counts = run(&*engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink(), false))?;
     ensure!(counts.answered == frames as u64, "{counts:?}");
     Ok(frames as f64 / begin.elapsed().as_secs_f64())
 }
@@ -32,11 +34,15 @@ fn rate(scene: &Scene, fixed: bool, frames: usize) -> anyhow::Result<f64> {
 fn main() -> anyhow::Result<()> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let scene = Scene::builtin("sensor-1")?;
-    let searching = scene.for_hardware();
-    let search = rate(&searching, false, 4000)?;
+    let searching = scene.estimated_by(EstimatorKind::Search);
+    let search = rate(&searching, EngineName::Golden, 4000)?;
     println!("sensor-1, stream: golden search {search:.0} frames/s");
-    println!("sensor-1, stream: fixed search {:.0} frames/s", rate(&searching, true, 400)?);
-    println!("sensor-1, stream: golden {} {:.0} frames/s", scene.estimator().name(), rate(&scene, false, 100)?);
+    println!("sensor-1, stream: fixed search {:.0} frames/s", rate(&searching, EngineName::Fixed, 400)?);
+    println!(
+        "sensor-1, stream: golden {} {:.0} frames/s",
+        scene.model_estimator().name(),
+        rate(&scene, EngineName::Golden, 100)?
+    );
     ensure!(search >= LEAST, "the search answers {search:.0} frames/s, less than {LEAST}");
     Ok(())
 }

@@ -20,65 +20,13 @@
 #include <stdint.h>
 
 /**
- * What became of a call.
- */
-typedef enum {
-  /**
-   * Done.
-   */
-  DERMIS_STATUS_OK = 0,
-  /**
-   * An argument, scene or frame cannot be used.
-   */
-  DERMIS_STATUS_INPUT = 1,
-  /**
-   * The result does not have what was asked for.
-   */
-  DERMIS_STATUS_ABSENT = 2,
-  /**
-   * Bytes from the link are not a valid packet; the next ones are read.
-   */
-  DERMIS_STATUS_DAMAGED = 3,
-  /**
-   * The board was built for another scene or version.
-   */
-  DERMIS_STATUS_BOARD = 4,
-  /**
-   * A defect of Dermis.
-   */
-  DERMIS_STATUS_INTERNAL = 5,
-} dermis_status;
-
-/**
- * What dermis_link_receive found.
- */
-typedef enum {
-  /**
-   * No packet is complete yet.
-   */
-  DERMIS_ANSWER_NONE = 0,
-  /**
-   * The board is the scene's.
-   */
-  DERMIS_ANSWER_IDENTITY = 1,
-  /**
-   * The result of a frame.
-   */
-  DERMIS_ANSWER_RESULT = 2,
-  /**
-   * An answer to no open request, such as a late one to a request that was made again; ignore it.
-   */
-  DERMIS_ANSWER_OTHER = 3,
-} dermis_answer;
-
-/**
  * A limitation of a result, one bit of dermis_result_flags; the guide's page on robustness says when each is raised.
  */
 typedef enum {
   /**
    * `no-contact`
    */
-  DERMIS_FLAG_NO_CONTACT = 1,
+  DERMIS_FLAG_NO_CONTACT = (1 << 0),
   /**
    * `no-compression`
    */
@@ -148,14 +96,75 @@ typedef enum {
    */
   DERMIS_FLAG_WRONG_CHANNEL = (1 << 17),
   /**
-   * `estimate-failed`
+   * `clipped`
    */
-  DERMIS_FLAG_ESTIMATE_FAILED = (1 << 18),
+  DERMIS_FLAG_CLIPPED = (1 << 18),
   /**
-   * `taxel-suspect`
+   * `line-fault`
    */
-  DERMIS_FLAG_TAXEL_SUSPECT = (1 << 19),
+  DERMIS_FLAG_LINE_FAULT = (1 << 19),
+  /**
+   * `taxel-constant`
+   */
+  DERMIS_FLAG_TAXEL_CONSTANT = (1 << 20),
+  /**
+   * `torn-frame`
+   */
+  DERMIS_FLAG_TORN_FRAME = (1 << 21),
 } dermis_flag;
+
+
+/**
+ * What became of a call.
+ */
+typedef enum {
+  /**
+   * Done.
+   */
+  DERMIS_STATUS_OK = 0,
+  /**
+   * An argument, scene or frame cannot be used.
+   */
+  DERMIS_STATUS_INPUT = 1,
+  /**
+   * The result does not have what was asked for.
+   */
+  DERMIS_STATUS_ABSENT = 2,
+  /**
+   * Bytes from the link are not a valid packet; the next ones are read.
+   */
+  DERMIS_STATUS_DAMAGED = 3,
+  /**
+   * The board was built for another scene or version.
+   */
+  DERMIS_STATUS_BOARD = 4,
+  /**
+   * A defect of Dermis.
+   */
+  DERMIS_STATUS_INTERNAL = 5,
+} dermis_status;
+
+/**
+ * What dermis_link_receive found.
+ */
+typedef enum {
+  /**
+   * No packet is complete yet.
+   */
+  DERMIS_ANSWER_NONE = 0,
+  /**
+   * The board is the scene's.
+   */
+  DERMIS_ANSWER_IDENTITY = 1,
+  /**
+   * The result of a frame.
+   */
+  DERMIS_ANSWER_RESULT = 2,
+  /**
+   * An answer to no open request, such as a late one to a request that was made again; ignore it.
+   */
+  DERMIS_ANSWER_OTHER = 3,
+} dermis_answer;
 
 /**
  * The host end of a board's link. One thread at a time may use it.
@@ -310,7 +319,7 @@ dermis_status dermis_result_forces(const dermis_result *result,
 /**
  * Write the contacts, at most capacity of them, and the number that the result has to count. With capacity 0, contacts may be
  * NULL. DERMIS_STATUS_ABSENT, and a count of 0, if the result does not tell contacts apart: those of the estimators
- * "evidence" and "learned" and of partition.case = "contacts" do.
+ * with evidence and of partition.case = "contacts" do.
  */
 dermis_status dermis_result_contacts(const dermis_result *result,
                                      dermis_contact *contacts,

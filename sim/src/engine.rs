@@ -1,121 +1,126 @@
-//! The two models of a scene, built when they are first needed, for calls from other languages.
+//! Engines by name, built for a scene, and the one way to their results.
 //!
-//! | engine | model | kept |
-//! |---|---|---|
-//! | `golden` | floating point | for the scene |
-//! | `fixed` | the integers of the hardware | for the scene if its codes do not depend on the frames, else for one call |
+//! | name | engine |
+//! |---|---|
+//! | `golden` | floating point |
+//! | `fixed` | the integers of the hardware |
+//! | `rtl` | the generated Verilog, under Verilator |
 
-use std::str::FromStr;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use anyhow::{bail, Error, Result};
+use anyhow::{anyhow, bail, Error, Result};
+use clap::ValueEnum;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::engine::{Engine, EngineError, FindNoise};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 
-/// Which model computes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Engine {
-    /// Floating point.
+use crate::cosim::hardware::Hardware;
+use crate::device_error::DeviceError;
+
+/// Name of an engine.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EngineName {
+    /// The floating-point model.
     Golden,
-    /// The integers of the hardware.
+    /// The bit-true integer model.
     Fixed,
+    /// The generated Verilog, under Verilator.
+    Rtl,
 }
 
-impl FromStr for Engine {
-    type Err = Error;
+/// An engine that several threads may use.
+pub type SharedEngine = dyn Engine + Send + Sync;
 
-    fn from_str(name: &str) -> Result<Engine> {
-        match name {
-            "golden" => Ok(Engine::Golden),
-            "fixed" => Ok(Engine::Fixed),
+impl EngineName {
+    /// The engines that are software.
+    pub const SOFTWARE: [EngineName; 2] = [EngineName::Golden, EngineName::Fixed];
+
+    /// The software engine of this name.
+    ///
+    /// # Errors
+    /// Another name.
+    pub fn software(name: &str) -> Result<EngineName> {
+        match EngineName::from_str(name, false) {
+            Ok(engine) if EngineName::SOFTWARE.contains(&engine) => Ok(engine),
             _ => bail!("engine = {name:?} is not allowed; it must be \"golden\" or \"fixed\""),
         }
     }
+
+    /// The engine of a scene for any frames, or for `frames`, whose largest stress is then the full scale of integers if the
+    /// scene needs one and states none. Simulations are built in the folder `build`.
+    ///
+    /// # Errors
+    /// A scene that the engine refuses, no Verilator.
+    pub fn engine(self, scene: &Scene, frames: Option<&[Frame]>, build: &Path) -> Result<Box<dyn Engine>> {
+        let model = || frames.map_or_else(|| Model::new(scene), |frames| Model::for_frames(scene, frames));
+        Ok(match self {
+            EngineName::Golden => Box::new(Golden::new(scene)?),
+            EngineName::Fixed => Box::new(model()?),
+            EngineName::Rtl => Box::new(Hardware::new(model()?, build)?),
+        })
+    }
 }
 
-/// The models of a scene, built once.
+/// The result of the frames of one reconstruction: [`dermis_golden::engine::result`], with errors by their own types.
+///
+/// # Errors
+/// As [`Engine::reconstruct`].
+pub fn result(engine: &dyn Engine, frames: &[Frame], find_noise: FindNoise) -> Result<Reconstruction> {
+    dermis_golden::engine::result(engine, frames, find_noise).map_err(typed)
+}
+
+/// An engine's error by its own type, from which exit codes and exceptions follow.
+fn typed(error: EngineError) -> Error {
+    match error {
+        EngineError::Golden(error) => error.into(),
+        EngineError::Fixed(error) => error.into(),
+        EngineError::Device(error) => match error.downcast::<DeviceError>() {
+            Ok(error) => error.into_inner(),
+            Err(error) => anyhow!(error),
+        },
+    }
+}
+
+/// The software engines of a scene for calls from other languages, each built when it is first needed.
 #[derive(Default)]
-pub struct Models {
-    golden: Mutex<Option<Arc<Golden>>>,
-    fixed: Mutex<Option<Arc<Model>>>,
+pub struct Engines {
+    golden: Mutex<Option<Arc<SharedEngine>>>,
+    fixed: Mutex<Option<Arc<SharedEngine>>>,
 }
 
-/// What reconstructs the frames of one call.
-pub enum Ready {
-    /// The floating-point model.
-    Golden(Arc<Golden>),
-    /// The bit-true model.
-    Fixed(Arc<Model>),
+/// The engine there is, or a new one; `build` says whether the new one serves later calls too.
+fn cached(
+    cache: &Mutex<Option<Arc<SharedEngine>>>,
+    build: impl FnOnce() -> Result<(Arc<SharedEngine>, bool)>,
+) -> Result<Arc<SharedEngine>> {
+    let mut cache = cache.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(engine) = cache.as_ref() {
+        return Ok(Arc::clone(engine));
+    }
+    let (engine, serves_all) = build()?;
+    *cache = serves_all.then(|| Arc::clone(&engine));
+    Ok(engine)
 }
 
-/// The value kept, or a new one; `build` says whether the new one is to be kept.
-fn kept<T>(place: &Mutex<Option<Arc<T>>>, build: impl FnOnce() -> Result<(T, bool)>) -> Result<Arc<T>> {
-    let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(value) = place.as_ref() {
-        return Ok(Arc::clone(value));
-    }
-    let (value, keep) = build()?;
-    let value = Arc::new(value);
-    if keep {
-        *place = Some(Arc::clone(&value));
-    }
-    Ok(value)
-}
-
-impl Models {
-    /// The scene's floating-point model.
+impl Engines {
+    /// A software engine of a scene for `frames`. The bit-true model is built for each call unless the scene states the full
+    /// scale, or needs none.
     ///
     /// # Errors
-    /// A scene that the model refuses.
-    pub fn golden(&self, scene: &Scene) -> Result<Arc<Golden>> {
-        kept(&self.golden, || Ok((Golden::new(scene)?, true)))
-    }
-
-    /// The scene's bit-true model for `frames`.
-    ///
-    /// # Errors
-    /// A scene that the model refuses.
-    pub fn fixed(&self, scene: &Scene, frames: &[Frame]) -> Result<Arc<Model>> {
-        kept(&self.fixed, || {
-            let model = Model::for_frames(scene, frames)?;
-            // A scale that the scene does not state is that of these frames.
-            let own = model.scene.input.full_scale_MPa == scene.input.full_scale_MPa;
-            Ok((model, own))
-        })
-    }
-
-    /// The model of an engine.
-    ///
-    /// # Errors
-    /// As the model's.
-    pub fn ready(&self, engine: Engine, scene: &Scene, frames: &[Frame]) -> Result<Ready> {
-        Ok(match engine {
-            Engine::Golden => Ready::Golden(self.golden(scene)?),
-            Engine::Fixed => Ready::Fixed(self.fixed(scene, frames)?),
-        })
-    }
-}
-
-impl Ready {
-    /// The result of the frames of one reconstruction; with `find_noise` as `dermis reconstruct` has it.
-    ///
-    /// # Errors
-    /// Frames that the model refuses.
-    pub fn reconstruct(&self, scene: &Scene, frames: &[Frame], find_noise: bool) -> Result<Reconstruction> {
-        let (mut result, scene) = match self {
-            Ready::Golden(golden) => (golden.run_averaged(frames)?, scene),
-            Ready::Fixed(model) => (model.reconstruct_averaged(frames)?, &model.scene),
-        };
-        if find_noise {
-            let stress = match self {
-                Ready::Golden(golden) => golden.stress(frames)?,
-                Ready::Fixed(model) => model.stress(frames)?,
-            };
-            result.find_noise(scene, &stress)?;
+    /// A scene that the engine refuses, an engine that is not software.
+    pub fn engine(&self, name: EngineName, scene: &Scene, frames: &[Frame]) -> Result<Arc<SharedEngine>> {
+        match name {
+            EngineName::Golden => cached(&self.golden, || Ok((Arc::new(Golden::new(scene)?), true))),
+            EngineName::Fixed => cached(&self.fixed, || {
+                let model = Model::for_frames(scene, frames)?;
+                let of_scene = model.scene.input.full_scale_MPa == scene.input.full_scale_MPa;
+                Ok((Arc::new(model), of_scene))
+            }),
+            EngineName::Rtl => bail!("engine = \"rtl\" is not allowed; it must be \"golden\" or \"fixed\""),
         }
-        Ok(result)
     }
 }

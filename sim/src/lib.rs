@@ -1,11 +1,12 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Eight folders; each uses only those above it and the files beside the folders.
+//! Eight folders and `engine`; each uses only those above it and the files beside them.
 //!
 //! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
 //! | [`cosim`] | co-simulation: the hardware under Verilator and rust-hdl, compared with the bit-true model, stressed, with faults |
+//! | [`mod@engine`] | engines by name, models and simulated hardware, and the one way to their results |
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`recording`] | frames and results of a stream in an MCAP file, with the message types of ROS 2 |
 //! | [`mod@link`] | the host end of a board's link, of real and of simulated boards |
@@ -17,7 +18,6 @@
 //! |---|---|
 //! | [`compare`] | differences between two force fields |
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
-//! | [`engine`] | the models of a scene, built when they are first needed, for Python and C |
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`mod@run_log`] | counts of long test runs, saved for the report |
@@ -29,6 +29,7 @@ mod artifact_cache;
 pub mod commands;
 pub mod compare;
 pub mod cosim;
+mod device_error;
 pub mod drawn_frames;
 pub mod engine;
 pub mod flow;

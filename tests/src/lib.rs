@@ -70,7 +70,7 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
 /// If there is no such scene or network.
 pub fn with_network(text: &str, hidden: &[usize]) -> (Scene, NamedTempFile) {
     let mut scene = Scene::parse(text, "network.toml").expect("a scene");
-    scene.search.estimator = EstimatorKind::Learned;
+    scene.search.estimator = Some(EstimatorKind::EvidenceNetwork);
     learned::with_network(scene, &Training::trial(hidden)).expect("a network")
 }
 

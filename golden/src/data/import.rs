@@ -36,9 +36,9 @@ mod units;
 pub use crop::{Crop, Window, CONTACT_SHARE, MARGIN, MOST_TAXELS};
 pub use error::ImportError;
 pub use format::Format;
-pub use measure::{noise, Codes, Noise};
+pub use measure::{idle, noise, Codes, Idle, Noise};
 pub use scene::BARE_DEPTH;
-pub use summary::{FrameRecord, Summary};
+pub use summary::{FrameRecord, Summary, IDLE_SHARE};
 pub use units::Unit;
 
 use crate::data::frame::Frame;
@@ -175,6 +175,7 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         frames_in_file,
         codes: measure::codes(readings, per_MPa, stated_MPa, full_scale_MPa),
         noise: noise(&stress, &alive),
+        idle: idle(&stress, &alive),
         frames: records,
     };
     let listed: &[bool] = if settings.missing_as_zero { &[] } else { &dead };

@@ -8,7 +8,7 @@
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
-//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::spec::sliding) |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
@@ -169,9 +169,26 @@ impl Input {
         Some(readings.iter().map(share).fold(0.0, f64::max))
     }
 
+    /// 1 where readings rise with the load, −1 where the table's gains have them fall.
+    pub(crate) fn sign(&self) -> f64 {
+        let gains = self.scale.iter().flat_map(|(_, gain)| gain);
+        if gains.sum::<f64>() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        }
+    }
+
+    /// The options themselves.
+    pub(crate) fn spec(&self) -> &InputSpec {
+        &self.spec
+    }
+
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
     /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
+        #[cfg(test)]
+        tests::CALIBRATIONS.with(|count| count.set(count.get() + 1));
         let mut frame = frame.clone();
         if let Some((zero, gain)) = &self.scale {
             for (b, (zero, gain)) in frame.stress_MPa.iter_mut().zip(zero.iter().zip(gain)) {

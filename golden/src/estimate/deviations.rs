@@ -118,11 +118,12 @@ pub enum DeviationsError {
 }
 
 impl Subject {
-    /// The subject of a scene; `None` unless the scene is searched with the objective `sparse`, shear and one μ per subarray.
-    pub fn of(scene: &Scene) -> Option<Subject> {
+    /// The subject of an estimator of a scene; `None` unless it is the search with the objective `sparse`, shear and one μ
+    /// per subarray.
+    pub fn of(scene: &Scene, estimator: EstimatorKind) -> Option<Subject> {
         let Scene { sensor, search, inverse, fixed, input, partition, .. } = scene;
         let searched = search.objective == ObjectiveKind::Sparse && search.form == Form::Oblique && search.mu_max > 0.0;
-        let by_search = scene.estimator() == EstimatorKind::Search && partition.case != Case::Contacts;
+        let by_search = estimator == EstimatorKind::Search && partition.case != Case::Contacts;
         let fields: [(&str, &dyn Debug); 19] = [
             ("sensor.rows", &sensor.rows),
             ("sensor.cols", &sensor.cols),
@@ -158,13 +159,13 @@ impl Subject {
 }
 
 impl Deviations {
-    /// The table of a scene: of the file that `search.deviations` names, else the program's own of the same subject. `None`
-    /// for a scene without a [`Subject`], or where neither is there.
+    /// The table of an estimator of a scene: of the file that `search.deviations` names, else the program's own of the same
+    /// subject. `None` for one without a [`Subject`], or where neither is there.
     ///
     /// # Errors
     /// [`DeviationsError`] of the named file.
-    pub fn of_scene(scene: &Scene) -> Result<Option<Deviations>, DeviationsError> {
-        let Some(subject) = Subject::of(scene) else { return Ok(None) };
+    pub fn of_scene(scene: &Scene, estimator: EstimatorKind) -> Result<Option<Deviations>, DeviationsError> {
+        let Some(subject) = Subject::of(scene, estimator) else { return Ok(None) };
         let Some(path) = &scene.search.deviations else {
             return Ok(TABLES.iter().find(|table| table.subject == subject).cloned());
         };

@@ -10,7 +10,7 @@
 //! | out: standard deviation of the noise, flag `shear-unreliable` | MPa |
 
 use crate::data::frame::Frame;
-use crate::data::input::{Input, InputError};
+use crate::data::input::Input;
 use crate::estimate::evidence::Evidence;
 use crate::result::flags::Flag;
 use crate::result::reconstruct::Reconstruction;
@@ -23,37 +23,35 @@ use crate::spec::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 pub const FOUND_NOISE_LIMIT: f64 = 1.25e-4;
 
 impl Reconstruction {
-    /// Finds the noise of `stress`, the calibrated frame of this result, and flags the shear if it hides it. Leaves
+    /// Finds the noise of `stress`, the calibrated frame of this result of `estimator`, and flags the shear if it hides it;
+    /// `input` has the scene's input options. Leaves
     /// results as they are that do not come from the objective `sparse`, whose noise is stated, or whose sensor the
     /// estimator `evidence` refuses.
     ///
     /// ```
     /// use dermis_golden::{result::flags::Flag, data::frame::Frame, data::generator::converter::Converter, estimate::float::Golden};
-    /// use dermis_golden::spec::scene::Scene;
+    /// use dermis_golden::spec::scene::{EstimatorKind, Scene};
     ///
-    /// let scene = Scene::builtin("sensor-1")?.for_hardware();
+    /// let scene = Scene::builtin("sensor-1")?;
     /// let exact = Frame::shipped(&scene).remove(0);
     /// let noisy = Converter { noise: 5e-4, seed: 1, ..Default::default() }.convert(&exact).unwrap();
-    /// let golden = Golden::new(&scene)?;
+    /// let golden = Golden::with(&scene, EstimatorKind::Search)?;
     /// for (frame, hidden) in [(exact, false), (noisy, true)] {
     ///     let mut result = golden.run(&frame)?;
     ///     assert!(!result.flags.contains(&Flag::ShearUnreliable));
-    ///     result.find_noise(&scene, &frame)?;
+    ///     result.find_noise(&scene, golden.estimator(), golden.input(), &frame);
     ///     assert_eq!(result.flags.contains(&Flag::ShearUnreliable), hidden);
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`InputError`] if a file of the scene's input options cannot be used.
-    pub fn find_noise(&mut self, scene: &Scene, stress: &Frame) -> Result<(), InputError> {
-        let searched = scene.estimator() == EstimatorKind::Search && scene.search.objective == ObjectiveKind::Sparse;
+    pub fn find_noise(&mut self, scene: &Scene, estimator: EstimatorKind, input: &Input, stress: &Frame) {
+        let searched = estimator == EstimatorKind::Search && scene.search.objective == ObjectiveKind::Sparse;
         let mut whole = scene.clone();
         whole.partition.case = Case::WHOLE;
         whole.search.form = Form::Oblique;
-        whole.search.estimator = EstimatorKind::Auto;
-        if !searched || whole.estimator() != EstimatorKind::Evidence || Input::new(scene)?.noise_MPa() > 0.0 {
-            return Ok(());
+        (whole.search.estimator, whole.search.network) = (None, None);
+        if !searched || whole.model_estimator() != EstimatorKind::Evidence || input.noise_MPa() > 0.0 {
+            return;
         }
         let estimate = Evidence::new(&whole).solve(&stress.stress_MPa, None);
         self.checks.noise_MPa = Some(estimate.noise_MPa);
@@ -62,6 +60,5 @@ impl Reconstruction {
             self.flags.sort();
             self.flags.dedup();
         }
-        Ok(())
     }
 }

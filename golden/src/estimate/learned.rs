@@ -48,7 +48,7 @@ pub use trial::with_network;
 
 use crate::read::bytes_up_to;
 use crate::spec::quads::Quads;
-use crate::spec::scene::Scene;
+use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
 use faer::Mat;
 use features::{Features, Readings};
@@ -117,18 +117,19 @@ impl Learned {
         let signature = Signature::of(scene);
         let (network, losses) = training::train(scene, signature.window, training, progress)?;
         let bytes = file::encode(&network, &signature)?;
-        let learned = Learned::from_bytes(scene, &bytes, "the trained network")?;
+        let learned = Learned::from_bytes(scene, EstimatorKind::Network, &bytes, "the trained network")?;
         Ok(Trained { learned, bytes, loss: [losses.first, losses.last] })
     }
 
-    /// The network that a scene names with `search.network`: a file, or `dermis:NAME`, a part of the program.
+    /// The network that a scene names with `search.network`, for one of its estimators: a file, or `dermis:NAME`, a part of
+    /// the program.
     ///
     /// # Errors
     /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`], [`LearnedError::Damaged`] or
     /// [`LearnedError::Mismatch`].
-    pub fn of_scene(scene: &Scene) -> Result<Learned, LearnedError> {
+    pub fn of_scene(scene: &Scene, estimator: EstimatorKind) -> Result<Learned, LearnedError> {
         let (bytes, file) = bytes_of(scene)?;
-        Learned::from_bytes(scene, &bytes, &file)
+        Learned::from_bytes(scene, estimator, &bytes, &file)
     }
 
     /// The limit of [`crate::estimate::misfit`] of the network that a scene names; `None` for a file without one.
@@ -149,13 +150,18 @@ impl Learned {
         file::with_limit(&bytes, limit, &file)
     }
 
-    /// The network in the bytes of a file, for a scene; `file` names it in errors.
+    /// The network in the bytes of a file, for an estimator of a scene; `file` names it in errors.
     ///
     /// # Errors
     /// [`LearnedError::Damaged`] or [`LearnedError::Mismatch`].
-    pub fn from_bytes(scene: &Scene, bytes: &[u8], file: &str) -> Result<Learned, LearnedError> {
+    pub fn from_bytes(
+        scene: &Scene,
+        estimator: EstimatorKind,
+        bytes: &[u8],
+        file: &str,
+    ) -> Result<Learned, LearnedError> {
         let (network, signature) = file::decode(bytes, file)?;
-        signature.check(scene, file)?;
+        signature.check(scene, estimator, file)?;
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
     }

@@ -54,17 +54,16 @@ pub struct Misfit {
 }
 
 impl Misfit {
-    /// The check of the network that a scene's estimator asks; `None` without one, or where its file has no limit.
+    /// The check of the network that alone gives μ to this estimator of a scene; `None` without one, or where its file has no
+    /// limit.
     ///
     /// # Errors
     /// As [`Learned::misfit_limit`].
-    pub fn of_scene(scene: &Scene) -> Result<Option<Misfit>, LearnedError> {
-        match scene.estimator() {
-            EstimatorKind::Learned | EstimatorKind::Network => {
-                Ok(Learned::misfit_limit(scene)?.map(|limit| Misfit::new(scene, limit)))
-            }
-            _ => Ok(None),
+    pub fn of_scene(scene: &Scene, estimator: EstimatorKind) -> Result<Option<Misfit>, LearnedError> {
+        if !estimator.mu_of_network() {
+            return Ok(None);
         }
+        Ok(Learned::misfit_limit(scene)?.map(|limit| Misfit::new(scene, limit)))
     }
 
     /// The check with this limit.

@@ -1,23 +1,23 @@
 //! Decode: the words of a device, or of this model, as a result in physical units.
 
 mod records;
+#[cfg(test)]
+mod tests;
+
+use std::ops::BitOr;
 
 use self::records::Records;
 use super::error::FixedError;
 use super::model::Model;
 use super::plan::contents::CasePlan;
-use super::stages::send::{
-    labels_of_beats, ln_sigma_of_word, Status, CASE_SHIFT, FLAG_CHANNEL, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND,
-    FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, FRAMES_SHIFT, STATUS_BEATS, TABLES_REFUSED,
-};
+use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
-use crate::data::input::Input;
-use crate::data::reception::{noise_floor_codes, receive, Received};
+use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::estimate::float::objective::Estimate;
 use crate::result::checks::Checks;
 use crate::result::errors::Errors;
-use crate::result::flags::{frame_flags, Flag};
+use crate::result::flags::{frame_flags, Flag, FlagSet};
 use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
@@ -46,8 +46,9 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
-        let trace = self.run(&self.readings(frames)?);
-        self.decode(frames, "fixed", &trace.beats, &trace.status)
+        let stress = self.stress(frames)?;
+        let trace = self.run(&self.readings_at(full_scale(&self.scene, &stress), frames));
+        self.decode_stress(frames, &stress, "fixed", &trace.beats, &trace.status)
     }
 
     /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
@@ -62,9 +63,19 @@ impl Model {
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
+        self.decode_stress(readings, &self.stress(readings)?, engine, beats, status)
+    }
+
+    /// The same for `frame`, the [`Model::stress`] of the readings.
+    fn decode_stress(
+        &self,
+        readings: &[Frame],
+        frame: &Frame,
+        engine: &str,
+        beats: &[[i32; 3]],
+        status: &[[i32; 3]],
+    ) -> Result<Reconstruction, FixedError> {
         let case = self.case_of(status)?;
-        let input = Input::new(&self.scene)?;
-        let frame = &input.calibrate(&input.average(&self.scene, readings)?);
         let codes = self.codes(frame)?;
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
@@ -89,31 +100,13 @@ impl Model {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let sensor = &self.scene.sensor;
-        let noise_MPa = input.noise_of_mean_MPa(readings.len());
-        let mut flags = frame_flags(&self.scene, frame, &codes, noise_MPa);
+        let noise_MPa = self.input.noise_of_mean_MPa(readings.len());
+        let mut flags = frame_flags(&self.scene, self.estimator(), frame, &codes, noise_MPa);
         let mut subarrays = Vec::with_capacity(case.parts.len());
         let mut shear_spread = None;
-        let all: Vec<Status> = status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
-        for status in &all {
-            if status.rescale_saturations + status.force_saturations > 0 || status.flags & FLAG_RAIL != 0 {
-                flags.push(Flag::Saturated);
-            }
-            if status.flags & FLAG_COEFFICIENTS != 0 {
-                flags.push(Flag::CoefficientsDamaged);
-            }
-            if status.flags & FLAG_CHANNEL != 0 {
-                flags.push(Flag::WrongChannel);
-            }
-            if status.flags & FLAG_TABLES != 0 {
-                flags.push(Flag::TablesIncomplete);
-            }
-            if status.tables & TABLES_REFUSED != 0 {
-                flags.push(Flag::TablesRefused);
-            }
-            if status.flags & FLAG_MORE_CONTACTS != 0 {
-                flags.push(Flag::TooManyContacts);
-            }
-        }
+        let all: Vec<Status> = Status::all(status).collect();
+        // Where each contact has a status the condition of the array is that of its codes, see `assemble`.
+        flags.extend(self.status_flags(&all, |_| self.by_contact.is_none()).iter());
         let floor = noise_floor_codes(&self.scene, &codes);
         let received = |part: &Subarray| {
             receive(sensor, part, &part.gather(sensor, &codes.codes), floor, self.scene.partition.condition)
@@ -139,9 +132,6 @@ impl Model {
         let searched = all.iter().filter(|_| regions.is_none());
         for (part, status) in case.parts.iter().zip(searched) {
             let StatusMu { condition, found, mu, estimate } = self.told(status);
-            if condition && self.searches() && !found {
-                flags.push(Flag::NoCompression);
-            }
             let received = Received { condition_met: condition, ..received(part) };
             shear_spread = shear_spread.or(estimate.and_then(|estimate| estimate.shear_spread()));
             let score = match estimate {
@@ -155,7 +145,7 @@ impl Model {
         result.extra.regions = regions;
         if let Some(records) = &records {
             // Without forces per taxel only the device knows whether there is a contact.
-            let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
+            let none = all.iter().all(|status| status.raised.contains(Flag::NoContact));
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
@@ -175,18 +165,18 @@ impl Model {
         }
         if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.
-            result.extra.mean_frames = status.first().map(|beat| (beat[2] as u32 >> FRAMES_SHIFT) as usize);
+            result.extra.mean_frames = all.first().map(|status| status.frames as usize);
         }
         if self.has_writable_tables() {
-            result.extra.tables_version = all.first().map(|status| status.tables & !TABLES_REFUSED);
+            result.extra.tables_version = all.first().map(|status| status.tables as u16);
         }
         if self.chooses() {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
-        let full_scale_share = input.full_scale_share(readings);
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
-        let checks = Checks { full_scale_share, network_misfit, shear_spread, ..result.figures(&self.scene, frame) };
+        let figures = result.figures(&self.scene, frame).with_readings(&self.input, readings);
+        let checks = Checks { network_misfit, shear_spread, ..figures };
         result.add_checks(&self.scene, checks);
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, &self.scene, frame, noise_MPa);
@@ -194,13 +184,26 @@ impl Model {
         Ok(result)
     }
 
+    /// The flags that the statuses of a frame raise; `condition-unmet` only by those whose μ `counts`, by their index.
+    pub fn status_flags(&self, statuses: &[Status], counts: impl Fn(usize) -> bool) -> FlagSet {
+        let raised = |(index, status): (usize, &Status)| {
+            let applies = |flag: &Flag| match flag {
+                Flag::ConditionUnmet => counts(index),
+                Flag::NoCompression => self.searches(),
+                _ => true,
+            };
+            status.flags().iter().filter(applies).collect()
+        };
+        statuses.iter().enumerate().map(raised).fold(FlagSet::default(), FlagSet::bitor)
+    }
+
     /// What a status says of μ.
     fn told(&self, status: &Status) -> StatusMu {
-        let [condition, found] = [FLAG_CONDITION, FLAG_FOUND].map(|flag| status.flags & flag != 0);
+        let Status { condition, found, .. } = *status;
         let unit = 1.0 / MU_STEPS as f64;
-        let mu = status.position.map(|x| f64::from(x) * unit * self.scene.search.mu_max);
+        let mu = status.position().map(|x| f64::from(x) * unit * self.scene.search.mu_max);
         let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
-        let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position));
+        let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position()));
         StatusMu { condition, found, mu, estimate }
     }
 
@@ -217,7 +220,7 @@ impl Model {
         if !self.chooses() {
             return Ok(self.first());
         }
-        let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
+        let number = CASE.get(status);
         let case = self.cases().iter().find(|case| case.number() == number);
         case.ok_or(FixedError::Internal("the status names a case that was not built"))
     }

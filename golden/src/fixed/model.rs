@@ -1,6 +1,6 @@
 //! The bit-true model of one scene: its plan, and the codes of a frame.
 
-use std::ops::{Deref, DerefMut};
+use std::ops::Deref;
 
 use super::error::FixedError;
 use super::plan::cases::{planned, planned_with};
@@ -12,14 +12,17 @@ use crate::data::input::Input;
 use crate::data::quantise::{quantise, Codes};
 use crate::data::reception::full_scale;
 use crate::estimate::deviations::Deviations;
-use crate::spec::scene::largest_code;
-use crate::spec::scene::Scene;
-use crate::spec::scene::MAX_DEGREE;
+use crate::estimate::float::{Golden, GoldenError};
+use crate::spec::scene::{largest_code, EstimatorKind, Scene, MAX_DEGREE};
 
-/// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences.
+/// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences, and the input
+/// options with their files, read once. Of the plan only the tables that the hardware takes change, by [`Model::load`] and
+/// [`Intake`](super::Intake).
 #[derive(Clone, Debug)]
 pub struct Model {
     plan: Plan,
+    /// The scene's input options.
+    pub(super) input: Input,
     /// Standard deviations of a search, where there is a table.
     pub(super) deviations: Option<Deviations>,
 }
@@ -32,31 +35,18 @@ impl Deref for Model {
     }
 }
 
-impl DerefMut for Model {
-    fn deref_mut(&mut self) -> &mut Plan {
-        &mut self.plan
-    }
-}
-
-/// Without standard deviations.
-impl From<Plan> for Model {
-    fn from(plan: Plan) -> Model {
-        Model { plan, deviations: None }
-    }
-}
-
 impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
     /// ```
-    /// use dermis_golden::{fixed::{Cycles, Model}, data::frame::Frame, estimate::float::Golden, spec::scene::Scene};
+    /// use dermis_golden::{fixed::{Cycles, Model}, data::frame::Frame, spec::scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let frame = Frame::shipped(&scene).remove(0);
     /// let model = Model::new(&scene)?;
     /// let fixed = model.reconstruct(&frame)?.resultant_N;
     /// // The golden model with the estimator that the hardware has.
-    /// let golden = Golden::new(&scene.for_hardware())?.run(&frame)?.resultant_N;
+    /// let golden = model.reference()?.run(&frame)?.resultant_N;
     /// // The normal force differs from the golden model's by less than 0.1 %.
     /// assert!((fixed[2] / golden[2] - 1.0).abs() < 1e-3);
     /// // The same in words, one beat per taxel, and the duration of a frame with a search.
@@ -70,9 +60,56 @@ impl Model {
     /// lacks the full scale. [`FixedError::DoesNotFit`] lists the resources the board lacks and changes that make the
     /// scene fit.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
-        let plan = fitting(planned(scene)?)?;
-        let deviations = Deviations::of_scene(&plan.scene)?;
-        Ok(Model { plan, deviations })
+        Model::of_plan(fitting(planned(scene)?)?)
+    }
+
+    /// The model that runs this plan. The files of its input options are read here, and never again.
+    ///
+    /// # Errors
+    /// What is wrong with the files that the plan's scene names.
+    pub fn of_plan(plan: Plan) -> Result<Self, FixedError> {
+        let input = Input::new(&plan.scene)?;
+        let deviations = Deviations::of_scene(&plan.scene, plan.scene.hardware_estimator())?;
+        Ok(Model { plan, input, deviations })
+    }
+
+    /// The model of the plan as `change` makes it, as [`Model::of_plan`] builds it.
+    ///
+    /// # Errors
+    /// As [`Model::of_plan`].
+    pub fn with_changed_plan(self, change: impl FnOnce(&mut Plan)) -> Result<Self, FixedError> {
+        let mut plan = self.plan;
+        change(&mut plan);
+        Model::of_plan(plan)
+    }
+
+    /// A variant of this hardware, of which resources are counted: the files that the plan names need not exist. Its input
+    /// options are those of this model.
+    pub fn variant(&self, plan: Plan) -> Self {
+        Model { plan, input: self.input.clone(), deviations: None }
+    }
+
+    /// The plan, whose tables change while the engine runs.
+    pub(super) fn plan_mut(&mut self) -> &mut Plan {
+        &mut self.plan
+    }
+
+    /// The floating-point reference: the same scene, full scale included, by the same estimator.
+    ///
+    /// # Errors
+    /// As [`Golden::new`].
+    pub fn reference(&self) -> Result<Golden, GoldenError> {
+        Golden::reference(&self.scene)
+    }
+
+    /// The estimator that the hardware computes.
+    pub fn estimator(&self) -> EstimatorKind {
+        self.scene.hardware_estimator()
+    }
+
+    /// The scene's input options with their files.
+    pub fn input(&self) -> &Input {
+        &self.input
     }
 
     /// The model with a polynomial of the given degree, 1 to 3, in place of the one the series needs.
@@ -80,12 +117,12 @@ impl Model {
     /// # Errors
     /// As [`Model::new`], but a board that is too small is no error.
     pub fn of_degree(scene: &Scene, degree: usize) -> Result<Self, FixedError> {
-        Ok(planned_with(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))?.into())
+        Model::of_plan(planned_with(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))?)
     }
 
     /// The model of a scene, whether it fits its board or not.
     pub(crate) fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
-        Ok(planned(scene)?.into())
+        Model::of_plan(planned(scene)?)
     }
 
     /// The model for `frames`: if the scene needs a full scale and has none, it takes the frames' largest |b|, one
@@ -94,8 +131,8 @@ impl Model {
     /// # Errors
     /// As [`Model::new`].
     pub fn for_frames(scene: &Scene, frames: &[Frame]) -> Result<Self, FixedError> {
-        // What `auto` takes is chosen for the scene as it stands, before a full scale is filled in.
-        let mut scene = scene.for_hardware();
+        // The estimator is chosen for the scene as it stands, before a full scale is filled in.
+        let mut scene = scene.clone().with_chosen_hardware();
         let needs = scene.search.noise_floor_MPa > 0.0
             || scene.threshold.min_force_N > 0.0
             || scene.input.average > 0
@@ -119,8 +156,7 @@ impl Model {
     /// [`InputError`](crate::data::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
     /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
-        let input = Input::new(&self.scene)?;
-        Ok(input.calibrate(&input.average(&self.scene, frames)?))
+        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
     }
 
     /// The converter's codes for the frames of one reconstruction, frame after frame, row-major.
@@ -128,9 +164,14 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn readings(&self, frames: &[Frame]) -> Result<Vec<i32>, FixedError> {
-        let full_scale = full_scale(&self.scene, &self.stress(frames)?) * self.prepare.reading_per_MPa;
+        Ok(self.readings_at(full_scale(&self.scene, &self.stress(frames)?), frames))
+    }
+
+    /// The same where the stress in MPa of the largest code is known.
+    pub(super) fn readings_at(&self, full_scale_MPa: f64, frames: &[Frame]) -> Vec<i32> {
+        let full_scale = full_scale_MPa * self.prepare.reading_per_MPa;
         let codes = |frame: &Frame| quantise(&frame.stress_MPa, self.formats().code_bits, full_scale).codes;
-        Ok(frames.iter().flat_map(codes).collect())
+        frames.iter().flat_map(codes).collect()
     }
 
     /// The readings that have these codes, as a frame named `id`: the other way round than [`Model::readings`], for codes that the

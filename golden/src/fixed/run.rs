@@ -15,11 +15,9 @@ use super::stages::prepare::Prepared;
 use super::stages::receive::mask;
 use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
-use super::stages::send::{
-    labels_to_beats, Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES,
-    FRAMES_SHIFT, TABLES_REFUSED,
-};
+use super::stages::send::{labels_to_beats, Status};
 use super::subarray::{SubarrayTrace, Told};
+use crate::result::flags::{Flag, FlagSet};
 use crate::spec::board::EngineKind;
 use crate::spec::partition::Subarray;
 
@@ -86,28 +84,31 @@ impl Model {
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
 
-        let refused = if self.tables_outcome == Outcome::Whole { 0 } else { TABLES_REFUSED };
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {
             part.scatter(sensor, &solved.forces(case, self.threshold), &mut forces);
         }
         let contact = forces.iter().any(|f| f.words[2] != 0);
         let force_saturations = forces.iter().map(|f| f.saturations).sum();
-        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
         let beats_of = |s: &SubarrayTrace, told: Told| {
             let status = Status {
-                position: told.position,
-                flags: flag(told.condition, FLAG_CONDITION)
-                    | flag(told.score.is_some(), FLAG_FOUND)
-                    | flag(!contact, FLAG_NO_CONTACT)
-                    | flag(told.more_contacts, FLAG_MORE_CONTACTS)
-                    | flag(self.tables_outcome == Outcome::Broken, FLAG_TABLES)
-                    | number << CASE_SHIFT
-                    | frames << FRAMES_SHIFT,
+                position_x: told.position[0],
+                position_y: told.position[1],
+                condition: told.condition,
+                found: told.score.is_some(),
+                framing: false,
+                case: number,
+                frames,
+                raised: FlagSet::raised([
+                    (Flag::NoContact, !contact),
+                    (Flag::TooManyContacts, told.more_contacts),
+                    (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
+                    (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
+                ]),
                 score: told.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,
-                tables: self.tables_version | refused,
+                tables: self.tables_version.into(),
                 rescale_saturations: s.saturations,
                 force_saturations,
                 cycles: sending.counted as u32,

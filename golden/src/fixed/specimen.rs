@@ -10,7 +10,6 @@ use super::plan::contents::{CasePlan, Plan};
 use super::stages::load::{self, Outcome, Tables, VERSION_BITS, WORD_BYTES};
 use super::stages::prepare::{Prepare, Scale};
 use super::words::quantised::Quantised;
-use crate::estimate::deviations::Deviations;
 use crate::spec::scene::Scene;
 
 impl Plan {
@@ -116,20 +115,20 @@ impl Intake {
     }
 
     /// A byte, the last of its image or not, between the codes of a frame or not: what becomes of the image if it is over.
-    pub fn byte(&mut self, plan: &mut Plan, byte: u8, last: bool, in_frame: bool) -> Option<Outcome> {
+    pub fn byte(&mut self, model: &mut Model, byte: u8, last: bool, in_frame: bool) -> Option<Outcome> {
         if self.skipping {
             self.skipping = !last;
             return None;
         }
         if self.image.is_empty() && in_frame {
             self.skipping = !last;
-            plan.refuse();
+            model.plan_mut().refuse();
             return Some(Outcome::Refused);
         }
         self.image.push(byte);
         let count = self.image.len();
-        let full = plan.tables().is_some_and(|tables| count == tables.image_bytes());
-        let wrong_head = count == WORD_BYTES && !plan.image().starts_with(&self.image);
+        let full = model.tables().is_some_and(|tables| count == tables.image_bytes());
+        let wrong_head = count == WORD_BYTES && !model.image().starts_with(&self.image);
         if !(last || full || wrong_head) {
             return None;
         }
@@ -137,23 +136,24 @@ impl Intake {
             // It is longer than it may be.
             self.image.push(0);
         }
-        let outcome = self.ends(plan);
+        let outcome = self.ends(model);
         self.skipping = outcome != Outcome::Whole && !last;
         Some(outcome)
     }
 
     /// A code: the rest of an image that has begun will not come.
-    pub fn code(&mut self, plan: &mut Plan) -> Option<Outcome> {
+    pub fn code(&mut self, model: &mut Model) -> Option<Outcome> {
         self.skipping = false;
-        (!self.image.is_empty()).then(|| self.ends(plan))
+        (!self.image.is_empty()).then(|| self.ends(model))
     }
 
     /// A reset: an image ends whose first word was right. The tables stay as they are, and it is forgotten that one was
     /// refused. The last `unused` bytes do not count: a byte that is taken in the cycle before a reset is not used.
-    pub fn reset(&mut self, plan: &mut Plan, unused: usize) -> Option<Outcome> {
+    pub fn reset(&mut self, model: &mut Model, unused: usize) -> Option<Outcome> {
         self.image.truncate(self.image.len().saturating_sub(unused));
         let begun = self.image.len() >= WORD_BYTES;
-        let outcome = begun.then(|| self.ends(plan));
+        let outcome = begun.then(|| self.ends(model));
+        let plan = model.plan_mut();
         if plan.tables_outcome == Outcome::Refused {
             plan.tables_outcome = Outcome::Whole;
         }
@@ -161,12 +161,17 @@ impl Intake {
         outcome
     }
 
-    fn ends(&mut self, plan: &mut Plan) -> Outcome {
-        plan.load(&std::mem::take(&mut self.image))
+    fn ends(&mut self, model: &mut Model) -> Outcome {
+        model.load(&std::mem::take(&mut self.image))
     }
 }
 
 impl Model {
+    /// What the hardware does with the bytes of an image, see [`Plan::load`].
+    pub fn load(&mut self, image: &[u8]) -> Outcome {
+        self.plan_mut().load(image)
+    }
+
     /// The model of this hardware with the tables of the specimen that `scene` describes; frames report `version`, 1 to 32767.
     ///
     /// # Errors
@@ -183,7 +188,7 @@ impl Model {
             return wrong("version", version.to_string(), "1 to 32767");
         }
         let mut own = self.scene.clone();
-        let specimen = scene.for_hardware();
+        let specimen = scene.clone().with_chosen_hardware();
         if let Some(part) = differs(&own, &specimen) {
             return Err(FixedError::NoTable { part });
         }
@@ -198,15 +203,14 @@ impl Model {
         if prepare.reading_per_MPa != self.prepare.reading_per_MPa {
             return Err(FixedError::NoTable { part: "the largest gain, without hardware.table_range.gain," });
         }
-        let mut model = self.clone();
-        (model.prepare, model.noise_floor, model.threshold) = (prepare, noise_floor, threshold);
+        let mut plan = Plan::clone(self);
+        (plan.prepare, plan.noise_floor, plan.threshold) = (prepare, noise_floor, threshold);
         if let Some(quantised) = quantised {
-            model.first_mut().quantised = quantised;
+            plan.first_mut().quantised = quantised;
         }
-        (model.tables_version, model.tables_outcome) = (version, Outcome::Whole);
-        model.scene = own;
-        model.deviations = Deviations::of_scene(&model.scene)?;
-        Ok(model)
+        (plan.tables_version, plan.tables_outcome) = (version, Outcome::Whole);
+        plan.scene = own;
+        Model::of_plan(plan)
     }
 
     /// The matrices of a specimen in this hardware's words; `None` where they are not written.
@@ -248,6 +252,8 @@ fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
     let mut other = specimen.clone();
     (other.input.calibration, other.input.tare) = (own.input.calibration.clone(), own.input.tare.clone());
     other.search.noise_floor_MPa = own.search.noise_floor_MPa;
+    // That of the floating-point model.
+    other.search.estimator = own.search.estimator;
     let range = &own.hardware.table_range;
     if range.thickness_mm.is_some() {
         other.sensor.thickness_mm = own.sensor.thickness_mm;

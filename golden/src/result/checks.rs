@@ -1,28 +1,27 @@
 //! Checks: the figures behind the flags of a result.
 //!
-//! | field | unit | flag | raised when | by |
-//! |---|---|---|---|---|
-//! | `full_scale_share` | – | `saturated` | a reading rounds to the last code of `input.full_scale_MPa` | [`Input`](crate::data::input::Input) |
-//! | `peak_MPa` | MPa | `implausible-stress` | above `input.plausible_MPa` | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `border_share` | – | none; beside `load-outside` | – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
-//! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
-//! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::estimate::found_noise::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
-//! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
-//! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
-//! | `residual_outlier` | – | `misfit` | above [`OUTLIER`] | the estimators `evidence` and `learned` |
-//! | `residual_correlation` | – | `misfit` | above [`CORRELATED`] | the same |
-//! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
-//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
+//! | field | unit | by |
+//! |---|---|---|
+//! | `full_scale_share` | – | [`Input`](crate::data::input::Input) |
+//! | `peak_MPa`, `mu_share`, `border_share` | MPa, –, – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
+//! | `load_ratio` | – | the golden engine |
+//! | `shape_misfit` | – | the golden engine, with `patch` and `symmetric` |
+//! | `noise_MPa` | MPa | the estimators with evidence, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
+//! | `misfit_probability` | – | the estimators with evidence, where the noise is stated |
+//! | `residual_outlier`, `residual_correlation` | – | the estimators with evidence |
+//! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
+//! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
+//! | `plateau`, `line_share` | – | all, [`readings`] |
+//! | `constant_share`, `torn_share` | – | streams, [`history`] |
 //!
+//! The flag of a figure, its limit and its words are in the flag's row, [`crate::result::flags`].
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
+pub mod history;
+pub mod readings;
 #[cfg(test)]
 mod tests;
 
-use crate::result::flags::Flag;
-use crate::spec::scene::Scene;
 use serde::{Deserialize, Serialize};
 
 /// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
@@ -45,6 +44,14 @@ pub const OUTLIER: f64 = 5.0;
 pub const CORRELATED: f64 = 2.5;
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
+/// [`Checks::plateau`] above which readings are clipped: one frame in a thousand by chance.
+pub const PLATEAU: f64 = 7.0;
+/// [`Checks::line_share`] above which a row or column is faulty.
+pub const LINE: f64 = 0.2;
+/// [`Checks::constant_share`] above which a taxel is stuck.
+pub const CONSTANT: f64 = 0.06;
+/// [`Checks::torn_share`] above which a frame's parts are of two moments.
+pub const TORN: f64 = 0.08;
 
 /// Ratio to the normal force below which a shear counts as none.
 const NO_SHEAR: f64 = 0.01;
@@ -104,52 +111,35 @@ pub struct Checks {
     /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
-    /// Distance of the reading that the others explain least, in standard deviations; `None` but for `evidence`.
+    /// Distance of the reading that the others explain least, in standard deviations; `None` but for estimators with evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_outlier: Option<f64>,
     /// Correlation of what the estimate leaves of neighbouring readings, in standard deviations of that of white noise;
-    /// `None` but for `evidence`.
+    /// `None` but for estimators with evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_correlation: Option<f64>,
+    /// Logarithm of the inverse probability that as many readings are the largest by rounding, see [`readings`]; `None` where
+    /// all are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plateau: Option<f64>,
+    /// Largest range of a row or column that repeats the next one or lies beside a silent one, over the frame's, see
+    /// [`readings`]; `None` on arrays of few rows and columns, and where all readings are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_share: Option<f64>,
+    /// Largest change of the taxels beside one that stands still, over the range of a frame, see [`history`]; `None` but in
+    /// streams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constant_share: Option<f64>,
+    /// Range of a part of the frame that is that of the frame before, or change of the rest if smaller, over the range of a
+    /// frame, see [`history`]; `None` but in streams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torn_share: Option<f64>,
 }
 
 impl Checks {
-    /// The figure behind a flag, in words; `None` for flags without one.
-    pub fn figure(&self, flag: Flag) -> Option<String> {
-        match flag {
-            Flag::Saturated => self.full_scale_share.map(|share| format!("{share:.3} of full scale")),
-            Flag::MuAtBound => self.mu_share.map(|share| format!("{share:.3} of mu_max")),
-            Flag::ImplausibleStress => Some(format!("{:.3} MPa", self.peak_MPa)),
-            Flag::LoadOutside => {
-                self.border_share.map(|share| format!("{:.1} % of the load at the border", 1e2 * share))
-            }
-            Flag::LoadMismatch => self.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
-            Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
-            Flag::ShearNotResolved => {
-                self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
-            }
-            Flag::ShearUnreliable => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
-            Flag::Misfit => match (self.misfit_probability, self.network_misfit) {
-                (probability, Some(misfit)) if misfit > 1.0 || probability.is_none() => {
-                    Some(format!("misfit {misfit:.3} times that of frames like the training"))
-                }
-                _ if self.leaves_structure() && probability_explains(self.misfit_probability) => {
-                    let figure = |size: Option<f64>| size.map_or("–".to_string(), |size| format!("{size:.1}"));
-                    let [outlier, correlation] = [self.residual_outlier, self.residual_correlation].map(figure);
-                    Some(format!(
-                        "a reading {outlier} standard deviations off, correlation of neighbours {correlation}"
-                    ))
-                }
-                (Some(probability), _) => Some(format!("probability {probability:.1e}")),
-                _ => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
-            },
-            _ => None,
-        }
-    }
-
     /// Whether the estimate leaves more than noise explains, of the stated size, else of one that a sensor can have, or more
     /// than of frames like those of the network's training.
-    fn misfits(&self) -> bool {
+    pub(crate) fn misfits(&self) -> bool {
         let unlike = self.network_misfit.is_some_and(|misfit| misfit > 1.0);
         unlike
             || self.leaves_structure()
@@ -165,28 +155,24 @@ impl Checks {
             || self.residual_correlation.is_some_and(|size| size > CORRELATED)
     }
 
-    /// The flags that the figures raise.
-    pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
-        let last_code = 1.0 - 0.5 / f64::from(crate::spec::scene::largest_code(scene.fixed.input_bits));
-        [
-            (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
-            (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
-            (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
-            (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
-            (Flag::Misfit, self.misfits()),
-            (Flag::ShearNotResolved, self.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED)),
-            (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
-        ]
-        .into_iter()
-        .filter_map(|(flag, raised)| raised.then_some(flag))
+    /// The figure behind `misfit`, in words: of the rules that raise it the first.
+    pub(crate) fn misfit_figure(&self) -> Option<String> {
+        match (self.misfit_probability, self.network_misfit) {
+            (probability, Some(misfit)) if misfit > 1.0 || probability.is_none() => {
+                Some(format!("misfit {misfit:.3} times that of frames like the training"))
+            }
+            (probability, _) if self.leaves_structure() && probability.is_none_or(|p| p >= MISFIT) => {
+                let figure = |size: Option<f64>| size.map_or("–".to_string(), |size| format!("{size:.1}"));
+                let [outlier, correlation] = [self.residual_outlier, self.residual_correlation].map(figure);
+                Some(format!("a reading {outlier} standard deviations off, correlation of neighbours {correlation}"))
+            }
+            (Some(probability), _) => Some(format!("probability {probability:.1e}")),
+            _ => self.noise_figure(),
+        }
     }
-}
 
-/// Whether the stated noise, if there is one, explains what is left.
-fn probability_explains(probability: Option<f64>) -> bool {
-    probability.is_none_or(|probability| probability >= MISFIT)
-}
-
-fn noise_figure(noise_MPa: f64, peak_MPa: f64) -> String {
-    format!("noise {:.3} % of the peak", 1e2 * noise_MPa / peak_MPa)
+    /// The noise, in words.
+    pub(crate) fn noise_figure(&self) -> Option<String> {
+        self.noise_MPa.map(|noise| format!("noise {:.3} % of the peak", 1e2 * noise / self.peak_MPa))
+    }
 }

@@ -1,106 +1,343 @@
 //! Flags: limitations of a result that a user must know before trusting it.
 //!
-//! | flag | raised when | by |
-//! |---|---|---|
-//! | `no-contact` | no taxel carries a force | [`crate::result::reconstruct::assemble`] |
-//! | `no-compression` | no candidate μ leaves Σp > 0 | the engine |
-//! | `condition-unmet` | a subarray does not meet the scene's condition and is not searched | `assemble` |
-//! | `saturated` | a reading reached full scale, a sample the end of its converter's range, or a word of the engine saturated | [`frame_flags`], `Checks::flags`, the engine, the scan |
-//! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
-//! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
-//! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
-//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, or noise found above 1.25·10⁻⁴, with `sparse` | `frame_flags`, [`find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
-//! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
-//! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
-//! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
-//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, with `search` where the noise is stated |
-//! | `misfit` | the stated noise does not explain what the estimate leaves, or noise found from the frame is above a tenth of its peak; with a network also a frame unlike those of its training | `Checks::flags`, estimators but `search` |
-//! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
-//! | `too-many-contacts` | more contacts than `partition.max_contacts` or than the segmentation holds; the smallest have no shear | the engine, with a network |
-//! | `tables-incomplete` | the hardware's tables are not whole: no force is computed from them | the engine |
-//! | `tables-refused` | the last tables sent to the hardware were refused; it has those of before | the engine |
-//! | `wrong-channel` | a converter that the hardware scans named another channel than that asked for | the scan |
-//! | `estimate-failed` | no fit explains the stress, or it is implausible: the normal force is Σ b·area, the shear is not known | `evidence`, `learned` |
-//! | `taxel-suspect` | a reading that no force explains: the taxel is taken as missing in this frame | `evidence`, `learned` |
+//! [`Flag`] lists them. Each is one row of `flags!`, from which follow the type, its name in JSON, the texts of `dermis flags`
+//! and of the guide, the figure behind it, the rule that raises it from a figure, and its bit in a status: the masks of
+//! `manifest.json`, the positions that the hardware and its readers take, and the enumeration of the C header.
 //!
-//! [`Checks::flags`]: crate::result::checks::Checks::flags
+//! # A new flag
+//!
+//! 1. A row at the end of `flags!` with the next number. The numbers are the bits of the C interface and the order in
+//!    results: they stay as they are.
+//! 2. What raises it: the `rule` of its row over a figure of [`Checks`]; [`frame_flags`] from the frame alone; an engine; or, of
+//!    a row with a `bit`, the bit-true model (`fixed/run.rs`) and the hardware (`hdl`).
+//!
+//! `make guide` and `DERMIS_ACCEPT=1 make c` then write the pages and `dermis.h`.
+
+mod set;
+mod status_field;
+
+pub use set::FlagSet;
+pub use status_field::{Feature, StatusField, STATUS_BEATS};
 
 use crate::data::frame::Frame;
 use crate::data::quantise::Codes;
-use crate::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
+use crate::result::checks::{Checks, CONSTANT, LINE, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED, PLATEAU, TORN};
+use crate::spec::scene::{largest_code, EstimatorKind, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
+use std::fmt::Write;
 
-/// A limitation of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Flag {
-    /// No taxel carries a force.
-    NoContact,
-    /// No candidate μ has a compressive resultant.
-    NoCompression,
-    /// A subarray does not meet the scene's condition and was not searched.
-    ConditionUnmet,
-    /// A value was clamped to the end of its range.
-    Saturated,
-    /// The contact extends beyond the array's edge.
-    LoadOutside,
-    /// Frame and scene name different media.
-    MediumMismatch,
-    /// Noise or quantisation is too large for the objective to determine the shear.
-    ShearUnreliable,
-    /// The hardware's coefficient memory does not hold the generated coefficients.
-    CoefficientsDamaged,
-    /// The ratio of shear to normal force is at the scene's bound; the true one may be larger.
-    MuAtBound,
-    /// The stress is above what a contact can plausibly cause.
-    ImplausibleStress,
-    /// The normal force differs from that of the same stress without shear.
-    LoadMismatch,
-    /// No contact of the shape that the objective assumes explains the stress within the stated noise.
-    ShapeMismatch,
-    /// The shear's standard deviation is above a third of it.
-    ShearNotResolved,
-    /// Noise of the stated size, or of a size that a sensor can have, does not explain what the estimate leaves of the
-    /// stress; with a network, the frame is unlike those of its training.
-    Misfit,
-    /// There are more contacts than get a μ; the smallest have no shear.
-    TooManyContacts,
-    /// The tables of the hardware are not whole, and every stress is taken as 0.
-    TablesIncomplete,
-    /// The hardware refused the last tables that it was sent.
-    TablesRefused,
-    /// A converter that the hardware scans named another channel than that asked for.
-    WrongChannel,
-    /// No fit explains the stress; the normal force is Σ b·area, the shear is not known.
-    EstimateFailed,
-    /// A taxel reads what no force explains, and is taken as missing.
-    TaxelSuspect,
+/// What is known of a flag.
+struct Row {
+    name: &'static str,
+    raised_when: &'static str,
+    remedy: &'static str,
+    raised_by: &'static str,
+    /// Raises it from the figures of a result.
+    rule: Option<fn(&Checks, &Scene) -> bool>,
+    /// The figure behind it, in words; none where it was not computed.
+    figure: Option<fn(&Checks) -> Option<String>>,
+    bit: Option<StatusField>,
 }
 
+/// An expression, if there is one.
+macro_rules! optional {
+    () => {
+        None
+    };
+    ($value:expr) => {
+        Some($value)
+    };
+}
+
+/// Defines the flags, a row each: number, name in JSON, when it is raised, what a user does about it, and by what it is raised;
+/// then, where there is one, the rule over the figures of a result, the figure in words, and the bit of a status as a constant.
+macro_rules! flags {
+    ($($flag:ident = $number:literal $name:literal {
+        raised_when: $raised_when:literal,
+        remedy: $remedy:literal,
+        raised_by: $raised_by:literal,
+        $(rule: $rule:expr,)?
+        $(figure: $figure:expr,)?
+        $(bit: $bit:ident = $field:expr,)?
+    })*) => {
+        /// A limitation of a result.
+        ///
+        /// | flag | raised when | what to do | by |
+        /// |---|---|---|---|
+        $(#[doc = concat!("| `", $name, "` | ", $raised_when, " | ", $remedy, " | ", $raised_by, " |")])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        pub enum Flag {
+            $(
+                #[doc = concat!("`", $name, "`: ", $raised_when, ".")]
+                #[serde(rename = $name)]
+                $flag = $number,
+            )*
+        }
+
+        impl Flag {
+            /// All flags, in the order of their numbers.
+            pub const ALL: [Flag; [$($number),*].len()] = [$(Flag::$flag),*];
+        }
+
+        $($(
+            #[doc = concat!("The bit of a status for `", $name, "`.")]
+            pub const $bit: StatusField = $field;
+        )?)*
+
+        static ROWS: [Row; Flag::ALL.len()] = [$(Row {
+            name: $name,
+            raised_when: $raised_when,
+            remedy: $remedy,
+            raised_by: $raised_by,
+            rule: optional!($($rule)?),
+            figure: optional!($($figure)?),
+            bit: optional!($($bit)?),
+        }),*];
+    };
+}
+
+flags! {
+    NoContact = 0 "no-contact" {
+        raised_when: "no taxel carries a force, or none above `threshold.min_force_N`",
+        remedy: "nothing to do",
+        raised_by: "all engines",
+        bit: NO_CONTACT = StatusField::flag("no_contact", 2, Feature::Always, "no force reaches the threshold"),
+    }
+    NoCompression = 1 "no-compression" {
+        raised_when: "no candidate μ leaves Σp > 0",
+        remedy: "check the sign of the readings: compression is positive",
+        raised_by: "all engines, with a search",
+    }
+    ConditionUnmet = 2 "condition-unmet" {
+        raised_when: "a subarray does not meet `partition.condition` and is not searched: its shear is 0",
+        remedy: "expected on subarrays without load",
+        raised_by: "all engines",
+    }
+    Saturated = 3 "saturated" {
+        raised_when: "a reading, zero or calibrated reading is at the end of the stated full scale (`full_scale_share`), the stress beyond it, a sample at the end of its converter's range, or the arithmetic saturated",
+        remedy: "raise `input.full_scale_MPa`",
+        raised_by: "all engines",
+        rule: |checks, scene| {
+            let last_code = 1.0 - 0.5 / f64::from(largest_code(scene.fixed.input_bits));
+            checks.full_scale_share.is_some_and(|share| share >= last_code)
+        },
+        figure: |checks| checks.full_scale_share.map(|share| format!("{share:.3} of full scale")),
+        bit: RAIL = StatusField::flag("rail", 7, Feature::Scan, "a sample was at an end of the converter's range"),
+    }
+    LoadOutside = 4 "load-outside" {
+        raised_when: "part of the contact lies over the array's edge; `border_share` is the share of the normal load in the outermost rows and columns",
+        remedy: "the forces are those on the array alone",
+        raised_by: "all engines",
+        figure: |checks| checks.border_share.map(|share| format!("{:.1} % of the load at the border", 1e2 * share)),
+    }
+    MediumMismatch = 5 "medium-mismatch" {
+        raised_when: "the frame names another medium than the scene",
+        remedy: "set `medium` in the scene",
+        raised_by: "all engines",
+    }
+    ShearUnreliable = 6 "shear-unreliable" {
+        raised_when: "stated noise, or rounding of the codes, above 5·10⁻⁵ of the peak, with `sparse`; where no noise is stated, noise found by `dermis reconstruct` above 1.25·10⁻⁴ (`noise_MPa`)",
+        remedy: "average, another objective, more bits",
+        raised_by: "all engines, with a search",
+        figure: |checks| checks.noise_figure(),
+    }
+    CoefficientsDamaged = 7 "coefficients-damaged" {
+        raised_when: "the signature of the hardware's coefficient memory is wrong",
+        remedy: "reset, configure again",
+        raised_by: "hardware",
+        bit: COEFFICIENTS =
+            StatusField::flag("coefficients", 4, Feature::CoefficientCheck, "the coefficient memory is damaged"),
+    }
+    MuAtBound = 8 "mu-at-bound" {
+        raised_when: "the size of μ of a subarray or contact with 5 % of the load is at least 0.95 of `search.mu_max` (`mu_share`)",
+        remedy: "raise `search.mu_max`; the true ratio may be any larger one",
+        raised_by: "all engines",
+        rule: |checks, _| checks.mu_share.is_some_and(|share| share >= MU_AT_BOUND),
+        figure: |checks| checks.mu_share.map(|share| format!("{share:.3} of mu_max")),
+    }
+    ImplausibleStress = 9 "implausible-stress" {
+        raised_when: "the largest stress (`peak_MPa`) is above `input.plausible_MPa`",
+        remedy: "check the unit of the readings, the calibration",
+        raised_by: "all engines",
+        rule: |checks, scene| checks.peak_MPa > scene.input.plausible_MPa,
+        figure: |checks| Some(format!("{:.3} MPa", checks.peak_MPa)),
+    }
+    LoadMismatch = 10 "load-mismatch" {
+        raised_when: "the normal force is more than 10 % off the one of the same stress without shear (`load_ratio`)",
+        remedy: "another objective or partition",
+        raised_by: "golden model",
+        rule: |checks, _| checks.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH),
+        figure: |checks| checks.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
+    }
+    ShapeMismatch = 11 "shape-mismatch" {
+        raised_when: "the contact that `patch` or `symmetric` fits leaves more of the stress than the stated noise explains (`shape_misfit` above 1)",
+        remedy: "state the noise; if it is stated, use `sparse` or `auto`",
+        raised_by: "golden model",
+        rule: |checks, _| checks.shape_misfit.is_some_and(|misfit| misfit > 1.0),
+        figure: |checks| checks.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
+    }
+    ShearNotResolved = 12 "shear-not-resolved" {
+        raised_when: "the shear of a contact, or with `search` and stated noise of a subarray, has a standard deviation above a third of it (`shear_spread`)",
+        remedy: "average; the normal force still holds",
+        raised_by: "all engines",
+        rule: |checks, _| checks.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED),
+        figure: |checks| {
+            checks.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
+        },
+    }
+    Misfit = 13 "misfit" {
+        raised_when: "with an estimator that has evidence, noise of the stated size leaves as much of the stress unexplained in less than one frame of a thousand (`misfit_probability`), or noise found from the frame is above a tenth of its peak; or a reading is more than 5 standard deviations off what the others say (`residual_outlier`), or neighbours leave alike (`residual_correlation` above 2.5), whatever the noise; with a network also a frame unlike those of its training (`network_misfit` above 1)",
+        remedy: "check medium, thickness, calibration, faulty taxels, the stated noise, and whether the noise is below 2 % of the peak",
+        raised_by: "golden model; with a network all engines",
+        rule: |checks, _| checks.misfits(),
+        figure: |checks| checks.misfit_figure(),
+    }
+    TooManyContacts = 14 "too-many-contacts" {
+        raised_when: "with a network for each contact, more contacts than `partition.max_contacts` or than the segmentation holds",
+        remedy: "raise `partition.max_contacts`; the smallest contacts have their normal force, but no shear",
+        raised_by: "all engines",
+        bit: MORE_CONTACTS = StatusField::flag("more_contacts", 5, Feature::Contacts, "more contacts than get a μ"),
+    }
+    TablesIncomplete = 15 "tables-incomplete" {
+        raised_when: "an image of tables was broken off or damaged: every stress is taken as 0",
+        remedy: "load it again",
+        raised_by: "hardware",
+        bit: TABLES = StatusField::flag(
+            "tables", 6, Feature::WritableTables, "the tables are not whole, and every stress is taken as 0"
+        ),
+    }
+    TablesRefused = 16 "tables-refused" {
+        raised_when: "the last image was damaged, cut short, or is for other hardware",
+        remedy: "`dermis load` with the scene of this hardware; `tables_version` says which tables are used",
+        raised_by: "hardware",
+        bit: TABLES_REFUSED = StatusField::new(
+            "tables_refused", [1, 2], [31, 1], Feature::WritableTables, "the last image of tables was refused"
+        ),
+    }
+    WrongChannel = 17 "wrong-channel" {
+        raised_when: "with `hardware.source = \"adc-scan\"`, a converter named another channel than that asked for",
+        remedy: "check wires and type of the converter",
+        raised_by: "hardware",
+        bit: WRONG_CHANNEL = StatusField::flag("wrong_channel", 10, Feature::Scan, "a sample named another channel"),
+    }
+    Clipped = 18 "clipped" {
+        raised_when: "several readings are the largest to the bit, and the others are far below (`plateau` above 7, the logarithm of a probability)",
+        remedy: "find what clips below full scale: an amplifier, a table, a unit",
+        raised_by: "all engines",
+        rule: |checks, _| checks.plateau.is_some_and(|plateau| plateau > PLATEAU),
+        figure: |checks| checks.plateau.map(|plateau| format!("by chance in e^-{plateau:.0} of the frames")),
+    }
+    LineFault = 19 "line-fault" {
+        raised_when: "a row or column repeats the next one to the bit, or has one reading beside loaded ones (`line_share` above 0.2 of the frame's range)",
+        remedy: "check the multiplexer, the connector, the transfer of the frame",
+        raised_by: "all engines",
+        rule: |checks, _| checks.line_share.is_some_and(|share| share > LINE),
+        figure: |checks| checks.line_share.map(|share| format!("beside {:.0} % of the range", 1e2 * share)),
+    }
+    TaxelConstant = 20 "taxel-constant" {
+        raised_when: "in a stream, a taxel has had one reading for 8 frames while all beside it rose or fell by 6 % of the range (`constant_share`)",
+        remedy: "list it in `input.dead`",
+        raised_by: "streams of all engines",
+        rule: |checks, _| checks.constant_share.is_some_and(|share| share > CONSTANT),
+        figure: |checks| {
+            checks.constant_share.map(|share| format!("beside a change of {:.0} % of the range", 1e2 * share))
+        },
+    }
+    TornFrame = 21 "torn-frame" {
+        raised_when: "in a stream, a part of the frame is that of the frame before to the bit, and the rest has changed (`torn_share` above 0.08 of the range)",
+        remedy: "give frames that are whole: read them between two scans",
+        raised_by: "streams of all engines",
+        rule: |checks, _| checks.torn_share.is_some_and(|share| share > TORN),
+        figure: |checks| checks.torn_share.map(|share| format!("{:.0} % of the range", 1e2 * share)),
+    }
+    EstimateFailed = 22 "estimate-failed" {
+        raised_when: "no fit explains half of Σ b·area, or the stress is implausible: the normal force is Σ b·area, its standard deviation half of the area times the sum of the sizes of b, the shear is 0 and not resolved",
+        remedy: "check zero, unit and wiring of the readings",
+        raised_by: "golden model, with evidence",
+    }
+    TaxelSuspect = 23 "taxel-suspect" {
+        raised_when: "a taxel reads what no force explains beside its neighbours: at least 8 standard deviations and 1 % of the peak off what a fit without it predicts. `suspects` names it with row, column, reading and expected stress; the estimate takes it as missing",
+        remedy: "repair the taxel, or list it in `input.dead`",
+        raised_by: "golden model, with evidence",
+    }
+}
+
+// Rows stand in the order of their numbers, and C has as many bits.
+const _: () = {
+    let mut at = 0;
+    while at < Flag::ALL.len() {
+        assert!(Flag::ALL[at] as usize == at);
+        at += 1;
+    }
+    assert!(at <= u32::BITS as usize);
+};
+
 impl Flag {
-    /// All flags, in order.
-    pub const ALL: [Flag; 20] = [
-        Flag::NoContact,
-        Flag::NoCompression,
-        Flag::ConditionUnmet,
-        Flag::Saturated,
-        Flag::LoadOutside,
-        Flag::MediumMismatch,
-        Flag::ShearUnreliable,
-        Flag::CoefficientsDamaged,
-        Flag::MuAtBound,
-        Flag::ImplausibleStress,
-        Flag::LoadMismatch,
-        Flag::ShapeMismatch,
-        Flag::ShearNotResolved,
-        Flag::Misfit,
-        Flag::TooManyContacts,
-        Flag::TablesIncomplete,
-        Flag::TablesRefused,
-        Flag::WrongChannel,
-        Flag::EstimateFailed,
-        Flag::TaxelSuspect,
-    ];
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    /// Name, as in JSON.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// When it is raised, in words of the guide.
+    pub fn raised_when(self) -> &'static str {
+        self.row().raised_when
+    }
+
+    /// What a user does about it.
+    pub fn remedy(self) -> &'static str {
+        self.row().remedy
+    }
+
+    /// The engines that raise it.
+    pub fn raised_by(self) -> &'static str {
+        self.row().raised_by
+    }
+
+    /// Its bit in the status of the hardware; `None` where the status has none of its own.
+    pub fn status_bit(self) -> Option<StatusField> {
+        self.row().bit
+    }
+
+    /// Its bit in a number of flags, as the C interface gives them: 2 to the power of its number.
+    pub fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+impl Checks {
+    /// The figure behind a flag, in words; `None` for flags without one.
+    pub fn figure(&self, flag: Flag) -> Option<String> {
+        flag.row().figure.and_then(|figure| figure(self))
+    }
+
+    /// The flags that the figures raise.
+    pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
+        let raised = |flag: Flag| (flag, flag.row().rule.is_some_and(|rule| rule(self, scene)));
+        only_raised(Flag::ALL.map(raised))
+    }
+}
+
+/// The flags that are marked as raised.
+fn only_raised<const N: usize>(all: [(Flag, bool); N]) -> impl Iterator<Item = Flag> {
+    all.into_iter().filter_map(|(flag, raised)| raised.then_some(flag))
+}
+
+/// The flags as a C enumeration `dermis_flag` of single bits.
+pub fn c_enum() -> String {
+    let mut text = String::from(
+        "/**\n * A limitation of a result, one bit of dermis_result_flags; the guide's page on robustness says when each is raised.\n \
+         */\ntypedef enum {\n",
+    );
+    for flag in Flag::ALL {
+        let (name, number) = (flag.name(), flag as u32);
+        let constant = name.to_uppercase().replace('-', "_");
+        let _ = writeln!(text, "  /**\n   * `{name}`\n   */\n  DERMIS_FLAG_{constant} = (1 << {number}),");
+    }
+    text + "} dermis_flag;\n"
 }
 
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
@@ -108,19 +345,17 @@ pub const SHARE_INSIDE: f64 = 0.995;
 /// Noise relative to the peak above which the sparse objective cannot determine the shear.
 pub const SPARSE_NOISE_LIMIT: f64 = 5e-5;
 
-/// The flags that depend on the frame and its codes alone, in the order of [`Flag`]; `noise_MPa` is the standard deviation
+/// The flags that depend on the estimator, the frame and its codes alone, in the order of [`Flag`]; `noise_MPa` is the standard deviation
 /// of a taxel of the averaged frame, 0 if it is not known, see [`crate::data::input::Input::noise_MPa`].
-pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) -> Vec<Flag> {
+pub fn frame_flags(scene: &Scene, estimator: EstimatorKind, frame: &Frame, codes: &Codes, noise_MPa: f64) -> Vec<Flag> {
     let medium_differs = frame.medium.is_some_and(|medium| medium != scene.medium);
-    [
+    let all = [
         (Flag::Saturated, codes.clipped.contains(&true)),
         (Flag::LoadOutside, load_outside(frame)),
         (Flag::MediumMismatch, medium_differs),
-        (Flag::ShearUnreliable, shear_unreliable(scene, frame, codes, noise_MPa)),
-    ]
-    .into_iter()
-    .filter_map(|(flag, raised)| raised.then_some(flag))
-    .collect()
+        (Flag::ShearUnreliable, estimator == EstimatorKind::Search && shear_unreliable(scene, frame, codes, noise_MPa)),
+    ];
+    only_raised(all).collect()
 }
 
 /// With known forces: the cells carry less than the load. Without: the largest |b| is in the outermost rows or columns
@@ -139,11 +374,10 @@ fn load_outside(frame: &Frame) -> bool {
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
 
-/// Compares the noise, or the standard deviation LSB/√12 of rounding, with the peak.
+/// Of a search: compares the noise, or the standard deviation LSB/√12 of rounding, with the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) -> bool {
     let search = &scene.search;
-    let by_search = scene.estimator() == EstimatorKind::Search;
-    let searched = by_search && search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
+    let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
     let noise = noise_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
@@ -156,7 +390,7 @@ mod tests {
     use crate::spec::scene::Medium;
 
     fn setting() -> (Scene, Frame) {
-        let scene = Scene::builtin("sensor-1").unwrap().for_hardware();
+        let scene = Scene::builtin("sensor-1").unwrap();
         let frame = Frame::shipped(&scene).remove(1);
         (scene, frame)
     }
@@ -165,35 +399,68 @@ mod tests {
         let peak = frame.peak_MPa();
         let full_scale = if peak > 0.0 { share * peak } else { 1.0 };
         let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
-        frame_flags(scene, frame, &quantise(&frame.stress_MPa, bits, full_scale), noise_MPa)
+        frame_flags(scene, EstimatorKind::Search, frame, &quantise(&frame.stress_MPa, bits, full_scale), noise_MPa)
+    }
+
+    /// Order and names of released flags, on which C and stored results rely.
+    #[test]
+    fn released_flags_stay_as_they_are() {
+        let released = "no-contact no-compression condition-unmet saturated load-outside medium-mismatch shear-unreliable \
+                        coefficients-damaged mu-at-bound implausible-stress load-mismatch shape-mismatch shear-not-resolved \
+                        misfit too-many-contacts tables-incomplete tables-refused wrong-channel";
+        for (number, name) in released.split(' ').enumerate() {
+            assert_eq!((Flag::ALL[number].name(), Flag::ALL[number] as usize), (name, number));
+        }
     }
 
     #[test]
-    fn names_are_those_of_the_json() {
-        let text = serde_json::to_string(&Flag::ALL).unwrap();
-        let wanted = [
-            "no-contact",
-            "no-compression",
-            "condition-unmet",
-            "saturated",
-            "load-outside",
-            "medium-mismatch",
-            "shear-unreliable",
-            "coefficients-damaged",
-            "mu-at-bound",
-            "implausible-stress",
-            "load-mismatch",
-            "shape-mismatch",
-            "shear-not-resolved",
-            "misfit",
-            "too-many-contacts",
-            "tables-incomplete",
-            "tables-refused",
-            "wrong-channel",
-            "estimate-failed",
-            "taxel-suspect",
-        ];
-        assert_eq!(text, serde_json::to_string(&wanted).unwrap());
+    fn each_row_has_what_its_readers_need() {
+        let header = c_enum();
+        for flag in Flag::ALL {
+            let name = flag.name();
+            assert_eq!(serde_json::to_value(flag).unwrap(), name);
+            assert_eq!(serde_json::from_value::<Flag>(name.into()).unwrap(), flag);
+            assert!(name.chars().all(|c| c.is_ascii_lowercase() || c == '-'), "{name}");
+            let texts = [flag.raised_when(), flag.remedy(), flag.raised_by()];
+            // One cell of a table each.
+            assert!(texts.iter().all(|text| !text.is_empty() && !text.contains(['|', '\n'])), "{texts:?}");
+            let constant = format!("DERMIS_FLAG_{} = (1 << {}),", name.to_uppercase().replace('-', "_"), flag as u32);
+            assert!(header.contains(&constant), "{constant}");
+            let others = Flag::ALL.into_iter().filter(|other| *other != flag);
+            for other in others {
+                assert!(other.name() != name && other.bit() != flag.bit());
+                let shared = flag.status_bit().filter(|_| flag.status_bit() == other.status_bit());
+                assert_eq!(shared, None, "{flag:?}, {other:?}");
+            }
+            let set: FlagSet = [flag].into_iter().collect();
+            assert!(set.iter().eq([flag]) && set.bits() == flag.bit(), "{flag:?}");
+        }
+    }
+
+    #[test]
+    fn a_flag_raised_by_a_figure_has_its_figure() {
+        let (scene, frame) = setting();
+        let checks = Checks {
+            full_scale_share: Some(2.0),
+            peak_MPa: 100.0,
+            mu_share: Some(1.0),
+            load_ratio: Some(2.0),
+            shape_misfit: Some(2.0),
+            noise_MPa: Some(50.0),
+            shear_spread: Some(1.0),
+            plateau: Some(20.0),
+            line_share: Some(1.0),
+            constant_share: Some(1.0),
+            torn_share: Some(1.0),
+            ..Checks::default()
+        };
+        let raised: Vec<Flag> = checks.flags(&scene).collect();
+        let by_rule = |flag: &Flag| flag.row().rule.is_some();
+        assert_eq!(raised, Flag::ALL.into_iter().filter(by_rule).collect::<Vec<_>>());
+        assert!(raised.iter().all(|flag| checks.figure(*flag).is_some()));
+        // And none of a good frame.
+        let good = Checks { peak_MPa: frame.peak_MPa(), ..Checks::default() };
+        assert_eq!(good.flags(&scene).count(), 0);
     }
 
     #[test]

@@ -11,13 +11,15 @@
 //! | out: wrench | 3, 3 | N, N mm |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod contact_estimate;
 mod contacts;
 mod extra;
 mod figures;
 mod output;
 mod suspect_taxel;
 
-pub use contacts::{ContactEstimate, FoundContact};
+pub use contact_estimate::ContactEstimate;
+pub use contacts::FoundContact;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use output::{shear_sigma_N, Resultant, Wrench};
@@ -25,6 +27,7 @@ pub use suspect_taxel::SuspectTaxel;
 
 use crate::data::frame::{Forces, Frame};
 use crate::data::reception::Received;
+use crate::result::checks::history::History;
 use crate::result::checks::Checks;
 use crate::result::errors::Errors;
 use crate::result::flags::Flag;
@@ -147,6 +150,13 @@ impl Reconstruction {
         self.extra.resultants = Some(resultants);
         self.forces_N = Forces::default();
         self
+    }
+
+    /// Adds what the readings of a stream so far show, `frames` being those of this result; the flags `taxel-constant` and
+    /// `torn-frame`.
+    pub fn add_history(&mut self, scene: &Scene, history: &mut History, frames: &[Frame]) {
+        let checks = history.add(frames, self.checks);
+        self.add_checks(scene, checks);
     }
 
     /// Adds the figures of `checks` and the flags that they raise.

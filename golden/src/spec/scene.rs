@@ -12,7 +12,8 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "network", "search"), `degree` (none; 1 … 8) |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` (chosen: [`Scene::model_estimator`]; "search", "evidence", "network", |
+//! | | "evidence+network", "combined"), `degree` (none; 1 … 8) |
 //! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …), `deviations` (none; a file) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
@@ -20,6 +21,7 @@
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
+//! | | `estimator` (chosen: [`Scene::choose_for_hardware`]; "search", "network") |
 //! | | `source` ("stream"; "adc-scan"): whether codes come as a stream or the hardware scans the array |
 //! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]), `thickness_mm` (the sensor's; \[least, largest\]) |
 //! | | `dead_taxels` (0; fewer than all): what writable tables may hold |
@@ -32,6 +34,8 @@
 
 mod adc_scan;
 mod error;
+mod estimator;
+mod estimator_choice;
 pub mod inverse;
 mod inversion;
 mod load;
@@ -42,6 +46,7 @@ mod supported;
 mod tests;
 
 pub use error::SceneError;
+pub use estimator::EstimatorKind;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
 use crate::spec::adc::AdcScan;
@@ -139,22 +144,6 @@ pub enum ObjectiveKind {
     Auto,
 }
 
-/// How forces are estimated from stress.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EstimatorKind {
-    /// The μ that maximises the objective Π.
-    Search,
-    /// The μ that makes the stress most probable, [`crate::estimate::evidence`].
-    Evidence,
-    /// The μ of a trained network, [`crate::estimate::learned`], and the forces that are most probable at that μ.
-    Learned,
-    /// The μ of a trained network, and p(μ) as the search has it: `learned` as the hardware computes it.
-    Network,
-    /// `evidence` where it implements the scene, with the network if there is one; else `search`.
-    #[default]
-    Auto,
-}
-
 /// How Eq. 1 is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
@@ -186,8 +175,8 @@ pub const MAX_CONTACTS: usize = 8;
 /// Table `[search]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchSpec {
-    /// How forces are estimated.
-    pub estimator: EstimatorKind,
+    /// The estimator of the floating-point model; `None` takes [`Scene::model_estimator`].
+    pub estimator: Option<EstimatorKind>,
     /// The objective that is maximised.
     pub objective: ObjectiveKind,
     /// Largest ratio of shear to normal force, 0.001 to 2; 0 means no shear and no search.
@@ -290,6 +279,8 @@ pub struct HardwareSpec {
     pub link: LinkKind,
     /// Whether the coefficient memory is checked.
     pub coefficient_check: CoefficientCheck,
+    /// The estimator of the hardware, `search` or `network`; `None` takes [`Scene::choose_for_hardware`].
+    pub estimator: Option<EstimatorKind>,
     /// Taxels that the search computes per cycle: 4, 2 or 1; `None` takes the board's.
     pub search_width: Option<usize>,
     /// Where the tables of a specimen stand.
@@ -466,7 +457,7 @@ impl Default for PartitionSpec {
 impl Default for SearchSpec {
     fn default() -> Self {
         SearchSpec {
-            estimator: EstimatorKind::default(),
+            estimator: None,
             objective: ObjectiveKind::default(),
             mu_max: 0.6,
             noise_floor_MPa: 0.0,
@@ -496,28 +487,12 @@ impl Default for HardwareSpec {
             board: "ulx3s-85f".to_string(),
             link: LinkKind::Uart,
             coefficient_check: CoefficientCheck::None,
+            estimator: None,
             search_width: None,
             tables: TableStorage::Rom,
             table_range: TableRange::default(),
             adc_scan: None,
         }
-    }
-}
-
-impl EstimatorKind {
-    /// Every estimator with its name in a scene file, the default first.
-    pub const NAMES: [(&'static str, EstimatorKind); 5] = [
-        ("auto", EstimatorKind::Auto),
-        ("evidence", EstimatorKind::Evidence),
-        ("learned", EstimatorKind::Learned),
-        ("network", EstimatorKind::Network),
-        ("search", EstimatorKind::Search),
-    ];
-
-    /// Name in a scene file.
-    pub fn name(self) -> &'static str {
-        let named = Self::NAMES.iter().find(|(_, kind)| *kind == self);
-        named.map_or("", |(name, _)| name)
     }
 }
 
@@ -539,30 +514,9 @@ impl ObjectiveKind {
 }
 
 impl Scene {
-    /// The estimator of the golden model: the scene's, and for `auto` the one that implements the scene.
-    pub fn estimator(&self) -> EstimatorKind {
-        match self.search.estimator {
-            EstimatorKind::Auto if self.evidence_refusal().is_none() => EstimatorKind::Evidence,
-            EstimatorKind::Auto => EstimatorKind::Search,
-            named => named,
-        }
-    }
-
-    /// The scene as the hardware and its bit-true model take it: `learned` becomes `network`, `auto` as
-    /// [`Scene::chosen_for_hardware`] says, all others `search`.
-    pub fn for_hardware(&self) -> Scene {
-        let estimator = match self.search.estimator {
-            EstimatorKind::Learned | EstimatorKind::Network => EstimatorKind::Network,
-            EstimatorKind::Auto => self.chosen_for_hardware().0,
-            EstimatorKind::Evidence | EstimatorKind::Search => EstimatorKind::Search,
-        };
-        let search = SearchSpec { estimator, ..self.search.clone() };
-        Scene { search, ..self.clone() }
-    }
-
     /// The cases in which the scene can be compared: `all`, or with a network the scene's own, for which it was trained.
     pub fn cases_of(&self, all: &[Case]) -> Vec<Case> {
-        match self.for_hardware().search.estimator {
+        match self.hardware_estimator() {
             EstimatorKind::Network => vec![self.partition.case],
             _ => all.to_vec(),
         }

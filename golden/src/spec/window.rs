@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Number of taxels up to which an array is one window.
-pub(crate) const WHOLE_UP_TO: usize = 144;
+pub const WHOLE_UP_TO: usize = 144;
 /// Distance from the contact's centre to which a window around it reaches, in units of the thickness.
 const REACH: f64 = 5.0;
 /// Largest number of rows and of columns of a window around a contact.

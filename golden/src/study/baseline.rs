@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn agrees_with_the_golden_model() {
         let scene = Scene::builtin("sensor-1").unwrap();
-        let (baseline, golden) = (Baseline::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+        let (baseline, golden) = (Baseline::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
         let frame = &Frame::shipped(&scene)[1];
         let (forces, result) = (baseline.run(frame).unwrap(), golden.run(frame).unwrap());
         let error = Errors::new(result.resultant_N, forces.resultant());

@@ -119,7 +119,7 @@ pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
         refused: None,
         fixed_refused: None,
     };
-    match Golden::new(&scene.for_hardware()) {
+    match Golden::reference(&scene) {
         Ok(golden) => fill(&mut row, &scene, &golden, &Truth::of(&scene, frame.as_ref()))?,
         Err(error) => row.refused = Some(error.to_string()),
     }

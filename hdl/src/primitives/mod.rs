@@ -54,6 +54,7 @@ pub(crate) use output::force_unit::tests::Requests;
 pub use output::force_unit::{ForceUnit, STEPS as FORCE_STEPS};
 pub use output::frame_cycles::{FrameCycles, CYCLE_BITS};
 pub use output::parts_begun::PartsBegun;
+pub(crate) use output::status_bits::status_bits;
 pub use output::status_code::StatusCode;
 pub use output::status_source::StatusSource;
 pub use pass::limb_sum::LimbSum;

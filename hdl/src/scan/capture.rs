@@ -186,7 +186,7 @@ mod tests {
     use crate::language::Change;
     use crate::wire::Word;
     use dermis_golden::fixed::stages::scan::code;
-    use dermis_golden::fixed::stages::send::{FLAG_CHANNEL, FLAG_RAIL};
+    use dermis_golden::result::flags::{Flag, FlagSet};
     use std::collections::VecDeque;
 
     /// Codes of whole channels by the stage.
@@ -201,9 +201,9 @@ mod tests {
         /// What waits: code, last.
         waiting: VecDeque<(i32, bool)>,
         /// Codes on their way.
-        later: VecDeque<Option<(Vec<i32>, bool, u32)>>,
+        later: VecDeque<Option<(Vec<i32>, bool, FlagSet)>>,
         ended: Option<[u64; 5]>,
-        flags: u32,
+        flags: FlagSet,
         reset: bool,
     }
 
@@ -219,7 +219,7 @@ mod tests {
                 waiting: VecDeque::new(),
                 later: [None].into(),
                 ended: None,
-                flags: 0,
+                flags: FlagSet::default(),
                 reset: false,
             }
         }
@@ -233,14 +233,14 @@ mod tests {
             let bit = |bit: bool| Some(Word::from(bit));
             let next = self.waiting.front();
             let complete = next.is_some_and(|next| next.1) && inputs[10].number() == 1;
-            let flag = |flag: u32| complete.then(|| Word::from(self.flags & flag != 0));
+            let flag = |flag: Flag| complete.then(|| Word::from(self.flags.contains(flag)));
             vec![
                 next.map(|next| Word::of_fields(&[next.0.into()], self.shape.code_bits as usize)),
                 bit(next.is_some()),
                 next.map(|next| Word::from(next.1)),
                 bit(complete),
-                flag(FLAG_RAIL),
-                flag(FLAG_CHANNEL),
+                flag(Flag::Saturated),
+                flag(Flag::WrongChannel),
                 bit(next.is_none()),
             ]
         }
@@ -249,11 +249,11 @@ mod tests {
             let of = |k: usize| inputs[k].number();
             let scan = self.shape.scan;
             if !self.waiting.is_empty() && of(10) == 1 && self.waiting.pop_front().is_some_and(|(_, last)| last) {
-                self.flags = 0;
+                self.flags = FlagSet::default();
             }
             if let Some(Some((codes, last, flags))) = self.later.pop_front() {
                 let count = codes.len();
-                self.flags |= flags;
+                self.flags = self.flags | flags;
                 self.waiting =
                     codes.into_iter().enumerate().map(|(at, code)| (code, last && at + 1 == count)).collect();
             }
@@ -270,9 +270,9 @@ mod tests {
                         .answers
                         .iter()
                         .map(|answers| code(&scan, self.shape.code_bits, channel as usize, answers.iter().copied()));
-                    let codes: Vec<(i32, u32)> = codes.collect();
+                    let codes: Vec<(i32, FlagSet)> = codes.collect();
                     let live = codes.iter().enumerate().filter(|(own, _)| alive >> own & 1 == 1);
-                    let flags = live.fold(0, |flags, (_, (_, own))| flags | own);
+                    let flags = live.fold(FlagSet::default(), |flags, (_, (_, own))| flags | *own);
                     closed = Some((codes.into_iter().map(|(code, _)| code).collect(), ends == 1, flags));
                 }
             }

@@ -1,6 +1,5 @@
 //! Generation of a scan as files.
 
-use dermis_golden::fixed::stages::send::{FLAG_CHANNEL, FLAG_RAIL};
 use dermis_golden::fixed::Model;
 use serde_json::json;
 
@@ -75,8 +74,6 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
     );
     let around = Around { top, hierarchy, sources: &[include_str!("core.rs")], header, row: "scan" };
     let mut generated = around.generated(model, engine)?;
-    generated.manifest["output"]["flags"]["rail"] = json!(FLAG_RAIL);
-    generated.manifest["output"]["flags"]["wrong_channel"] = json!(FLAG_CHANNEL);
     generated.manifest["scan"] = json!({
         "converter": scan.converter.name,
         "converters": scan.converters,

@@ -1,6 +1,6 @@
 //! Marks of a scan in the status of its frame.
 
-use dermis_golden::fixed::stages::send::{FLAG_CHANNEL, FLAG_RAIL, STATUS_BEATS};
+use dermis_golden::result::flags::{StatusField, RAIL, STATUS_BEATS, WRONG_CHANNEL};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -116,12 +116,11 @@ fn kernel(forces: usize) -> Kernel {
     marks.set(complete.mux(rest | added, rest));
     waiting.set((place + complete.extend(place.bits())).low(place.bits()));
 
-    // The flags are the beat's third word.
     let flag = |at: usize| -> Expr {
-        let of = |flag: u32| at == 2 * WORD + flag.trailing_zeros() as usize;
+        let of = |field: StatusField| at == field.word * WORD + field.low as usize;
         match at {
-            _ if of(FLAG_RAIL) => marked & marks.at(0),
-            _ if of(FLAG_CHANNEL) => marked & marks.at(1),
+            _ if of(RAIL) => marked & marks.at(0),
+            _ if of(WRONG_CHANNEL) => marked & marks.at(1),
             _ => k.constant(1, 0),
         }
     };
@@ -171,7 +170,8 @@ mod tests {
                 }
             }
             if of(1) {
-                self.waiting.push_back(if of(2) { FLAG_RAIL } else { 0 } | if of(3) { FLAG_CHANNEL } else { 0 });
+                self.waiting
+                    .push_back(if of(2) { RAIL.mask() } else { 0 } | if of(3) { WRONG_CHANNEL.mask() } else { 0 });
             }
             if of(0) {
                 *self = Marks { reset: true, ..Marks::default() };
@@ -191,7 +191,7 @@ mod tests {
             let last = beat + 1 == length;
             let mut data = Word::default();
             data.set(0, 64, random.u64(..));
-            data.set(64, 32, u64::from(random.u32(..) & !(FLAG_RAIL | FLAG_CHANNEL)));
+            data.set(64, 32, u64::from(random.u32(..) & !(RAIL.mask() | WRONG_CHANNEL.mask())));
             under_way += usize::from(complete);
             if given && ready {
                 beat += 1;

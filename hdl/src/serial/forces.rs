@@ -10,15 +10,16 @@
 //! place of the forces.
 
 use dermis_golden::fixed::plan::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
-use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::stages::send::{CONDITION, FOUND, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
+use dermis_golden::result::flags::NO_CONTACT;
 use rust_hdl::prelude::*;
 
 use super::pass_sequencer::SATURATION_BITS;
 use super::rounder::SHIFT_BITS;
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
-use crate::primitives::{count_bits, position_bits};
+use crate::primitives::{count_bits, position_bits, status_bits};
 use crate::wire::Wire;
 
 const WORD: usize = FORCE_BITS as usize;
@@ -185,7 +186,7 @@ struct Status<'k> {
     /// x and y of the best position.
     best: [Expr<'k>; 2],
     score: Expr<'k>,
-    /// Framing error, no contact, found, condition: the flags, most significant first.
+    /// The bits that are set, up to `framing`.
     flags: Expr<'k>,
     found: Expr<'k>,
     normalise: Expr<'k>,
@@ -245,7 +246,11 @@ fn kernel(sizes: Sizes) -> Kernel {
     let state = Status {
         best,
         score,
-        flags: concat(&[framing, !*contact, found, condition]),
+        flags: concat(&status_bits(
+            &k,
+            &[(FRAMING, framing), (NO_CONTACT, !*contact), (FOUND, found), (CONDITION, condition)],
+            FRAMING.low + 1,
+        )),
         found,
         normalise,
         rescale,

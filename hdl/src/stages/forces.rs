@@ -326,8 +326,8 @@ mod tests {
 
     #[test]
     fn values_are_stored_and_beats_leave_as_they_were_requested() {
-        let mut model = model(4, 4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n");
-        model.threshold = 1000;
+        let model = model(4, 4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n");
+        let model = model.with_changed_plan(|plan| plan.threshold = 1000).unwrap();
         let stimulus = stimulus(&model, 20);
         let subject = |changes: &[Change]| {
             block_subject!(

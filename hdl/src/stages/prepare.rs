@@ -201,12 +201,15 @@ mod tests {
 
     #[test]
     fn codes_are_calibrated_then_averaged() {
-        let mut model = model(2, 3, "[input]\naverage = 2\nfull_scale_MPa = 1.0\n");
+        let model = model(2, 3, "[input]\naverage = 2\nfull_scale_MPa = 1.0\n");
         let (taxels, bits) = (model.scene.sensor.taxels(), model.formats().code_bits as usize);
         let mut random = fastrand::Rng::with_seed(14);
         let half = 1 << (bits - 1);
-        model.prepare.zero = Some((0..taxels).map(|_| random.i32(-half..half)).collect());
-        model.prepare.gain = Some((0..taxels).map(|_| random.i32(-(1 << 17)..1 << 17)).collect());
+        let model = model.with_changed_plan(|plan| {
+            plan.prepare.zero = Some((0..taxels).map(|_| random.i32(-half..half)).collect());
+            plan.prepare.gain = Some((0..taxels).map(|_| random.i32(-(1 << 17)..1 << 17)).collect());
+        });
+        let model = model.unwrap();
         let mut beats = 0;
         let cycle = |cycle: usize| {
             let rst = cycle < 3 || random.u16(..400) == 0;

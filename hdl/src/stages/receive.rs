@@ -370,8 +370,7 @@ pub(crate) mod tests {
         let dead = model(5, 7, &format!("{noise}dead = [[0, 3], [4, 6]]\n"));
         assert!(parts.noise_floor > 0 && dead.dead.len() == 2);
         let tables = noise.replace("[input]", "[hardware]\ntables = \"writable\"\n[input]");
-        let mut written = model(4, 5, &tables);
-        written.noise_floor += 17;
+        let written = model(4, 5, &tables).with_changed_plan(|plan| plan.noise_floor += 17).unwrap();
         for (model, case, defect) in [
             (written, 0, Change::value("", "stats__floor", |k| k.constant(20, (1 << 19) - 1))),
             (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),

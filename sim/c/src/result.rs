@@ -6,84 +6,11 @@ use std::ffi::{c_char, CString};
 use std::sync::OnceLock;
 
 use dermis_golden::data::frame::Forces;
-use dermis_golden::result::flags::Flag;
+use dermis_golden::result::flags::FlagSet;
 use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use dermis_sim::link::PhysicalAnswer;
 
 use crate::guard::{attempt, copy, dermis_status, free, guarded, place, reference, room, Error};
-
-/// A limitation of a result, one bit of dermis_result_flags; the guide's page on robustness says when each is raised.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum dermis_flag {
-    /// `no-contact`
-    NoContact = 1,
-    /// `no-compression`
-    NoCompression = 1 << 1,
-    /// `condition-unmet`
-    ConditionUnmet = 1 << 2,
-    /// `saturated`
-    Saturated = 1 << 3,
-    /// `load-outside`
-    LoadOutside = 1 << 4,
-    /// `medium-mismatch`
-    MediumMismatch = 1 << 5,
-    /// `shear-unreliable`
-    ShearUnreliable = 1 << 6,
-    /// `coefficients-damaged`
-    CoefficientsDamaged = 1 << 7,
-    /// `mu-at-bound`
-    MuAtBound = 1 << 8,
-    /// `implausible-stress`
-    ImplausibleStress = 1 << 9,
-    /// `load-mismatch`
-    LoadMismatch = 1 << 10,
-    /// `shape-mismatch`
-    ShapeMismatch = 1 << 11,
-    /// `shear-not-resolved`
-    ShearNotResolved = 1 << 12,
-    /// `misfit`
-    Misfit = 1 << 13,
-    /// `too-many-contacts`
-    TooManyContacts = 1 << 14,
-    /// `tables-incomplete`
-    TablesIncomplete = 1 << 15,
-    /// `tables-refused`
-    TablesRefused = 1 << 16,
-    /// `wrong-channel`
-    WrongChannel = 1 << 17,
-    /// `estimate-failed`
-    EstimateFailed = 1 << 18,
-    /// `taxel-suspect`
-    TaxelSuspect = 1 << 19,
-}
-
-/// The bit of a flag.
-pub fn bit(flag: Flag) -> u32 {
-    let bit = match flag {
-        Flag::NoContact => dermis_flag::NoContact,
-        Flag::NoCompression => dermis_flag::NoCompression,
-        Flag::ConditionUnmet => dermis_flag::ConditionUnmet,
-        Flag::Saturated => dermis_flag::Saturated,
-        Flag::LoadOutside => dermis_flag::LoadOutside,
-        Flag::MediumMismatch => dermis_flag::MediumMismatch,
-        Flag::ShearUnreliable => dermis_flag::ShearUnreliable,
-        Flag::CoefficientsDamaged => dermis_flag::CoefficientsDamaged,
-        Flag::MuAtBound => dermis_flag::MuAtBound,
-        Flag::ImplausibleStress => dermis_flag::ImplausibleStress,
-        Flag::LoadMismatch => dermis_flag::LoadMismatch,
-        Flag::ShapeMismatch => dermis_flag::ShapeMismatch,
-        Flag::ShearNotResolved => dermis_flag::ShearNotResolved,
-        Flag::Misfit => dermis_flag::Misfit,
-        Flag::TooManyContacts => dermis_flag::TooManyContacts,
-        Flag::TablesIncomplete => dermis_flag::TablesIncomplete,
-        Flag::TablesRefused => dermis_flag::TablesRefused,
-        Flag::WrongChannel => dermis_flag::WrongChannel,
-        Flag::EstimateFailed => dermis_flag::EstimateFailed,
-        Flag::TaxelSuspect => dermis_flag::TaxelSuspect,
-    };
-    bit as u32
-}
 
 /// One contact of a result. A figure counts where its marker is true; else it is NaN.
 #[repr(C)]
@@ -183,7 +110,7 @@ impl dermis_result {
             Source::Reconstruction(result) => &result.flags,
             Source::Answer(answer) => &answer.flags,
         };
-        flags.iter().fold(0, |bits, flag| bits | bit(*flag))
+        flags.iter().copied().collect::<FlagSet>().bits()
     }
 
     fn json(&self) -> Result<&CString, Error> {
@@ -249,7 +176,7 @@ pub unsafe extern "C" fn dermis_result_forces(
 
 /// Write the contacts, at most capacity of them, and the number that the result has to count. With capacity 0, contacts may be
 /// NULL. DERMIS_STATUS_ABSENT, and a count of 0, if the result does not tell contacts apart: those of the estimators
-/// "evidence" and "learned" and of partition.case = "contacts" do.
+/// with evidence and of partition.case = "contacts" do.
 #[no_mangle]
 pub unsafe extern "C" fn dermis_result_contacts(
     result: *const dermis_result,

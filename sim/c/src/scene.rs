@@ -4,7 +4,7 @@ use std::ffi::c_char;
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{Engine, Models};
+use dermis_sim::engine::{self, EngineName, Engines};
 
 use crate::guard::{attempt, dermis_status, free, guarded, place, reference, text, values, Error};
 use crate::result::dermis_result;
@@ -12,12 +12,12 @@ use crate::result::dermis_result;
 /// A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
 pub struct dermis_scene {
     pub(crate) spec: Scene,
-    models: Models,
+    engines: Engines,
 }
 
 impl dermis_scene {
     fn into_raw(spec: Scene) -> *mut dermis_scene {
-        Box::into_raw(Box::new(dermis_scene { spec, models: Models::default() }))
+        Box::into_raw(Box::new(dermis_scene { spec, engines: Engines::default() }))
     }
 }
 
@@ -126,10 +126,10 @@ pub unsafe extern "C" fn dermis_reconstruct(
         let result = unsafe { place("result", result) }?;
         result.write(std::ptr::null_mut());
         let scene = unsafe { reference("scene", scene) }?;
-        let engine: Engine = unsafe { text("engine", engine) }?.parse()?;
+        let name = EngineName::software(unsafe { text("engine", engine) }?)?;
         let frames = unsafe { frames(&scene.spec, stress_MPa, count) }?;
-        let ready = scene.models.ready(engine, &scene.spec, &frames)?;
-        let found = ready.reconstruct(&scene.spec, &frames, find_noise)?;
+        let engine = scene.engines.engine(name, &scene.spec, &frames)?;
+        let found = engine::result(&*engine, &frames, find_noise.into())?;
         result.write(dermis_result::of_model(found).into_raw());
         Ok(())
     })

@@ -100,7 +100,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     Ok(SceneCheck {
         target: arguments.target.clone(),
         checked_as: "scene",
-        estimator: scene.estimator().name(),
+        estimator: golden.estimator().name(),
         degree: matrices.degree,
         spectral_radius: matrices.spectral_radius,
         mu_max: scene.search.mu_max,

@@ -24,6 +24,7 @@ use crate::cosim::verilator::VerilatorError;
 use crate::flow::tools::ToolError;
 use crate::jobs::Interrupted;
 use crate::link::{HostError, IdentityError, PseudoTerminal};
+use crate::report;
 
 /// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
 #[derive(Parser, Debug)]
@@ -52,7 +53,7 @@ const EXAMPLES: &str = "Examples:
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
-  dermis train sensor-1                              a network for search.estimator = \"learned\"
+  dermis train sensor-1                              a network for search.estimator = \"evidence+network\"
   dermis deviations my-scene.toml                    how far shear and normal force of a search may be off
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
@@ -97,6 +98,10 @@ enum Command {
     Block(super::block::Arguments),
     /// Print the register map of a core, as `dermis build --bus` generates one.
     Registers(super::registers::Arguments),
+    /// Print the flags of a result, what to do about each, and the fields of the hardware's status.
+    #[command(after_help = "Example:
+  dermis flags                      a row per flag, then a row per field")]
+    Flags,
     /// Print the converters that a scene can scan its array with.
     Converters(super::converters::Arguments),
     /// Make the image of a specimen's tables for hardware with writable tables.
@@ -123,7 +128,7 @@ enum Command {
     Guide(super::guide_pages::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
     Table(super::table::Arguments),
-    /// Train a network for search.estimator = "learned" on frames drawn from the scene's own physics.
+    /// Train a network for the estimators that have one on frames drawn from the scene's own physics.
     Train(super::train::Arguments),
     /// Measure the standard deviations of a search on frames drawn from the scene's own physics.
     Deviations(super::deviations::Arguments),
@@ -211,6 +216,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
         Command::Registers(arguments) => Ok((super::registers::run(arguments)?, true)),
+        Command::Flags => Ok((report::flags(), true)),
         Command::Converters(arguments) => Ok((super::converters::run(arguments)?, true)),
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),

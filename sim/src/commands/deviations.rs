@@ -55,12 +55,12 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let scene = Scene::load(&arguments.scene)?;
     let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.scene, &scene, "deviations"));
-    if scene.for_hardware().search.estimator == EstimatorKind::Network {
-        bail!("scene {}: search.estimator: a network gives standard deviations of its own", scene.name);
+    if scene.hardware_estimator() == EstimatorKind::Network {
+        bail!("scene {}: hardware.estimator: a network gives standard deviations of its own", scene.name);
     }
     let (written, table) = match arguments.check {
         true => {
-            let Some(table) = Deviations::of_scene(&scene.for_hardware())? else {
+            let Some(table) = Deviations::of_scene(&scene, EstimatorKind::Search)? else {
                 bail!("scene {}: it has no table of standard deviations; leave out --check to make one", scene.name);
             };
             (String::new(), table)

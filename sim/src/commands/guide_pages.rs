@@ -1,9 +1,12 @@
-//! `dermis guide`: the tables, code and pictures of README.md and of the guide, made by the commands that they name.
+//! `dermis guide`: the tables, figures, code and pictures of README.md and of the guide, made by the commands that they name.
 //!
 //! ```text
 //! page ── markers ── commands, each once ── Markdown table ──┬─ written between the marker's lines
 //!                                                            └─ --check: compared with what stands there
 //! ```
+//!
+//! A figure in the text is a cell of such a table. A quick check takes it from the table of the same command that a page has,
+//! where that table has a cheaper check of its own.
 //!
 //! | module | does |
 //! |---|---|
@@ -52,11 +55,16 @@ A table or code stands between two lines of a Markdown page:
   <!-- end of table -->
   <!-- code: dermis block butterfly --verilog ; language: verilog -->
   <!-- end of code -->
+A figure stands in the text, within a line:
+  … in <!-- figure: dermis table --cosim ; row: sensor-1 ; column: µs -->12.78<!-- end of figure --> µs …
 Attributes follow the command after semicolons, all of them optional:
   check: COMMAND          what --quick runs; each of its rows must stand in the page, in the columns that both have
   check columns: A | B    compare only these columns of the check's table
   table: N                the N-th table that the command prints, 1 if not given; the check's as well
   columns: A | B          columns to keep, in this order
+  row: A                  of a figure: the first cell of its row
+  column: B               of a figure: the head of its column
+  part: N                 of a figure: the N-th of several that `/` separates in its cell
   takes: 40 s             how long the command takes, for the reader")]
 pub struct Arguments {
     /// Folder of the repository, which holds README.md and sim/guide; commands run in it.
@@ -103,20 +111,22 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     for name in page_names(root)? {
         let path = root.join(&name);
         let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        let mut markers = markers(&name, &text)?;
+        let mut markers = markers(&name, &text).map_err(|error| anyhow!("{error:#}"))?;
         markers.retain(|marker| arguments.only.as_ref().is_none_or(|only| marker.command.contains(only)));
         pages.push(Page { name, text, markers });
     }
     if let Some(only) = &arguments.only {
         ensure!(pages.iter().any(|page| !page.markers.is_empty()), "--only {only:?}: no table's command contains it");
     }
-    let command = |marker: &Marker| marker.quick_check(arguments.quick).unwrap_or(&marker.command).to_owned();
+    let quick = arguments.quick;
+    let command = |marker: &Marker| marker.quick_check(quick).unwrap_or(&marker.command).to_owned();
+    let is_run = |marker: &&Marker| !quick || marker.cell.is_none() || checked_table(&pages, marker).is_none();
     let of_page = |page: &Page| -> Vec<(String, String)> {
-        page.markers.iter().map(|marker| (at(page, marker), command(marker))).collect()
+        page.markers.iter().filter(is_run).map(|marker| (at(page, marker), command(marker))).collect()
     };
     let outputs = outputs(pages.iter().flat_map(of_page).collect(), arguments, build)?;
     match arguments.check {
-        true => check(&pages, arguments.quick, &outputs),
+        true => check(&pages, quick, &outputs),
         false => Ok((fill(&pages, root, &outputs)?, true)),
     }
 }
@@ -169,7 +179,7 @@ fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
         if text != page.text {
             write(&root.join(&page.name), text.as_bytes())?;
         }
-        told.push_str(&format!("{}: {} tables, {changed} changed\n", page.name, page.markers.len()));
+        told.push_str(&format!("{}: {} tables and figures, {changed} changed\n", page.name, page.markers.len()));
     }
     Ok(told)
 }
@@ -180,7 +190,13 @@ fn content(marker: &Marker, old: &str, outputs: &Outputs) -> Result<(String, boo
         let differs = old != code;
         return Ok((code, differs));
     }
-    let new = printed(marker, &marker.command, outputs)?.select(&marker.columns)?;
+    let new = printed(marker, &marker.command, outputs)?;
+    if let Some(cell) = &marker.cell {
+        let figure = new.cell(cell)?;
+        let differs = old != figure;
+        return Ok((figure, differs));
+    }
+    let new = new.select(&marker.columns)?;
     Ok((new.text(), tables(old) != [new]))
 }
 
@@ -199,19 +215,35 @@ fn check(pages: &[Page], quick: bool, outputs: &Outputs) -> Result<(String, bool
         for marker in &page.markers {
             count += 1;
             let command = marker.quick_check(quick).unwrap_or(&marker.command);
-            if let Some(difference) = located(page, marker, differs(page, marker, quick, outputs))? {
+            if let Some(difference) = located(page, marker, differs(pages, page, marker, quick, outputs))? {
                 stale.push_str(&format!("{}: stale: {command}\n{difference}\n", at(page, marker)));
             }
         }
     }
     match stale.is_empty() {
-        true => Ok((format!("{count} tables are as their commands print them\n"), true)),
+        true => Ok((format!("{count} tables and figures are as their commands print them\n"), true)),
         false => Ok((format!("{stale}dermis guide --only TEXT writes what the command prints\n"), false)),
     }
 }
 
-/// The first row in which the page's table is not its command's, or its check's.
-fn differs(page: &Page, marker: &Marker, quick: bool, outputs: &Outputs) -> Result<Option<Difference>> {
+/// The table of the marker's command that a page has and a cheaper command checks.
+fn checked_table(pages: &[Page], marker: &Marker) -> Option<Table> {
+    let is_same =
+        |other: &&Marker| other.check.is_some() && (&other.command, other.table) == (&marker.command, marker.table);
+    let of_page =
+        |page: &Page| page.markers.iter().find(is_same).map(|other| tables(&page.text[other.content.clone()]));
+    pages.iter().find_map(of_page)?.pop()
+}
+
+/// The first row in which the page's table is not its command's, or its check's; of a figure the figure.
+fn differs(pages: &[Page], page: &Page, marker: &Marker, quick: bool, outputs: &Outputs) -> Result<Option<Difference>> {
+    if let Some(cell) = &marker.cell {
+        let table = match checked_table(pages, marker).filter(|_| quick) {
+            Some(table) => table,
+            None => printed(marker, &marker.command, outputs)?,
+        };
+        return Ok(Difference::of_lines(&page.text[marker.content.clone()], &table.cell(cell)?));
+    }
     if let Some(code) = code(marker, outputs) {
         return Ok(Difference::of_lines(&page.text[marker.content.clone()], &code));
     }
@@ -320,7 +352,7 @@ mod tests {
     fn tables_are_written_between_their_markers() {
         let folder = tempfile::tempdir().unwrap();
         let told = fill(&[page(PAGE)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
-        assert_eq!(told, "README.md: 2 tables, 2 changed\n");
+        assert_eq!(told, "README.md: 2 tables and figures, 2 changed\n");
         let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
         let wanted = "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\
                       <!-- end of table -->\n\ntext\n<!-- table: dermis a ; columns: x -->\n|  x |\n|---:|\n|  1 |\n| 30 |\n\
@@ -328,7 +360,7 @@ mod tests {
         assert_eq!(text, wanted);
         // A second time nothing changes.
         let told = fill(&[page(&text)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
-        assert_eq!(told, "README.md: 2 tables, 0 changed\n");
+        assert_eq!(told, "README.md: 2 tables and figures, 0 changed\n");
     }
 
     #[test]
@@ -347,6 +379,30 @@ mod tests {
         assert!(check(true, &[("dermis b", "| s | x |\n|---|---|\n| q | 2 |\n")]).unwrap().1);
         let (text, good) = check(true, &[("dermis b", "| s | x |\n|---|---|\n| q | 3 |\n")]).unwrap();
         assert!(!good && text.contains("README.md:3: stale: dermis b\n"), "{text}");
+    }
+
+    /// A figure in the text is written from its command's table, and a stale one is found, quickly too: there from the table
+    /// on a page that has a check.
+    #[test]
+    fn a_figure_is_written_and_a_stale_one_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let figure = |text: &str, row: &str| {
+            format!("{row} takes <!-- figure: dermis a ; row: {row} ; column: x -->{text}<!-- end of figure --> µs.\n")
+        };
+        let table = PAGE.split_once("text\n").unwrap().0;
+        let stale = format!("{}{}\n{table}", figure("1", "p"), figure("3", "q"));
+        let check = |text: &str, quick, outputs: &[(&str, &str)]| check(&[page(text)], quick, &ran(outputs)).unwrap();
+        let of_check = ("dermis b", "| s | x |\n|---|---|\n| q | 2 |\n");
+        let (text, good) = check(&stale, true, &[of_check]);
+        assert!(!good && text.contains("README.md:2: stale: dermis a\n  page:    3\n  command: 2\n"), "{text}");
+        assert!(!text.contains("README.md:1:"), "{text}");
+        let told = fill(&[page(&stale)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
+        assert_eq!(told, "README.md: 3 tables and figures, 2 changed\n");
+        let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
+        assert!(text.starts_with(&format!("{}{}\n# A", figure("1", "p"), figure("30", "q"))), "{text}");
+        assert!(check(&text, false, &[("dermis a", NEW)]).1);
+        let (text, good) = check(&stale, false, &[("dermis a", NEW)]);
+        assert!(!good && text.contains("README.md:2: stale: dermis a\n  page:    3\n  command: 30\n"), "{text}");
     }
 
     #[test]

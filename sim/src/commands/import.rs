@@ -163,6 +163,14 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     if codes.at_full_scale > 0 {
         writeln!(text, "                {} readings at full scale", codes.at_full_scale)?;
     }
+    if let Some((share, idle)) = summary.idle_share().zip(summary.idle) {
+        let level = format!("{:.1} kPa, {} of full scale", 1e3 * idle.level_MPa, percent_text(share));
+        let what = match idle.falls {
+            true => "readings fall with the load: dermis calibrate makes a table with zeros and negative gains",
+            false => "without load: give an unloaded frame as input.tare",
+        };
+        writeln!(text, "zero            {level}; {what}")?;
+    }
     match (noise.loaded_MPa, noise.loaded_share) {
         (Some(MPa), Some(share)) => {
             let of = format!("{:.3} kPa, {} of the peak", 1e3 * MPa, percent_text(share));

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
-use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_golden::spec::scene::Scene;
 
 /// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";
@@ -39,22 +39,18 @@ pub(super) fn beside(named: &str, scene: &Scene, extension: &str) -> PathBuf {
     Path::new(named).with_file_name(format!("{}.{extension}", scene.name))
 }
 
-/// What the hardware takes in place of the scene's estimator; `None` where it has that.
+/// The hardware's estimator where it is not that of the floating-point model.
 pub(super) fn estimator_instead(scene: &Scene) -> Option<&'static str> {
-    match scene.for_hardware().estimator() {
-        same if same == scene.estimator() => None,
-        EstimatorKind::Network => Some("the μ of the network with the p(μ) of the series"),
-        _ => Some("search with sparse"),
-    }
+    let hardware = scene.hardware_estimator();
+    (hardware != scene.model_estimator()).then(|| hardware.name())
 }
 
-/// One line on standard error where the hardware takes another estimator than the scene.
+/// One line on standard error where the hardware computes another estimator than the floating-point model and the scene does
+/// not state it.
 pub(super) fn note_estimator(scene: &Scene) {
-    if let Some(taken) = estimator_instead(scene) {
-        // A choice only where there is a network.
-        let chosen = scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some();
-        let why = if chosen { format!(": {}", scene.chosen_for_hardware().1) } else { String::new() };
-        eprintln!("{}: the hardware has no estimator {} and takes {taken}{why}", scene.name, scene.estimator().name());
+    if let (Some(hardware), None) = (estimator_instead(scene), scene.hardware.estimator) {
+        let (model, (_, reason)) = (scene.model_estimator().name(), scene.choose_for_hardware());
+        eprintln!("{}: estimator {hardware} in hardware, {model} in floating point: {reason}", scene.name);
     }
 }
 

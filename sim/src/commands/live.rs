@@ -8,16 +8,18 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
+use dermis_golden::engine::Engine;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_estimator, BoardOverride};
-use super::reconstruct_stream::{open, SoftwareEngine};
-use crate::link::{open_board, Session};
+use super::reconstruct_stream::{open, software_engine, stream_engine};
+use crate::engine::EngineName;
+use crate::link::{open_board, BoardEngine, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
 use crate::recording::{Lines, Pace};
-use crate::stream::{run as run_stream, Engine, Outcome, Policy, Source, StreamOptions};
+use crate::stream::{run as run_stream, Outcome, Policy, Source, StreamOptions};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]
@@ -50,8 +52,8 @@ pub struct Arguments {
     #[arg(long = "loop", requires = "recording")]
     repeat: bool,
     /// Model that computes the forces.
-    #[arg(long, value_enum, default_value = "golden", conflicts_with = "board")]
-    engine: SoftwareEngine,
+    #[arg(long, value_parser = software_engine(), default_value = "golden", conflicts_with = "board")]
+    engine: EngineName,
     /// Serial port of a board that computes the forces in place of a model, at the bit rate of the scene's board.
     #[arg(long, value_name = "PATH")]
     board: Option<String>,
@@ -93,15 +95,12 @@ impl Arguments {
     }
 
     /// What computes the forces.
-    fn engine(&self, scene: &Scene) -> Result<Engine> {
-        let fixed = matches!(self.engine, SoftwareEngine::Fixed);
-        if fixed || self.board.is_some() {
-            note_estimator(scene);
-        }
-        let Some(port) = &self.board else { return Engine::new(scene, fixed) };
+    fn engine(&self, scene: &Scene) -> Result<Box<dyn Engine>> {
+        let Some(port) = &self.board else { return stream_engine(scene, self.engine) };
+        note_estimator(scene);
         let model = Model::new(scene)?;
         let client = open_board(port, &model, None, BOARD_TIMEOUT, "live --board")?;
-        Ok(Session::new(client, model, None, None, true, false)?.into())
+        Ok(Box::new(BoardEngine::new(Session::new(client, model, None, None, true, false)?)))
     }
 }
 
@@ -146,11 +145,11 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
     let mut output = |outcome: &Outcome| show.outcome(outcome);
     match (hand, input) {
         (Some(hand), _) => {
-            hand.run(&scene, &engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
+            hand.run(&*engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
         }
         (None, Some((input, name))) => {
             let options = StreamOptions { queue: 1, policy: Policy::Latest };
-            let counts = run_stream(&scene, &engine, (input, &name), options, &mut output)?;
+            let counts = run_stream(&*engine, (input, &name), options, &mut output)?;
             eprintln!("{}: {name} has ended after {} results; the last one is shown", scene.name, counts.answered);
         }
         (None, None) => (),

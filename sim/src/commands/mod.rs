@@ -27,11 +27,12 @@
 //! | [`mod@registers`] | `dermis registers`: the register map of a core |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
+//! | `sensor_faults` | `dermis study sensor-faults`: frames of faulty sensors, flagged or silently wrong |
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
 //! | [`mod@study`] | `dermis study`: comparisons shown in the guide |
 //! | [`table`] | `dermis table`: errors of scenes in the paper's cases |
-//! | [`train`] | `dermis train`: a network for the learned estimator |
+//! | [`train`] | `dermis train`: a network for the estimators that have one |
 
 pub mod bitstream;
 pub mod block;
@@ -59,6 +60,7 @@ mod reconstruct_stream;
 pub mod registers;
 pub mod replay;
 pub mod report;
+mod sensor_faults;
 pub mod stability;
 pub mod stress;
 pub mod study;

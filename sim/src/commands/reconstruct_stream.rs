@@ -1,17 +1,20 @@
 //! `dermis reconstruct --stream`: frames as lines, results as lines of JSON, and as a recording.
 
 use std::io::{Error, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{anyhow, bail, Result};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{value_parser, Args, ValueEnum};
+use dermis_golden::engine::Engine;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_estimator;
+use crate::engine::EngineName;
 use crate::jobs::{Interrupt, Interrupted};
 use crate::recording::Recorder;
-use crate::stream::{as_lines, run_until, Engine, Outcome, Policy, Source, Stop, StreamOptions};
+use crate::stream::{as_lines, require_blocks, run_until, Outcome, Policy, Source, Stop, StreamOptions};
 
 /// Lines that wait with `--all`: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;
@@ -57,12 +60,9 @@ impl StreamArguments {
     ///
     /// # Errors
     /// A scene without that engine, a source that cannot be read, lines that were refused.
-    pub(super) fn run(&self, scene: &Scene, fixed: bool) -> Result<String> {
+    pub(super) fn run(&self, scene: &Scene, name: EngineName) -> Result<String> {
         let Some(source) = &self.stream else { return Ok(String::new()) };
-        if fixed {
-            note_estimator(scene);
-        }
-        let engine = Engine::new(scene, fixed)?;
+        let engine = stream_engine(scene, name)?;
         let policy = if self.latest { Policy::Latest } else { Policy::All };
         let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
         let (input, name) = open(source, scene, self.baud)?;
@@ -86,7 +86,7 @@ impl StreamArguments {
             }
             lines(outcome)
         };
-        let counts = run_until(&stop, scene, &engine, (input, &name), options, &mut output);
+        let counts = run_until(&stop, &*engine, (input, &name), options, &mut output);
         // Completed whatever ended the stream.
         if let (Some(recorder), Some(path)) = (recorder, &self.record) {
             let results = recorder.finish()?;
@@ -107,13 +107,25 @@ impl StreamArguments {
     }
 }
 
-/// The model of a stream.
-#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SoftwareEngine {
-    /// The floating-point model.
-    Golden,
-    /// The bit-true integer model.
-    Fixed,
+/// The software engine of a stream.
+///
+/// # Errors
+/// Another engine, a sliding mean, a scene that the engine refuses.
+pub(super) fn stream_engine(scene: &Scene, name: EngineName) -> Result<Box<dyn Engine>> {
+    if !EngineName::SOFTWARE.contains(&name) {
+        bail!("--engine rtl: a stream takes golden or fixed");
+    }
+    require_blocks(scene)?;
+    if name != EngineName::Golden {
+        note_estimator(scene);
+    }
+    name.engine(scene, None, Path::new(""))
+}
+
+/// Parses the name of a software engine.
+pub(super) fn software_engine() -> impl TypedValueParser<Value = EngineName> {
+    let names = EngineName::SOFTWARE.iter().filter_map(EngineName::to_possible_value);
+    PossibleValuesParser::new(names).try_map(|name| EngineName::software(&name))
 }
 
 /// Opens a source of lines; a serial port without `baud` takes the bit rate of the scene's board. Gives its name too.

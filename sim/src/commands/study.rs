@@ -1,8 +1,9 @@
 //! `dermis study`: comparisons that the guide shows, each one table.
 
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::{Args, Subcommand};
 
+use super::sensor_faults;
 use crate::report::study::{contacts, dead_taxels, input_bits, link_times};
 
 /// What to compare.
@@ -12,27 +13,34 @@ use crate::report::study::{contacts, dead_taxels, input_bits, link_times};
   dermis study input-bits my-scene.toml
   dermis study dead-taxels eight-by-eight
   dermis study contacts ellipses                     lines of the table by their first word
-  dermis study link-times sensor-1 eight-by-eight")]
+  dermis study link-times sensor-1 eight-by-eight
+  dermis study sensor-faults                         flagged and silently wrong frames of faulty sensors")]
 pub struct Arguments {
-    /// The study.
-    #[arg(value_enum)]
-    study: Name,
+    #[command(subcommand)]
+    study: Study,
+}
+
+/// The lines of a table.
+#[derive(Args, Debug)]
+struct Lines {
     /// Scenes of the table's lines (built-in names; of input-bits and link-times paths as well), of contacts their
     /// shapes; without any all lines.
     lines: Vec<String>,
 }
 
 /// A study by its name.
-#[derive(ValueEnum, Clone, Copy, Debug)]
-enum Name {
+#[derive(Subcommand, Debug)]
+enum Study {
     /// Shear error of golden and bit-true model at 20 and 16 bits of input.
-    InputBits,
+    InputBits(Lines),
     /// Shear error and latency with dead taxels.
-    DeadTaxels,
+    DeadTaxels(Lines),
     /// Shear error of several contacts in case 0, adaptive and contacts.
-    Contacts,
+    Contacts(Lines),
     /// Time of a frame's packets on each link.
-    LinkTimes,
+    LinkTimes(Lines),
+    /// Frames of faulty sensors, by every engine: flagged, silently wrong, right.
+    SensorFaults(sensor_faults::Arguments),
 }
 
 /// The study's table.
@@ -40,11 +48,11 @@ enum Name {
 /// # Errors
 /// A line that the study does not have, a scene that cannot be loaded or is refused.
 pub fn run(arguments: &Arguments) -> Result<String> {
-    let lines = &arguments.lines;
-    match arguments.study {
-        Name::InputBits => input_bits::run(lines),
-        Name::DeadTaxels => dead_taxels::run(lines),
-        Name::Contacts => contacts::run(lines),
-        Name::LinkTimes => link_times::run(lines),
+    match &arguments.study {
+        Study::InputBits(Lines { lines }) => input_bits::run(lines),
+        Study::DeadTaxels(Lines { lines }) => dead_taxels::run(lines),
+        Study::Contacts(Lines { lines }) => contacts::run(lines),
+        Study::LinkTimes(Lines { lines }) => link_times::run(lines),
+        Study::SensorFaults(arguments) => sensor_faults::run(arguments),
     }
 }

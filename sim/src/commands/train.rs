@@ -1,4 +1,4 @@
-//! `dermis train`: a network for `search.estimator = "learned"`, trained on frames drawn from the scene's own physics.
+//! `dermis train`: a network for the estimators that have one, trained on frames drawn from the scene's own physics.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -31,7 +31,8 @@ const MOST_MEASURED: usize = 4096;
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
   dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
-Then, in the scene: [search] with estimator = \"learned\" and network = \"my-scene.network\".
+Then, in the scene: [search] with estimator = \"evidence+network\" and network = \"my-scene.network\",
+[hardware] with estimator = \"network\".
 Prints the errors on frames that were not in the training; exit code 1 if they are not better than no shear.")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
@@ -71,7 +72,7 @@ pub struct Arguments {
 /// An unknown scene, one that the estimator refuses, an option out of range, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let mut scene = Scene::load(&arguments.scene)?;
-    scene.search.estimator = EstimatorKind::Learned;
+    scene.search.estimator = Some(EstimatorKind::EvidenceNetwork);
     scene.require_golden()?;
     if arguments.draws == 0 {
         bail!("--draws 0 is not allowed; it must be at least 1");
@@ -125,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let mut study = ShapeStudy {
         levels: LEVELS.to_vec(),
         draws: arguments.draws,
-        candidates: vec![Candidate::Estimator(EstimatorKind::Learned)],
+        candidates: vec![Candidate::Estimator(EstimatorKind::EvidenceNetwork)],
         ..Default::default()
     };
     study.options.seed = arguments.seed.wrapping_add(FRESH);

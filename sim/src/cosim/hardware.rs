@@ -10,9 +10,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::Input;
+use dermis_golden::engine::{Engine, EngineError};
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
-use dermis_golden::spec::scene::Scene;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_hdl::device::{Device, Tap};
 use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
@@ -23,6 +25,7 @@ use super::board::VerilatedBoard;
 use super::drive::{record, InputFrame, Stimulus};
 use super::scan::ScannedBoard;
 use super::verilator::{Design, Optimisation, Verilated, VerilatorError};
+use crate::device_error::device_error;
 use crate::flow::netlist::netlist;
 
 /// Cycles without a transfer after which a run is aborted; far above any scene's latency.
@@ -217,11 +220,8 @@ impl Hardware {
         self.model.scene.input.frames_of_results(frames).into_iter().map(|frames| self.vector(frames)).collect()
     }
 
-    /// Reconstructs the mean of the frames in the verilated hardware (engine `rtl`); the result after the last one.
-    ///
-    /// # Errors
-    /// As [`Hardware::device`]; [`DeviceTimeout`].
-    pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
+    /// The forces and status beats that the verilated hardware sends after the last of the frames.
+    fn words(&self, frames: &[Frame]) -> Result<[Vec<[i32; 3]>; 2]> {
         let vectors = self.vectors(frames)?;
         let inputs: Vec<InputFrame> = vectors.iter().map(Vector::input).collect();
         let mut device = self.device_for(Simulator::Verilator, &vectors, 1)?;
@@ -231,8 +231,28 @@ impl Hardware {
             return Err(DeviceTimeout { frame, cycle: timeout.cycle, rule: timeout.rule }.into());
         }
         let before: usize = inputs.iter().rev().skip(1).map(|input| input.beats).sum();
-        let beats: Vec<[i32; 3]> = recording.beats.iter().skip(before).map(|beat| beat.data).collect();
-        let (forces, status) = beats.split_at(self.model.force_beats().min(beats.len()));
-        Ok(self.model.decode(frames, "rtl", forces, status)?)
+        let mut forces: Vec<[i32; 3]> = recording.beats.iter().skip(before).map(|beat| beat.data).collect();
+        let status = forces.split_off(self.model.force_beats().min(forces.len()));
+        Ok([forces, status])
+    }
+}
+
+impl Engine for Hardware {
+    fn scene(&self) -> &Scene {
+        &self.model.scene
+    }
+
+    fn input(&self) -> &Input {
+        self.model.input()
+    }
+
+    fn estimator(&self) -> EstimatorKind {
+        self.model.estimator()
+    }
+
+    /// In the verilated hardware (engine `rtl`).
+    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        let [forces, status] = self.words(frames).map_err(device_error)?;
+        Ok(self.model.decode(frames, "rtl", &forces, &status)?)
     }
 }

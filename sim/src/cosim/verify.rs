@@ -14,7 +14,6 @@ use std::path::Path;
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
-use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::plan::contact_cycles::Course;
 use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
@@ -98,8 +97,8 @@ pub fn verify_specimen(
     if let Some(specimen) = specimen {
         hardware.load(specimen, 1)?;
     }
-    // The model's scene has the full scale filled in, so that all models use the same codes.
-    let golden = Golden::new(&hardware.model.scene)?;
+    // Of the model's scene, which has the full scale filled in, so that both use the same codes.
+    let golden = hardware.model.reference()?;
     let vectors = hardware.vectors(frames)?;
 
     let mut verified = Verified {

@@ -1,20 +1,17 @@
 //! A board's answer to a frame, in LSBs and in physical units.
 
-use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use anyhow::Result;
 use dermis_golden::data::frame::{Forces, Frame};
-use dermis_golden::data::input::Input;
-use dermis_golden::fixed::stages::send::{
-    labels_of_beats, Status, FLAG_CHANNEL, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS,
-    FLAG_NO_CONTACT, FLAG_RAIL, FLAG_TABLES, STATUS_BEATS, TABLES_REFUSED,
-};
+use dermis_golden::fixed::stages::send::{labels_of_beats, status_fields, Status, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::result::checks::history::History;
 use dermis_golden::result::checks::Checks;
-use dermis_golden::result::flags::{frame_flags, Flag};
+use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
 use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -85,8 +82,8 @@ impl Answer {
             return Some(format!("row {}, column {}: label {got}, model {expected}", index / cols, index % cols));
         }
         let mut status = self.status.clone();
-        let unseen = FLAG_FRAMING | FLAG_RAIL | FLAG_CHANNEL;
-        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(unseen as i32));
+        let unseen = status_fields().into_iter().filter(|field| *field == FRAMING || field.feature == Feature::Scan);
+        unseen.for_each(|field| status.chunks_mut(STATUS_BEATS).for_each(|beats| field.put(beats, 0)));
         (status != trace.status).then(|| format!("status {status:?}, model {:?}", trace.status))
     }
 
@@ -103,20 +100,20 @@ impl Answer {
     }
 
     fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
-        self.status.chunks(STATUS_BEATS).filter_map(Status::of_beats)
+        Status::all(&self.status)
     }
 
     /// Whether the board has dropped a frame's packet since its last answer.
     pub fn dropped_before(&self) -> bool {
-        self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
+        self.statuses().any(|status| status.framing)
     }
 
     /// The version of the tables in each status, or `refused`, `not whole`.
     pub(super) fn tables(&self) -> impl Iterator<Item = String> + '_ {
-        self.statuses().map(|status| match status.tables {
-            _ if status.flags & FLAG_TABLES != 0 => "not whole".to_owned(),
-            tables if tables & TABLES_REFUSED != 0 => "refused".to_owned(),
-            version => version.to_string(),
+        self.statuses().map(|status| match status.raised {
+            raised if raised.contains(Flag::TablesIncomplete) => "not whole".to_owned(),
+            raised if raised.contains(Flag::TablesRefused) => "refused".to_owned(),
+            _ => status.tables.to_string(),
         })
     }
 
@@ -124,45 +121,26 @@ impl Answer {
     fn mu_share(&self) -> Option<f64> {
         let mut all = self.statuses();
         let (first, others) = (all.next(), all.next());
-        let [x, y] = first.filter(|_| others.is_none())?.position.map(f64::from);
+        let [x, y] = first.filter(|_| others.is_none())?.position().map(f64::from);
         Some(x.hypot(y) / MU_STEPS as f64)
     }
 
     /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
-        Ok(Checks {
-            full_scale_share: Input::new(&model.scene)?.full_scale_share(std::slice::from_ref(readings)),
-            peak_MPa: frame.peak_MPa(),
-            mu_share: self.mu_share(),
-            ..Checks::default()
-        })
+        let figures = Checks { peak_MPa: frame.peak_MPa(), mu_share: self.mu_share(), ..Checks::default() };
+        Ok(figures.with_readings(model.input(), std::slice::from_ref(readings)))
     }
 
     /// The flags of an answer with sums, as in a reconstruction, but `mu-at-bound` only with one subarray.
     fn flags(&self, model: &Model, frame: &Frame, checks: &Checks) -> Result<Vec<Flag>> {
-        let noise_MPa = Input::new(&model.scene)?.noise_MPa();
-        let of_frame = frame_flags(&model.scene, frame, &model.codes(frame)?, noise_MPa);
-        let mut flags: BTreeSet<Flag> = of_frame.into_iter().collect();
-        flags.extend(checks.flags(&model.scene));
+        let noise_MPa = model.input().noise_MPa();
+        let of_frame = frame_flags(&model.scene, model.estimator(), frame, &model.codes(frame)?, noise_MPa);
         // The statuses of contacts that are not there say nothing of μ.
         let labels = labels_of_beats(&self.labels, model.scene.sensor.taxels());
         let of_taxels = |slot: usize| labels.is_empty() || labels.contains(&(slot + 1));
-        for (slot, status) in self.statuses().enumerate() {
-            let has = |bit: u32| status.flags & bit != 0;
-            let saturated = status.rescale_saturations + status.force_saturations > 0;
-            let all = [
-                (has(FLAG_TABLES), Flag::TablesIncomplete),
-                (status.tables & TABLES_REFUSED != 0, Flag::TablesRefused),
-                (has(FLAG_NO_CONTACT), Flag::NoContact),
-                (has(FLAG_MORE_CONTACTS), Flag::TooManyContacts),
-                (of_taxels(slot) && !has(FLAG_CONDITION), Flag::ConditionUnmet),
-                (has(FLAG_CONDITION) && !has(FLAG_FOUND), Flag::NoCompression),
-                (saturated || has(FLAG_RAIL), Flag::Saturated),
-                (has(FLAG_CHANNEL), Flag::WrongChannel),
-            ];
-            flags.extend(all.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag));
-        }
-        Ok(flags.into_iter().collect())
+        let statuses: Vec<Status> = self.statuses().collect();
+        let of_others = of_frame.into_iter().chain(checks.flags(&model.scene)).collect::<FlagSet>();
+        Ok((model.status_flags(&statuses, of_taxels) | of_others).iter().collect())
     }
 }
 
@@ -194,6 +172,14 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
+    /// Adds what the readings of a stream so far show, `readings` being those of this answer.
+    pub fn add_history(&mut self, scene: &Scene, history: &mut History, readings: &Frame) {
+        self.checks = history.add(std::slice::from_ref(readings), self.checks);
+        self.flags.extend(self.checks.flags(scene));
+        self.flags.sort();
+        self.flags.dedup();
+    }
+
     /// The answer to `readings`, in physical units.
     ///
     /// # Errors
@@ -231,5 +217,69 @@ impl PhysicalAnswer {
             forces_N: answer.forces.as_ref().filter(|_| !model.sends_resultants()).map(forces),
             equal: answer.difference.as_ref().map(Option::is_none),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::spec::scene::Scene;
+
+    /// A frame's flags as a host tells them that asked for resultants, or for forces; the statuses are changed on the way.
+    fn flags(model: &Model, change: &dyn Fn(&mut Status)) -> [Vec<Flag>; 2] {
+        let frame = Frame::shipped(&model.scene).remove(1);
+        let trace = model.run(&model.readings(std::slice::from_ref(&frame)).unwrap());
+        let changed = |mut status: Status| {
+            change(&mut status);
+            status.beats()
+        };
+        let sums = Some(Sums::of(&trace.beats, model.scene.sensor.cols));
+        let status = Status::all(&trace.status).flat_map(changed).collect();
+        let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
+        let answer = Answer { sums, forces: None, labels, status, codes, difference: None, received_at };
+        let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
+        [answer, whole].map(|answer| PhysicalAnswer::new(model, &frame, &answer).unwrap().flags)
+    }
+
+    #[test]
+    fn each_flag_of_a_status_is_told_with_and_without_forces() {
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        let model = Model::new(&scene).unwrap();
+        assert_eq!(flags(&model, &|_| ()), [[], []]);
+        for flag in Flag::ALL.into_iter().filter(|flag| flag.status_bit().is_some()) {
+            let raised = FlagSet::raised([(flag, true)]);
+            assert_eq!(flags(&model, &|status| status.raised = raised), [[flag], [flag]]);
+        }
+        assert_eq!(flags(&model, &|status| status.condition = false), [[Flag::ConditionUnmet]; 2]);
+        assert_eq!(flags(&model, &|status| status.found = false), [[Flag::NoCompression]; 2]);
+        assert_eq!(flags(&model, &|status| status.force_saturations = 1), [[Flag::Saturated]; 2]);
+        // Without a search there was nothing to find.
+        scene.search.mu_max = 0.0;
+        assert_eq!(flags(&Model::new(&scene).unwrap(), &|_| ()), [[], []]);
+    }
+
+    /// A comparison with the model leaves out what the model does not see, and nothing else.
+    #[test]
+    fn each_field_of_a_status_is_compared_with_the_model_but_those_it_does_not_see() {
+        let model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+        let codes = model.readings(&Frame::shipped(&model.scene)[1..2]).unwrap();
+        let trace = model.run(&codes);
+        let answer = |status| Answer {
+            sums: None,
+            forces: None,
+            labels: Vec::new(),
+            status,
+            codes: Vec::new(),
+            difference: None,
+            received_at: SystemTime::UNIX_EPOCH,
+        };
+        assert_eq!(answer(trace.status.clone()).compare_with_model(&model, &codes), None);
+        for field in status_fields() {
+            let mut status = trace.status.clone();
+            let other = field.get(&status) ^ 1;
+            field.put(&mut status, other);
+            let unseen = field == FRAMING || field.feature == Feature::Scan;
+            assert_eq!(answer(status).compare_with_model(&model, &codes).is_none(), unseen, "{}", field.name);
+        }
     }
 }

@@ -28,5 +28,5 @@ pub use error::{HostError, IdentityError};
 pub use host_uart::{require_uart, HostUart, UartSymbol};
 pub use noisy_channel::{ChannelFaults, NoisyChannel};
 pub(crate) use session::open_board;
-pub use session::{open, Session};
+pub use session::{open, BoardEngine, Session};
 pub use terminal::PseudoTerminal;

@@ -6,8 +6,11 @@ use std::time::Duration;
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::Input;
+use dermis_golden::engine::{Engine, EngineError};
 use dermis_golden::fixed::Model;
+use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::link_kind::LinkKind;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::wire::link::{Identity, Kind};
 use serialport::SerialPort;
 
@@ -15,7 +18,7 @@ use super::answer::Answer;
 use super::client::Client;
 use super::error::HostError;
 use super::host_uart::require_uart;
-use crate::stream::Engine;
+use crate::device_error::device_error;
 
 /// Longest wait of a read of the port for a byte.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
@@ -53,8 +56,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
             client.load(specimen, !identity.supports(Kind::FrameForResultants))?;
         }
         let model = specimen.unwrap_or(hardware);
-        let input = Input::new(&model.scene)?;
-        let offset = tare.map(|tare| offset(&input, tare));
+        let offset = tare.map(|tare| offset(model.input(), tare));
         Ok(Session { client, model, identity, offset, forces, check })
     }
 
@@ -120,16 +122,41 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     }
 }
 
-impl<P: std::io::Read + std::io::Write + 'static> From<Session<P>> for Engine {
-    /// The board as the engine of a stream; the session must ask for forces. A board takes no blocks of several frames.
-    fn from(session: Session<P>) -> Engine {
-        let session = RefCell::new(session);
-        Engine::Other(Box::new(move |frames| {
-            let mut session = session.borrow_mut();
-            let [frame] = frames else { bail!("{} frames: a board takes one for each result", frames.len()) };
-            let (readings, answer) = session.request(frame)?;
-            answer.decode(&session.model, &readings)?.ok_or_else(|| anyhow!("the answer has no forces"))
-        }))
+/// A board as an engine, which takes no blocks of several frames; its session must ask for forces.
+pub struct BoardEngine<P> {
+    /// The model of the board's hardware.
+    model: Model,
+    session: RefCell<Session<P>>,
+}
+
+impl<P: std::io::Read + std::io::Write> BoardEngine<P> {
+    /// The board of a session.
+    pub fn new(session: Session<P>) -> Self {
+        BoardEngine { model: session.model.clone(), session: RefCell::new(session) }
+    }
+
+    fn result(&self, frames: &[Frame]) -> Result<Reconstruction> {
+        let [frame] = frames else { bail!("{} frames: a board takes one for each result", frames.len()) };
+        let (readings, answer) = self.session.borrow_mut().request(frame)?;
+        answer.decode(&self.model, &readings)?.ok_or_else(|| anyhow!("the answer has no forces"))
+    }
+}
+
+impl<P: std::io::Read + std::io::Write> Engine for BoardEngine<P> {
+    fn scene(&self) -> &Scene {
+        &self.model.scene
+    }
+
+    fn input(&self) -> &Input {
+        self.model.input()
+    }
+
+    fn estimator(&self) -> EstimatorKind {
+        self.model.estimator()
+    }
+
+    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        self.result(frames).map_err(device_error)
     }
 }
 

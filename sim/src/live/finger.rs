@@ -13,10 +13,12 @@ use anyhow::Result;
 use dermis_golden::data::frame::{Contact, Forces, Frame};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::generate;
+use dermis_golden::engine::{Engine, FindNoise};
 use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
-use crate::stream::{seconds, Answer, Engine, Outcome, Output};
+use crate::engine;
+use crate::stream::{seconds, Answer, Outcome, Output};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
 const RADIUS_IN_PITCHES: f64 = 2.0;
@@ -83,13 +85,14 @@ impl Hand {
     ///
     /// # Errors
     /// A scene that generator or engine refuse, an output that fails.
-    pub fn run(&self, scene: &Scene, engine: &Engine, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
+    pub fn run(&self, engine: &dyn Engine, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
+        let scene = engine.scene();
         for sequence in 0.. {
             let begun = Instant::now();
             let received_s = seconds(SystemTime::now());
             let frame = self.frame(scene, noise, sequence)?;
             let frames = vec![frame; scene.input.frames_per_result()];
-            let result = engine.reconstruct(&frames)?;
+            let result = engine::result(engine, &frames, FindNoise::No)?;
             let answered_s = seconds(SystemTime::now());
             let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
             let (frames, received, result) = (&frames[..], &received[..], &result);

@@ -43,7 +43,7 @@ mod tests {
         let estimated = Golden::new(&scene).unwrap().run(&frame).unwrap();
         let found = contacts(&estimated);
         assert_eq!(found[0].sigma_N(), Some(estimated.extra.contacts.as_ref().unwrap()[0].sigma_N));
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         let searched = golden.run(&frame).unwrap();
         let (force_N, own) = (searched.resultant_N, &searched.subarrays[0]);
         let whole = FoundContact { centre_mm: own.compression_centroid_mm, force_N, mu: own.mu, ..Default::default() };

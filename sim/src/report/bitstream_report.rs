@@ -23,7 +23,7 @@ pub struct Summary {
     pub achieved: Baseline,
     /// Required clock, from the board's file, in MHz.
     pub clock_MHz: f64,
-    /// Cycles from the engine's first input beat to its last output beat.
+    /// Cycles from the engine's first input beat to its last output beat, of the frame that takes longest.
     pub cycles: u64,
     /// Time of these cycles at the board's clock.
     pub time_us: f64,
@@ -105,7 +105,7 @@ const HEAD: [&str; 14] = [
     "median",
     "worst",
     "clock, MHz",
-    "cycles",
+    "cycles, worst case",
     "µs",
     "margin to 1 ms",
 ];

@@ -2,6 +2,7 @@
 
 use dermis_golden::data::input::known_loads::LoadFit;
 
+use super::document::percent_text;
 use super::table::{markdown, significant_digits};
 
 /// Step of the full scale in MPa.
@@ -11,7 +12,19 @@ const ROUNDING: f64 = 1e-12;
 
 /// The scene's fields that follow from a calibration whose table is in the file `table`, and its residuals.
 pub fn calibration(fit: &LoadFit, table: &str) -> String {
-    let mut text = format!("{table}: offset and gain of {} taxels; for the scene:\n\n", fit.table.gain.len());
+    let mut text = String::new();
+    for stress_MPa in &fit.saturated_MPa {
+        text += &format!(
+            "left out: the load of {stress_MPa} MPa, whose readings stand at the end of the converter's range\n"
+        );
+    }
+    if let Some(share) = fit.curved_share() {
+        let off = percent_text(share);
+        text += &format!(
+            "curved: the readings are no straight line of the load, off by {off} of the largest one; see below\n"
+        );
+    }
+    text += &format!("{table}: offset and gain of {} taxels; for the scene:\n\n", fit.table.gain.len());
     text += &format!("[input]\ncalibration = {table:?}\n");
     // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
     let full_scale_MPa = (fit.full_scale_MPa * (1.0 - ROUNDING) / SHOWN).ceil() * SHOWN;

@@ -63,7 +63,7 @@ pub struct SceneCheck {
 pub struct HardwareCheck {
     /// Degree of the series in μ.
     pub degree: usize,
-    /// What the hardware takes in place of the scene's estimator.
+    /// The hardware's estimator where it is not that of the floating-point model, by its name in scenes.
     pub estimator_instead: Option<&'static str>,
     /// Optional features that the scene does not use.
     pub left_out: Vec<&'static str>,
@@ -114,7 +114,7 @@ impl HardwareCheck {
             "time        at most {cycles} cycles = {time_us:.2} µs at {clock_MHz} MHz, {margin} the budget of {BUDGET_US} µs\n"
         );
         if let Some(instead) = self.estimator_instead {
-            text += &format!("left out    by the hardware: the scene's estimator; it takes {instead}\n");
+            text += &format!("left out    by the hardware: the model's estimator; it computes {instead}\n");
         }
         if !self.left_out.is_empty() {
             text +=

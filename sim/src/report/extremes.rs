@@ -89,8 +89,7 @@ pub(super) fn extremes_table(scene: &str, rows: &[Row]) -> Table {
 
 /// Flags as in JSON, separated by commas.
 fn names(flags: &[Flag]) -> String {
-    let name = |flag: &Flag| json!(flag).as_str().unwrap_or_default().to_owned();
-    flags.iter().map(name).collect::<Vec<_>>().join(", ")
+    flags.iter().map(|flag| flag.name()).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -14,8 +14,7 @@ pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> St
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
     let [x, y, normal] = physical.resultant_N.map(|force| sign(force).to_owned() + &significant_digits(force, largest));
     let centre = physical.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
-    let flags: Vec<String> =
-        physical.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+    let flags: Vec<&str> = physical.flags.iter().map(|flag| flag.name()).collect();
     format!(
         "{frame}: N x {x}   y {y}   normal {normal}   centre {centre}   taxels {}   flags {}\n{}",
         physical.loaded.map_or("-".to_owned(), |loaded| loaded.to_string()),

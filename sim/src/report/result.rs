@@ -79,10 +79,10 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
         contact(own.centre_mm, own.force_N, [x, y, own.normal_sigma_N])?;
     }
     let flag = |flag: &Flag| {
-        let name = serde_json::to_value(flag).ok()?.as_str().map(str::to_owned)?;
-        Some(result.checks.figure(*flag).map_or(name.clone(), |figure| format!("{name} ({figure})")))
+        let name = flag.name();
+        result.checks.figure(*flag).map_or(name.to_owned(), |figure| format!("{name} ({figure})"))
     };
-    let flags: Vec<String> = result.flags.iter().filter_map(flag).collect();
+    let flags: Vec<String> = result.flags.iter().map(flag).collect();
     writeln!(text, "flags           {}", if flags.is_empty() { "none".to_owned() } else { flags.join(", ") })
 }
 

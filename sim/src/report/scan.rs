@@ -78,8 +78,7 @@ pub fn scan(verified: &VerifiedScan) -> String {
         "first sample to last beat µs",
     ];
     let rows = report.frames.iter().map(|row| {
-        let flags: Vec<String> =
-            row.flags.iter().map(|flag| serde_json::json!(flag).as_str().unwrap_or("").to_owned()).collect();
+        let flags: Vec<&str> = row.flags.iter().map(|flag| flag.name()).collect();
         let forces = row.resultant_N.map(|force| format!("{force:.3}"));
         let times = [row.scan_us, row.engine_us, row.end_to_end_us].map(|us| format!("{us:.2}"));
         let equal = if row.equal { "yes" } else { "NO" }.to_owned();

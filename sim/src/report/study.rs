@@ -6,11 +6,13 @@
 //! | [`dead_taxels`] | errors and latency with taxels that are left out |
 //! | [`contacts`] | case 0, `adaptive` and `contacts` on frames of several contacts |
 //! | [`link_times`] | time of a frame's packets on each link |
+//! | [`sensor_faults`] | engines on frames that a sensor's faults spoil |
 
 pub mod contacts;
 pub mod dead_taxels;
 mod drawn;
 pub mod input_bits;
 pub mod link_times;
+pub mod sensor_faults;
 
 pub use drawn::{one_contact, tangential, FRAMES};

@@ -97,8 +97,8 @@ pub fn scenes(all: &[Verified]) -> String {
         "e_n golden",
         "e_n fixed",
         "RTL = fixed",
-        "latency, cycles",
-        "total, cycles",
+        "latency, shipped frames",
+        "cycles, shipped frames",
         "frame interval, cycles",
         "MHz",
         "µs",
@@ -127,8 +127,8 @@ pub fn scenes(all: &[Verified]) -> String {
     });
     let mut text = markdown(&head, rows.collect());
     text.push_str(
-        "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; cycles: the slowest frame; \
-         frame interval: frames back to back\n",
+        "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; latency and \
+         cycles: of the slowest of these frames; frame interval: frames back to back\n",
     );
     text
 }

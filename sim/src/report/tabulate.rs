@@ -106,9 +106,9 @@ pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut 
         if matches!(subarrays(case, &scene.sensor), Err(PartitionError::NotDividing { .. })) {
             continue;
         }
-        let mut scene = scene.for_hardware();
+        let mut scene = scene.clone().with_chosen_hardware();
         scene.partition.case = case;
-        let golden = Golden::new(&scene)?;
+        let golden = Golden::reference(&scene)?;
         // A case without hardware is not an error here: its columns stay empty.
         let model = Model::for_frames(&scene, frames).ok();
         for (index, frame) in frames.iter().enumerate() {

@@ -6,8 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
-use dermis_golden::estimate::float::Golden;
-use dermis_golden::fixed::Model;
+use dermis_golden::engine::{Engine, FindNoise};
+use dermis_golden::result::checks::history::History;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
@@ -15,19 +15,7 @@ use serde::Serialize;
 use super::line;
 use super::queue::{Policy, Queue};
 use super::stop::Stop;
-
-/// What reconstructs.
-pub enum Engine {
-    /// The floating-point model.
-    Golden(Box<Golden>),
-    /// The bit-true model.
-    Fixed(Box<Model>),
-    /// Something else, such as a board.
-    Other(Box<Reconstruct>),
-}
-
-/// Gives the result of a block of frames.
-pub type Reconstruct = dyn Fn(&[Frame]) -> Result<Reconstruction>;
+use crate::engine;
 
 /// How a stream is read and answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,32 +106,15 @@ pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> 
     }
 }
 
-impl Engine {
-    /// The engine of a scene that takes blocks of frames.
-    ///
-    /// # Errors
-    /// A sliding mean, a scene that the model refuses.
-    pub fn new(scene: &Scene, fixed: bool) -> Result<Engine> {
-        if scene.input.slides() {
-            bail!("scene {}: input.mean = \"sliding\" is not available in a stream: block", scene.name);
-        }
-        match fixed {
-            false => Ok(Engine::Golden(Box::new(Golden::new(scene)?))),
-            true => Ok(Engine::Fixed(Box::new(Model::new(scene)?))),
-        }
+/// Refuses a scene that a stream cannot have.
+///
+/// # Errors
+/// A sliding mean.
+pub fn require_blocks(scene: &Scene) -> Result<()> {
+    if scene.input.slides() {
+        bail!("scene {}: input.mean = \"sliding\" is not available in a stream: block", scene.name);
     }
-
-    /// The result of a block of frames.
-    ///
-    /// # Errors
-    /// Frames that the model refuses.
-    pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
-        match self {
-            Engine::Golden(golden) => Ok(golden.run_averaged(frames)?),
-            Engine::Fixed(model) => Ok(model.reconstruct_averaged(frames)?),
-            Engine::Other(reconstruct) => reconstruct(frames),
-        }
-    }
+    Ok(())
 }
 
 /// Answers every line of `input`, called `name` in errors, until it ends or `output` is closed.
@@ -151,13 +122,12 @@ impl Engine {
 /// # Errors
 /// Input or output that fails; a bad line is none.
 pub fn run(
-    scene: &Scene,
-    engine: &Engine,
+    engine: &dyn Engine,
     input: (Box<dyn Read + Send>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
-    run_until(&Stop::default(), scene, engine, input, options, output)
+    run_until(&Stop::default(), engine, input, options, output)
 }
 
 /// As [`run`], or until `stop`.
@@ -166,8 +136,7 @@ pub fn run(
 /// As [`run`].
 pub fn run_until(
     stop: &Stop,
-    scene: &Scene,
-    engine: &Engine,
+    engine: &dyn Engine,
     (input, name): (Box<dyn Read + Send>, &str),
     options: StreamOptions,
     output: &mut Output,
@@ -184,7 +153,7 @@ pub fn run_until(
     };
     stop.add(&queue);
     let (waiting, times, counts) = (Vec::new(), Vec::new(), Counts::default());
-    let mut stream = Stream { scene, engine, waiting, times, counts };
+    let mut stream = Stream { engine, history: History::new(engine.scene()), waiting, times, counts };
     loop {
         if stop.stopped() {
             queue.close();
@@ -233,8 +202,8 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 
 /// The state of a stream.
 struct Stream<'a> {
-    scene: &'a Scene,
-    engine: &'a Engine,
+    engine: &'a dyn Engine,
+    history: History,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
     /// Seconds since 1970 when the line of each was read.
@@ -248,11 +217,12 @@ impl Stream<'_> {
         let result = self.frame(received).and_then(|frame| {
             self.waiting.push(frame);
             self.times.push(seconds(received.time));
-            if self.waiting.len() < self.scene.input.frames_per_result() {
+            if self.waiting.len() < self.engine.scene().input.frames_per_result() {
                 return Ok(None);
             }
             let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
-            let result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
+            let mut result = engine::result(self.engine, &frames, FindNoise::No).map_err(|error| error.to_string())?;
+            result.add_history(self.engine.scene(), &mut self.history, &frames);
             Ok(Some((frames, times, result)))
         });
         let line = received.number;
@@ -276,7 +246,7 @@ impl Stream<'_> {
     fn frame(&self, received: &Received) -> Result<Frame, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
         let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-        match line::frame(text, received.number, &self.scene.sensor) {
+        match line::frame(text, received.number, &self.engine.scene().sensor) {
             Ok((_, frame)) => Ok(frame),
             Err(none) => Err(none.reason),
         }
@@ -291,13 +261,27 @@ pub fn seconds(time: SystemTime) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::EngineName;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::EstimatorKind;
     use serde_json::Value;
+    use std::path::Path;
 
-    fn answers(scene: &Scene, fixed: bool, input: String, options: StreamOptions, brief: bool) -> (Counts, Vec<Value>) {
-        let engine = Engine::new(scene, fixed).unwrap();
+    fn engine_of(scene: &Scene, name: EngineName) -> Box<dyn Engine> {
+        name.engine(scene, None, Path::new("")).unwrap()
+    }
+
+    fn answers(
+        scene: &Scene,
+        name: EngineName,
+        input: String,
+        options: StreamOptions,
+        brief: bool,
+    ) -> (Counts, Vec<Value>) {
+        let engine = engine_of(scene, name);
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
         let mut output = Vec::new();
-        let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut output, brief)).unwrap();
+        let counts = run(&*engine, (input, "memory"), options, &mut as_lines(&mut output, brief)).unwrap();
         let text = String::from_utf8(output).unwrap();
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }
@@ -305,7 +289,7 @@ mod tests {
     const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All };
 
     fn scene() -> Scene {
-        Scene::builtin("eight-by-eight").unwrap().for_hardware()
+        Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search)
     }
 
     fn csv(frame: &Frame) -> String {
@@ -316,8 +300,8 @@ mod tests {
     fn results_are_those_of_the_engines_and_bad_lines_are_numbered() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
         let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
-        for fixed in [false, true] {
-            let (counts, answers) = answers(&scene, fixed, input.clone(), ALL, false);
+        for name in EngineName::SOFTWARE {
+            let (counts, answers) = answers(&scene, name, input.clone(), ALL, false);
             assert_eq!(counts, Counts { answered: 2, refused: 2, dropped: 0 });
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
@@ -325,10 +309,7 @@ mod tests {
             assert!(answers[3]["error"].as_str().unwrap().starts_with("missing field `stress_MPa`"));
             for (answer, frame, sequence) in [(&answers[0], &frames[0], 0), (&answers[2], &frames[1], 1)] {
                 let plain = Frame { resultant_N: None, ..frame.clone() };
-                let result = match fixed {
-                    false => Golden::new(&scene).unwrap().run(&plain).unwrap(),
-                    true => Model::new(&scene).unwrap().reconstruct(&plain).unwrap(),
-                };
+                let result = engine_of(&scene, name).reconstruct(&[plain]).unwrap();
                 let wanted: Value = serde_json::to_value(&result).unwrap();
                 assert_eq!((&answer["forces_N"], &answer["flags"]), (&wanted["forces_N"], &wanted["flags"]));
                 assert_eq!(answer["sequence"], sequence);
@@ -342,11 +323,31 @@ mod tests {
         let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
         scene.input.average = 1;
         let input = csv(&frames[0]) + &csv(&frames[1]) + &csv(&frames[2]);
-        let (counts, answers) = answers(&scene, false, input, ALL, true);
+        let (counts, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
         assert_eq!((counts.answered, answers.len(), &answers[0]["line"]), (1, 1, &Value::from(2)));
         assert_eq!(answers[0]["forces_N"]["fz"], Value::Array(Vec::new()));
         let mean = Golden::new(&scene).unwrap().run_averaged(&frames[..2]).unwrap().resultant_N;
         assert_eq!(answers[0]["resultant_N"], serde_json::to_value(mean).unwrap());
+    }
+
+    /// A press that grows over a taxel that does not; both models, and only from the frame on that is late enough.
+    #[test]
+    fn a_taxel_that_stands_still_is_flagged_in_a_stream() {
+        let (scene, exact) = (scene(), Frame::shipped(&scene()).remove(1));
+        let peak = (0..64).max_by(|a, b| exact.stress_MPa[*a].total_cmp(&exact.stress_MPa[*b])).unwrap();
+        let line = |moment: usize| {
+            let mut frame = exact.clone();
+            frame.stress_MPa.iter_mut().for_each(|b| *b *= moment as f64);
+            frame.stress_MPa[peak] = exact.stress_MPa[peak];
+            csv(&frame)
+        };
+        let input: String = (1..=10).map(line).collect();
+        for name in EngineName::SOFTWARE {
+            let (_, answers) = answers(&scene, name, input.clone(), ALL, true);
+            let has = |answer: &Value| answer["flags"].as_array().unwrap().contains(&Value::from("taxel-constant"));
+            assert_eq!((has(&answers[6]), has(&answers[9])), (false, true), "{answers:?}");
+            assert!(answers[9]["checks"]["constant_share"].as_f64() > Some(0.06));
+        }
     }
 
     #[test]
@@ -354,7 +355,7 @@ mod tests {
         let mut scene = scene();
         scene.input.mean = dermis_golden::spec::scene::MeanKind::Sliding;
         scene.input.average = 2;
-        let error = Engine::new(&scene, false).err().unwrap().to_string();
+        let error = require_blocks(&scene).unwrap_err().to_string();
         assert!(error.contains("input.mean = \"sliding\""), "{error}");
     }
 
@@ -362,7 +363,7 @@ mod tests {
     fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
         let options = StreamOptions { queue: 1, policy: Policy::Latest };
-        let (counts, answers) = answers(&scene, false, csv(&frames[0]).repeat(2000), options, true);
+        let (counts, answers) = answers(&scene, EngineName::Golden, csv(&frames[0]).repeat(2000), options, true);
         assert_eq!(counts.answered + counts.dropped, 2000);
         assert!(counts.dropped > 0);
         // The newest line is never dropped.
@@ -383,8 +384,8 @@ mod tests {
     fn a_stream_whose_input_never_ends_is_stopped() {
         let (scene, stop) = (scene(), Stop::default());
         let run = || {
-            let engine = Engine::new(&scene, false)?;
-            run_until(&stop, &scene, &engine, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
+            let engine = engine_of(&scene, EngineName::Golden);
+            run_until(&stop, &*engine, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
         };
         std::thread::scope(|scope| {
             let running = scope.spawn(run);
@@ -399,7 +400,7 @@ mod tests {
     fn an_answer_has_the_frames_of_its_block() {
         let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
         scene.input.average = 1;
-        let engine = Engine::new(&scene, false).unwrap();
+        let engine = engine_of(&scene, EngineName::Golden);
         let input = csv(&frames[0]) + &csv(&frames[1]);
         let mut seen = Vec::new();
         let mut output = |outcome: &Outcome| {
@@ -410,7 +411,7 @@ mod tests {
             Ok(())
         };
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
-        run(&scene, &engine, (input, "memory"), ALL, &mut output).unwrap();
+        run(&*engine, (input, "memory"), ALL, &mut output).unwrap();
         let [(stress, received, last)] = &seen[..] else { panic!("{} answers", seen.len()) };
         assert_eq!(*stress, [frames[0].stress_MPa.clone(), frames[1].stress_MPa.clone()]);
         assert!(received.len() == 2 && received[0] <= received[1] && received[1] == *last, "{received:?}, {last}");

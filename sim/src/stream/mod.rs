@@ -33,7 +33,7 @@ pub mod source;
 pub mod stop;
 
 pub use answers::{
-    as_lines, run, run_until, seconds, Answer, Counts, Engine, Outcome, Output, Reconstruct, Refusal, StreamOptions,
+    as_lines, require_blocks, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions,
 };
 pub use line::LONGEST_LINE;
 pub use queue::Policy;

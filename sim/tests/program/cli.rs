@@ -94,7 +94,8 @@ fn wrong_input_ends_with_its_exit_code_and_message() {
 }
 
 /// What commands for the hardware print of a scene that names no estimator.
-const NOTE: &str = "eight-by-eight: the hardware has no estimator evidence and takes search with sparse\n";
+const NOTE: &str =
+    "eight-by-eight: estimator search in hardware, evidence in floating point: the scene names no network\n";
 
 /// Exit code and stderr of a reconstruction in simulated hardware, with `work` as the only folder in PATH.
 fn rtl_in(work: &Path) -> (Option<i32>, String) {

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 const PAD: &str = "[sensor]\nrows = 9\ncols = 12\npitch_x_mm = 2\npitch_y_mm = 2\nthickness_mm = 2\n\
                    [partition]\ncase = \"contacts\"\nmax_contacts = 2\n\
-                   [search]\nestimator = \"learned\"\nnetwork = \"pad.network\"\n";
+                   [search]\nestimator = \"evidence+network\"\nnetwork = \"pad.network\"\n";
 
 /// Runs the command in a folder: exit code, standard output, standard error.
 fn run(folder: &Path, args: &[&str]) -> (Option<i32>, String, String) {

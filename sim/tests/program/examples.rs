@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 63] = [
+const NOT_RUN: [(&str, &str); 66] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -61,6 +61,9 @@ const NOT_RUN: [(&str, &str); 63] = [
     ("dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network", "minutes"),
     ("dermis study input-bits", "a minute; accuracy.rs measures the same"),
     ("dermis study contacts ellipses", "a minute; guide.rs"),
+    ("dermis study sensor-faults", "minutes; guide.rs"),
+    ("dermis study sensor-faults my-scene.toml --quick", "a minute; golden/src/study/sensor_faults/tests.rs"),
+    ("dermis study sensor-faults sensor-1-noisy --noise 0.002 --json", "minutes"),
     ("dermis guide", PAGES),
     ("dermis guide --only stability", PAGES),
     ("dermis guide --check", PAGES),
@@ -116,7 +119,7 @@ fn all_examples() -> BTreeSet<String> {
     let overview = help(&[]);
     let listed = overview.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let commands = listed.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
-    let texts = commands.map(|name| help(&[name])).chain([overview.clone()]);
+    let texts = commands.map(|name| help(&[name])).chain([overview.clone(), help(&["study", "sensor-faults"])]);
     texts.flat_map(|text| examples(&text)).collect()
 }
 

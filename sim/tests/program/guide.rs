@@ -46,12 +46,13 @@ fn the_tables_of_the_pages_are_what_their_commands_print() {
 fn a_changed_digit_is_found_and_mended() {
     const COMMAND: &str = "dermis bitstream --committed";
     let folder = copied();
-    let marked = |name: &String| fs::read_to_string(folder.path().join(name)).unwrap().contains(COMMAND);
+    let of_command = |text: &str| Some(text.find(&format!("<!-- table: {COMMAND}"))? + "<!-- table: ".len());
+    let marked = |name: &String| of_command(&fs::read_to_string(folder.path().join(name)).unwrap()).is_some();
     let name = page_names(folder.path()).unwrap().into_iter().find(marked).expect("a page with that table");
     let path = folder.path().join(&name);
     let whole = fs::read_to_string(&path).unwrap();
     // The last digit of the table's last row.
-    let (before, rest) = whole.split_at(whole.find(COMMAND).unwrap());
+    let (before, rest) = whole.split_at(of_command(&whole).unwrap());
     let (table, after) = rest.split_at(rest.find("<!-- end of table -->").unwrap());
     let digit = table.rfind(|character: char| character.is_ascii_digit()).unwrap();
     let other = if table[digit..].starts_with('0') { "1" } else { "0" };
@@ -69,6 +70,28 @@ fn a_changed_digit_is_found_and_mended() {
     // Written anew the table is as it was.
     let (text, code) = told(&guide(folder.path(), &["--only", COMMAND]));
     assert_eq!(code, Some(0), "{text}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), whole);
+    assert_eq!(check().1, Some(0));
+}
+
+#[test]
+fn a_stale_figure_in_the_text_is_found_and_mended() {
+    const COMMAND: &str = "dermis bitstream --committed --board ulx3s-85f";
+    const END: &str = "<!-- end of figure -->";
+    let folder = copied();
+    let path = folder.path().join("README.md");
+    let whole = fs::read_to_string(&path).unwrap();
+    let at = whole.find(&format!("<!-- figure: {COMMAND} ;")).expect("a figure of that command");
+    let from = at + whole[at..].find("-->").unwrap() + "-->".len();
+    let to = from + whole[from..].find(END).unwrap();
+    fs::write(&path, format!("{}1 267{}", &whole[..from], &whole[to..])).unwrap();
+    let check = || told(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
+    let (text, code) = check();
+    assert_eq!(code, Some(1), "{text}");
+    let line = whole[..at].lines().count();
+    let wanted = format!("README.md:{line}: stale: {COMMAND}\n  page:    1 267\n  command: {}\n", &whole[from..to]);
+    assert!(text.contains(&wanted), "{text}");
+    assert_eq!(told(&guide(folder.path(), &["--only", COMMAND])).1, Some(0));
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
     assert_eq!(check().1, Some(0));
 }

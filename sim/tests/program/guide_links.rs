@@ -8,11 +8,15 @@
 //! | `` `golden/…` ``, `` `hdl/…` ``, `` `sim/…` ``, `` `python/…` ``, `` `constraints/…` ``, `` `tests/…` `` | be a file or folder of the repository |
 //! | a line that begins with `dermis` in an `sh` block | be accepted by the command line |
 //! | a fence | name its language |
+//!
+//! What they say of the project's own lists is compared with these: folders, stages, values of a field, columns of cycles,
+//! figures in the README's text.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use dermis_sim::commands::check_arguments;
+use dermis_sim::commands::guide_pages::markdown::tables;
 
 /// Longest README in lines: one page.
 const README_LINES: usize = 140;
@@ -144,6 +148,110 @@ fn every_page_is_in_the_contents_and_in_the_documentation() {
         assert!(modules.contains(&format!("\"{name}\" ")), "{name} is not in sim/src/guide.rs");
         assert!(name == "index.md" || contents.contains(&format!("]: {name}\n")), "{name} is not in index.md");
     }
+}
+
+fn read(page: &str) -> String {
+    fs::read_to_string(root().join(page)).unwrap()
+}
+
+/// First cells of the rows of a page's tables whose first head is `head`.
+fn first_cells(page: &str, head: &str) -> Vec<String> {
+    let all = tables(&read(page)).into_iter().filter(|table| table.head[0] == head);
+    all.flat_map(|table| table.rows).map(|row| row[0].clone()).collect()
+}
+
+#[test]
+fn each_folder_of_sim_is_named() {
+    let text = read("CONTRIBUTING.md");
+    let list = text.split_once("the folders of `sim/src` (").unwrap().1.split_once(')').unwrap().0;
+    let mut named: Vec<&str> = code(list).collect();
+    named.sort();
+    let entries = fs::read_dir(root().join("sim/src")).unwrap().map(|entry| entry.unwrap().path());
+    let mut folders: Vec<String> = entries
+        .filter(|path| path.is_dir())
+        .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
+        .collect();
+    folders.sort();
+    assert_eq!(named, folders);
+}
+
+#[test]
+fn the_stages_are_those_of_the_hardware() {
+    let all = first_cells("sim/guide/architecture.md", "stage");
+    let of_contacts = first_cells("sim/guide/architecture/contacts.md", "stage");
+    let blocks = first_cells("sim/guide/architecture/blocks.md", "block");
+    let stages: Vec<&String> = blocks.iter().filter(|name| *name != "`butterfly`").collect();
+    assert!(stages.len() > 10, "{stages:?}");
+    for stage in stages {
+        assert!(all.contains(stage) || of_contacts.contains(stage), "{stage} is in no table of stages");
+    }
+    // The page counts those of the other page in words.
+    let words = ["none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"];
+    let count = format!("have {} more: [stages of contacts]", words[of_contacts.len()]);
+    assert!(read("sim/guide/architecture.md").contains(&count), "{count}");
+}
+
+#[test]
+fn the_limits_know_both_kinds_of_tables() {
+    let page = read("sim/guide/limits.md");
+    let specimen = page.split("\n- ").find(|item| item.contains("serves one specimen")).unwrap();
+    let scene = |kind: &str| {
+        let text = format!(
+            "[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 2\npitch_y_mm = 2\nthickness_mm = 2\n\
+             [input]\nfull_scale_MPa = 1\n[hardware]\ntables = \"{kind}\"\n"
+        );
+        dermis_golden::spec::scene::Scene::parse(&text, "s.toml").unwrap().hardware.has_writable_tables()
+    };
+    for (kind, writable) in [("rom", false), ("writable", true)] {
+        assert_eq!(scene(kind), writable);
+        assert!(specimen.contains(&format!("\"{kind}\"")), "{kind}: {specimen}");
+    }
+}
+
+/// The same scene has one number of cycles in the README and another one in the table of boards: the heads say why.
+#[test]
+fn a_column_of_cycles_says_of_which_frames() {
+    for page in ["README.md", "sim/guide/boards.md"] {
+        let heads: Vec<String> = tables(&read(page)).into_iter().flat_map(|table| table.head).collect();
+        let mut cycles = heads.iter().filter(|head| head.contains("cycles")).peekable();
+        assert!(cycles.peek().is_some());
+        let which = ["shipped frames", "worst case", "frame interval"];
+        for head in cycles {
+            assert!(which.iter().any(|which| head.contains(which)), "{page}: {head}");
+        }
+    }
+}
+
+/// Text of a page without its figures, which a command writes.
+fn without_figures(text: &str) -> String {
+    let mut parts = text.split("<!-- figure:");
+    let first = parts.next().unwrap_or_default().to_owned();
+    let rest = parts.map(|part| part.split_once("<!-- end of figure -->").unwrap().1);
+    [first].into_iter().chain(rest.map(str::to_owned)).collect()
+}
+
+/// Measured times in the text of a page that no command writes: a number before a unit of time.
+fn unmarked(text: &str) -> Vec<String> {
+    let mut fenced = false;
+    let prose = without_figures(text);
+    let prose = prose.lines().filter(|line| {
+        fenced ^= line.starts_with("```");
+        !fenced && !line.starts_with('|')
+    });
+    let words: Vec<&str> = prose.flat_map(str::split_whitespace).collect();
+    let is_number = |word: &str| word.chars().any(|c| c.is_ascii_digit()) && !word.contains('×');
+    let is_time = |word: &str| ["cycles", "clock", "µs"].iter().any(|unit| word.trim_end_matches([',', '.']) == *unit);
+    words.windows(2).filter(|pair| is_number(pair[0]) && is_time(pair[1])).map(|pair| pair.join(" ")).collect()
+}
+
+#[test]
+fn times_in_the_readme_are_written_by_a_command() {
+    let text = read("README.md");
+    assert_eq!(unmarked(&text), [""; 0]);
+    assert!(text.contains("<!-- figure:"));
+    // As it once was.
+    let stale = format!("{text}\n10×10 taxels take 1 267 clock cycles, 12.7 µs at 100 MHz.\n");
+    assert_eq!(unmarked(&stale), ["267 clock", "12.7 µs"]);
 }
 
 #[test]

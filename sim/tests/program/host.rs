@@ -17,10 +17,13 @@ use dermis_sim::link::{ChannelFaults, NoisyChannel, PseudoTerminal};
 /// Eight clock cycles per bit, to keep the simulation short.
 const BAUD: u32 = 12_500_000;
 
+/// The model of a scene on a board with that bit rate.
+fn fast(scene: &Scene) -> Model {
+    Model::new(scene).unwrap().with_changed_plan(|plan| plan.board.uart_baud = Some(BAUD)).unwrap()
+}
+
 fn model() -> Model {
-    let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-    model.board.uart_baud = Some(BAUD);
-    model
+    fast(&Scene::builtin("eight-by-eight").unwrap())
 }
 
 /// A simulated board of the scene `eight-by-eight`, which runs until it is dropped.
@@ -157,8 +160,7 @@ fn tables_are_written_over_a_noisy_channel() {
     std::fs::write(path("left.toml"), format!("{hand}[search]\nnoise_floor_MPa = 0.05\n")).unwrap();
     std::fs::write(path("press.csv"), "0.5,0.4,0.04,0\n0.4,0.3,0.04,0\n0,0.04,0,0\n").unwrap();
 
-    let mut model = Model::new(&Scene::load(&path("hand.toml")).unwrap()).unwrap();
-    model.board.uart_baud = Some(BAUD);
+    let model = fast(&Scene::load(&path("hand.toml")).unwrap());
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
     let faults =
         |seed| NoisyChannel::new(ChannelFaults { lost: 1200, flipped: 1200, seed, ..ChannelFaults::default() });
@@ -204,8 +206,7 @@ fn a_board_that_scans_is_asked_for_scans() {
     std::fs::write(path("own.toml"), format!("{mat}[threshold]\nmin_force_N = 0.05\n")).unwrap();
     let scene = path("mat.toml");
 
-    let mut model = Model::new(&Scene::load(&scene).unwrap()).unwrap();
-    model.board.uart_baud = Some(BAUD);
+    let model = fast(&Scene::load(&scene).unwrap());
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
     let hardware = Hardware::new(model.clone(), &build).unwrap();
     let faults =

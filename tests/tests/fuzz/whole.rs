@@ -49,7 +49,7 @@ pub fn drawn(seed: u64) -> Outcome {
 /// Builds both models; errors must have a message.
 fn engines(text: &str) -> Option<Engines> {
     let scene = Scene::parse(text, "fuzz.toml").ok()?;
-    let (golden, model) = (Golden::new(&scene.for_hardware()), Model::new(&scene));
+    let (golden, model) = (Golden::reference(&scene), Model::new(&scene));
     let refusals = [golden.as_ref().err().map(ToString::to_string), model.as_ref().err().map(ToString::to_string)];
     for message in refusals.iter().flatten() {
         assert!(!message.is_empty() && !message.contains("internal"), "{message}");

@@ -181,7 +181,7 @@ fn the_choice_is_measured() {
         let of = |case: Case| {
             let mut scene = scene.clone();
             scene.partition.case = case;
-            Golden::new(&scene.for_hardware()).unwrap()
+            Golden::reference(&scene).unwrap()
         };
         let models: Vec<Golden> = (0..4).filter_map(Case::numbered).map(of).collect();
         let adaptive = of(Case::Adaptive);

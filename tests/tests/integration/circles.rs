@@ -1,4 +1,4 @@
-//! No module of a crate uses a module that uses it, directly or through others.
+//! No module of a crate uses a module that uses it, directly or through others; nor does a folder.
 //!
 //! An arrow leads from a module to each module that defines what it uses. It is read from the `use` declarations and
 //! from the paths in the code:
@@ -256,37 +256,60 @@ impl Modules {
         arrows
     }
 
-    /// The shortest circle through each module that is in one, in words.
-    fn circles(&self) -> BTreeSet<String> {
-        let arrows: BTreeMap<&Name, BTreeMap<Name, String>> =
-            self.modules.keys().map(|name| (name, self.arrows(name))).collect();
-        let mut found = BTreeSet::new();
-        for start in self.modules.keys() {
-            let (mut from, mut queue) = (BTreeMap::new(), VecDeque::from([start]));
-            while let Some(name) = queue.pop_front().filter(|_| !from.contains_key(start)) {
-                for next in arrows[name].keys().filter(|next| arrows.contains_key(next)) {
-                    from.entry(next).or_insert_with(|| {
-                        queue.push_back(next);
-                        name
-                    });
+    /// The arrows of all modules.
+    fn graph(&self) -> Graph {
+        self.modules.keys().map(|name| (name.clone(), self.arrows(name))).collect()
+    }
+
+    /// The arrows between the rooms of module `parent`: its folders and files, each with all that it holds, and `parent` itself.
+    fn rooms(&self, parent: &[&str]) -> Graph {
+        let parent: Name = parent.iter().map(ToString::to_string).collect();
+        let room = |name: &Name| name.starts_with(&parent).then(|| name[..name.len().min(parent.len() + 1)].to_vec());
+        let mut rooms = Graph::new();
+        for (from, arrows) in self.graph() {
+            let Some(from) = room(&from) else { continue };
+            let own = rooms.entry(from.clone()).or_default();
+            for (to, path) in arrows {
+                if let Some(to) = room(&to).filter(|to| *to != from) {
+                    own.entry(to).or_insert(path);
                 }
-            }
-            let mut circle = vec![start];
-            while let Some(before) = from.get(circle[circle.len() - 1]).filter(|_| from.contains_key(start)) {
-                circle.push(before);
-                if *before == start {
-                    break;
-                }
-            }
-            circle.reverse();
-            // The same circle is found from each of its modules; it is printed from the first of them.
-            if circle.len() > 1 && circle.iter().min() == Some(&start) {
-                let step = |pair: &[&Name]| format!("{} uses {}", pair[0].join("::"), arrows[pair[0]][pair[1]]);
-                found.insert(circle.windows(2).map(step).collect::<Vec<_>>().join(", "));
             }
         }
-        found
+        rooms
     }
+}
+
+/// For each module or room those that it uses, each with a path by which it does.
+type Graph = BTreeMap<Name, BTreeMap<Name, String>>;
+
+/// The shortest circle through each node that is in one, in words.
+fn circles_of(arrows: &Graph) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for start in arrows.keys() {
+        let (mut from, mut queue) = (BTreeMap::new(), VecDeque::from([start]));
+        while let Some(name) = queue.pop_front().filter(|_| !from.contains_key(start)) {
+            for next in arrows[name].keys().filter(|next| arrows.contains_key(*next)) {
+                from.entry(next).or_insert_with(|| {
+                    queue.push_back(next);
+                    name
+                });
+            }
+        }
+        let mut circle = vec![start];
+        while let Some(before) = from.get(circle[circle.len() - 1]).filter(|_| from.contains_key(start)) {
+            circle.push(before);
+            if *before == start {
+                break;
+            }
+        }
+        circle.reverse();
+        // The same circle is found from each of its modules; it is printed from the first of them.
+        if circle.len() > 1 && circle.iter().min() == Some(&start) {
+            let step = |pair: &[&Name]| format!("{} uses {}", pair[0].join("::"), arrows[pair[0]][pair[1]]);
+            found.insert(circle.windows(2).map(step).collect::<Vec<_>>().join(", "));
+        }
+    }
+    found
 }
 
 /// Names and texts of the modules in a folder of sources; a program's `main.rs` is no module of the crate.
@@ -319,7 +342,7 @@ fn golden() -> Modules {
 /// Asserts that a crate of at least `least` modules has no circle.
 fn none(modules: &Modules, least: usize) {
     assert!(modules.modules.len() >= least, "{} modules", modules.modules.len());
-    let circles: Vec<String> = modules.circles().into_iter().collect();
+    let circles: Vec<String> = circles_of(&modules.graph()).into_iter().collect();
     assert!(circles.is_empty(), "modules that use one another:\n{}", circles.join("\n"));
 }
 
@@ -369,6 +392,33 @@ fn in_order(modules: &Modules, parent: &[&str], layers: &[&str], above: bool) {
 }
 
 #[test]
+fn no_rooms_use_one_another() {
+    let (golden, hdl, sim) = (golden(), modules("dermis_hdl", "hdl"), modules("dermis_sim", "sim"));
+    let rooms = [(&golden, vec![]), (&hdl, vec![]), (&sim, vec![]), (&sim, vec!["report"]), (&sim, vec!["commands"])];
+    for (modules, parent) in rooms {
+        let circles = circles_of(&modules.rooms(&parent));
+        assert!(circles.is_empty(), "rooms of {} {parent:?} that use one another: {circles:#?}", modules.crate_name);
+    }
+}
+
+#[test]
+fn a_circle_of_rooms_is_found_where_no_modules_are_in_one() {
+    let texts =
+        [("", "mod a; mod b;"), ("a::x", "use crate::b::y;"), ("a::z", ""), ("b::y", ""), ("b::w", "use crate::a::z;")];
+    let name = |name: &str| name.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect();
+    let modules = Modules::new("seeded", texts.into_iter().map(|(own, text)| (name(own), text.to_string())));
+    assert_eq!(circles_of(&modules.graph()), BTreeSet::new());
+    let found = ["a uses crate::b::y, b uses crate::a::z".to_string()];
+    assert_eq!(circles_of(&modules.rooms(&[])), BTreeSet::from(found));
+}
+
+#[test]
+fn the_floors_of_golden_are_in_order() {
+    let floors = ["random", "read", "write", "spec", "physics", "data", "result", "estimate", "fixed", "wire", "study"];
+    in_order(&golden(), &[], &floors, false);
+}
+
+#[test]
 fn the_layers_of_fixed_are_in_order() {
     in_order(&golden(), &["fixed"], &["words", "error", "stages", "plan"], true);
 }
@@ -378,7 +428,7 @@ fn the_layers_of_sim_are_in_order() {
     in_order(
         &modules("dermis_sim", "sim"),
         &[],
-        &["flow", "cosim", "stream", "recording", "link", "report", "live", "commands"],
+        &["flow", "cosim", "engine", "stream", "recording", "link", "report", "live", "commands"],
         false,
     );
 }
@@ -396,7 +446,7 @@ fn a_layer_that_uses_a_later_one_is_found() {
 fn circles(texts: &[(&str, &str)]) -> Vec<String> {
     let name = |name: &str| name.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect();
     let texts = texts.iter().map(|(own, text)| (name(own), text.to_string()));
-    Modules::new("seeded", texts).circles().into_iter().collect()
+    circles_of(&Modules::new("seeded", texts).graph()).into_iter().collect()
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::plan::check::undetected;
 use dermis_golden::fixed::plan::storage::word_bits;
-use dermis_golden::fixed::stages::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::{CoefficientCheck, Scene};
@@ -78,7 +78,9 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
     let play = InputFrame { codes: &vector.codes, taxels: vector.taxels, beats };
     let recording = record(device.as_mut(), 0, &[play], Stimulus::FullSpeed, 100_000);
     assert_eq!(recording.beats.len(), beats);
-    recording.beats[forces..].iter().step_by(STATUS_BEATS).all(|beat| beat.data[2] as u32 & FLAG_COEFFICIENTS != 0)
+    let status: Vec<[i32; 3]> = recording.beats[forces..].iter().map(|beat| beat.data).collect();
+    let mut all = Status::all(&status);
+    all.all(|status| status.flags().contains(Flag::CoefficientsDamaged))
 }
 
 #[test]

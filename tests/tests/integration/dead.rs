@@ -72,7 +72,7 @@ fn unlike_scenes_are_equal() {
 fn what_a_dead_taxel_reads_changes_no_bit() {
     for (name, dead) in SCENES {
         let scene = masked(name, dead);
-        let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+        let (model, golden) = (Model::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
         let at = |[row, col]: [usize; 2]| row * scene.sensor.cols + col;
         let most = (1 << (scene.fixed.input_bits - 1)) - 1;
         for frame in frames(&scene, 3) {

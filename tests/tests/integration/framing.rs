@@ -1,8 +1,8 @@
 //! Frames whose `tlast` comes early or is missing, under Verilator and in rust-hdl's simulation: an incomplete frame
 //! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
-//! `FLAG_FRAMING`, once.
+//! `framing`, once.
 
-use dermis_golden::fixed::stages::send::FLAG_FRAMING;
+use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
@@ -82,7 +82,7 @@ fn setting() -> Setting {
             [trace.beats, trace.status].concat()
         })
     };
-    Setting { plain: sent(0), flagged: sent(FLAG_FRAMING), codes, hardware }
+    Setting { plain: sent(0), flagged: sent(FRAMING.mask()), codes, hardware }
 }
 
 const SIMULATORS: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];

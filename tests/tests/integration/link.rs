@@ -5,7 +5,7 @@
 use std::ops::Deref;
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::fixed::stages::send::FLAG_FRAMING;
+use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::wire::link::{
@@ -69,7 +69,7 @@ impl Questions {
         let trace = self.model.run(&self.codes[index]);
         let mut status = trace.status.clone();
         if framing {
-            status[0][2] |= FLAG_FRAMING as i32;
+            FRAMING.put(&mut status, 1);
         }
         let bytes = |beats: &[[i32; 3]]| -> Vec<u8> { beats.iter().flatten().flat_map(|w| w.to_le_bytes()).collect() };
         let (forces, labels) = trace.beats.split_at(trace.beats.len() - self.model.label_beats());
@@ -110,9 +110,9 @@ impl Board {
 
     /// A board that `device` makes of the model.
     fn with(mut questions: Questions, device: impl FnOnce(&Model) -> Box<dyn BoardDevice>) -> Board {
-        let model = &mut questions.model;
-        let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
-        model.board.uart_baud = Some(baud);
+        let baud = (questions.model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
+        questions.model = questions.model.with_changed_plan(|plan| plan.board.uart_baud = Some(baud)).unwrap();
+        let model = &questions.model;
         let silence = Cycles::longest(model).total + 1_000;
         let clock_hz = Identity::of(model).unwrap().clock_hz;
         let uart = HostUart::new(device(model), baud, clock_hz);

@@ -189,14 +189,16 @@ fn carry_chains(folder: &Path, top: &str) -> usize {
 #[test]
 fn a_missing_memory_and_a_wrong_count_are_found() {
     // Without a search, which takes Yosys longest.
-    let mut model = small("wrong", "[search]\nmu_max = 0\n[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\n");
+    let model = small("wrong", "[search]\nmu_max = 0\n[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\n");
     let right = model.resources.clone();
-    model.resources.memories[0].words += 1;
-    assert!(generate(&model).unwrap_err().to_string().contains("is not in the hardware"));
+    let wrong = model.clone().with_changed_plan(|plan| plan.resources.memories[0].words += 1).unwrap();
+    assert!(generate(&wrong).unwrap_err().to_string().contains("is not in the hardware"));
     // If one memory moves from block RAM to LUTs, Yosys counts differ.
-    model.resources = right.clone();
-    let moved = model.resources.memories.iter_mut().find(|memory| memory.holds == Holds::Values).unwrap();
-    assert!(std::mem::take(&mut moved.block_rams) > 0);
+    let model = model.with_changed_plan(|plan| {
+        let moved = plan.resources.memories.iter_mut().find(|memory| memory.holds == Holds::Values).unwrap();
+        assert!(std::mem::take(&mut moved.block_rams) > 0);
+    });
+    let model = model.unwrap();
     let counted = synthesise(&generate(&model).unwrap(), "map_ffram")("DP16KD");
     assert_eq!(counted, model.resources.block_rams());
     assert_ne!(counted, right.block_rams());

@@ -117,8 +117,8 @@ fn memories_and_multipliers_are_those_of_yosys() {
 fn a_wrong_coefficient_is_found() {
     let (scene, frames) = scene("eight-by-eight");
     let right = Model::new(&on_board(scene)).unwrap();
-    let mut wrong = right.clone();
-    wrong.first_mut().quantised.ax.flips[0].parity[2][5] ^= 1;
+    let wrong = right.clone().with_changed_plan(|plan| plan.first_mut().quantised.ax.flips[0].parity[2][5] ^= 1);
+    let wrong = wrong.unwrap();
     let [right, wrong] = [right, wrong].map(|model| Hardware::new(model, &build_dir()).unwrap());
     let vectors: Vec<Vector> = frames.iter().map(|frame| right.vector(std::slice::from_ref(frame)).unwrap()).collect();
     let findings = |hardware: &Hardware| compare(hardware, Simulator::Verilator, &vectors, Stimulus::FullSpeed);

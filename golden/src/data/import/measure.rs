@@ -15,10 +15,14 @@
 //! Frames without contact, of at most [`EMPTY_SHARE`] of the recording's peak, give the noise of unloaded taxels: their
 //! standard deviation in time, which devices with a threshold hide.
 //!
+//! The frame whose readings differ least is taken for one without load. Readings fall with the load where they are farther below
+//! its median than above it by a factor of [`FALLS`]; their level without load is that median then, else the reading of that frame
+//! that is nearest to 0.
+//!
 //! | | unit | range |
 //! |---|---|---|
 //! | in: stress of all frames, dead taxels | MPa | finite |
-//! | out: [`Noise`], [`Codes`] | MPa, shares of a frame's peak | ≥ 0 |
+//! | out: [`Noise`], [`Codes`], [`Idle`] | MPa, shares of a frame's peak | ≥ 0 |
 
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +38,18 @@ const EMPTY_SHARE: f64 = 0.05;
 const LEAST_RUN: usize = 6;
 /// Smallest number of frames without contact.
 const LEAST_EMPTY: usize = 8;
+
+/// Smallest ratio of how far readings that fall with the load are below the level without load to how far above it.
+const FALLS: f64 = 3.0;
+
+/// Readings without load.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Idle {
+    /// Their level in MPa.
+    pub level_MPa: f64,
+    /// Whether readings fall with the load.
+    pub falls: bool,
+}
 
 /// Temporal noise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -81,6 +97,24 @@ pub fn noise(frames: &[&[f64]], alive: &[bool]) -> Noise {
         empty_frames: empty.len(),
         empty_MPa,
     }
+}
+
+/// The level without load, and the sign of the load; `None` where no taxel exists.
+pub fn idle(frames: &[&[f64]], alive: &[bool]) -> Option<Idle> {
+    let sorted = |frame: &&[f64]| {
+        let mut own: Vec<f64> = std::iter::zip(*frame, alive).filter(|(_, alive)| **alive).map(|(b, _)| *b).collect();
+        own.sort_by(f64::total_cmp);
+        own
+    };
+    let all: Vec<Vec<f64>> = frames.iter().map(sorted).filter(|own| !own.is_empty()).collect();
+    let range = |own: &[f64]| own[own.len() - 1] - own[0];
+    let evenest = all.iter().min_by(|a, b| range(a).total_cmp(&range(b)))?;
+    let middle = evenest[evenest.len() / 2];
+    let below = all.iter().map(|own| middle - own[0]).fold(0.0, f64::max);
+    let above = all.iter().map(|own| own[own.len() - 1] - middle).fold(0.0, f64::max);
+    let falls = below > FALLS * above;
+    let nearest = evenest.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    Some(Idle { level_MPa: if falls { middle } else { nearest }, falls })
 }
 
 /// σ of the middle one of three frames, and σ over its peak, if the load is held.
@@ -186,6 +220,31 @@ mod tests {
         // The rise by 0.6 % in 60 frames adds 0.17 % to 1 % in the square.
         let spread = measured.spread_share.unwrap() / share;
         assert!((1.0..1.05).contains(&spread), "{spread}");
+    }
+
+    /// Presses on 25 taxels by way of a level and a sign, the first frame without load.
+    fn presses(level: f64, sign: f64) -> Vec<Vec<f64>> {
+        let load = |t: usize, k: usize| if (6..9).contains(&k) || k == 12 { (t * k) as f64 / 100.0 } else { 0.0 };
+        let noise = |t: usize, k: usize| 1e-3 * ((7 * t + 3 * k) % 5) as f64;
+        (0..6).map(|t| (0..25).map(|k| level + noise(t, k) + sign * load(t, k)).collect()).collect()
+    }
+
+    #[test]
+    fn falling_readings_and_a_level_without_load_are_told() {
+        let alive = [true; 25];
+        for (level, sign) in [(0.0, 1.0), (0.0, -1.0), (3.0, 1.0), (3.0, -1.0)] {
+            let frames = presses(level, sign);
+            // All frames; the last one alone.
+            for frames in [&frames[..], &frames[5..]] {
+                let slices: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+                let idle = idle(&slices, &alive).unwrap();
+                assert!(
+                    (idle.level_MPa - level).abs() < 0.01 && idle.falls == (sign < 0.0),
+                    "{level} {sign}: {idle:?}"
+                );
+            }
+        }
+        assert_eq!((idle(&[], &alive), idle(&[&[1.0]], &[false])), (None, None));
     }
 
     #[test]

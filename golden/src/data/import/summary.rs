@@ -2,9 +2,12 @@
 
 use super::crop::Window;
 use super::format::Format;
-use super::measure::{Codes, Noise};
+use super::measure::{Codes, Idle, Noise};
 use super::units::Unit;
 use serde::{Deserialize, Serialize};
+
+/// Share of full scale up to which the level without load is that of a zero.
+pub const IDLE_SHARE: f64 = 0.05;
 
 /// One frame of an imported recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +67,9 @@ pub struct Summary {
     pub codes: Codes,
     /// Noise in the window.
     pub noise: Noise,
+    /// Readings without load in the window.
+    #[serde(default)]
+    pub idle: Option<Idle>,
     /// The imported frames.
     pub frames: Vec<FrameRecord>,
 }
@@ -74,6 +80,14 @@ impl Summary {
         let mut all: Vec<f64> = self.frames.iter().filter_map(|frame| frame.closure().map(f64::abs)).collect();
         all.sort_by(f64::total_cmp);
         Some([*all.last()?, all[all.len() / 2]])
+    }
+
+    /// The level of the readings without load over the full scale, where it is more than [`IDLE_SHARE`], or the readings fall
+    /// with the load.
+    pub fn idle_share(&self) -> Option<f64> {
+        let idle = self.idle?;
+        let share = idle.level_MPa / self.full_scale_MPa;
+        (idle.falls || share.abs() > IDLE_SHARE).then_some(share)
     }
 
     /// Largest Σ b·area outside the window over the largest Σ b·area of a frame.

@@ -9,7 +9,11 @@ const EMED: &[u8] = include_bytes!("../../../data/recordings/emed-step.lst");
 
 /// 1 MPa for a count of 255.
 fn counts() -> Settings {
-    Settings { full_scale_MPa: Some(1.0), ..Settings::default() }
+    counts_of(1.0)
+}
+
+fn counts_of(full_scale_MPa: f64) -> Settings {
+    Settings { full_scale_MPa: Some(full_scale_MPa), ..Settings::default() }
 }
 
 fn message(file: &str, bytes: &[u8], settings: &Settings) -> String {
@@ -39,6 +43,28 @@ fn tekscan_counts_with_pads_and_raw_sums() {
     // Counts of 8 bits in steps of one.
     assert!((summary.codes.step_MPa.unwrap() * 255.0 - 1.0).abs() < 1e-12);
     assert_eq!((summary.codes.bits, summary.codes.at_full_scale), (Some(8), 0));
+}
+
+/// Counts of 12 bits that stand at 3000 without load and fall under it; and the recordings of real arrays, which do not.
+#[test]
+fn inverted_counts_are_told_by_the_level_without_load() {
+    let count = |k: i32, load: i32| (3000 - k % 3 - if k == 5 { load } else { 0 }).to_string();
+    let line = |load: i32| (0..16).map(|k| count(k, load)).collect::<Vec<_>>().join(",") + "\n";
+    let csv = line(0) + &line(900) + &line(1800);
+    let stated = Settings {
+        unit: Some(Unit::Raw),
+        bits: Some(12),
+        size: Some([4, 4]),
+        pitch_mm: Some([5.0, 5.0]),
+        ..counts_of(0.1)
+    };
+    let summary = import("glove.csv", csv.as_bytes(), &stated).unwrap().summary;
+    let share = summary.idle_share().unwrap();
+    assert!(summary.idle.unwrap().falls && (share - 2999.0 / 4095.0).abs() < 1e-12, "{share}");
+    for (file, bytes) in [("iscan-finger.csv", ISCAN), ("fscan-walk.asf", FSCAN), ("emed-step.lst", EMED)] {
+        let summary = import(file, bytes, &counts()).unwrap().summary;
+        assert_eq!(summary.idle_share(), None, "{file}: {:?}", summary.idle);
+    }
 }
 
 #[test]
@@ -133,7 +159,7 @@ fn stated() -> Settings {
 fn arrays_that_numpy_wrote() {
     macro_rules! array {
         ($name:literal) => {
-            include_bytes!(concat!("../../data/recordings/numpy/", $name, ".npy"))
+            include_bytes!(concat!("../../../data/recordings/numpy/", $name, ".npy"))
         };
     }
     let a = |frame: usize, k: usize| 100.0 * frame as f64 + 10.0 * (k / 4) as f64 + (k % 4) as f64;

@@ -10,6 +10,9 @@
 //! load in turn is left out, the table of the others is applied to its readings, and the difference from its stress is its
 //! residual. The smallest and the largest load are extrapolated then.
 //!
+//! A load is saturated, and left out, where a tenth of the taxels read one value at an end of all readings in each of its frames,
+//! though readings under another load have noise. The load of the smallest stress may stand at an end.
+//!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: loads | stress, frames of readings | MPa, unit of the readings |
@@ -28,6 +31,11 @@ use thiserror::Error;
 const DEAD_SHARE: f64 = 0.1;
 /// Fewest loads for residuals: two for the table, one left out.
 const FEWEST_FOR_RESIDUALS: usize = 3;
+
+/// Share of taxels at an end of the readings from which on a load is saturated.
+const SATURATED_SHARE: f64 = 0.1;
+/// Largest residual, root mean square over the largest stress, of a straight characteristic.
+const STRAIGHT: f64 = 0.05;
 
 /// Readings under a known uniform stress.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +74,8 @@ pub struct LoadFit {
     pub noise_MPa: Option<f64>,
     /// Largest gain times largest reading in MPa: the least `input.full_scale_MPa`.
     pub full_scale_MPa: f64,
+    /// Stresses in MPa of loads that are saturated and left out.
+    pub saturated_MPa: Vec<f64>,
     /// Residuals of the loads, each left out of the table that it is compared with; empty with two different loads.
     pub residuals: Vec<Residual>,
 }
@@ -80,6 +90,14 @@ pub enum LoadError {
     #[error("{different} different loads: a calibration takes at least two")]
     TooFew {
         /// Number of different stresses.
+        different: usize,
+    },
+    /// Without the saturated loads there are too few.
+    #[error("the readings under {stress_MPa} MPa stand at one value, at the end of the converter's range: {different} different loads are left, a calibration takes at least two")]
+    Saturated {
+        /// Stress of a saturated load in MPa.
+        stress_MPa: f64,
+        /// Number of different stresses of the others.
         different: usize,
     },
     /// The readings are the same under all loads.
@@ -124,10 +142,15 @@ impl LoadFit {
     pub fn new(scene: &Scene, loads: &[KnownLoad]) -> Result<LoadFit, LoadError> {
         loads.iter().flat_map(|load| &load.frames).try_for_each(|frame| frame.check(scene))?;
         let taxels = scene.sensor.taxels();
+        let (saturated, loads): (Vec<&KnownLoad>, Vec<&KnownLoad>) =
+            loads.iter().partition(|load| is_saturated(load, loads));
         let place = |k: usize| [k / scene.sensor.cols, k % scene.sensor.cols];
         let means: Vec<(f64, Vec<f64>)> =
             loads.iter().map(|load| (load.stress_MPa, mean(&load.frames, taxels))).collect();
         let all: Vec<&(f64, Vec<f64>)> = means.iter().collect();
+        if let Some(load) = saturated.first().filter(|_| different(&all) < 2) {
+            return Err(LoadError::Saturated { stress_MPa: load.stress_MPa, different: different(&all) });
+        }
         if different(&all) < 2 {
             return Err(LoadError::TooFew { different: different(&all) });
         }
@@ -168,13 +191,40 @@ impl LoadFit {
             frame.stress_MPa.iter().enumerate().filter(|(k, _)| live[*k]).map(|(_, reading)| *reading)
         });
         Ok(LoadFit {
-            noise_MPa: noise(loads, &means, &table, &live),
+            saturated_MPa: saturated.iter().map(|load| load.stress_MPa).collect(),
+            noise_MPa: noise(&loads, &means, &table, &live),
             full_scale_MPa: largest(&mut table.gain.iter().copied()) * largest(readings),
             dead: (0..taxels).filter(|&k| !live[k]).map(place).collect(),
             table,
             residuals,
         })
     }
+}
+
+impl LoadFit {
+    /// The largest residual, root mean square, over the largest stress where the characteristic is curved, or a load is not what
+    /// is stated; else `None`.
+    pub fn curved_share(&self) -> Option<f64> {
+        let largest = |figure: fn(&Residual) -> f64| self.residuals.iter().map(figure).fold(0.0, f64::max);
+        let share = largest(|own| own.rms_MPa) / largest(|own| own.stress_MPa.abs());
+        (share > STRAIGHT).then_some(share)
+    }
+}
+
+/// Whether a load's readings stand at an end of those of all `loads`.
+fn is_saturated(load: &KnownLoad, loads: &[KnownLoad]) -> bool {
+    let Some(Frame { stress_MPa: first, .. }) = load.frames.first() else { return false };
+    let still =
+        |load: &KnownLoad, k: usize| load.frames.windows(2).all(|two| two[0].stress_MPa[k] == two[1].stress_MPa[k]);
+    let has_noise = |load: &KnownLoad| (0..first.len()).filter(|k| !still(load, *k)).count() * 2 > first.len();
+    let readings = || loads.iter().flat_map(|load| &load.frames).flat_map(|frame| frame.stress_MPa.iter().copied());
+    let ends = [readings().fold(f64::INFINITY, f64::min), readings().fold(f64::NEG_INFINITY, f64::max)];
+    let at = |end: f64| (0..first.len()).filter(|k| first[*k] == end && still(load, *k)).count() as f64;
+    let least = loads.iter().map(|load| load.stress_MPa.abs()).fold(f64::INFINITY, f64::min);
+    load.frames.len() > 1
+        && load.stress_MPa.abs() > least
+        && ends.iter().any(|end| at(*end) >= SATURATED_SHARE * first.len() as f64)
+        && loads.iter().any(has_noise)
 }
 
 /// The mean reading of each taxel.
@@ -213,7 +263,7 @@ fn table(means: &[&(f64, Vec<f64>)], taxels: usize) -> (Calibration, Vec<bool>) 
 }
 
 /// Standard deviation of a live taxel around the mean of its load.
-fn noise(loads: &[KnownLoad], means: &[(f64, Vec<f64>)], table: &Calibration, live: &[bool]) -> Option<f64> {
+fn noise(loads: &[&KnownLoad], means: &[(f64, Vec<f64>)], table: &Calibration, live: &[bool]) -> Option<f64> {
     let (mut squares, mut degrees) = (0.0, 0usize);
     for (load, (_, mean)) in loads.iter().zip(means) {
         let taxels = || (0..live.len()).filter(|&k| live[k]);
@@ -278,6 +328,28 @@ mod tests {
         let off = (0.04875 - 0.005 / 3.0) / 0.9 - 0.05;
         assert!((residuals[1].mean_MPa - off).abs() < 1e-9, "{residuals:?}");
         assert!(residuals.iter().all(|r| r.rms_MPa > 5e-4), "{residuals:?}");
+    }
+
+    /// Counts of a converter that ends at 400: under the largest load nearly all, with noise in the others.
+    #[test]
+    fn a_saturated_load_is_left_out_and_named() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let whole = LoadFit::new(&scene, &loads(&scene, 2e-4, linear)).unwrap();
+        assert!(whole.saturated_MPa.is_empty() && whole.curved_share().is_none());
+        for sign in [1.0, -1.0] {
+            let mut clipped = loads(&scene, 2e-4, |k, stress| sign * linear(k, stress));
+            let readings = clipped.iter_mut().flat_map(|load| &mut load.frames).flat_map(|frame| &mut frame.stress_MPa);
+            readings.for_each(|reading| *reading = reading.round().clamp(-330.0, 330.0));
+            let fit = LoadFit::new(&scene, &clipped).unwrap();
+            assert_eq!(fit.saturated_MPa, [0.2]);
+            assert!((sign * fit.table.gain[9] / truth(9).1 - 1.0).abs() < 0.02 && fit.residuals.len() == 3);
+            // With that load the table would be wrong, and two loads are too few for one.
+            let text = LoadFit::new(&scene, &[clipped[0].clone(), clipped[3].clone()]).unwrap_err().to_string();
+            assert!(text.starts_with("the readings under 0.2 MPa stand at one value"), "{text}");
+        }
+        // Readings that hardly rise beyond 190 counts: no straight line.
+        let curved = loads(&scene, 2e-4, |k, stress| linear(k, stress).min(190.0 + 0.1 * stress));
+        assert!(LoadFit::new(&scene, &curved).unwrap().curved_share() > Some(STRAIGHT));
     }
 
     #[test]

@@ -7,6 +7,12 @@ use crate::fixed::Model;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{ForceOutput, MeanKind, Scene};
 use crate::spec::sensor::Sensor;
+use std::cell::Cell;
+
+thread_local! {
+    /// Calls of [`Input::calibrate`] in this thread.
+    pub(super) static CALIBRATIONS: Cell<usize> = const { Cell::new(0) };
+}
 
 fn scene(name: &str) -> Scene {
     Scene::builtin(name).unwrap()
@@ -17,7 +23,7 @@ fn hertz() -> Frame {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
+    Golden::reference(scene).unwrap().run(frame).unwrap()
 }
 
 fn shears(results: impl Iterator<Item = Reconstruction>) -> Vec<f64> {
@@ -33,7 +39,7 @@ fn a_dead_taxel_costs_little_and_its_reading_nothing() {
     for frame in Frame::shipped(&scene) {
         let peak = (0..100).max_by(|a, b| frame.stress_MPa[*a].total_cmp(&frame.stress_MPa[*b])).unwrap();
         scene.input.dead = vec![[peak / 10, peak % 10]];
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         let result = golden.run(&frame).unwrap();
         // A masked taxel may read anything: forces, condition, centroids and flags do not change.
         for share in [-0.5, 1e6] {
@@ -100,7 +106,7 @@ fn table_and_tare_undo_what_the_sensor_did() {
     readings.stress_MPa.iter_mut().for_each(|b| *b += 0.3);
     assert!(near(run(&scene, &readings)));
     scene.input.tare = Some(folder.path().join("absent.json"));
-    assert!(Golden::new(&scene.for_hardware()).err().unwrap().to_string().contains("absent.json: cannot be read"));
+    assert!(Golden::reference(&scene).err().unwrap().to_string().contains("absent.json: cannot be read"));
 }
 
 #[test]
@@ -139,7 +145,7 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
     let deviation = (squares / 100.0).sqrt() / frame.peak_MPa();
     // 100 draws estimate a deviation to 1/√200 = 7 %; four times that.
     assert!((deviation / 0.00125 - 1.0).abs() < 0.28, "{deviation}");
-    let error = Golden::new(&scene.for_hardware()).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
+    let error = Golden::reference(&scene).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
     assert_eq!(error, "scene sensor-1: input.average = 6 takes 64 frames at a time, got 63");
     assert!(input.average(&scene, &[]).is_err());
 }
@@ -168,7 +174,7 @@ fn a_sliding_mean_has_the_noise_of_its_frames() {
     }
     let mut newest = frames.clone();
     newest[39].id = "newest".to_string();
-    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let golden = Golden::reference(&scene).unwrap();
     let model = Model::for_frames(&scene, &newest).unwrap();
     for result in [golden.run_averaged(&newest).unwrap(), model.reconstruct_averaged(&newest).unwrap()] {
         assert_eq!((result.frame.as_str(), result.extra.mean_frames), ("newest", Some(15)));
@@ -189,8 +195,7 @@ fn filled_readings_beat_zeros_and_are_reported() {
         let plain = scene(name);
         let mut scene = plain.clone();
         scene.input.unipolar = true;
-        let (golden, zeros) =
-            (Golden::new(&scene.for_hardware()).unwrap(), Golden::new(&plain.for_hardware()).unwrap());
+        let (golden, zeros) = (Golden::reference(&scene).unwrap(), Golden::reference(&plain).unwrap());
         let converter = Converter { unipolar: true, ..Default::default() };
         let (mut with, mut without) = (Vec::new(), Vec::new());
         for frame in Frame::shipped(&scene) {
@@ -261,4 +266,36 @@ fn resultants_stand_for_the_forces() {
         assert!((sum - full.resultant_N[axis]).abs() < 1e-12);
     }
     assert!(parts.iter().flat_map(|part| part.centre_mm).flatten().all(|mm| mm.abs() <= 20.0));
+}
+
+/// A model reads the files of its scene when it is built: neither a changed nor a deleted one matters afterwards.
+#[test]
+fn files_are_read_once_and_a_frame_is_calibrated_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene("sensor-1");
+    let frame = hertz();
+    let path = folder.path().join("table.csv");
+    let write = |gain: f64| {
+        let lines = (0..100).map(|k| format!("{},{},0,{gain}\n", k / 10, k % 10)).collect::<String>();
+        std::fs::write(&path, format!("{}\n{lines}", calibration::HEADER)).unwrap();
+    };
+    write(2.0);
+    scene.input.calibration = Some(path.clone());
+    scene.input.full_scale_MPa = Some(4.0 * frame.peak_MPa());
+    let (golden, model) = (Golden::reference(&scene).unwrap(), Model::new(&scene).unwrap());
+    let results = || {
+        let sent = model.run(&model.readings(std::slice::from_ref(&frame)).unwrap());
+        let decoded = model.decode(std::slice::from_ref(&frame), "fixed", &sent.beats, &sent.status).unwrap();
+        [golden.run(&frame).unwrap(), model.reconstruct(&frame).unwrap(), decoded]
+    };
+    let before = results();
+    write(3.0);
+    assert_eq!(results(), before);
+    // The file matters: a model that is built now differs.
+    assert_ne!(Model::new(&scene).unwrap().reconstruct(&frame).unwrap().resultant_N, before[1].resultant_N);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(results(), before);
+    CALIBRATIONS.with(|count| count.set(0));
+    model.reconstruct(&frame).unwrap();
+    assert_eq!(CALIBRATIONS.with(Cell::get), 1);
 }

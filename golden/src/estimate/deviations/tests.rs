@@ -13,7 +13,7 @@ use crate::study::noise::{deviations_coverage, measure_deviations};
 const PEAK: f64 = 0.1;
 
 fn searched(name: &str) -> Scene {
-    Scene::builtin(name).unwrap().for_hardware()
+    Scene::builtin(name).unwrap().estimated_by(EstimatorKind::Search)
 }
 
 /// The scene with stated noise, in units of the frames' peak.
@@ -34,18 +34,18 @@ fn the_built_in_scenes_have_a_table_each() {
     for (name, text) in SHIPPED {
         let table = Deviations::parse(text, name).unwrap();
         let scene = searched(name);
-        assert_eq!(Some(&table.subject), Subject::of(&scene).as_ref(), "{name}");
+        assert_eq!(Some(&table.subject), Subject::of(&scene, scene.model_estimator()).as_ref(), "{name}");
         assert_eq!(table.to_text(), text, "{name}");
-        assert_eq!(Deviations::of_scene(&scene).unwrap(), Some(table), "{name}");
+        assert_eq!(Deviations::of_scene(&scene, scene.model_estimator()).unwrap(), Some(table), "{name}");
     }
     // What no search finds has none, and what no table was measured for.
     let without = |change: fn(&mut Scene)| {
         let mut scene = searched("sensor-1");
         change(&mut scene);
-        assert_eq!(Deviations::of_scene(&scene).unwrap(), None);
+        assert_eq!(Deviations::of_scene(&scene, scene.model_estimator()).unwrap(), None);
     };
     without(|s| s.search.mu_max = 0.0);
-    without(|s| s.search.estimator = EstimatorKind::Evidence);
+    without(|s| s.search.estimator = Some(EstimatorKind::Evidence));
     without(|s| s.search.objective = ObjectiveKind::Patch);
     without(|s| s.search.form = Form::Orthogonal);
     without(|s| s.partition.case = Case::Contacts);
@@ -59,7 +59,7 @@ fn the_built_in_scenes_have_a_table_each() {
 #[test]
 fn between_levels_the_logarithm_is_linear() {
     let row = |sigma: f64| vec![[sigma, 2.0 * sigma, 0.1], [0.5, 0.5, 0.5]];
-    let subject = Subject::of(&searched("sensor-1")).unwrap();
+    let subject = Subject::of(&searched("sensor-1"), EstimatorKind::Search).unwrap();
     let table = Deviations::new(subject, [9, 1], vec![1e-4, 1e-2], vec![4.0], vec![row(0.01), row(0.16)]);
     // Beyond the last level that of the normal force grows with the noise.
     let [x, _, normal] = table.at(1.0, 3.9);
@@ -82,14 +82,14 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
     let mut scene = searched("sensor-1");
     scene.search.deviations = Some(path.clone());
     let message = |scene: &Scene| {
-        let error = Deviations::of_scene(scene).unwrap_err().to_string();
+        let error = Deviations::of_scene(scene, scene.model_estimator()).unwrap_err().to_string();
         assert_eq!(Model::new(scene).unwrap_err().to_string(), error);
         assert_eq!(Golden::new(scene).err().unwrap().to_string(), error);
         assert!(error.starts_with(&path.display().to_string()), "{error}");
         error
     };
     assert!(message(&scene).contains("search.deviations cannot be read"));
-    let good = Deviations::of_scene(&searched("sensor-1")).unwrap().unwrap();
+    let good = Deviations::of_scene(&searched("sensor-1"), EstimatorKind::Search).unwrap().unwrap();
     type Fault = (fn(&mut Deviations), &'static str);
     let faults: [Fault; 7] = [
         (|t| t.version = 2, "version"),
@@ -111,7 +111,7 @@ fn a_wrong_file_is_refused_by_what_is_wrong() {
         assert!(message(&scene).contains("not a table of standard deviations"), "{text}");
     }
     std::fs::write(&path, good.to_text()).unwrap();
-    assert_eq!(Deviations::of_scene(&scene).unwrap(), Some(good));
+    assert_eq!(Deviations::of_scene(&scene, scene.model_estimator()).unwrap(), Some(good));
     type Change = (fn(&mut Scene), &'static str);
     let changes: [Change; 10] = [
         (|s| s.inverse.level = Some(0.3), "inverse.level = None, the scene has Some(0.3)"),
@@ -144,7 +144,7 @@ fn results_have_the_deviations_of_their_noise() {
             let one = &result.subarrays[0];
             let (mu, shear, normal) = (one.mu_sigma.unwrap(), one.shear_sigma_N.unwrap(), one.normal_sigma_N.unwrap());
             assert_eq!(shear, mu.map(|mu| mu * result.resultant_N[2]));
-            let table = Deviations::of_scene(&scene).unwrap().unwrap();
+            let table = Deviations::of_scene(&scene, scene.model_estimator()).unwrap().unwrap();
             let size = result.resultant_N[2] / (own.peak_MPa() * 8.0);
             let noise = scene.search.noise_floor_MPa.hypot(0.12 / 524_287.0 / 12f64.sqrt()) / own.peak_MPa();
             let [x, y, share] = table.at(noise, size);
@@ -194,7 +194,7 @@ fn the_noise_is_that_of_the_reading() {
     assert!(one.shear_sigma_N.is_some() && one.normal_sigma_N.is_none());
     let mut result = Golden::new(&searched("sensor-1")).unwrap().run(&own).unwrap();
     let plain = result.clone();
-    let table = Deviations::of_scene(&searched("sensor-1")).unwrap().unwrap();
+    let table = Deviations::of_scene(&searched("sensor-1"), EstimatorKind::Search).unwrap().unwrap();
     for noise in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
         table.add(&mut result, &scene, &own, noise);
         assert_eq!(result, plain, "{noise}");
@@ -243,7 +243,7 @@ fn one_standard_deviation_covers_two_thirds_of_the_errors() {
     let levels = [2e-6, 5e-5, 6e-4, 2e-2];
     for (name, draws) in [("eight-by-eight", 300), ("sensor-1", 300), ("sensor-2", 300), ("sensor-3", 100)] {
         let scene = searched(name);
-        let mut table = Deviations::of_scene(&scene).unwrap().unwrap();
+        let mut table = Deviations::of_scene(&scene, scene.model_estimator()).unwrap().unwrap();
         let covered =
             |table: &Deviations| deviations_coverage(&scene, table, &levels, [draws, 77], &|_, _| ()).unwrap();
         for (level, shares) in levels.iter().zip(covered(&table)) {

@@ -9,9 +9,10 @@
 //! | in: stress | taxels | MPa |
 //! | out: forces, one contact | 3 × taxels | N |
 
-use super::estimate::{ContactEstimate, Estimate};
+use super::estimate::Estimate;
 use super::estimator::Evidence;
 use crate::data::frame::Forces;
+use crate::result::reconstruct::ContactEstimate;
 
 /// Standard deviation of the normal force over Σ |b|·area, and of μ over the largest.
 const UNKNOWN: f64 = 0.5;

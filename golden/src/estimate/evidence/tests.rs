@@ -13,7 +13,7 @@ use crate::spec::scene::{EstimatorKind, Medium, Scene};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();
-    scene.search.estimator = EstimatorKind::Evidence;
+    scene.search.estimator = Some(EstimatorKind::Evidence);
     scene
 }
 
@@ -381,10 +381,7 @@ fn refused_by_field() {
         let error = Golden::new(&scene).err().unwrap().to_string();
         assert!(error.contains(field), "{error}");
         // `auto` takes the other estimator.
-        let auto = Scene {
-            search: crate::spec::scene::SearchSpec { estimator: EstimatorKind::Auto, ..scene.search },
-            ..scene
-        };
-        assert!(auto.estimator() == EstimatorKind::Search && Golden::new(&auto).is_ok(), "{field}");
+        let auto = Scene { search: crate::spec::scene::SearchSpec { estimator: None, ..scene.search }, ..scene };
+        assert!(auto.model_estimator() == EstimatorKind::Search && Golden::new(&auto).is_ok(), "{field}");
     }
 }

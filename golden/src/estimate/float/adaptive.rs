@@ -24,13 +24,18 @@
 //! | in: per case, `receive` of its subarrays | parts | – |
 //! | out: reason for rejecting the case | text | – |
 
+use super::array::{Array, CaseOutcome, EngineInput};
+use super::by_contacts::taxels;
 use super::contacts::Contacts;
-use super::golden::{CaseOutcome, EngineInput, Golden};
-use crate::data::frame::{Forces, Frame};
+use super::estimator::Estimator;
+use super::objective::taxels::Taxels;
+use super::objective::Sparse;
+use crate::data::frame::Forces;
 use crate::data::reception::Received;
 use crate::estimate::segment::{segment, Segments, WIDTH};
 use crate::result::reconstruct::{CaseChoice, Reconstruction, RejectedCase};
 use crate::spec::partition::{Case, Subarray};
+use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
 
 /// Fraction of a contact's largest force from which a cell is part of it.
@@ -106,12 +111,22 @@ fn not_nearest_reason(off: f64) -> String {
     format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
 }
 
-impl Golden {
+/// The search in the case that fits the contacts; `taxels` for fits of ellipses.
+struct Adaptive {
+    taxels: Option<Taxels>,
+}
+
+/// The adaptive search of a scene.
+pub(super) fn new(scene: &Scene) -> Box<dyn Estimator> {
+    Box::new(Adaptive { taxels: taxels(scene) })
+}
+
+impl Estimator for Adaptive {
     /// Solves all admissible cases and returns the one whose shear is nearest to that of the contacts.
-    pub(super) fn adaptive(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
-        let sensor = &self.scene.sensor;
-        let whole = self.subarrays(input, self.whole());
-        let solved = self.find_contacts(input);
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        let sensor = &array.scene.sensor;
+        let whole = array.subarrays(input, array.whole(), &Sparse::default());
+        let solved = array.find_contacts(self.taxels.as_ref(), input);
         let target = solved.as_ref().map(Contacts::forces);
         let contacts = match &solved {
             Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
@@ -121,13 +136,13 @@ impl Golden {
         let nothing = "nothing finer is as near to the contacts".to_string();
         let mut refused: Vec<(Case, String)> = Vec::new();
         let mut best = (off(&whole), Case::WHOLE, whole, nothing);
-        for tiling in self.tilings.iter().rev().filter(|tiling| tiling.case != Case::WHOLE) {
-            let received: Vec<Received> = tiling.parts.iter().map(|part| self.receive(input, part)).collect();
+        for tiling in array.tilings.iter().rev().filter(|tiling| tiling.case != Case::WHOLE) {
+            let received: Vec<Received> = tiling.parts.iter().map(|part| array.receive(input, part)).collect();
             if let Some(reason) = rejection_reason(sensor, &tiling.parts, &received, &contacts) {
                 refused.push((tiling.case, reason));
                 continue;
             }
-            let outcome = self.subarrays(input, tiling);
+            let outcome = array.subarrays(input, tiling, &Sparse::default());
             let own = off(&outcome);
             if own <= best.0 {
                 let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();
@@ -139,12 +154,12 @@ impl Golden {
         }
         let (_, case, outcome, reason) = best;
         // The finer cases, in their order.
-        let finer = self.tilings.iter().take_while(|tiling| tiling.case != case);
+        let finer = array.tilings.iter().take_while(|tiling| tiling.case != case);
         let refused = finer
             .filter_map(|tiling| refused.iter().find(|(other, _)| *other == tiling.case))
             .map(|(case, reason)| RejectedCase { case: case.to_string(), reason: reason.clone() })
             .collect();
-        let mut result = self.finish(frame, outcome);
+        let mut result = array.finish(input.frame, outcome);
         result.extra.taken = Some(CaseChoice { case: case.to_string(), reason, refused });
         result
     }

@@ -19,7 +19,7 @@ fn errors(read_as: impl Fn(Medium) -> Medium) -> Vec<(String, Option<f64>, f64)>
             scene.medium = Medium::BondedLayer { poisson };
             let frames = Frame::shipped(&scene);
             scene.medium = read_as(scene.medium);
-            let golden = Golden::new(&scene.for_hardware()).unwrap();
+            let golden = Golden::reference(&scene).unwrap();
             for frame in frames {
                 let result = golden.run(&frame).unwrap();
                 if !result.flags.contains(&Flag::LoadOutside) {
@@ -59,7 +59,7 @@ fn the_half_space_does_not_stand_in_for_the_layer() {
 fn two_contacts_share_their_load_but_not_their_shear() {
     let mut scene = Scene::builtin("sensor-3").unwrap();
     scene.medium = Medium::BondedLayer { poisson: 0.48 };
-    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let golden = Golden::reference(&scene).unwrap();
     let frames = Frame::shipped(&scene);
     assert_eq!(frames.len(), 2);
     for frame in frames {

@@ -10,45 +10,50 @@
 //! | out: forces | 3 × n | N |
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
+use super::array::{Array, CaseOutcome, EngineInput};
 use super::contacts::by_network::Told;
 use super::contacts::{Contacts, MeasuredStress, Solver};
+use super::estimator::Estimator;
 use super::forces::threshold;
-use super::golden::{CaseOutcome, EngineInput, Golden};
-use super::objective::Objective;
-use super::objective::Sparse;
+use super::objective::taxels::Taxels;
+use super::objective::{Objective, Sparse};
 use super::pass::Polynomial;
 use super::search::search;
-use crate::data::frame::{Forces, Frame};
+use crate::data::frame::Forces;
 use crate::estimate::learned::Learned;
 use crate::estimate::segment::Segments;
 use crate::result::flags::Flag;
 use crate::result::reconstruct::{shear_spread_of, Reconstruction, Region};
-use crate::spec::scene::Condition;
+use crate::spec::scene::{Condition, Scene};
 use crate::spec::sensor::Sensor;
 
-impl Golden {
+/// The search by contacts; `taxels` for fits of ellipses.
+struct ByContacts {
+    taxels: Option<Taxels>,
+}
+
+/// The search by contacts of a scene.
+pub(super) fn new(scene: &Scene) -> Box<dyn Estimator> {
+    Box::new(ByContacts { taxels: taxels(scene) })
+}
+
+/// The taxels for fits of ellipses: of an array without dead taxels and with mu_max > 0.
+pub(super) fn taxels(scene: &Scene) -> Option<Taxels> {
+    let fits = scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
+    fits.then(|| Taxels::new(&scene.sensor, scene.medium))
+}
+
+impl Array {
     /// The contacts of a frame with their μ; `None` if no candidate is compressive.
-    pub(super) fn find_contacts(&self, input: &EngineInput) -> Option<Contacts> {
-        let (scene, matrices) = (&self.scene, self.matrices());
-        let family = Polynomial::new(matrices, input.stress_MPa);
+    pub(super) fn find_contacts(&self, taxels: Option<&Taxels>, input: &EngineInput) -> Option<Contacts> {
+        let (scene, matrices, b) = (&self.scene, self.matrices(), &input.frame.stress_MPa);
+        let family = Polynomial::new(matrices, b);
         let found = search(&family, scene.search.mu_max, &|p| Sparse::default().score(p))?;
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-        let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
-        let stress = self.taxels.as_ref().map(|taxels| MeasuredStress { taxels, b, noise_MPa });
+        let stress = taxels.map(|taxels| MeasuredStress { taxels, b, noise_MPa: input.noise_MPa });
         let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
         Some(solver.solve(&family, found))
-    }
-
-    /// The contacts of a frame with the μ that the network knows.
-    fn ask_contacts(&self, network: &Learned, input: &EngineInput) -> Told {
-        let (scene, matrices) = (&self.scene, self.matrices());
-        let family = Polynomial::of_degree(matrices, input.stress_MPa, 0);
-        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-        let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
-        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
-        let alive = scene.input.alive(&scene.sensor);
-        solver.by_network(network, input.stress_MPa, &alive, scene.partition.max_contacts)
     }
 
     /// Whether the taxels of a region meet the scene's condition.
@@ -61,42 +66,54 @@ impl Golden {
         }
     }
 
-    /// Reconstructs a frame with one region per contact.
-    pub(super) fn contacts(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
-        let scene = &self.scene;
-        let (mut outcome, contacts, sigma) = match &self.network {
-            Some(network) => {
-                let Told { contacts, sigma, too_many } = self.ask_contacts(network, input);
-                let mut outcome = CaseOutcome::default();
-                outcome.flags.extend(too_many.then_some(Flag::TooManyContacts));
-                (outcome, contacts, Some(sigma))
-            }
-            None => {
-                let outcome = self.subarrays(input, self.whole());
-                match self.find_contacts(input) {
-                    Some(contacts) => (outcome, contacts, None),
-                    None => return self.finish(frame, outcome),
-                }
-            }
-        };
-        let (x, truncation) = self.whole().apply_form(input.stress_MPa, contacts.forces());
+    /// The result with one region per contact; `sigma` is the standard deviation of the μ of each, where it is known.
+    fn by_region(
+        &self,
+        input: &EngineInput,
+        mut outcome: CaseOutcome,
+        contacts: &Contacts,
+        sigma: Option<Vec<Option<[f64; 2]>>>,
+    ) -> Reconstruction {
+        let (x, truncation) = self.whole().apply_form(&input.frame.stress_MPa, contacts.forces());
         outcome.truncation = truncation.into_iter().collect();
-        let forces = threshold(x, scene.threshold.min_force_N);
+        let forces = threshold(x, self.scene.threshold.min_force_N);
         let met: Vec<bool> =
             (0..contacts.segments.count).map(|k| self.meets_condition(input, &contacts.segments, k)).collect();
-        let mut own = regions(&scene.sensor, &contacts, &met, &forces);
+        let mut own = regions(&self.scene.sensor, contacts, &met, &forces);
         outcome.forces = forces;
         if let Some(sigma) = sigma {
             outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
             own = own.into_iter().zip(sigma).map(|(region, sigma)| region.with_sigma(sigma)).collect();
             outcome.shear_spread = shear_spread_of(&own);
         }
-        let mut result = self.finish(frame, outcome);
+        let mut result = self.finish(input.frame, outcome);
         result.extra.regions = Some(own);
         result.extra.sweeps = Some(contacts.sweeps);
         result.extra.converged = Some(contacts.converged);
         result
     }
+}
+
+impl Estimator for ByContacts {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        let outcome = array.subarrays(input, array.whole(), &Sparse::default());
+        match array.find_contacts(self.taxels.as_ref(), input) {
+            Some(contacts) => array.by_region(input, outcome, &contacts, None),
+            None => array.finish(input.frame, outcome),
+        }
+    }
+}
+
+/// The result with the μ of each contact that `network` gives; `alive` says which taxels are not dead.
+pub(super) fn by_network(array: &Array, input: &EngineInput, network: &Learned, alive: &[bool]) -> Reconstruction {
+    let (scene, matrices, b) = (&array.scene, array.matrices(), &input.frame.stress_MPa);
+    let family = Polynomial::of_degree(matrices, b, 0);
+    let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
+    let searched = |segments: &Segments, region: usize| array.meets_condition(input, segments, region);
+    let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
+    let Told { contacts, sigma, too_many } = solver.by_network(network, b, alive, scene.partition.max_contacts);
+    let flags = too_many.then_some(Flag::TooManyContacts).into_iter().collect();
+    array.by_region(input, CaseOutcome { flags, ..CaseOutcome::default() }, &contacts, Some(sigma))
 }
 
 /// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the

@@ -3,28 +3,46 @@
 //! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
 //! scene states none: it is found from the frame.
 
+use super::array::{Array, CaseOutcome, EngineInput};
+use super::estimator::{Clipped, Estimator};
 use super::forces::threshold;
-use super::golden::{CaseOutcome, EngineInput, Golden};
-use crate::data::frame::Frame;
+use crate::data::input::Input;
 use crate::estimate::evidence::Evidence;
+use crate::estimate::learned::{Learned, LearnedError};
 use crate::result::checks::{largest_spread, relative_spread};
 use crate::result::flags::Flag;
-use crate::result::reconstruct::ContactEstimate;
-use crate::result::reconstruct::{Reconstruction, SubarrayResult};
-use crate::spec::partition::Subarray;
+use crate::result::reconstruct::{ContactEstimate, Reconstruction};
+use crate::spec::scene::{EstimatorKind, Scene};
 
-impl Golden {
-    /// Estimates the contacts of calibrated stress, clipped readings as they are.
-    pub(super) fn by_evidence(&self, evidence: &Evidence, frame: &Frame, input: &EngineInput) -> Reconstruction {
-        let stated = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
+/// The estimator `evidence`, with or without a network.
+struct ByEvidence(Evidence);
+
+/// The estimator `kind`, one with evidence.
+///
+/// # Errors
+/// As [`Learned::of_scene`], where the estimator has a network.
+pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, LearnedError> {
+    let mut evidence = Evidence::new(scene);
+    if kind.has_network() {
+        evidence = evidence.advised_by(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
+    }
+    if let Some(shares) = input.noise_shares() {
+        evidence = evidence.with_noise_shares(shares);
+    }
+    Ok(Box::new(ByEvidence(evidence)))
+}
+
+impl Estimator for ByEvidence {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        let noise_MPa = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
         // No force is worth a fit of readings that no contact causes, such as counts without calibration.
-        let estimate = match frame.peak_MPa() > self.scene.input.plausible_MPa {
-            true => evidence.without_fit(input.stress_MPa, stated),
-            false => evidence.solve(input.stress_MPa, stated),
+        let estimate = match input.frame.peak_MPa() > array.scene.input.plausible_MPa {
+            true => self.0.without_fit(&input.frame.stress_MPa, noise_MPa),
+            false => self.0.solve(&input.frame.stress_MPa, noise_MPa),
         };
-        let forces = threshold(estimate.forces_N, self.scene.threshold.min_force_N);
-        let subarrays = vec![self.array_of(input, forces.resultant())];
-        let mut result = self.finish(frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
+        let forces = threshold(estimate.forces_N, array.scene.threshold.min_force_N);
+        let subarrays = vec![array.array_of(input, forces.resultant())];
+        let mut result = array.finish(input.frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
@@ -41,11 +59,13 @@ impl Golden {
         result
     }
 
-    /// The array as one subarray that is not searched; its μ is the ratio of the resultants.
-    pub(super) fn array_of(&self, input: &EngineInput, resultant_N: [f64; 3]) -> SubarrayResult {
-        let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
-        let part = Subarray { row0: 0, col0: 0, rows, cols };
-        SubarrayResult::of_regions(&part, &self.receive(input, &part), resultant_N)
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::AsRead
+    }
+
+    /// Its load does not come from Cz⁺b.
+    fn compares_load(&self) -> bool {
+        false
     }
 }
 

@@ -1,30 +1,66 @@
-//! By network: μ as a trained network knows it, in the place of a search.
-//!
-//! p(μ) is then that of the search. The estimator `learned` takes the same μ, but the most probable forces at it.
+//! By network: μ as a trained network knows it, in the place of a search; p(μ) is then that of the search.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b of the whole array | n | MPa |
 //! | out: μ with its standard deviations | 2 | – |
 //! | out: objective, ln of the density at μ | scalar | – |
+//!
+//! With `contacts` the network is evaluated for each contact, `float::contacts::by_network`.
 
+use super::array::{Array, EngineInput};
+use super::by_contacts;
+use super::estimator::{Clipped, Estimator};
 use super::objective::{Estimate, Objective, SearchInput};
 use crate::estimate::learned::{Learned, LearnedError, OneContact};
-use crate::spec::scene::Scene;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::partition::Case;
+use crate::spec::scene::{EstimatorKind, Scene};
 
-/// The network of a scene, asked for the whole array.
-pub(super) struct ByNetwork {
+/// A network that gives one μ for the whole array.
+struct ByNetwork {
     network: Learned,
     alive: Vec<bool>,
 }
 
-impl ByNetwork {
-    /// The network that a scene names.
-    ///
-    /// # Errors
-    /// As [`Learned::of_scene`].
-    pub fn new(scene: &Scene) -> Result<ByNetwork, LearnedError> {
-        Ok(ByNetwork { network: Learned::of_scene(scene)?, alive: scene.input.alive(&scene.sensor) })
+/// A network that gives each contact a μ.
+struct ByNetworkOfContacts {
+    network: Learned,
+    alive: Vec<bool>,
+}
+
+/// The estimator with the network that a scene names.
+///
+/// # Errors
+/// As [`Learned::of_scene`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, LearnedError> {
+    let network = Learned::of_scene(scene, EstimatorKind::Network)?;
+    let alive = scene.input.alive(&scene.sensor);
+    Ok(match scene.partition.case {
+        Case::Contacts => Box::new(ByNetworkOfContacts { network, alive }),
+        _ => Box::new(ByNetwork { network, alive }),
+    })
+}
+
+impl Estimator for ByNetwork {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        array.finish(input.frame, array.subarrays(input, array.whole(), self))
+    }
+
+    /// The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::Zero
+    }
+}
+
+impl Estimator for ByNetworkOfContacts {
+    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        by_contacts::by_network(array, input, &self.network, &self.alive)
+    }
+
+    /// As with one μ.
+    fn clipped_readings(&self) -> Clipped {
+        Clipped::Zero
     }
 }
 

@@ -30,7 +30,7 @@ fn hertz() -> Frame {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
+    Golden::reference(scene).unwrap().run(frame).unwrap()
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn extreme_stress_is_an_error_or_a_finite_result() {
     for case in [Case::WHOLE, Case::Adaptive, Case::Contacts] {
         let mut scene = scene();
         scene.partition.case = case;
-        let golden = Golden::new(&scene.for_hardware()).unwrap();
+        let golden = Golden::reference(&scene).unwrap();
         for scale in [1e-300, 1e150, 1e300, 1e307, 1e308] {
             let mut frame = hertz();
             frame.stress_MPa.iter_mut().for_each(|b| *b *= scale);
@@ -198,7 +198,7 @@ fn extreme_stress_is_an_error_or_a_finite_result() {
 #[test]
 fn frames_of_another_sensor_are_rejected() {
     let eight = Scene::builtin("eight-by-eight").unwrap();
-    let other = Golden::new(&eight.for_hardware()).unwrap().run(&hertz());
+    let other = Golden::reference(&eight).unwrap().run(&hertz());
     assert!(matches!(other, Err(GoldenError::Frame(_))));
 }
 

@@ -15,9 +15,9 @@
 //! The hardware's `normalise`, `fold` and `unfold` have no counterpart here: floating point has its own exponents, and
 //! folding is an exact change of basis.
 //!
-//! The driver: [`Golden`] runs the stages for each subarray of a scene (`golden`), between the input and the output
-//! options (`run`, with `unipolar` for readings that a sensor clips). `adaptive` and `by_contacts` have the partitions
-//! that depend on the frame, `by_evidence` and `by_network` the estimators that take the place of the search.
+//! The driver: [`Golden`] runs an estimator (`golden`) between the input and the output options (`run`, with `unipolar`
+//! for readings that a sensor clips). The estimators (`estimator`) compute with the matrices of
+//! `array`: `by_subarray`, `adaptive` and `by_contacts` search, `by_evidence` and `by_network` take the place of a search.
 
 pub mod contacts;
 pub mod forces;
@@ -27,15 +27,20 @@ pub mod pass;
 pub mod search;
 
 mod adaptive;
+mod array;
 #[cfg(test)]
 mod bonded_tests;
 mod by_contacts;
 mod by_evidence;
 mod by_network;
+mod by_subarray;
+mod error;
+mod estimator;
 mod golden;
 #[cfg(test)]
 mod golden_tests;
 mod run;
 mod unipolar;
 
-pub use golden::{Golden, GoldenError};
+pub use error::GoldenError;
+pub use golden::Golden;

@@ -8,8 +8,10 @@
 //! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
 //! | `output.forces` | resultants instead of forces per taxel |
 
+use super::error::GoldenError;
+use super::estimator::Clipped;
 use super::forces::force;
-use super::golden::{Golden, GoldenError};
+use super::golden::Golden;
 use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};
 use crate::data::frame::Frame;
@@ -17,7 +19,7 @@ use crate::physics::matrices::Matrices;
 use crate::result::checks::Checks;
 use crate::result::reconstruct::{Reconstruction, Unipolar};
 use crate::spec::partition::Subarray;
-use crate::spec::scene::{EstimatorKind, ForceOutput, Scene};
+use crate::spec::scene::{ForceOutput, Scene};
 
 impl Golden {
     /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
@@ -55,53 +57,51 @@ impl Golden {
 
     /// Reconstructs `mean`, the average of the frames `readings`.
     fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
-        mean.check(&self.scene)?;
+        let scene = self.scene();
+        mean.check(scene)?;
         let frame = self.input.calibrate(mean);
-        // Evidence takes clipped readings as they are, and its load does not come from Cz⁺b.
-        let searched = self.evidence.is_none();
-        let (filled, report) = match (self.scene.input.unipolar && searched, self.scene.estimator()) {
-            (false, _) => (frame.clone(), None),
-            // The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
-            (true, EstimatorKind::Network) => (clipped(&frame), None),
-            (true, _) => self.filled(&frame),
+        let (filled, report) = match (scene.input.unipolar, self.estimator.clipped_readings()) {
+            (false, _) | (true, Clipped::AsRead) => (frame.clone(), None),
+            (true, Clipped::Zero) => (clipped(&frame), None),
+            (true, Clipped::Filled) => self.filled(&frame),
         };
         let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
-        let misfit = |report| Unipolar { misfit: misfit(&self.scene, &frame, &result.forces_N), ..report };
+        let misfit = |report| Unipolar { misfit: misfit(scene, &frame, &result.forces_N), ..report };
         result.extra.unipolar = report.map(misfit);
+        let compares_load = self.estimator.compares_load();
         let checks = Checks {
-            full_scale_share: self.input.full_scale_share(readings),
             network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
-            load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
-            ..result.figures(&self.scene, &frame)
+            load_ratio: if compares_load { self.load_ratio(&filled, &result) } else { None },
+            ..result.figures(scene, &frame).with_readings(&self.input, readings)
         };
-        result.add_checks(&self.scene, checks);
+        result.add_checks(scene, checks);
         if let Some(deviations) = &self.deviations {
-            deviations.add(&mut result, &self.scene, &frame, noise_MPa);
+            deviations.add(&mut result, scene, &frame, noise_MPa);
         }
-        Ok(match self.scene.output.forces {
+        Ok(match scene.output.forces {
             ForceOutput::Taxels => result,
-            ForceOutput::Resultants => result.with_resultants(&self.scene.sensor),
+            ForceOutput::Resultants => result.with_resultants(&scene.sensor),
         })
     }
 
     /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless the latter presses.
     fn load_ratio(&self, frame: &Frame, result: &Reconstruction) -> Option<f64> {
-        let scene = &self.scene;
+        let scene = self.scene();
         let normal = |(part, matrices): (&Subarray, &Matrices)| {
             let family = Polynomial::of_degree(matrices, &part.gather(&scene.sensor, &frame.stress_MPa), 0);
             force(family.v(0, 0), [0.0; 2], scene.threshold.min_force_N).fz.iter().sum::<f64>()
         };
-        let without_shear: f64 = self.parts().map(normal).sum();
+        let without_shear: f64 = self.array.parts().map(normal).sum();
         let ratio = result.resultant_N[2] / without_shear;
         (without_shear > 0.0).then_some(ratio)
     }
 
     /// The frame with tension in place of clipped readings, and its report without the misfit.
     fn filled(&self, frame: &Frame) -> (Frame, Option<Unipolar>) {
-        let Scene { sensor, input, search, .. } = &self.scene;
+        let Scene { sensor, input, search, .. } = self.scene();
         let mut filled = clipped(frame);
         let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
-        for (part, matrices) in self.parts() {
+        for (part, matrices) in self.array.parts() {
             let b = part.gather(sensor, &filled.stress_MPa);
             let dead = part.local_indices(&input.dead);
             let clipped: Vec<usize> = (0..b.len()).filter(|k| b[*k] == 0.0 && !dead.contains(k)).collect();
@@ -135,9 +135,9 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
-        let mean = self.input.average(&self.scene, frames)?;
+        let mean = self.input.average(self.scene(), frames)?;
         let mut result = self.run_readings(frames, &mean, self.input.noise_of_mean_MPa(frames.len()))?;
-        result.extra.mean_frames = self.scene.input.frames_held(frames.len());
+        result.extra.mean_frames = self.scene().input.frames_held(frames.len());
         Ok(result)
     }
 
@@ -146,7 +146,7 @@ impl Golden {
     /// # Errors
     /// [`GoldenError::Input`] unless there are 2^k frames, of a sliding mean at least one, all of the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
-        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
+        Ok(self.input.calibrate(&self.input.average(self.scene(), frames)?))
     }
 }
 

@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn composed_layers_take_the_mask_of_a_window() {
         let mut scene = Scene::builtin("sensor-3").unwrap();
-        scene.search.estimator = crate::spec::scene::EstimatorKind::Learned;
+        scene.search.estimator = Some(crate::spec::scene::EstimatorKind::EvidenceNetwork);
         let training = Training { steps: 30, batch: 16, contacts: 60, hidden: vec![16, 8], ..Training::default() };
         let learned = Learned::train(&scene, &training, &|_| ()).unwrap().learned;
         let mut random = crate::random::Random::new(6);
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn composed_layers_are_the_network() {
         let scene = Scene::builtin("sensor-1").unwrap();
-        let learned = Learned::of_scene(&scene).unwrap();
+        let learned = Learned::of_scene(&scene, crate::spec::scene::EstimatorKind::Network).unwrap();
         let frame = crate::data::frame::Frame::shipped(&scene).remove(1);
         for dead in [vec![], vec![37, 5]] {
             let alive: Vec<bool> = (0..100).map(|taxel| !dead.contains(&taxel)).collect();

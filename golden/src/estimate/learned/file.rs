@@ -82,15 +82,15 @@ impl Signature {
         }
     }
 
-    /// Checks that a network with this signature serves `scene`; `file` names it in the error.
+    /// Checks that a network with this signature serves an estimator of `scene`; `file` names it in the error.
     ///
     /// # Errors
     /// [`LearnedError::Mismatch`] with the first field that differs.
-    pub fn check(&self, scene: &Scene, file: &str) -> Result<(), LearnedError> {
+    pub fn check(&self, scene: &Scene, estimator: EstimatorKind, file: &str) -> Result<(), LearnedError> {
         let mut wanted = Signature::of(scene);
-        // The adviser of `evidence` takes either window.
+        // An estimator with evidence takes either window.
         let either = [Window::of(&scene.sensor), Window::around_contact(&scene.sensor)];
-        if scene.estimator() != EstimatorKind::Network && either.contains(&self.window) {
+        if estimator.has_evidence() && either.contains(&self.window) {
             wanted.window = self.window;
         }
         let pairs = [
@@ -293,11 +293,11 @@ mod tests {
     fn another_physics_is_refused_by_field() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let signature = Signature::of(&scene);
-        assert!(signature.check(&scene, "n").is_ok());
+        assert!(signature.check(&scene, EstimatorKind::Network, "n").is_ok());
         let refused = |change: fn(&mut Scene)| {
             let mut other = scene.clone();
             change(&mut other);
-            signature.check(&other, "n").unwrap_err().to_string()
+            signature.check(&other, EstimatorKind::Network, "n").unwrap_err().to_string()
         };
         type Case = (fn(&mut Scene), &'static str);
         let cases: [Case; 7] = [

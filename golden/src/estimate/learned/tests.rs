@@ -8,7 +8,7 @@ use crate::study::noise::{shape_study, Candidate, ShapeStudy};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();
-    scene.search.estimator = EstimatorKind::Learned;
+    scene.search.estimator = Some(EstimatorKind::EvidenceNetwork);
     scene
 }
 
@@ -56,7 +56,10 @@ fn the_shipped_network_is_accurate() {
     let study = ShapeStudy {
         levels: vec![5e-4, 2e-3, 1e-2],
         draws: 40,
-        candidates: vec![Candidate::Estimator(EstimatorKind::Learned), Candidate::Estimator(EstimatorKind::Auto)],
+        candidates: vec![
+            Candidate::Estimator(EstimatorKind::EvidenceNetwork),
+            Candidate::Estimator(EstimatorKind::Combined),
+        ],
         ..Default::default()
     };
     let rows = shape_study(&scene, &study, &|_, _| ()).unwrap();
@@ -113,9 +116,10 @@ fn several_contacts_need_a_window_around_each() {
     scene.partition.case = Case::Contacts;
     let Trained { learned, bytes, .. } = trained(&scene, 10);
     assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
-    let fits = |scene: &Scene, bytes: &[u8]| Learned::from_bytes(scene, bytes, "n").map(|_| ());
+    let fits =
+        |scene: &Scene, bytes: &[u8]| Learned::from_bytes(scene, scene.model_estimator(), bytes, "n").map(|_| ());
     assert!(fits(&scene, &whole).is_ok() && fits(&scene, &bytes).is_ok());
-    scene.search.estimator = EstimatorKind::Network;
+    scene.search.estimator = Some(EstimatorKind::Network);
     assert!(fits(&scene, &bytes).is_ok());
     let error = fits(&scene, &whole).unwrap_err();
     assert!(matches!(&error, LearnedError::Mismatch { field: "sensor.rows and cols", .. }), "{error}");
@@ -141,7 +145,7 @@ fn a_window_moves_with_its_contact() {
     assert_eq!(learned.signature.window, Window { place: Place::Contact, rows: 9, cols: 11 });
     let mut larger = scene.clone();
     (larger.sensor.rows, larger.sensor.cols) = (24, 22);
-    let other = Learned::from_bytes(&larger, &bytes, "n").unwrap();
+    let other = Learned::from_bytes(&larger, EstimatorKind::Network, &bytes, "n").unwrap();
     let stress = |cols: usize, at: [usize; 2]| {
         let mut b = vec![0.0; 24 * 22];
         for (k, value) in [0.2, 1.0, 0.3, 0.1, 0.7, -0.2].iter().enumerate() {
@@ -180,9 +184,9 @@ fn what_cannot_be_used_is_named() {
     assert_eq!(message(&scene), "");
     scene.input.unipolar = true;
     assert!(message(&scene).contains("input.unipolar = false, the scene has true"), "{}", message(&scene));
-    scene.search.estimator = EstimatorKind::Auto;
+    scene.search.estimator = None;
     assert_eq!(message(&scene), "");
-    scene.search.estimator = EstimatorKind::Learned;
+    scene.search.estimator = Some(EstimatorKind::EvidenceNetwork);
     scene.input.unipolar = false;
     scene.partition.case = crate::spec::partition::Case::numbered(1).unwrap();
     assert!(message(&scene).contains("partition.case"), "{}", message(&scene));
@@ -195,7 +199,7 @@ fn what_cannot_be_used_is_named() {
 #[test]
 fn in_words_the_network_is_nearly_the_same() {
     let scene = scene("sensor-1");
-    let (model, golden) = (crate::fixed::Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+    let (model, golden) = (crate::fixed::Model::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
     let draws = Draws::new(&scene, DrawOptions { seed: 78, ..Default::default() }).unwrap();
     let mut differences: Vec<f64> = Vec::new();
     for number in 0..40 {

@@ -29,7 +29,7 @@ fn unlike(mut frame: Frame) -> Frame {
 /// flag it.
 fn misfits(scene: &Scene, frame: &Frame) -> ([f64; 3], bool) {
     let model = Model::without_fit_check(scene).unwrap().reconstruct(frame).unwrap();
-    let golden = [scene.for_hardware(), scene.clone()].map(|scene| Golden::new(&scene).unwrap().run(frame).unwrap());
+    let golden = [Golden::reference(scene), Golden::new(scene)].map(|golden| golden.unwrap().run(frame).unwrap());
     let [network, learned] = golden;
     let all = [network, learned, model];
     let flagged = all.each_ref().map(|result| result.flags.contains(&Flag::Misfit));
@@ -60,7 +60,7 @@ fn both_models_flag_what_is_unlike_the_training() {
 /// The flag is that of the limit: with a larger one the same frame has none, without one nothing is checked.
 #[test]
 fn the_limit_of_the_file_decides() {
-    let mut scene = Scene::builtin("sensor-1-noisy").unwrap().for_hardware();
+    let mut scene = Scene::builtin("sensor-1-noisy").unwrap().estimated_by(EstimatorKind::Network);
     let frame = unlike(like(&scene, 1, 0));
     let run = |scene: &Scene| Golden::new(scene).unwrap().run(&frame).unwrap();
     let own = run(&scene);
@@ -81,7 +81,9 @@ fn the_limit_of_the_file_decides() {
 /// A scene of 13 × 18 taxels with a small network for several contacts, and the limit measured for it.
 fn several() -> (Scene, tempfile::NamedTempFile) {
     let sensor = "[sensor]\nrows = 13\ncols = 18\npitch_x_mm = 2\npitch_y_mm = 2.5\nthickness_mm = 2\n";
-    let text = format!("name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n[search]\nestimator = \"learned\"\n");
+    let text = format!(
+        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n[search]\nestimator = \"evidence+network\"\n"
+    );
     let training = Training { steps: 200, contacts: 200, ..Training::trial(&[16, 8]) };
     let (scene, file) = with_network(Scene::parse(&text, "pad.toml").unwrap(), &training).unwrap();
     let limit = misfit_limit(&scene, 60, 1, &|_, _| ()).unwrap().unwrap();

@@ -3,7 +3,7 @@ use crate::data::generator::draws::{DrawOptions, Draws};
 use crate::estimate::float::Golden;
 use crate::estimate::learned::{with_network, Learned, OneContact, Training};
 use crate::fixed::stages::receive::mask;
-use crate::fixed::stages::send::{Status, FLAG_FOUND, STATUS_BEATS};
+use crate::fixed::stages::send::{Status, STATUS_BEATS};
 use crate::fixed::subarray::SubarrayTrace;
 use crate::fixed::words::formats::MU_STEPS;
 use crate::fixed::Model;
@@ -16,7 +16,7 @@ use tempfile::NamedTempFile;
 fn scene(more: &str, partition: &str) -> (Scene, NamedTempFile) {
     let sensor = "[sensor]\nrows = 13\ncols = 18\npitch_x_mm = 2\npitch_y_mm = 2.5\nthickness_mm = 2\n";
     let text = format!(
-        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"learned\"\n{more}"
+        "name = \"pad\"\n{sensor}[partition]\ncase = \"contacts\"\n{partition}[search]\nestimator = \"evidence+network\"\n{more}"
     );
     let training = Training { steps: 30, contacts: 60, ..Training::trial(&[16, 8]) };
     with_network(Scene::parse(&text, "pad.toml").unwrap(), &training).unwrap()
@@ -40,7 +40,10 @@ fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
 fn a_contact_has_what_the_network_says_of_its_window() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
     let model = Model::without_fit_check(&scene).unwrap();
-    let (network, alive) = (Learned::of_scene(&scene).unwrap(), scene.input.alive(&scene.sensor));
+    let (network, alive) = (
+        Learned::of_scene(&scene, crate::spec::scene::EstimatorKind::Network).unwrap(),
+        scene.input.alive(&scene.sensor),
+    );
     let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 9, ..Default::default() }).unwrap();
     let mut asked = 0;
     for number in 0..8 {
@@ -72,7 +75,7 @@ fn contacts_are_those_of_the_golden_model() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");
     // Dead taxels break the symmetry, so that the matrices are too large for the board.
     let model = Model::without_fit_check(&scene).unwrap();
-    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let golden = Golden::reference(&scene).unwrap();
     let draws = Draws::new(&scene, DrawOptions { contacts: 3, seed: 5, ..Default::default() }).unwrap();
     let (mut taxels, mut other, mut compared, mut moved) = (0, 0, 0, 0);
     for number in 0..12 {
@@ -105,7 +108,7 @@ fn contacts_are_those_of_the_golden_model() {
 #[test]
 fn of_more_contacts_the_largest_have_shear() {
     let (scene, _file) = scene("", "max_contacts = 1\n");
-    let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene.for_hardware()).unwrap());
+    let (model, golden) = (Model::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
     let draws = Draws::new(&scene, DrawOptions { contacts: 2, seed: 3, ..Default::default() }).unwrap();
     let frame = draws.frame(1).unwrap().frame;
     let (fixed, float) = (model.reconstruct(&frame).unwrap(), golden.run(&frame).unwrap());
@@ -130,10 +133,10 @@ fn nothing_and_the_largest_codes() {
     let largest = (1 << (model.formats().code_bits - 1)) - 1;
     for codes in [vec![0; 234], vec![-largest; 234], vec![largest; 234]] {
         let trace = model.run(&codes);
-        let found: Vec<Status> = trace.status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
+        let found: Vec<Status> = Status::all(&trace.status).collect();
         assert_eq!(found.len(), 8);
         // Pressure alone is a contact.
-        let contacts = found.iter().filter(|status| status.flags & FLAG_FOUND != 0).count();
+        let contacts = found.iter().filter(|status| status.found).count();
         assert_eq!(contacts == 0, codes[0] <= 0, "{contacts} contacts for {}", codes[0]);
     }
     let quiet = Frame {

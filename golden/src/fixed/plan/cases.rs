@@ -47,7 +47,7 @@ pub fn planned(scene: &Scene) -> Result<Plan, FixedError> {
 /// As [`planned`].
 pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Plan, FixedError> {
     scene.require_supported()?;
-    let scene = &scene.for_hardware();
+    let scene = &scene.clone().with_chosen_hardware();
     let board = Board::load(&scene.hardware.board)?;
     if board.engine == EngineKind::Serial {
         scene.require_serial()?;
@@ -159,7 +159,7 @@ fn of_shapes(
             segmenter: Segmenter::new(&scene.sensor, segment::WIDTH),
             window: Window::around_contact(&scene.sensor),
         }),
-        misfit: Misfit::of_scene(&scene)?,
+        misfit: Misfit::of_scene(&scene, scene.hardware_estimator())?,
         board: board.clone(),
         scene,
         cases: planned,

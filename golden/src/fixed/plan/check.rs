@@ -7,7 +7,7 @@
 //! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the section's first word
 //! ```
 //! If it differs from the generated value after the last word of any section, the subarray's status has
-//! [`FLAG_COEFFICIENTS`](crate::fixed::stages::send::FLAG_COEFFICIENTS). The forces are sent all the same.
+//! [`COEFFICIENTS`](crate::result::flags::COEFFICIENTS). The forces are sent all the same.
 //!
 //! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so a parity bit per word of the lanes would
 //! cost another block RAM, or LUTs that grow with the number of words. A signature needs no memory and no cycle,

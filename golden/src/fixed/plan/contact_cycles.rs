@@ -78,7 +78,7 @@ mod tests {
         for (sensor, bound, drawn) in [("sensor-1", 37_193, [6_730, 10_998]), ("sensor-3", 56_429, [27_420, 28_149])] {
             let mut scene = Scene::builtin(sensor).unwrap();
             scene.partition.case = Case::Contacts;
-            scene.search.estimator = EstimatorKind::Learned;
+            scene.hardware.estimator = Some(EstimatorKind::Network);
             let (scene, _file) = with_network(scene, &Training::trial(&[80, 40, 20])).unwrap();
             let model = Model::without_fit_check(&scene).unwrap();
             let longest = Cycles::longest(&model).latency;

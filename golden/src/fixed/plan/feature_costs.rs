@@ -115,7 +115,7 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     let own = format!("mu_max = {}", scene.search.mu_max);
     let back = if degree > 0 { scene.search.mu_max } else { mu_max };
     add("search", plan.searches(), set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
-        plain(&with(&|s| (s.search.mu_max, s.search.estimator) = (back, EstimatorKind::Search)))
+        plain(&with(&|s| (s.search.mu_max, s.hardware.estimator) = (back, Some(EstimatorKind::Search))))
     });
     if plan.has_network() {
         let layers: Vec<String> = plan.formats().layers.iter().map(usize::to_string).collect();

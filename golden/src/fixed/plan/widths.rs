@@ -215,8 +215,10 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
 
 /// The layers of the network that gives μ; none with a search.
 fn composed(scene: &Scene) -> Result<Vec<ComposedLayer>, FixedError> {
-    match scene.search.estimator {
-        EstimatorKind::Network => Ok(Learned::of_scene(scene)?.composed(&scene.input.alive(&scene.sensor))),
+    match scene.hardware_estimator() {
+        kind @ EstimatorKind::Network => {
+            Ok(Learned::of_scene(scene, kind)?.composed(&scene.input.alive(&scene.sensor)))
+        }
         _ => Ok(Vec::new()),
     }
 }

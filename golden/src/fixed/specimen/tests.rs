@@ -112,9 +112,9 @@ fn an_image_ends_as_the_stream_says() {
     let (_folder, scene) = specimen(1.0);
     let image = hardware.with_tables(&scene, 3).unwrap().image();
     let mut intake = Intake::default();
-    let mut send = |plan: &mut Plan, bytes: &[u8], in_frame| {
+    let mut send = |model: &mut Model, bytes: &[u8], in_frame| {
         let count = bytes.len();
-        let each = bytes.iter().enumerate().map(|(at, &byte)| intake.byte(plan, byte, at + 1 == count, in_frame));
+        let each = bytes.iter().enumerate().map(|(at, &byte)| intake.byte(model, byte, at + 1 == count, in_frame));
         let all: Vec<Outcome> = each.flatten().collect();
         assert!(!intake.is_busy());
         all

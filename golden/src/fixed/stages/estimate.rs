@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn negative_images_are_zero_and_large_ones_saturate() {
         let mut scene = crate::spec::scene::Scene::builtin("sensor-1").unwrap();
-        scene.search.estimator = crate::spec::scene::EstimatorKind::Learned;
+        scene.hardware.estimator = Some(crate::spec::scene::EstimatorKind::Network);
         let model = crate::fixed::Model::new(&scene).unwrap();
         let formats = model.formats();
         let largest = (1i64 << formats.image_bits()) - 1;

@@ -10,12 +10,12 @@
 //!
 //! The sum keeps all its bits and is shifted before the one rounding. A mean alone would hide a sample at the end of the
 //! range among others that are not: one such sample makes the code the end of its own range, and raises
-//! [`FLAG_RAIL`]. The lower end of a unipolar converter is no stress and raises nothing. A sample
-//! whose tag names another channel makes the code the upper end, and raises [`FLAG_CHANNEL`].
+//! [`Flag::Saturated`]. The lower end of a unipolar converter is no stress and raises nothing. A sample
+//! whose tag names another channel makes the code the upper end, and raises [`Flag::WrongChannel`].
 //! Dead taxels raise nothing.
 
-use super::send::{FLAG_CHANNEL, FLAG_RAIL};
 use crate::fixed::words::arith::round_shift;
+use crate::result::flags::{Flag, FlagSet};
 use crate::spec::adc::{AdcScan, Converter};
 
 /// The codes of a scan, and its flags.
@@ -23,8 +23,8 @@ use crate::spec::adc::{AdcScan, Converter};
 pub struct Scanned {
     /// A code per taxel, row-major, `code_bits` signed.
     pub codes: Vec<i32>,
-    /// `FLAG_RAIL` and `FLAG_CHANNEL`, if raised.
-    pub flags: u32,
+    /// `saturated` and `wrong-channel`, if raised; bits of the frame's status.
+    pub flags: FlagSet,
 }
 
 /// Codes in a beat of the output stream.
@@ -48,7 +48,7 @@ pub fn rail(code_bits: u32) -> i32 {
 }
 
 /// The code of a taxel on channel `channel` from the answers of its samples, tag above result, and its flags.
-pub fn code(scan: &AdcScan, code_bits: u32, channel: usize, answers: impl Iterator<Item = u32>) -> (i32, u32) {
+pub fn code(scan: &AdcScan, code_bits: u32, channel: usize, answers: impl Iterator<Item = u32>) -> (i32, FlagSet) {
     let converter = &scan.converter;
     let most = (1u32 << converter.bits) - 1;
     let middle = if converter.bipolar { 1i64 << (converter.bits - 1) } else { 0 };
@@ -60,8 +60,7 @@ pub fn code(scan: &AdcScan, code_bits: u32, channel: usize, answers: impl Iterat
         low |= converter.bipolar && result == 0;
         other |= converter.tag_bits > 0 && answer >> converter.bits != channel as u32;
     }
-    let flags = [(high || low, FLAG_RAIL), (other, FLAG_CHANNEL)];
-    let flags = flags.into_iter().filter(|(raised, _)| *raised).fold(0, |flags, (_, flag)| flags | flag);
+    let flags = FlagSet::raised([(Flag::Saturated, high || low), (Flag::WrongChannel, other)]);
     let mean = round_shift(sum << alignment(converter, code_bits), scan.average);
     match (high || other, low) {
         (true, _) => (rail(code_bits), flags),
@@ -81,7 +80,7 @@ pub fn scan(scan: &AdcScan, code_bits: u32, dead: &[usize], answers: &[u32]) -> 
             let of_taxel = answers.iter().skip(own).step_by(count).copied();
             let (code, flags) = code(scan, code_bits, group % scan.channels, of_taxel);
             if !dead.contains(&scanned.codes.len()) {
-                scanned.flags |= flags;
+                scanned.flags = scanned.flags | flags;
             }
             scanned.codes.push(code);
         }
@@ -107,34 +106,35 @@ mod tests {
         }
     }
 
-    fn of(scan: &AdcScan, bits: u32, channel: usize, answers: &[u32]) -> (i32, u32) {
-        code(scan, bits, channel, answers.iter().copied())
+    fn of(scan: &AdcScan, bits: u32, channel: usize, answers: &[u32]) -> (i32, Vec<Flag>) {
+        let (code, flags) = code(scan, bits, channel, answers.iter().copied());
+        (code, flags.iter().collect())
     }
 
     #[test]
     fn unipolar_by_hand() {
         let max = spec(0, 1, 1);
         // 12 bits to 14: a = 1; (5 + 6) · 2 / 2.
-        assert_eq!(of(&max, 14, 3, &[0x3005, 0x3006]), (11, 0));
+        assert_eq!(of(&max, 14, 3, &[0x3005, 0x3006]), (11, vec![]));
         // To 13: a = 0; 11 / 2 rounds half up.
-        assert_eq!(of(&max, 13, 3, &[0x3005, 0x3006]), (6, 0));
-        assert_eq!(of(&max, 13, 0, &[0, 0]), (0, 0));
+        assert_eq!(of(&max, 13, 3, &[0x3005, 0x3006]), (6, vec![]));
+        assert_eq!(of(&max, 13, 0, &[0, 0]), (0, vec![]));
         // One of two at the upper end.
-        assert_eq!(of(&max, 13, 0, &[0xfff, 0]), (4095, FLAG_RAIL));
-        assert_eq!(of(&max, 13, 0, &[0xffe, 0xffe]), (4094, 0));
+        assert_eq!(of(&max, 13, 0, &[0xfff, 0]), (4095, vec![Flag::Saturated]));
+        assert_eq!(of(&max, 13, 0, &[0xffe, 0xffe]), (4094, vec![]));
         // One of two names channel 2.
-        assert_eq!(of(&max, 13, 3, &[0x3005, 0x2005]), (4095, FLAG_CHANNEL));
-        assert_eq!(of(&max, 20, 3, &[0xffff, 0x3005]), ((1 << 19) - 1, FLAG_RAIL | FLAG_CHANNEL));
+        assert_eq!(of(&max, 13, 3, &[0x3005, 0x2005]), (4095, vec![Flag::WrongChannel]));
+        assert_eq!(of(&max, 20, 3, &[0xffff, 0x3005]), ((1 << 19) - 1, vec![Flag::Saturated, Flag::WrongChannel]));
     }
 
     #[test]
     fn bipolar_by_hand() {
         let ads = spec(1, 1, 1);
-        assert_eq!(of(&ads, 16, 1, &[0x8000, 0x7ffd]), (-1, 0));
-        assert_eq!(of(&ads, 18, 1, &[0x8000, 0x7ffd]), (-6, 0));
-        assert_eq!(of(&ads, 16, 1, &[0x8000, 0]), (-32767, FLAG_RAIL));
-        assert_eq!(of(&ads, 16, 1, &[0xffff, 0]), (32767, FLAG_RAIL));
-        assert_eq!(of(&ads, 16, 1, &[1, 1]), (-32767, 0));
+        assert_eq!(of(&ads, 16, 1, &[0x8000, 0x7ffd]), (-1, vec![]));
+        assert_eq!(of(&ads, 18, 1, &[0x8000, 0x7ffd]), (-6, vec![]));
+        assert_eq!(of(&ads, 16, 1, &[0x8000, 0]), (-32767, vec![Flag::Saturated]));
+        assert_eq!(of(&ads, 16, 1, &[0xffff, 0]), (32767, vec![Flag::Saturated]));
+        assert_eq!(of(&ads, 16, 1, &[1, 1]), (-32767, vec![]));
     }
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
         let answers = [0x0001, 0x0002, 0x1003, 0x1fff, 0x0005, 0x0006, 0x0007, 0x1008];
         let all = scan(&two, 13, &[], &answers);
         assert_eq!(all.codes, [1, 2, 3, 4095, 5, 6, 4095, 8]);
-        assert_eq!(all.flags, FLAG_RAIL | FLAG_CHANNEL);
-        assert_eq!(scan(&two, 13, &[3, 6], &answers), Scanned { flags: 0, ..all });
+        assert!(all.flags.iter().eq([Flag::Saturated, Flag::WrongChannel]));
+        assert_eq!(scan(&two, 13, &[3, 6], &answers), Scanned { flags: FlagSet::default(), ..all });
     }
 }

@@ -4,11 +4,8 @@
 //! subarray of the chosen case, row-major. Saturations of `forces`, the contact flag and the cycles are those of the
 //! whole frame, the same for every subarray:
 //!
-//! | beat | fx word | fy word | fz word |
-//! |---|---|---|---|
-//! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
-//! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise`; from bit 16 on the [version](Status::tables) of the tables |
-//! | 2 | saturations of `rescale` | saturations of `forces` | cycles to the first output beat, see [`Status::cycles`] |
+//! [`Status`] lists the fields of its words, except the bits of flags, which are in the rows of [`crate::result::flags`];
+//! [`status_fields`] gives all of them, from which the manifest and the guide's table are made.
 //!
 //! With a μ for each contact there are [`label_beats`] between forces and status, and the status of each of
 //! `partition.max_contacts` contacts follows, the contact with the largest load first; those beyond the last have neither
@@ -17,42 +14,10 @@
 //! With a network the score is a word of two ln σ instead, that of μ1 in the lower half, in 1/384, σ in units of mu_max
 //! ([`ln_sigma_word`]); the saturations of `estimate` and `relax` are counted with those of `rescale`.
 
-use serde::Serialize;
-
 use super::load::VERSION_BITS;
+use crate::result::flags::{Feature, Flag, FlagSet, StatusField};
 
-/// Status beats per subarray after the forces.
-pub const STATUS_BEATS: usize = 3;
-
-/// Flag bit: the centroid condition of the scene is met.
-pub const FLAG_CONDITION: u32 = 1;
-/// Flag bit: the search found a candidate with Σp > 0; with a network, it gave μ.
-pub const FLAG_FOUND: u32 = 1 << 1;
-/// Flag bit: no taxel's |fz| reaches the threshold, or all are zero.
-pub const FLAG_NO_CONTACT: u32 = 1 << 2;
-/// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
-pub const FLAG_FRAMING: u32 = 1 << 3;
-/// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
-/// "signature"` ([`crate::fixed::plan::check`]).
-pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
-/// Flag bit: there are more contacts than get a μ; only with `partition.case = "contacts"`.
-pub const FLAG_MORE_CONTACTS: u32 = 1 << 5;
-/// Flag bit: the tables are not whole, and every stress is taken as 0; only with `hardware.tables = "writable"`
-/// ([`load`](super::load)).
-pub const FLAG_TABLES: u32 = 1 << 6;
-/// Flag bit: a sample of the frame was at an end of the converter's range; only with `hardware.source = "adc-scan"`, as the next
-/// ([`scan`](super::scan)).
-pub const FLAG_RAIL: u32 = 1 << 7;
-/// Flag bit: a sample of the frame named another channel than that asked for.
-pub const FLAG_CHANNEL: u32 = 1 << 10;
-/// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
-pub const CASE_SHIFT: u32 = 8;
-/// Position of the version of the tables beside the shift of `normalise`.
-pub const TABLES_SHIFT: u32 = 16;
-/// Bit above the version: the last image was refused.
-pub const TABLES_REFUSED: u16 = 1 << VERSION_BITS;
-/// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.
-pub const FRAMES_SHIFT: u32 = 16;
+pub use crate::result::flags::STATUS_BEATS;
 
 /// Width of a label on the stream: 0 or the number of a contact.
 pub const LABEL_BITS: u32 = 4;
@@ -99,65 +64,120 @@ pub fn ln_sigma_of_word(word: i32) -> [i32; 2] {
     [i32::from(word as i16), word >> LN_SIGMA_BITS]
 }
 
-/// The decoded status of a subarray in one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Status {
-    /// μ* in units of mu_max / 384.
-    pub position: [i32; 2],
-    /// OR of the `FLAG_*` bits; with several cases, also the paper's number of the chosen case from bit [`CASE_SHIFT`]
-    /// on; with a sliding mean, the number of frames that it holds from bit [`FRAMES_SHIFT`] on.
-    pub flags: u32,
-    /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing; with a network the word of two ln σ.
-    pub score: i32,
-    /// Right shift of `rescale`.
-    pub rescale: u32,
-    /// Left shift of `normalise`, below 2^16.
-    pub normalise: u32,
-    /// Version of the tables, 15 bits, 0 for those of the bitstream; [`TABLES_REFUSED`] if the last image was refused.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub tables: u16,
-    /// Number of words saturated in `rescale`.
-    pub rescale_saturations: u32,
-    /// Number of force words saturated.
-    pub force_saturations: u32,
-    /// Cycles to the first output beat, from the frame's last beat into `receive`, with several rows of subarrays from the last
-    /// of the first row, without those in which the rest is awaited; for a frame that waited in the buffer, from the cycle
-    /// before its computation started.
-    pub cycles: u32,
+/// A number that a field of the status holds.
+trait Value {
+    /// The number from the field's bits.
+    fn of(bits: u32) -> Self;
 }
 
-fn is_zero(version: &u16) -> bool {
-    *version == 0
+impl Value for bool {
+    fn of(bits: u32) -> Self {
+        bits != 0
+    }
+}
+
+impl Value for i32 {
+    fn of(bits: u32) -> Self {
+        bits as i32
+    }
+}
+
+impl Value for u32 {
+    fn of(bits: u32) -> Self {
+        bits
+    }
+}
+
+/// Defines the status, a row for each field: constant, name and type, `[beat, word]`, `[lowest bit, bits]`, what the scene must
+/// ask for, meaning.
+macro_rules! status {
+    ($($constant:ident $field:ident: $kind:ident = $at:expr, $bits:expr, $feature:ident, $meaning:literal;)*) => {
+        /// The decoded status of a subarray, or of a contact, in one frame.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct Status {
+            $(#[doc = concat!($meaning, ".")] pub $field: $kind,)*
+            /// The flags whose [own bit](Flag::status_bit) is set.
+            pub raised: FlagSet,
+        }
+
+        $(
+            #[doc = concat!("Field of a status: ", $meaning, ".")]
+            pub const $constant: StatusField =
+                StatusField::new(stringify!($field), $at, $bits, Feature::$feature, $meaning);
+        )*
+
+        /// The fields of a status that are no flag's.
+        const FIELDS: &[StatusField] = &[$($constant),*];
+
+        impl Status {
+            /// The status as beats `[fx, fy, fz]`.
+            pub fn beats(&self) -> [[i32; 3]; STATUS_BEATS] {
+                let mut beats = [[0; 3]; STATUS_BEATS];
+                $($constant.put(&mut beats, self.$field as u32);)*
+                self.raised.put(&mut beats);
+                beats
+            }
+
+            /// The status from its beats; `None` unless there are [`STATUS_BEATS`] of them.
+            pub fn of_beats(beats: &[[i32; 3]]) -> Option<Self> {
+                (beats.len() == STATUS_BEATS).then(|| Status {
+                    $($field: Value::of($constant.get(beats)),)*
+                    raised: FlagSet::of_status(beats),
+                })
+            }
+        }
+    };
+}
+
+status! {
+    POSITION_X position_x: i32 = [0, 0], [0, 32], Always, "μ1* in mu_max/384";
+    POSITION_Y position_y: i32 = [0, 1], [0, 32], Always, "μ2* in mu_max/384";
+    CONDITION condition: bool = [0, 2], [0, 1], Always, "the subarray or contact meets the condition of the scene";
+    FOUND found: bool = [0, 2], [1, 1], Always, "the search found a candidate with Σp > 0; with a network, it gave μ";
+    FRAMING framing: bool = [0, 2], [3, 1], Always,
+        "since the last frame sent `tlast` came early or was missing, and the frame concerned was dropped";
+    CASE case: u32 = [0, 2], [8, 2], Adaptive, "the paper's number of the case that was taken";
+    FRAMES frames: u32 = [0, 2], [16, 13], SlidingMean, "number of frames in the mean, up to 2^(average+1) − 1";
+    SCORE score: i32 = [1, 0], [0, 32], Always,
+        "score at μ* in 2^−6 bit, 0 if nothing was found; with a network a word of two ln σ, that of μ1 in the lower half";
+    RESCALE rescale: u32 = [1, 1], [0, 32], Always, "right shift of `rescale`";
+    NORMALISE normalise: u32 = [1, 2], [0, 16], Always, "left shift of `normalise`";
+    TABLES_VERSION tables: u32 = [1, 2], [16, VERSION_BITS], WritableTables,
+        "version of the tables, 0 for those of the bitstream";
+    RESCALE_SATURATIONS rescale_saturations: u32 = [2, 0], [0, 32], Always,
+        "number of words saturated in `rescale`, `estimate`, `shear` and `relax`";
+    FORCE_SATURATIONS force_saturations: u32 = [2, 1], [0, 32], Always, "number of force words saturated in the frame";
+    CYCLES cycles: u32 = [2, 2], [0, 32], Always, "cycles to the first output beat";
 }
 
 impl Status {
-    /// The status as beats `[fx, fy, fz]`.
-    pub fn beats(&self) -> [[i32; 3]; STATUS_BEATS] {
-        [
-            [self.position[0], self.position[1], self.flags as i32],
-            [self.score, self.rescale as i32, (u32::from(self.tables) << TABLES_SHIFT | self.normalise) as i32],
-            [self.rescale_saturations as i32, self.force_saturations as i32, self.cycles as i32],
-        ]
+    /// The statuses in the status beats of a frame.
+    pub fn all(beats: &[[i32; 3]]) -> impl Iterator<Item = Status> + '_ {
+        beats.chunks(STATUS_BEATS).filter_map(Status::of_beats)
     }
 
-    /// The status from its beats; `None` unless there are [`STATUS_BEATS`] of them.
-    pub fn of_beats(beats: &[[i32; 3]]) -> Option<Self> {
-        let &[[x, y, flags], [score, rescale, normalise], [rescale_saturations, force_saturations, cycles]] = beats
-        else {
-            return None;
-        };
-        Some(Status {
-            position: [x, y],
-            flags: flags as u32,
-            score,
-            rescale: rescale as u32,
-            normalise: normalise as u32 & ((1 << TABLES_SHIFT) - 1),
-            tables: (normalise as u32 >> TABLES_SHIFT) as u16,
-            rescale_saturations: rescale_saturations as u32,
-            force_saturations: force_saturations as u32,
-            cycles: cycles as u32,
-        })
+    /// μ* in units of mu_max / 384, [x, y].
+    pub fn position(&self) -> [i32; 2] {
+        [self.position_x, self.position_y]
     }
+
+    /// The flags that the status raises: those with a bit of their own, and those that follow from other fields.
+    pub fn flags(&self) -> FlagSet {
+        let others = [
+            (Flag::ConditionUnmet, !self.condition),
+            (Flag::NoCompression, self.condition && !self.found),
+            (Flag::Saturated, self.rescale_saturations > 0 || self.force_saturations > 0),
+        ];
+        self.raised | FlagSet::raised(others)
+    }
+}
+
+/// All fields of a status, those of flags among them, in the order of beats, words and bits.
+pub fn status_fields() -> Vec<StatusField> {
+    let of_flags = Flag::ALL.into_iter().filter_map(Flag::status_bit);
+    let mut all: Vec<StatusField> = FIELDS.iter().copied().chain(of_flags).collect();
+    all.sort_by_key(|field| (field.beat, field.word, field.low));
+    all
 }
 
 #[cfg(test)]
@@ -183,9 +203,60 @@ mod tests {
 
     #[test]
     fn beats_read_back() {
-        let status =
-            Status { position: [-3, 384], flags: 5, score: -70_000, normalise: 3, tables: 0x8005, ..Status::default() };
-        assert_eq!(Status::of_beats(&status.beats()), Some(status));
-        assert_eq!(Status::of_beats(&[[0; 3]]), None);
+        let status = Status {
+            position_x: -3,
+            position_y: 384,
+            condition: true,
+            case: 3,
+            frames: 8191,
+            score: -70_000,
+            normalise: 3,
+            tables: 5,
+            cycles: 77,
+            raised: Flag::ALL.into_iter().filter(|flag| flag.status_bit().is_some()).collect(),
+            ..Status::default()
+        };
+        let beats = status.beats();
+        assert_eq!(Status::of_beats(&beats), Some(status));
+        assert_eq!(Status::of_beats(&beats[..1]), None);
+        // Condition; no_contact, coefficients, more_contacts, tables, rail; case; wrong_channel; frames.
+        let flags = 1 | 1 << 2 | 0b1111 << 4 | 3 << 8 | 1 << 10 | 8191 << 16;
+        assert_eq!(beats, [[-3, 384, flags], [-70_000, 0, 0x8005_0003u32 as i32], [0, 0, 77]]);
+    }
+
+    /// A field written alone changes only its bits, and reads back: no two fields share a bit.
+    #[test]
+    fn fields_do_not_overlap() {
+        let all = status_fields();
+        for word in all.iter().map(|field| [field.beat, field.word]) {
+            let of_word = all.iter().filter(|field| [field.beat, field.word] == word);
+            let bits: u32 = of_word.clone().map(|field| field.bits).sum();
+            assert_eq!(of_word.fold(0, |mask, field| mask | field.mask()).count_ones(), bits, "{word:?}");
+        }
+        let mut names: Vec<String> = all.iter().filter_map(|field| Some(field.manifest_entry()?.0)).collect();
+        names.sort();
+        let count = names.len();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        // None of the three words of a beat is without a field.
+        assert_eq!(all.iter().filter(|field| field.low == 0).count(), STATUS_BEATS * 3);
+    }
+
+    /// Each flag is raised by its bit alone, the others by what they follow from.
+    #[test]
+    fn each_flag_of_a_status_is_raised() {
+        let good = Status { condition: true, found: true, ..Status::default() };
+        assert_eq!(good.flags(), FlagSet::default());
+        for flag in Flag::ALL {
+            let mut beats = good.beats();
+            let Some(bit) = flag.status_bit() else { continue };
+            bit.put(&mut beats, 1);
+            assert!(Status::of_beats(&beats).unwrap().flags().iter().eq([flag]), "{flag:?}");
+        }
+        let of = |status: Status| status.flags().iter().collect::<Vec<_>>();
+        assert_eq!(of(Status { condition: false, ..good }), [Flag::ConditionUnmet]);
+        assert_eq!(of(Status { found: false, ..good }), [Flag::NoCompression]);
+        assert_eq!(of(Status { force_saturations: 1, ..good }), [Flag::Saturated]);
+        assert_eq!(of(Status { rescale_saturations: 1, ..good }), [Flag::Saturated]);
     }
 }

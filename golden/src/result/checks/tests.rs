@@ -6,11 +6,12 @@ use crate::data::frame::Frame;
 use crate::data::generator::generate;
 use crate::estimate::float::Golden;
 use crate::fixed::Model;
+use crate::result::flags::Flag;
 use crate::result::reconstruct::Reconstruction;
-use crate::spec::scene::{EstimatorKind, Medium, ObjectiveKind};
+use crate::spec::scene::{EstimatorKind, Medium, ObjectiveKind, Scene};
 use crate::spec::sensor::Sensor;
 
-fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
+pub(super) fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
     let contact = Contact {
         shape: Some("hertz-circle".to_string()),
         size_mm: vec![radius_mm],
@@ -24,12 +25,12 @@ fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2])
 /// The search, which both models have.
 fn sensor_1() -> Scene {
     let mut scene = Scene::builtin("sensor-1").unwrap();
-    scene.search.estimator = EstimatorKind::Search;
+    scene.search.estimator = Some(EstimatorKind::Search);
     scene
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
+    Golden::reference(scene).unwrap().run(frame).unwrap()
 }
 
 /// Counts of 0.00035 MPa above offsets near 600, a table, a tare frame and a dead taxel: a full scale between the
@@ -83,7 +84,7 @@ fn one_of_several_averaged_frames_beyond_full_scale_is_enough() {
         frame.stress_MPa.iter_mut().for_each(|b| *b *= factor);
         frame
     };
-    let (golden, fixed) = (Golden::new(&scene.for_hardware()).unwrap(), Model::new(&scene).unwrap());
+    let (golden, fixed) = (Golden::reference(&scene).unwrap(), Model::new(&scene).unwrap());
     for (factor, flagged) in [(1.6, true), (1.4, false)] {
         let frames = [scaled(factor), scaled(0.1)];
         let results = [golden.run_averaged(&frames).unwrap(), fixed.reconstruct_averaged(&frames).unwrap()];
@@ -172,7 +173,7 @@ fn large_contacts_are_right_or_flagged() {
     for sensor in [Scene::builtin("sensor-1").unwrap().sensor, thin] {
         for objective in [ObjectiveKind::Symmetric, ObjectiveKind::Patch, ObjectiveKind::Auto] {
             let mut scene = Scene::of_sensor(&sensor, "large");
-            (scene.search.estimator, scene.search.objective) = (EstimatorKind::Search, objective);
+            (scene.search.estimator, scene.search.objective) = (Some(EstimatorKind::Search), objective);
             for radius in [6.0, 8.0, 10.0] {
                 let frame = press(&sensor, radius, 15.0, [3.0, 2.0]);
                 let result = run(&scene, &frame);

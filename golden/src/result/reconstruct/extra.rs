@@ -14,7 +14,7 @@
 //! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
-use super::contacts::ContactEstimate;
+use super::contact_estimate::ContactEstimate;
 use super::output::{shear_sigma_N, Resultant, Wrench};
 use super::suspect_taxel::SuspectTaxel;
 use crate::data::frame::Forces;

@@ -10,7 +10,6 @@ impl Reconstruction {
     /// The figures that follow from this result and its calibrated frame.
     pub fn figures(&self, scene: &Scene, frame: &Frame) -> Checks {
         Checks {
-            full_scale_share: None,
             peak_MPa: frame.peak_MPa(),
             mu_share: mu_share(scene, self),
             border_share: border_share(&scene.sensor, &self.forces_N.fz),

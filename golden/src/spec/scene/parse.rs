@@ -1,6 +1,7 @@
 //! Parsing and checking scene text: the schema, and one function per table.
 
 use super::adc_scan::{adc_scan, FIELDS as ADC_SCAN_FIELDS};
+use super::estimator::FORMER_NAMES;
 use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
@@ -26,7 +27,7 @@ const SCHEMA: [(&str, &[&str]); 13] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check", "search_width", "tables", "source"]),
+    ("hardware", &["board", "link", "coefficient_check", "estimator", "search_width", "tables", "source"]),
     ("hardware.adc_scan", &ADC_SCAN_FIELDS),
     ("hardware.table_range", &["gain", "thickness_mm", "dead_taxels"]),
     (
@@ -249,7 +250,7 @@ fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
     let mu_max = reader.number("search.mu_max", in_range, &allowed)?;
     let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
     Ok(SearchSpec {
-        estimator: reader.choice("search.estimator", &EstimatorKind::NAMES)?,
+        estimator: estimator(reader, "search.estimator", &EstimatorKind::NAMES)?,
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
@@ -258,6 +259,19 @@ fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
         network: file(reader, origin, "search.network")?,
         deviations: file(reader, origin, "search.deviations")?,
     })
+}
+
+/// A stated estimator. The error for a name of an earlier version says what takes its place.
+fn estimator(
+    reader: &Reader,
+    path: &str,
+    names: &[(&str, EstimatorKind)],
+) -> Result<Option<EstimatorKind>, SceneError> {
+    let Some(value) = reader.value(path) else { return Ok(None) };
+    match FORMER_NAMES.iter().find(|(former, _)| value.as_str() == Some(former)) {
+        Some((_, now)) => Err(reader.wrong(path, value, *now)),
+        None => reader.one_of(path, value, names).map(Some),
+    }
 }
 
 fn degree(reader: &Reader) -> Result<Option<usize>, SceneError> {
@@ -314,6 +328,7 @@ fn hardware(reader: &Reader, origin: &str, sensor: &Sensor, dead: usize) -> Resu
         board: board(reader, origin)?,
         link: reader.choice("hardware.link", &LinkKind::NAMES)?,
         coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
+        estimator: estimator(reader, "hardware.estimator", &EstimatorKind::HARDWARE_NAMES)?,
         search_width: search_width(reader)?,
         tables: reader.choice("hardware.tables", &tables)?,
         table_range: table_range(reader, sensor, dead)?,

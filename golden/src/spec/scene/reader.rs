@@ -112,9 +112,11 @@ impl<'a> Reader<'a> {
 
     /// One of the named choices, or the type's default if the field is absent.
     pub(super) fn choice<T: Copy + Default>(&self, path: &str, names: &[(&str, T)]) -> Result<T, SceneError> {
-        let Some(value) = self.value(path) else {
-            return Ok(T::default());
-        };
+        self.value(path).map_or_else(|| Ok(T::default()), |value| self.one_of(path, value, names))
+    }
+
+    /// The named choice that is the value of a field.
+    pub(super) fn one_of<T: Copy>(&self, path: &str, value: &Value, names: &[(&str, T)]) -> Result<T, SceneError> {
         let named = names.iter().find(|(name, _)| value.as_str() == Some(name));
         named.map(|(_, choice)| *choice).ok_or_else(|| {
             let quoted: Vec<_> = names.iter().map(|(name, _)| format!("{name:?}")).collect();

@@ -8,15 +8,16 @@
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.degree` | all | 1 … 3 |
-//! | `search.estimator` | all; "evidence" and "learned" as below | "learned" as "network"; "auto" as [`Scene::chosen_for_hardware`] says; "search" for the others |
+//! | `search.estimator` | all, as below | any: the hardware has `hardware.estimator` |
+//! | `hardware.estimator` | any: the model has `search.estimator` | "search", "network" |
 //! | `search.form` | all, "orthogonal" up to [`crate::estimate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | with a network |
 //!
-//! The estimators "evidence" and "learned" take no objective but the default, no "orthogonal" form, mu_max above 0,
-//! partition 0 or "contacts", since they find the contacts themselves, and a pitch of up to 3 thicknesses, on a bonded
-//! layer 1.5. "network", and "learned" in hardware, takes case 0 of up to 144 taxels or "contacts", mu_max above 0, no
-//! "search_width", not the serial engine. "auto" takes "evidence" for these scenes and "search" for the others.
+//! The estimators "evidence", "evidence+network" and "combined" take no objective but the default, no "orthogonal" form,
+//! mu_max above 0, partition 0 or "contacts", since they find the contacts themselves, and a pitch of up to 3 thicknesses,
+//! on a bonded layer 1.5. "network" takes case 0 of up to 144 taxels or "contacts", mu_max above 0, no "search_width", not
+//! the serial engine.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::physics::matrices::Matrices::without`]). The broken
 //! mirror symmetry takes up to four products instead of one ([`crate::fixed::words::coefficients`]). A subarray with a
@@ -57,9 +58,6 @@ const LARGEST_PITCH: f64 = 3.0;
 /// The same on a bonded layer, whose stress spreads less. At 1.33 the standard deviations hold; at 2 one frame in ten is
 /// off by more than three of them.
 const LARGEST_PITCH_BONDED: f64 = 1.5;
-/// Stated noise over full scale below which the search is nearer to the truth than a network. On 200 drawn frames on sensor-1
-/// its median e_t is 1.8 % without noise and 3.9 % at 1e-5; that of the network is 3.1 and 3.2 %.
-const QUIET: f64 = 1e-5;
 
 impl Scene {
     /// Checks that the hardware implements every value of the scene.
@@ -73,10 +71,10 @@ impl Scene {
         self.require([
             rule(self.medium != Medium::HalfSpace, "medium.kind", self.medium.to_string(), "half-space"),
             rule(
-                self.partition.case == Case::Contacts && self.for_hardware().estimator() != EstimatorKind::Network,
+                self.partition.case == Case::Contacts && self.hardware_estimator() != EstimatorKind::Network,
                 "partition.case",
                 self.partition.case.to_string(),
-                "0, 1, 2, 3, adaptive, rows and cols; contacts with search.estimator = learned",
+                "0, 1, 2, 3, adaptive, rows and cols; contacts with hardware.estimator = network",
             ),
             rule(
                 several && self.partition.choices(&self.sensor).len() < 2,
@@ -109,6 +107,12 @@ impl Scene {
                 search.objective.name().to_string(),
                 "sparse",
             ),
+            rule(
+                !EstimatorKind::HARDWARE_NAMES.iter().any(|(_, kind)| *kind == self.hardware_estimator()),
+                "hardware.estimator",
+                self.hardware_estimator().name().to_string(),
+                "search, network",
+            ),
             rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
             rule(
                 search.degree.is_some_and(|degree| degree > MAX_DEGREE),
@@ -123,16 +127,16 @@ impl Scene {
                 "none, or partition.case = 0 or contacts",
             ),
             rule(
-                input.unipolar && self.for_hardware().estimator() != EstimatorKind::Network,
+                input.unipolar && self.hardware_estimator() != EstimatorKind::Network,
                 "input.unipolar",
                 "true".to_string(),
-                "false, or search.estimator = learned",
+                "false, or hardware.estimator = network",
             ),
             rule(several && self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adaptive"),
             rule(
-                self.hardware.has_writable_coefficients() && self.for_hardware().estimator() == EstimatorKind::Network,
-                "search.estimator",
-                search.estimator.name().to_string(),
+                self.hardware.has_writable_coefficients() && self.hardware_estimator() == EstimatorKind::Network,
+                "hardware.estimator",
+                EstimatorKind::Network.name().to_string(),
                 "search, with hardware.table_range.thickness_mm or dead_taxels: a network was trained for one cover",
             ),
             rule(
@@ -156,7 +160,7 @@ impl Scene {
             ),
         ])?;
         self.require_scannable()?;
-        match self.for_hardware().estimator() {
+        match self.hardware_estimator() {
             EstimatorKind::Network => self.require_network(),
             _ => Ok(()),
         }
@@ -189,24 +193,8 @@ impl Scene {
         ])
     }
 
-    /// What `auto` takes in hardware, `network` or `search`, and why. The network is taken where the scene names one and
-    /// states, by `noise_floor_MPa`, noise that a real array has. A network that was trained for something else, or that the
-    /// board cannot hold, is an error then.
-    pub fn chosen_for_hardware(&self) -> (EstimatorKind, String) {
-        let noise_MPa = self.search.noise_floor_MPa * self.input.noise_share();
-        let quiet = self.input.full_scale_MPa.is_some_and(|full| noise_MPa < QUIET * full);
-        let search = |why: &str| (EstimatorKind::Search, why.to_owned());
-        match self.require_network() {
-            _ if self.search.network.is_none() => search("the scene names no network"),
-            _ if noise_MPa == 0.0 => search("the scene states no noise"),
-            _ if quiet => search("the stated noise is below 1e-5 of full scale"),
-            Err(refused) => search(&refused.to_string()),
-            Ok(()) => (EstimatorKind::Network, "the scene states noise and names a network".to_owned()),
-        }
-    }
-
     /// Checks that a network can give the μ of the whole array and p(μ) be that of the series.
-    fn require_network(&self) -> Result<(), SceneError> {
+    pub(super) fn require_network(&self) -> Result<(), SceneError> {
         let (search, sensor) = (&self.search, &self.sensor);
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
@@ -214,20 +202,20 @@ impl Scene {
                 !matches!(self.partition.case, Case::WHOLE | Case::Contacts),
                 "partition.case",
                 self.partition.case.to_string(),
-                "0, with search.estimator = learned",
+                "0, with the estimator network",
             ),
             rule(
                 self.partition.case == Case::WHOLE && Window::of(sensor).place != Place::Array,
                 "sensor.rows",
                 sensor.rows.to_string(),
-                "with sensor.cols up to 144 taxels, with search.estimator = learned",
+                "with sensor.cols up to 144 taxels, with the estimator network",
             ),
-            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with search.estimator = learned"),
+            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with the estimator network"),
             rule(
                 self.hardware.search_width.is_some(),
                 "hardware.search_width",
                 self.hardware.search_width.unwrap_or_default().to_string(),
-                "left out, with search.estimator = learned: nothing is searched",
+                "left out, with the estimator network: nothing is searched",
             ),
         ])
     }
@@ -243,9 +231,9 @@ impl Scene {
         let none = "none on a board with the serial engine";
         self.require([
             rule(
-                self.for_hardware().estimator() == EstimatorKind::Network,
-                "search.estimator",
-                self.search.estimator.name().to_string(),
+                self.hardware_estimator() == EstimatorKind::Network,
+                "hardware.estimator",
+                EstimatorKind::Network.name().to_string(),
                 "search on a board with the serial engine",
             ),
             rule(sensor.rows % 2 != 0, "sensor.rows", sensor.rows.to_string(), even),
@@ -309,13 +297,11 @@ impl Scene {
         // Regions and the choice of a case are compared by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
-        if let Some(refusal) = self
-            .evidence_refusal()
-            .filter(|_| matches!(self.search.estimator, EstimatorKind::Evidence | EstimatorKind::Learned))
-        {
+        let estimator = self.model_estimator();
+        if let Some(refusal) = self.evidence_refusal().filter(|_| estimator.has_evidence()) {
             return self.require([refusal]);
         }
-        if self.estimator() == EstimatorKind::Network {
+        if estimator == EstimatorKind::Network {
             self.require_network()?;
         }
         self.require([
@@ -345,12 +331,10 @@ impl Scene {
         let Scene { search, partition, sensor, .. } = self;
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         let (largest_pitch, thick_enough) = match self.medium {
-            Medium::HalfSpace => {
-                (LARGEST_PITCH, "at least a third of the larger pitch, with search.estimator = evidence")
-            }
+            Medium::HalfSpace => (LARGEST_PITCH, "at least a third of the larger pitch, with the estimator evidence"),
             Medium::BondedLayer { .. } => (
                 LARGEST_PITCH_BONDED,
-                "on a bonded layer at least two thirds of the larger pitch, with search.estimator = evidence",
+                "on a bonded layer at least two thirds of the larger pitch, with the estimator evidence",
             ),
         };
         let rules = [
@@ -364,20 +348,20 @@ impl Scene {
                 !matches!(partition.case, Case::WHOLE | Case::Contacts),
                 "partition.case",
                 partition.case.to_string(),
-                "0 or contacts, with search.estimator = evidence",
+                "0 or contacts, with the estimator evidence",
             ),
             rule(
                 search.objective != ObjectiveKind::Sparse,
                 "search.objective",
                 search.objective.name().to_string(),
-                "left out, with search.estimator = evidence",
+                "left out, with the estimator evidence",
             ),
-            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with search.estimator = evidence"),
+            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with the estimator evidence"),
             rule(
                 search.form != Form::Oblique,
                 "search.form",
                 "orthogonal".to_string(),
-                "oblique, with search.estimator = evidence",
+                "oblique, with the estimator evidence",
             ),
         ];
         rules.into_iter().find(|rule| rule.refused)

@@ -257,7 +257,7 @@ fn choices_not_built_yet_say_so() {
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, adaptive, rows and"),
         (
-            "[partition]\ncase = \"contacts\"\ncondition = \"both-signs\"\n[search]\nestimator = \"learned\"",
+            "[partition]\ncase = \"contacts\"\ncondition = \"both-signs\"\n[hardware]\nestimator = \"network\"",
             "partition.condition = both-signs; available: loaded, with contacts",
         ),
         ("[partition]\ncase = \"adaptive\"\n[search]\nmu_max = 0", "search.mu_max = 0; available: above 0, with"),
@@ -331,11 +331,12 @@ fn files_are_read_and_bounded() {
 fn auto_takes_the_network_in_hardware_where_noise_can_be() {
     let chosen = |change: fn(&mut Scene)| {
         let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
-        scene.search.estimator = EstimatorKind::Auto;
+        scene.search.estimator = None;
+        scene.hardware.estimator = None;
         (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (1e-4, Some(0.1));
         change(&mut scene);
-        assert_eq!(scene.for_hardware().search.estimator, scene.chosen_for_hardware().0);
-        scene.chosen_for_hardware()
+        assert_eq!(scene.hardware_estimator(), scene.choose_for_hardware().0);
+        scene.choose_for_hardware()
     };
     assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network".to_owned()));
     // Without a full scale nothing says that the noise is small.
@@ -356,4 +357,47 @@ fn auto_takes_the_network_in_hardware_where_noise_can_be() {
     // Of a mean of 64 frames more noise is allowed in each.
     assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (7e-6, 6)).0, EstimatorKind::Search);
     assert_eq!(chosen(|s| s.search.noise_floor_MPa = 1.1e-6).0, EstimatorKind::Network);
+}
+
+/// A name is an algorithm; a name of an earlier version is refused with the names that take its place.
+#[test]
+fn estimators_are_named_for_the_model_and_for_the_hardware() {
+    let text = |more: &str| {
+        format!("[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n{more}")
+    };
+    let parsed = |more: &str| Scene::parse(&text(more), "own.toml");
+    let both = |more: &str| {
+        let scene = parsed(more).unwrap();
+        (scene.model_estimator(), scene.hardware_estimator())
+    };
+    let stated = |name: &str| both(&format!("[search]\nestimator = \"{name}\"\n"));
+    use EstimatorKind::{Combined, Evidence, EvidenceNetwork, Network, Search};
+    assert_eq!(both(""), (Evidence, Search));
+    assert_eq!(both("[search]\nnetwork = \"own.network\"\n"), (Combined, Search));
+    assert_eq!(
+        EstimatorKind::NAMES.map(|(name, _)| stated(name)),
+        [(Search, Search), (Evidence, Search), (Network, Network), (EvidenceNetwork, Network), (Combined, Network),]
+    );
+    let split = "[search]\nestimator = \"evidence+network\"\n[hardware]\nestimator = \"search\"\n";
+    assert_eq!(both(split), (EvidenceNetwork, Search));
+    // A search by subarrays has no evidence.
+    assert_eq!(both("[partition]\ncase = 1\n"), (Search, Search));
+    let refused = |more: &str| parsed(more).unwrap_err().to_string();
+    for table in ["search", "hardware"] {
+        let error = refused(&format!("[{table}]\nestimator = \"learned\"\n"));
+        for named in [
+            "own.toml",
+            &format!("{table}.estimator = \"learned\""),
+            "\"evidence+network\"",
+            "hardware.estimator = \"network\"",
+        ] {
+            assert!(error.contains(named), "{named}: {error}");
+        }
+    }
+    assert!(refused("[search]\nestimator = \"auto\"\n").contains("left out"));
+    assert!(refused("[hardware]\nestimator = \"evidence\"\n").contains("\"search\" or \"network\""));
+    let mut scene = parsed("").unwrap();
+    scene.hardware.estimator = Some(Evidence);
+    let error = scene.require_supported().unwrap_err().to_string();
+    assert!(error.contains("hardware.estimator = evidence") && error.contains("search, network"), "{error}");
 }

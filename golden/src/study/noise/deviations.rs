@@ -14,6 +14,7 @@ use super::statistic::quantile;
 use super::StudyError;
 use crate::data::frame::Frame;
 use crate::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
+use crate::engine::{result, Engine, FindNoise};
 use crate::estimate::deviations::{Deviations, Load, Subject};
 use crate::estimate::float::Golden;
 use crate::fixed::Model;
@@ -21,6 +22,7 @@ use crate::result::checks::COUNTS_FROM;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, ForceOutput, InputSpec, Scene, ThresholdSpec};
 use rayon::prelude::*;
+use std::slice::from_ref;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of errors within one standard deviation of a normal distribution.
@@ -101,7 +103,7 @@ pub fn deviations_coverage(
 }
 
 fn subject(scene: &Scene) -> Result<Subject, StudyError> {
-    Subject::of(scene).ok_or_else(|| StudyError::Parameter {
+    Subject::of(scene, EstimatorKind::Search).ok_or_else(|| StudyError::Parameter {
         field: "scene",
         value: scene.name.clone(),
         allowed: "one that is searched: objective sparse, form oblique, mu_max above 0, no contacts, not unipolar",
@@ -140,14 +142,20 @@ fn errors(
     let options = DrawOptions { shapes, ratio, seed, ..Default::default() };
     let study = ShapeStudy { levels: levels.to_vec(), draws, options, ..Default::default() };
     study.check()?;
-    let engine = Engine::new(scene)?;
+    let engine = engine(scene)?;
     let drawn = study.frames(scene)?;
     let done = AtomicUsize::new(0);
     let at = |level: usize| {
         let readings = readings(&drawn, &study.converter(level), scene)?;
         let of = |(drawn, reading): (&DrawnFrame, &Frame)| {
             let reading = reading.clone().mask_dead(&scene.input.dead);
-            let own = errors_of(scene, drawn, &reading, &engine.run(&reading)?, levels[level] * PEAK);
+            let own = errors_of(
+                scene,
+                drawn,
+                &reading,
+                &result(&*engine, from_ref(&reading), FindNoise::No)?,
+                levels[level] * PEAK,
+            );
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, levels.len() * draws);
             Ok(own)
         };
@@ -166,30 +174,17 @@ fn bare(scene: &Scene) -> Scene {
     scene.output.forces = ForceOutput::Taxels;
     scene.search.noise_floor_MPa = 0.0;
     scene.search.deviations = None;
-    scene.search.estimator = EstimatorKind::Search;
+    scene.search.estimator = Some(EstimatorKind::Search);
+    scene.hardware.estimator = Some(EstimatorKind::Search);
     scene
 }
 
 /// The model that is measured.
-enum Engine {
-    Fixed(Box<Model>),
-    Golden(Box<Golden>),
-}
-
-impl Engine {
-    fn new(scene: &Scene) -> Result<Engine, StudyError> {
-        Ok(match scene.require_supported() {
-            Ok(()) => Engine::Fixed(Box::new(Model::without_fit_check(scene)?)),
-            Err(_) => Engine::Golden(Box::new(Golden::new(scene)?)),
-        })
-    }
-
-    fn run(&self, frame: &Frame) -> Result<Reconstruction, StudyError> {
-        Ok(match self {
-            Engine::Fixed(model) => model.reconstruct(frame)?,
-            Engine::Golden(golden) => golden.run(frame)?,
-        })
-    }
+fn engine(scene: &Scene) -> Result<Box<dyn Engine + Send + Sync>, StudyError> {
+    Ok(match scene.require_supported() {
+        Ok(()) => Box::new(Model::without_fit_check(scene)?),
+        Err(_) => Box::new(Golden::new(scene)?),
+    })
 }
 
 /// The errors of the searched subarrays of one result that carry a part of the true load worth a μ.

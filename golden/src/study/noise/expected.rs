@@ -82,7 +82,7 @@ pub fn expected(
     noise: &StatedNoise,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ShapeRow>, StudyError> {
-    let mut bare = scene.clone();
+    let mut bare = scene.clone().with_chosen_hardware();
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.hardware.take_stress();
     bare.input = InputSpec { dead, unipolar, gain_spread, plausible_MPa, ..InputSpec::default() };
@@ -94,7 +94,7 @@ pub fn expected(
     if mu_max > 0.0 {
         options.ratio = options.ratio.map(|ratio| ratio * mu_max / SearchSpec::default().mu_max);
     }
-    let mut candidates = vec![Candidate::Estimator(scene.estimator())];
+    let mut candidates = vec![Candidate::Scene];
     candidates.extend(asked.with_hardware.then_some(Candidate::Hardware));
     let share = noise.share();
     let levels = share.map_or_else(|| ShapeStudy::default().levels, |share| vec![share]);

@@ -78,7 +78,7 @@ pub fn sensitivities(
         converter.gain_spread = converter.gain_spread.hypot(setting.gain_spread);
         let readings = readings(drawn, &converter, &own)?;
         for &candidate in &study.candidates {
-            let outcomes = outcomes(&candidate.stated(&own), drawn, &readings, &step)?;
+            let outcomes = outcomes(candidate, &candidate.stated(&own), drawn, &readings, &step)?;
             rows.push(SensitivityRow {
                 what: setting.what,
                 off: setting.off,

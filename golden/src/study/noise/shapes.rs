@@ -121,9 +121,9 @@ impl Candidate {
         if self == Candidate::Hardware {
             return "hardware".to_owned();
         }
-        let search = self.stated(scene).search;
-        match search.estimator {
-            EstimatorKind::Search => format!("search {}", search.objective.name()),
+        let stated = self.stated(scene);
+        match stated.model_estimator() {
+            EstimatorKind::Search => format!("search {}", stated.search.objective.name()),
             other => other.name().to_owned(),
         }
     }
@@ -133,15 +133,42 @@ impl Candidate {
         let mut scene = scene.clone();
         match self {
             Candidate::Scene | Candidate::Hardware => {}
-            Candidate::Estimator(kind) => scene.search.estimator = kind,
+            Candidate::Estimator(kind) => scene.search.estimator = Some(kind),
             Candidate::Objective(kind) => {
-                scene.search.estimator = EstimatorKind::Search;
+                scene.search.estimator = Some(EstimatorKind::Search);
                 scene.search.objective = kind;
             }
         }
         scene
     }
+
+    /// What reconstructs averaged frames of stress of the scene `stated`, [`Candidate::stated`].
+    ///
+    /// The bit-true model reads each frame as codes of its own full scale unless the scene states one. Stated noise is used
+    /// for the standard deviations alone: the noise floor is a word of the hardware, which needs a full scale.
+    ///
+    /// # Errors
+    /// A scene that the model refuses.
+    pub(super) fn run(self, stated: &Scene) -> Result<Box<Run>, StudyError> {
+        if self != Candidate::Hardware {
+            let golden = Golden::new(stated)?;
+            return Ok(Box::new(move |frame| Ok(golden.run(frame)?)));
+        }
+        let mut scene = stated.clone().with_chosen_hardware();
+        let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
+        scene.search.noise_floor_MPa = 0.0;
+        let model = Model::new(&scene)?;
+        let deviations = Deviations::of_scene(&model.scene, model.estimator()).map_err(FixedError::from)?;
+        Ok(Box::new(move |frame| {
+            let mut result = model.reconstruct(frame)?;
+            deviations.iter().for_each(|table| table.add(&mut result, &scene, frame, noise_MPa));
+            Ok(result)
+        }))
+    }
 }
+
+/// Reconstructs a frame of stress.
+pub(super) type Run = dyn Fn(&Frame) -> Result<Reconstruction, StudyError> + Send + Sync;
 
 impl ShapeStudy {
     /// # Errors
@@ -193,45 +220,15 @@ pub(super) fn readings(drawn: &[DrawnFrame], converter: &Converter, stated: &Sce
     drawn.par_iter().enumerate().map(|(number, drawn)| read((number, drawn))).collect()
 }
 
-/// Reconstructs every reading by the golden model; `step` is called after each.
+/// Reconstructs every reading by a candidate for the scene `stated`, [`Candidate::stated`]; `step` is called after each.
 pub(super) fn outcomes(
-    scene: &Scene,
+    candidate: Candidate,
+    stated: &Scene,
     drawn: &[DrawnFrame],
     readings: &[Frame],
     step: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, StudyError> {
-    let engine = Golden::new(scene)?;
-    outcomes_of(&|frame| Ok(engine.run(frame)?), drawn, readings, step)
-}
-
-/// Reconstructs every reading by the bit-true model, which reads each frame as codes of its own full scale unless the scene
-/// states one. Stated noise is told for the standard deviations alone: the noise floor is a word of the hardware, which
-/// needs a full scale.
-fn outcomes_of_hardware(
-    scene: &Scene,
-    drawn: &[DrawnFrame],
-    readings: &[Frame],
-    step: &(dyn Fn() + Sync),
-) -> Result<Vec<Outcome>, StudyError> {
-    let mut scene = scene.for_hardware();
-    let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
-    scene.search.noise_floor_MPa = 0.0;
-    let engine = Model::new(&scene)?;
-    let deviations = Deviations::of_scene(&engine.scene).map_err(FixedError::from)?;
-    let run = |frame: &Frame| {
-        let mut result = engine.reconstruct(frame)?;
-        deviations.iter().for_each(|table| table.add(&mut result, &scene, frame, noise_MPa));
-        Ok(result)
-    };
-    outcomes_of(&run, drawn, readings, step)
-}
-
-fn outcomes_of(
-    run: &(dyn Fn(&Frame) -> Result<Reconstruction, StudyError> + Sync),
-    drawn: &[DrawnFrame],
-    readings: &[Frame],
-    step: &(dyn Fn() + Sync),
-) -> Result<Vec<Outcome>, StudyError> {
+    let run = candidate.run(stated)?;
     let one = |(drawn, reading): (&DrawnFrame, &Frame)| {
         let outcome = Outcome::new(drawn, &run(reading)?);
         step();
@@ -288,10 +285,7 @@ pub fn shape_study(
         let mut all = vec![("none".to_owned(), baseline.collect::<Vec<_>>())];
         for &candidate in &study.candidates {
             let named = candidate.stated(&stated);
-            let outcomes = match candidate {
-                Candidate::Hardware => outcomes_of_hardware(&named, &drawn, &readings, &step)?,
-                _ => outcomes(&named, &drawn, &readings, &step)?,
-            };
+            let outcomes = outcomes(candidate, &named, &drawn, &readings, &step)?;
             all.push((candidate.name(&stated), outcomes));
         }
         for (estimator, outcomes) in &all {

@@ -5,6 +5,7 @@ use super::contact::{ContactStress, HertzContact};
 use super::statistic::quantile;
 use crate::data::frame::{Frame, FrameError};
 use crate::data::generator::GeneratorError;
+use crate::engine::EngineError;
 use crate::estimate::float::{Golden, GoldenError};
 use crate::fixed::FixedError;
 use crate::random::Random;
@@ -79,6 +80,9 @@ pub enum StudyError {
     /// The scene has no bit-true model, or a frame no result in it.
     #[error(transparent)]
     Fixed(#[from] FixedError),
+    /// An engine refuses a frame.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
     /// A frame is not finite.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -151,9 +155,8 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
     let mut engines = Vec::new();
     for &kind in &study.objectives {
         let mut scene = scene.clone();
-        scene.search.estimator = EstimatorKind::Search;
         scene.search.objective = kind;
-        engines.push((kind, Golden::new(&scene)?));
+        engines.push((kind, Golden::with(&scene, EstimatorKind::Search)?));
     }
     for &frames in &averagings {
         for (level, &noise) in study.levels.iter().enumerate() {

@@ -28,11 +28,9 @@ use crate::data::generator::GeneratorError;
 use crate::estimate::float::Golden;
 use crate::estimate::learned::{LearnedError, Signature, GAINS, NOISE, RATIO};
 use crate::estimate::misfit::Misfit;
-use crate::fixed::Model;
 use crate::random::Random;
 use crate::result::flags::Flag;
-use crate::result::reconstruct::Reconstruction;
-use crate::spec::scene::Scene;
+use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::window::Place;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -95,9 +93,6 @@ struct Reading {
     frame: Frame,
     noise_MPa: f64,
 }
-
-/// An engine.
-type Run<'a> = dyn Fn(&Frame) -> Result<Reconstruction, StudyError> + Sync + 'a;
 
 /// Frames as a network's training draws them.
 struct Like<'a> {
@@ -260,7 +255,8 @@ pub fn misfit_limit(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Option<f64>, StudyError> {
     // The network alone is faster than the most probable forces at the same μ; not every scene has it.
-    let golden = Golden::new(&scene.for_hardware()).or_else(|_| Golden::new(scene))?;
+    let golden =
+        Golden::with(scene, EstimatorKind::Network).or_else(|_| Golden::with(scene, EstimatorKind::EvidenceNetwork))?;
     let (misfit, like) = (Misfit::new(scene, 1.0), Like::new(scene, seed));
     let done = AtomicUsize::new(0);
     let one = |number: u64| -> Result<Option<f64>, StudyError> {
@@ -291,10 +287,10 @@ pub fn unlike_study(
     // No noise is stated, and the hardware takes no noise floor without a full scale.
     let mut scene = scene.clone();
     scene.search.noise_floor_MPa = 0.0;
-    let Some(misfit) = Misfit::of_scene(&scene).map_err(golden)? else {
+    let Some(misfit) = Misfit::of_scene(&scene, scene.model_estimator()).map_err(golden)? else {
         let value = scene.search.network.as_ref().map_or("none".to_owned(), |path| path.display().to_string());
         let allowed =
-            "a network of search.estimator = learned with a limit of the misfit (dermis train --limit-of adds it)";
+            "a network with a limit of the misfit (dermis train --limit-of adds it), and search.estimator = network or evidence+network";
         return Err(StudyError::Parameter { field: "search.network", value, allowed });
     };
     let kinds = Kind::all();
@@ -302,16 +298,7 @@ pub fn unlike_study(
     let mut rows = Vec::new();
     for &candidate in estimators {
         let named = candidate.stated(&scene);
-        let run: Box<Run> = match candidate {
-            Candidate::Hardware => {
-                let model = Model::new(&named)?;
-                Box::new(move |frame| Ok(model.reconstruct(frame)?))
-            }
-            _ => {
-                let golden = Golden::new(&named)?;
-                Box::new(move |frame| Ok(golden.run(frame)?))
-            }
-        };
+        let run = candidate.run(&named)?;
         for &kind in &kinds {
             let one = |number: u64| -> Result<(Option<f64>, [bool; 3]), StudyError> {
                 let Reading { frame, noise_MPa } = like.of(kind, number)?;

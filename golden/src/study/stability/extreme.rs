@@ -25,12 +25,13 @@
 //! words report what only the engine knows: condition met, candidate found, no contact, saturations of its own
 //! arithmetic, and the framing of its input.
 
+use crate::fixed::stages::send::{status_fields, Status, STATUS_BEATS};
+
 use crate::data::frame::{Contact, Frame};
 use crate::data::generator::{generate, GeneratorError};
 use crate::estimate::float::{Golden, GoldenError};
-use crate::fixed::stages::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
 use crate::fixed::{FixedError, Model};
-use crate::result::flags::Flag;
+use crate::result::flags::{Flag, StatusField};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::{subarrays, Case};
 use crate::spec::scene::{EstimatorKind, Scene};
@@ -147,7 +148,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
         plain(bare("all clipped, unipolar", &|row, col| -press.stress_MPa[row * sensor.cols + col].abs()));
     unipolar.scene.input.unipolar = true;
     // A network serves the readings and the partition that it was trained for.
-    let network = scene.for_hardware().search.estimator == EstimatorKind::Network;
+    let network = scene.hardware_estimator() == EstimatorKind::Network;
     if scene.input.unipolar || !network {
         all.push(unipolar);
     }
@@ -175,7 +176,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
 /// [`GoldenError`] if the golden model rejects scene or frame.
 pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
     let Extreme { scene, frame } = extreme;
-    let golden = Golden::new(&scene.for_hardware())?.run(frame)?;
+    let golden = Golden::reference(scene)?.run(frame)?;
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
         let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
         let trace = model.run(&model.readings(std::slice::from_ref(frame))?);
@@ -193,18 +194,12 @@ fn of(result: &Reconstruction) -> Outcome {
     Outcome { resultant_N: result.resultant_N, errors, flags: result.flags.clone() }
 }
 
-/// The names of the flags in the status words, and the number of saturations if any.
+/// The names of the bits that are set in the status words, and the number of saturations if any.
 fn status(beats: &[[i32; 3]]) -> String {
-    let all: Vec<Status> = beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
-    let names = [
-        (FLAG_CONDITION, "condition"),
-        (FLAG_FOUND, "found"),
-        (FLAG_NO_CONTACT, "no-contact"),
-        (FLAG_FRAMING, "framing"),
-    ];
-    let raised = |bit: u32| all.iter().any(|status| status.flags & bit != 0);
+    let all: Vec<Status> = Status::all(beats).collect();
+    let is_set = |field: &StatusField| field.bits == 1 && beats.chunks(STATUS_BEATS).any(|beats| field.get(beats) != 0);
     let mut words: Vec<String> =
-        names.iter().filter(|(bit, _)| raised(*bit)).map(|(_, name)| name.to_string()).collect();
+        status_fields().iter().filter(|field| is_set(field)).map(|field| field.name.replace('_', "-")).collect();
     // Every status has the force saturations of the whole frame.
     let saturations = all.iter().map(|status| status.rescale_saturations).sum::<u32>()
         + all.first().map_or(0, |status| status.force_saturations);

@@ -2,9 +2,10 @@
 
 use dermis_golden::fixed::plan::cycles::ACCEPT;
 use dermis_golden::fixed::stages::resultants::Summed;
-use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT, TABLES_SHIFT};
+use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING, TABLES_VERSION};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, TABLES};
 use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
@@ -18,6 +19,7 @@ use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
 use crate::primitives::frame::load::{THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::primitives::frame::sliding_mean::frames_bits;
 use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
+use crate::primitives::output::status_bits::status_bits;
 use crate::primitives::pass::raw_length::shift_bits;
 use crate::primitives::search::sweep::position_bits;
 use crate::primitives::stream::queue::LATENCY as LEAVING;
@@ -130,8 +132,6 @@ const UNCOUNTED: u32 = ACCEPT as u32 + 2 + COUNT_DELAY as u32 - 1 + LEAVING as u
 const WORD: usize = FORCE_BITS as usize;
 /// Width of a μ word, in bits.
 const MU_BITS: usize = MULTIPLIER_BITS as usize;
-/// Flags of a subarray, the bits below the case's number.
-const FLAGS: usize = 7;
 /// Width of a right shift, in bits.
 const SHIFT_BITS: usize = 6;
 
@@ -395,25 +395,25 @@ impl Shape {
         let start_count = force_saturations.extend(SATURATION_BITS + 1);
         let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
         let count = k.wire("count", count);
-        let case = |below: u32| value_by_case(&k, which, &self.numbers, (below - CASE_SHIFT) as usize);
+        let case = |below: u32| value_by_case(&k, which, &self.numbers, (below - CASE.low) as usize);
         let case = match self.frames_bits {
             None => case(FORCE_BITS),
             Some(_) => {
-                let frames = kept.status("frames_held", frames).extend(WORD - FRAMES_SHIFT as usize);
-                frames.concat(case(FRAMES_SHIFT))
+                let frames = kept.status("frames_held", frames).extend(WORD - FRAMES.low as usize);
+                frames.concat(case(FRAMES.low))
             }
         };
-        let flags = [
-            case,
-            k.constant(CASE_SHIFT as usize - FLAGS, 0),
-            if self.threshold.is_none() { incomplete } else { k.constant(1, 0) },
-            if self.contacts { overflow } else { k.constant(1, 0) },
-            if self.checks { kept.status("damages", damaged) } else { k.constant(1, 0) },
-            framing,
-            !*contact,
-            kept.status("founds", found),
-            kept.status("conditions", condition),
-        ];
+        let mut bits = Vec::new();
+        bits.extend(self.threshold.is_none().then_some((TABLES, incomplete)));
+        bits.extend(self.contacts.then_some((MORE_CONTACTS, overflow)));
+        bits.extend(self.checks.then(|| (COEFFICIENTS, kept.status("damages", damaged))));
+        bits.extend([
+            (FRAMING, framing),
+            (NO_CONTACT, !*contact),
+            (FOUND, kept.status("founds", found)),
+            (CONDITION, kept.status("conditions", condition)),
+        ]);
+        let flags = [vec![case], status_bits(&k, &bits, CASE.low)].concat();
         let position = |name: &str, position| match self.searches {
             true => word(kept.status(name, position).signed()),
             false => k.constant(WORD, 0),
@@ -424,7 +424,10 @@ impl Shape {
         let rescale_saturations = kept.status("rescale_saturations", saturations);
         let first = concat(&[concat(&flags), y, x]);
         let normalise = match self.threshold {
-            None => version.extend(WORD - TABLES_SHIFT as usize).concat(normalise.extend(TABLES_SHIFT as usize)),
+            None => {
+                let low = TABLES_VERSION.low as usize;
+                version.extend(WORD - low).concat(normalise.extend(low))
+            }
             Some(_) => word(normalise),
         };
         let second = concat(&[normalise, word(rescale), kept.status("scores", score)]);

@@ -3,5 +3,6 @@
 pub(crate) mod force_unit;
 pub(crate) mod frame_cycles;
 pub(crate) mod parts_begun;
+pub(crate) mod status_bits;
 pub(crate) mod status_code;
 pub(crate) mod status_source;

@@ -1,7 +1,5 @@
 //! The beats of a frame against plain integers.
 
-use dermis_golden::fixed::stages::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
-
 use super::*;
 use crate::language::testbench::{check, Reference};
 use crate::wire::Word;
@@ -59,9 +57,9 @@ impl Beats {
         let number = |k: usize| inputs[k].number() as i64;
         match self.beat {
             0 => {
-                let flags = [(8, FLAG_CONDITION), (7, FLAG_FOUND), (9, FLAG_FRAMING)]
-                    .map(|(k, bit)| number(k) * i64::from(bit));
-                let no_contact = i64::from(!self.contact) * i64::from(FLAG_NO_CONTACT);
+                let flags =
+                    [(8, CONDITION), (7, FOUND), (9, FRAMING)].map(|(k, bit)| number(k) * i64::from(bit.mask()));
+                let no_contact = i64::from(!self.contact) * i64::from(NO_CONTACT.mask());
                 let [x, y] = [4, 5].map(|k| inputs[k].signed(0, position_bits()));
                 [x, y, flags.iter().sum::<i64>() + no_contact]
             }

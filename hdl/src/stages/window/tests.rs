@@ -5,6 +5,7 @@ use dermis_golden::fixed::plan::contents::ContactPlan;
 use dermis_golden::fixed::stages::receive::Received;
 use dermis_golden::fixed::stages::window::{cycles, window, Array, WindowWords};
 use dermis_golden::fixed::words::network::MASKED;
+use dermis_golden::fixed::Plan;
 use dermis_golden::spec::window::Place;
 
 use super::*;
@@ -17,12 +18,13 @@ use crate::wire::Word;
 
 /// A model of an array with so many contacts, `own` rows and columns in a window; `more` is the rest of the scene file.
 fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, more: &str) -> Model {
-    let mut model = model(rows, cols, more);
-    (model.scene.partition.max_contacts, model.noise_floor) = (contacts, 100);
-    let segmenter = Segmenter::new(&model.scene.sensor, 1.0);
-    let window = window::Window { place: Place::Contact, rows: own[0], cols: own[1] };
-    model.by_contact = Some(ContactPlan { segmenter, window });
-    model
+    let change = |plan: &mut Plan| {
+        (plan.scene.partition.max_contacts, plan.noise_floor) = (contacts, 100);
+        let segmenter = Segmenter::new(&plan.scene.sensor, 1.0);
+        let window = window::Window { place: Place::Contact, rows: own[0], cols: own[1] };
+        plan.by_contact = Some(ContactPlan { segmenter, window });
+    };
+    model(rows, cols, more).with_changed_plan(change).unwrap()
 }
 
 /// Input `floor`.

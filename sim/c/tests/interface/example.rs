@@ -8,6 +8,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use dermis_golden::data::frame::Frame;
+use dermis_golden::engine::{result, FindNoise};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
@@ -91,7 +92,7 @@ fn wanted(result: &Reconstruction, cols: usize) -> BTreeMap<String, Vec<u64>> {
     let forces = &result.forces_N;
     let of_taxel = |k: usize| bits(&[(k / cols) as f64, (k % cols) as f64, forces.fx[k], forces.fy[k], forces.fz[k]]);
     let contacts = result.extra.contacts.iter().flatten();
-    let flags: u32 = result.flags.iter().map(|flag| dermis_c::result::bit(*flag)).sum();
+    let flags: u32 = result.flags.iter().map(|flag| flag.bit()).sum();
     BTreeMap::from([
         ("resultant".to_owned(), bits(&result.resultant_N)),
         ("flags".to_owned(), bits(&[f64::from(flags)])),
@@ -116,22 +117,20 @@ fn its_numbers_are_those_of_the_rust_call() {
     let (frame, path) = frame(own.path());
     let scene = Scene::builtin(SCENE).unwrap();
     let build = folder().join("../../build");
-    let mut model = Model::new(&scene).unwrap();
-    model.board.uart_baud = Some(BAUD);
-    let hardware = Hardware::new(model, &build).unwrap();
+    let model = Model::new(&scene).unwrap().with_changed_plan(|plan| plan.board.uart_baud = Some(BAUD));
+    let hardware = Hardware::new(model.unwrap(), &build).unwrap();
     let terminal = PseudoTerminal::of(&hardware).unwrap();
     let output = Command::new(example()).arg(SCENE).arg(&path).arg(terminal.path()).output().unwrap();
     let (printed, error) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success(), "{error}");
-    let mut golden = Golden::new(&scene).unwrap().run(&frame).unwrap();
-    golden.find_noise(&scene, &frame).unwrap();
+    let golden = result(&Golden::new(&scene).unwrap(), std::slice::from_ref(&frame), FindNoise::Yes).unwrap();
     assert!(golden.extra.contacts.as_ref().is_some_and(|contacts| !contacts.is_empty()));
     check(&printed, "golden", &golden);
     let model = Model::new(&scene).unwrap();
     let mut fixed = model.reconstruct(&frame).unwrap();
     // The board's result is that of the bits, whose noise no one looked for.
     check(&printed, "board", &fixed);
-    fixed.find_noise(&scene, &frame).unwrap();
+    fixed.find_noise(&scene, model.estimator(), model.input(), &frame);
     check(&printed, "fixed", &fixed);
 }
 

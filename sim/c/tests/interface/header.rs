@@ -13,7 +13,8 @@ pub fn folder() -> &'static Path {
 
 /// The header of the sources, each changed by `change`.
 fn header(change: impl Fn(String) -> String) -> String {
-    let config = Config::from_file(folder().join("cbindgen.toml")).unwrap();
+    let mut config = Config::from_file(folder().join("cbindgen.toml")).unwrap();
+    config.after_includes = Some(format!("\n{}", dermis_golden::result::flags::c_enum()));
     let changed = tempfile::tempdir().unwrap();
     let mut builder = Builder::new().with_config(config);
     // In the order of use.

@@ -153,7 +153,7 @@ fn answers_give_the_results_of_the_model() {
                 let json = CStr::from_ptr(dermis_result_json(result)).to_str().unwrap();
                 assert!(json.contains("\"resultant_N\""), "{json}");
             }
-            assert_eq!(flags, wanted.flags.iter().map(|flag| bit(*flag)).sum::<u32>());
+            assert_eq!(flags, wanted.flags.iter().map(|flag| flag.bit()).sum::<u32>());
             // Sums of integers and of their multiples differ in their last bits.
             assert!(sum.iter().zip(wanted.resultant_N).all(|(sum, wanted)| (sum - wanted).abs() < 1e-12), "{sum:?}");
         }

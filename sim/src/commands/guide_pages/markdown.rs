@@ -4,8 +4,9 @@
 
 use std::fmt;
 
-use anyhow::{bail, ensure, Result};
+use anyhow::{anyhow, bail, ensure, Result};
 
+use super::marker::Cell;
 use crate::report::aligned;
 
 /// A table.
@@ -123,6 +124,31 @@ impl Table {
         Ok(Table { head: columns.to_vec(), rows: self.rows.iter().map(pick).collect(), labels })
     }
 
+    /// The cell in the row whose first cell is `row`, or one of its figures that `/` separates.
+    ///
+    /// # Errors
+    /// A row, column or part that the table does not have, or has twice.
+    pub fn cell(&self, cell: &Cell) -> Result<String> {
+        let column = self.column_index(&cell.column)?;
+        let mut rows = self.rows.iter().filter(|row| row[0] == cell.row);
+        let text = match (rows.next(), rows.next()) {
+            (Some(row), None) => &row[column],
+            (None, _) => bail!("no row {:?}; there are: {}", cell.row, line(&self.first_cells())),
+            _ => bail!("two rows are called {:?}", cell.row),
+        };
+        match cell.part {
+            None => Ok(text.clone()),
+            Some(part) => {
+                let found = text.split('/').nth(part - 1).map(|text| text.trim().to_owned());
+                found.ok_or_else(|| anyhow!("{text:?} has no part {part}"))
+            }
+        }
+    }
+
+    fn first_cells(&self) -> Vec<&str> {
+        self.rows.iter().map(|row| row[0].as_str()).collect()
+    }
+
     fn column_index(&self, column: &str) -> Result<usize> {
         let mut indices = (0..self.head.len()).filter(|index| self.head[*index] == column);
         match (indices.next(), indices.next()) {
@@ -190,6 +216,21 @@ mod tests {
         assert_eq!(of(&["x, µm", "s"]).unwrap().rows[1], ["10", "q"]);
         assert_eq!(of(&[]).unwrap(), *one);
         assert_eq!(of(&["y"]).unwrap_err().to_string(), "no column \"y\"; there are: | s | x, µm | e | f |");
+    }
+
+    #[test]
+    fn a_cell_is_found_by_row_and_column() {
+        let table = &tables("| s | x |\n|---|--:|\n| p | 1 % / 2 % |\n| q | 3 |\n| q | 4 |\n")[0];
+        let of = |row: &str, column: &str, part: Option<usize>| {
+            let cell = Cell { row: row.into(), column: column.into(), part };
+            table.cell(&cell).map_err(|error| error.to_string())
+        };
+        assert_eq!(of("p", "x", None).unwrap(), "1 % / 2 %");
+        assert_eq!(of("p", "x", Some(2)).unwrap(), "2 %");
+        assert_eq!(of("p", "x", Some(3)).unwrap_err(), "\"1 % / 2 %\" has no part 3");
+        assert_eq!(of("r", "x", None).unwrap_err(), "no row \"r\"; there are: | p | q | q |");
+        assert_eq!(of("q", "x", None).unwrap_err(), "two rows are called \"q\"");
+        assert_eq!(of("p", "y", None).unwrap_err(), "no column \"y\"; there are: | s | x |");
     }
 
     #[test]

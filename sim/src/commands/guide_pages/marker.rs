@@ -1,4 +1,4 @@
-//! Markers: HTML comments of a Markdown page that say which command prints a table or a piece of code.
+//! Markers: HTML comments of a Markdown page that say which command prints a table, a piece of code or a figure in the text.
 //!
 //! ```text
 //! <!-- table: COMMAND ; attribute: value ; … -->      may go on over several lines
@@ -7,9 +7,12 @@
 //! <!-- code: COMMAND ; language: verilog -->
 //! a fenced block                                       all that the command printed
 //! <!-- end of code -->
+//! … take <!-- figure: COMMAND ; row: sensor-1 ; column: cycles -->1278<!-- end of figure --> cycles, …
 //! ```
+//! A figure is a cell of a printed table: that in the row whose first cell is `row`. It stands within one line, and not first:
+//! a comment at the beginning of a line ends a paragraph in Markdown.
 //!
-//! Code fences are skipped, so that a page can show a marker.
+//! Code is skipped, so that a page can show a marker.
 
 use std::ops::Range;
 
@@ -17,12 +20,25 @@ use anyhow::{bail, ensure, Result};
 
 /// What a marker begins with, and the line behind its content: of a table, of code.
 const KINDS: [(&str, &str); 2] = [("<!-- table:", "<!-- end of table -->"), ("<!-- code:", "<!-- end of code -->")];
+/// What a figure in the text begins with, and ends with.
+const FIGURE: [&str; 2] = ["<!-- figure:", "<!-- end of figure -->"];
 /// What ends a comment.
 const CLOSE: &str = "-->";
 /// What begins and ends a block of code.
 const FENCES: [&str; 2] = ["```", "~~~"];
 
-/// A table or a piece of code of a page.
+/// A cell of a table.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cell {
+    /// First cell of its row.
+    pub row: String,
+    /// Head of its column.
+    pub column: String,
+    /// Which of the figures in the cell that `/` separates, from 1; without it the whole cell.
+    pub part: Option<usize>,
+}
+
+/// A table, a piece of code or a figure of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Marker {
     /// Line of the marker, from 1.
@@ -39,9 +55,11 @@ pub struct Marker {
     pub columns: Vec<String>,
     /// Language of code; `None` for a table.
     pub language: Option<String>,
+    /// The cell of a figure; `None` for a table and code.
+    pub cell: Option<Cell>,
     /// How long the command takes, for the reader of the page.
     pub takes: Option<String>,
-    /// Bytes between the marker's line and the end's.
+    /// Bytes between the marker's line and the end's, of a figure between its comments.
     pub content: Range<usize>,
 }
 
@@ -67,10 +85,10 @@ pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
     let mut lines = text.split_inclusive('\n').zip(1..);
     let (mut offset, mut fenced) = (0, false);
     let mut open: Option<Marker> = None;
-    while let Some((line, number)) = lines.next() {
+    while let Some((line_text, number)) = lines.next() {
         let begin = offset;
-        offset += line.len();
-        let line = line.trim();
+        offset += line_text.len();
+        let line = line_text.trim();
         if FENCES.iter().any(|fence| line.starts_with(fence)) {
             fenced = !fenced;
         } else if fenced {
@@ -100,7 +118,14 @@ pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
                 is_code == marker.language.is_some(),
                 "{page}:{number}: code wants one attribute `language`, a table none"
             );
+            ensure!(marker.cell.is_none(), "{page}:{number}: row, column and part are a figure's");
             open = Some(marker);
+        } else {
+            for figure in figures(line_text) {
+                let (marker, content) = figure.map_err(|reason| reason.context(format!("{page}:{number}")))?;
+                let content = begin + content.start..begin + content.end;
+                markers.push(Marker { line: number, content, ..marker });
+            }
         }
     }
     match &open {
@@ -113,11 +138,32 @@ fn unclosed(page: &str, marker: &Marker) -> String {
     format!("{page}:{}: no `{}` behind what `{}` prints", marker.line, marker.end(), marker.command)
 }
 
+/// The figures in a line of text, each with the bytes between its comments.
+fn figures(line: &str) -> Vec<Result<(Marker, Range<usize>)>> {
+    let [begin, end] = FIGURE;
+    let figure = |(at, _): (usize, &str)| {
+        ensure!(!line[..at].trim().is_empty(), "a figure cannot begin a line");
+        let inner = &line[at + begin.len()..];
+        let Some((attributes, content)) = inner.split_once(CLOSE) else { bail!("the comment has no `{CLOSE}`") };
+        let Some((content, _)) = content.split_once(end) else { bail!("no `{end}` in the line of a figure") };
+        let marker = parse(attributes.trim())?;
+        let whole = marker.cell.as_ref().is_some_and(|cell| !cell.row.is_empty() && !cell.column.is_empty());
+        ensure!(whole, "a figure wants one attribute `row` and one `column`");
+        let other = marker.check.is_some() || !marker.columns.is_empty() || marker.language.is_some();
+        ensure!(!other, "check, columns and language are not a figure's");
+        let from = at + begin.len() + attributes.len() + CLOSE.len();
+        Ok((marker, from..from + content.len()))
+    };
+    // Between backticks stands an example.
+    let is_code = |(at, _): &(usize, &str)| line[..*at].matches('`').count() % 2 == 1;
+    line.match_indices(begin).filter(|found| !is_code(found)).map(figure).collect()
+}
+
 /// Command and attributes.
 fn parse(inner: &str) -> Result<Marker> {
     let mut parts = inner.split(';').map(str::trim);
     let command = parts.next().filter(|command| !command.is_empty());
-    let Some(command) = command else { bail!("a table without a command") };
+    let Some(command) = command else { bail!("a marker without a command") };
     let mut marker = Marker {
         line: 0,
         command: command.to_owned(),
@@ -126,6 +172,7 @@ fn parse(inner: &str) -> Result<Marker> {
         table: 1,
         columns: Vec::new(),
         language: None,
+        cell: None,
         takes: None,
         content: 0..0,
     };
@@ -138,18 +185,28 @@ fn parse(inner: &str) -> Result<Marker> {
         match name {
             "check" => marker.check = Some(value.to_owned()),
             "check columns" => marker.check_columns = columns(value),
+            "column" => marker.cell.get_or_insert_default().column = value.to_owned(),
             "columns" => marker.columns = columns(value),
             "language" => marker.language = Some(value.to_owned()),
+            "part" => marker.cell.get_or_insert_default().part = Some(from_one(name, value)?),
+            "row" => marker.cell.get_or_insert_default().row = value.to_owned(),
             "takes" => marker.takes = Some(value.to_owned()),
-            "table" => match value.parse() {
-                Ok(table) if table > 0 => marker.table = table,
-                _ => bail!("table: {value:?}: wanted a number from 1"),
-            },
-            _ => bail!("unknown attribute {name:?}; known: check, check columns, columns, language, table, takes"),
+            "table" => marker.table = from_one(name, value)?,
+            _ => bail!(
+                "unknown attribute {name:?}; known: check, check columns, column, columns, language, part, row, table, takes"
+            ),
         }
     }
     ensure!(marker.check_columns.is_empty() || marker.check.is_some(), "check columns: there is no check");
     Ok(marker)
+}
+
+/// A number from 1.
+fn from_one(name: &str, value: &str) -> Result<usize> {
+    match value.parse() {
+        Ok(number) if number > 0 => Ok(number),
+        _ => bail!("{name}: {value:?}: wanted a number from 1"),
+    }
 }
 
 /// Heads of columns, which may hold commas.
@@ -197,7 +254,7 @@ mod tests {
         assert_eq!(of("takes"), "a.md:1: \"takes\": wanted `attribute: value`");
         assert_eq!(of("takes: 1 s ; takes: 2 s"), "a.md:1: takes: wanted one value");
         assert_eq!(of("check columns: a"), "a.md:1: check columns: there is no check");
-        assert_eq!(error("<!-- table: ; check: dermis b -->"), "a.md:1: a table without a command");
+        assert_eq!(error("<!-- table: ; check: dermis b -->"), "a.md:1: a marker without a command");
     }
 
     #[test]
@@ -209,6 +266,30 @@ mod tests {
         assert_eq!(&text[found[0].content.clone()], "```rust\n<!-- end of code -->\n```\n");
         assert!(error("<!-- code: dermis a -->\n<!-- end of code -->\n").contains("wants one attribute `language`"));
         assert!(error("<!-- code: dermis a ; language: rust -->\n<!-- end of table -->\n").contains("without a marker"));
+    }
+
+    #[test]
+    fn figures_stand_in_the_text() {
+        let figure =
+            |attributes: &str| format!("takes <!-- figure: dermis a ; {attributes} -->12<!-- end of figure --> µs");
+        let text = format!("µ\n  {}, {}\n", figure("row: p ; column: x, y"), figure("row: q ; column: z ; part: 2"));
+        let found = markers("a.md", &text).unwrap();
+        let cells: Vec<Cell> = found.iter().filter_map(|marker| marker.cell.clone()).collect();
+        assert_eq!(cells[0], Cell { row: "p".into(), column: "x, y".into(), part: None });
+        assert_eq!(cells[1], Cell { row: "q".into(), column: "z".into(), part: Some(2) });
+        assert!(found.iter().all(|marker| marker.line == 2 && &text[marker.content.clone()] == "12"));
+        assert_eq!(error(&figure("row: p")), "a.md:1: a figure wants one attribute `row` and one `column`");
+        assert!(error(&figure("row: p ; column: x ; check: dermis b")).ends_with("are not a figure's"));
+        assert!(error(&figure("row: p ; column: x ; part: 0")).ends_with("wanted a number from 1"));
+        let open = "a <!-- figure: dermis a ; row: p ; column: x -->12\n<!-- end of figure -->\n";
+        assert_eq!(error(open), "a.md:1: no `<!-- end of figure -->` in the line of a figure");
+        assert_eq!(error("a <!-- figure: dermis a\n"), "a.md:1: the comment has no `-->`");
+        assert_eq!(error(" <!-- figure: dermis a -->"), "a.md:1: a figure cannot begin a line");
+        let table = "<!-- table: dermis a ; row: p -->\n<!-- end of table -->\n";
+        assert_eq!(error(table), "a.md:1: row, column and part are a figure's");
+        for code in [format!("```text\n{text}```\n"), format!("- write `{}`\n", figure("row: … ; column: …"))] {
+            assert_eq!(markers("a.md", &code).unwrap(), []);
+        }
     }
 
     #[test]

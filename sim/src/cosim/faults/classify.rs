@@ -1,8 +1,7 @@
 //! Classifies a fault by what a receiver of the output stream can notice.
 
-use dermis_golden::fixed::stages::send::{
-    Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS,
-};
+use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
+use dermis_golden::result::flags::{Flag, FlagSet};
 
 use super::super::drive::{Beat, Recording};
 use super::super::stress::Sample;
@@ -67,14 +66,45 @@ fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
 fn reports_error(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
     let got: Vec<[i32; 3]> = got.iter().map(|beat| beat.data).collect();
     got.chunks(STATUS_BEATS).zip(wanted.chunks(STATUS_BEATS)).any(|(got, wanted)| {
-        let flags = |beats| Status::of_beats(beats).map_or([false; 4], |status| error_flags(&status));
-        flags(got).into_iter().zip(flags(wanted)).any(|(got, wanted)| got && !wanted)
+        match [got, wanted].map(Status::of_beats) {
+            [Some(got), Some(wanted)] => {
+                let additional = |flag: Flag| !errors(&wanted).contains(flag);
+                (got.framing && !wanted.framing) || errors(&got).iter().any(additional)
+            }
+            _ => false,
+        }
     })
 }
 
-/// Error indications of a status: framing flag, coefficient flag, saturations, search without result.
-fn error_flags(status: &Status) -> [bool; 4] {
-    let flag = |bit: u32| status.flags & bit != 0;
-    let saturated = status.rescale_saturations + status.force_saturations > 0;
-    [flag(FLAG_FRAMING), flag(FLAG_COEFFICIENTS), saturated, flag(FLAG_CONDITION) && !flag(FLAG_FOUND)]
+/// The flags of a status that report an error; the others describe the frame.
+fn errors(status: &Status) -> FlagSet {
+    let describes = |flag: &Flag| matches!(flag, Flag::NoContact | Flag::ConditionUnmet | Flag::TooManyContacts);
+    status.flags().iter().filter(|flag| !describes(flag)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beats(status: &[[i32; 3]]) -> Vec<Beat> {
+        status.iter().map(|data| Beat { cycle: 0, data: *data, last: false }).collect()
+    }
+
+    /// Each flag of a status is an error report, or describes the frame; so a new one is reported unless it is named here.
+    #[test]
+    fn each_flag_of_a_status_is_an_error_or_describes_the_frame() {
+        let good = Status { condition: true, found: true, ..Status::default() };
+        let reports = |status: Status| reports_error(&beats(&status.beats()), &good.beats());
+        assert!(!reports(good));
+        for flag in Flag::ALL.into_iter().filter(|flag| flag.status_bit().is_some()) {
+            let describes = [Flag::NoContact, Flag::TooManyContacts].contains(&flag);
+            assert_eq!(reports(Status { raised: FlagSet::raised([(flag, true)]), ..good }), !describes, "{flag:?}");
+        }
+        assert!(reports(Status { framing: true, ..good }) && reports(Status { found: false, ..good }));
+        assert!(reports(Status { force_saturations: 1, ..good }));
+        assert!(!reports(Status { condition: false, ..good }) && !reports(Status { score: 7, ..good }));
+        // What the model reports too is no detection.
+        let both = Status { framing: true, found: false, ..good };
+        assert!(!reports_error(&beats(&both.beats()), &both.beats()));
+    }
 }

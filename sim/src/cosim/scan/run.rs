@@ -84,7 +84,7 @@ pub fn expected(model: &Model, array: &Array, scans: Range<usize>) -> Vec<Expect
         let scanned = codes_of(&scan, code_bits, &model.dead, &array.answers(number));
         let trace = model.run(&scanned.codes);
         let mut status = trace.status;
-        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] |= scanned.flags as i32);
+        status.chunks_mut(STATUS_BEATS).for_each(|beats| scanned.flags.put(beats));
         let codes = if model.code_beats() > 0 { beats(&scanned.codes) } else { Vec::new() };
         Expected { number, scanned, beats: [trace.beats, status, codes].concat(), cycles: trace.cycles }
     };

@@ -1,7 +1,7 @@
 //! Scoreboard: derives the expected output from the accepted input beats.
 //!
 //! A frame is complete with its last taxel. An earlier `tlast` drops the frame's codes; a missing `tlast` on the last
-//! taxel changes nothing. Both set [`FLAG_FRAMING`] in all subarrays of the next complete frame, which may be the same
+//! taxel changes nothing. Both set [`FRAMING`] in all subarrays of the next complete frame, which may be the same
 //! frame. A reset clears the flag. A sliding mean holds the complete frames since the last early `tlast` or reset.
 //!
 //! With writable tables a beat may be a byte of an image; the model takes it as the hardware does.
@@ -11,8 +11,9 @@ use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::load::Outcome as Loaded;
 use dermis_golden::fixed::stages::prepare::Prepared;
-use dermis_golden::fixed::stages::send::{FLAG_FRAMING, STATUS_BEATS, TABLES_REFUSED, TABLES_SHIFT};
+use dermis_golden::fixed::stages::send::{FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::{Intake, Model};
+use dermis_golden::result::flags::{StatusField, TABLES_REFUSED};
 
 use super::outcome::{Outcome, Violation};
 use super::samples::Sample;
@@ -21,9 +22,6 @@ use super::samples::Sample;
 const REPORTED_VIOLATIONS: usize = 8;
 /// Number of violations that ends an experiment.
 const VIOLATION_LIMIT: u64 = 100;
-
-/// The status beat with the version of the tables.
-const TABLES_BEAT: usize = 1;
 
 /// A complete frame that has not left yet.
 struct PendingFrame<'a> {
@@ -154,13 +152,12 @@ impl<'a> Scoreboard<'a> {
         let due = frame.timed.map(|at| at + beat_cycles[index]);
         let timed = due.is_some();
         let mut wanted = beats[index];
-        if flagged && index >= *forces && (index - forces).is_multiple_of(STATUS_BEATS) {
-            wanted[2] |= FLAG_FRAMING as i32;
+        let holds = |field: &StatusField| index >= *forces && (index - forces) % STATUS_BEATS == field.beat;
+        if flagged && holds(&FRAMING) {
+            wanted[FRAMING.word] |= FRAMING.mask() as i32;
         }
-        let is_tables = index >= *forces && (index - forces) % STATUS_BEATS == TABLES_BEAT;
-        let refused = (u32::from(TABLES_REFUSED) << TABLES_SHIFT) as i32;
-        if frame.may_refuse && is_tables && data[2] & refused != 0 {
-            wanted[2] |= refused;
+        if frame.may_refuse && holds(&TABLES_REFUSED) {
+            wanted[TABLES_REFUSED.word] |= data[TABLES_REFUSED.word] & TABLES_REFUSED.mask() as i32;
         }
         let at_end = index + 1 == beats.len();
         if data != wanted {

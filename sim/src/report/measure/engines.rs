@@ -37,7 +37,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
         if frames.is_empty() {
             return Err(anyhow!("scene {}: no frame is shipped for {}", scene.name, scene.sensor));
         }
-        let network = scene.for_hardware().estimator() == EstimatorKind::Network;
+        let network = scene.hardware_estimator() == EstimatorKind::Network;
         for case in scene.cases_of(cases) {
             let mut scene = scene.clone();
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
@@ -70,7 +70,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
 }
 
 fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
-    let engine = Golden::new(&scene.for_hardware())?;
+    let engine = Golden::reference(&scene)?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
     let bit_true = match Model::for_frames(&scene, &frames) {
         Ok(model) => Ok(bit_true(model, &frames, options)?),

@@ -25,14 +25,14 @@ pub struct NoiseStudy {
     pub rows: Vec<ShapeRow>,
 }
 
-/// Error against noise on contacts of five shapes: of the first scene, for what it names, the estimator `auto` and two
+/// Error against noise on contacts of five shapes: of the first scene, for what it names, the estimator `evidence` and two
 /// objectives of the search; of scenes with a network, for their golden model and their hardware, which is one design whatever
 /// the noise. The quick variant has the first of either.
 ///
 /// # Errors
 /// A scene that the golden model refuses, contacts that do not fit, an interruption.
 pub fn noise(measured: &[Measured], options: &Options) -> Result<Vec<NoiseStudy>> {
-    let network = |m: &&Measured| m.scene.for_hardware().estimator() == EstimatorKind::Network;
+    let network = |m: &&Measured| m.scene.hardware_estimator() == EstimatorKind::Network;
     let first = measured.iter().find(|m| m.scene.partition.case == Case::WHOLE && !network(m));
     let most = if options.quick { 1 } else { usize::MAX };
     let networks = measured.iter().filter(|m| network(m) && m.bit_true.is_ok()).take(most);
@@ -40,7 +40,7 @@ pub fn noise(measured: &[Measured], options: &Options) -> Result<Vec<NoiseStudy>
         let mut candidates = vec![Candidate::Scene];
         let [sparse, patch] = [ObjectiveKind::Sparse, ObjectiveKind::Patch].map(Candidate::Objective);
         let others = match told {
-            true => vec![Candidate::Estimator(EstimatorKind::Auto), sparse, patch],
+            true => vec![Candidate::Estimator(EstimatorKind::Evidence), sparse, patch],
             false => vec![Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware],
         };
         for other in others {

@@ -27,7 +27,7 @@ use dermis_golden::data::reception::full_scale;
 use dermis_golden::estimate::float::pass::Polynomial;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::stages::pass::join_limbs;
-use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::words::arith::bit_length;
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, vectors, EXPONENTS};
@@ -150,7 +150,7 @@ pub fn trace(scene: &Scene, frame: &Frame) -> Result<Vec<(&'static str, u32, Com
     if scene.input.average > 0 {
         bail!("scene {}: input.average = {}: stages are compared without averaging", scene.name, scene.input.average);
     }
-    let engine = Golden::new(&scene.for_hardware())?;
+    let engine = Golden::reference(scene)?;
     let frames = std::slice::from_ref(frame);
     let model = Model::for_frames(scene, frames)?;
     if model.by_contact.is_some() {
@@ -196,7 +196,7 @@ impl<'a> FloatReference<'a> {
             frame,
             golden,
             trace,
-            status: trace.status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
+            status: Status::all(&trace.status).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
             families: model.parts().iter().map(|part| family(stress(part))).collect(),
         }
@@ -270,7 +270,7 @@ impl<'a> FloatReference<'a> {
         let step = self.model.scene.search.mu_max / MU_STEPS as f64;
         let golden = &self.golden.subarrays;
         for (status, golden) in self.status.iter().zip(golden).filter(|(_, golden)| golden.objective_value.is_some()) {
-            compared.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step), step);
+            compared.add(status.position().map(i64::from), golden.mu.map(|mu| mu / step), step);
         }
     }
 
@@ -306,7 +306,7 @@ impl<'a> FloatReference<'a> {
             "fold" => return stress().map(|quad| in_lsb(hadamard(quad), code)).collect(),
             "forces" => {
                 let step = scene.search.mu_max / MU_STEPS as f64;
-                let p = family.eval(status.position.map(|position| f64::from(position) * step));
+                let p = family.eval(status.position().map(|position| f64::from(position) * step));
                 return layout.pack(&p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();
             }
             _ => {}
@@ -347,7 +347,7 @@ impl FloatReference<'_> {
     fn relaxed(&self, stage: &str, part: usize, [raw, word]: [f64; 2]) -> Vec<([f64; 4], f64)> {
         let (f, layout) = (self.formats(), self.model.layout());
         let step = self.model.scene.search.mu_max / MU_STEPS as f64;
-        let mu = self.status[part].position.map(|position| f64::from(position) * step);
+        let mu = self.status[part].position().map(|position| f64::from(position) * step);
         // After so many steps p has the terms up to that degree.
         let after = |degree: usize| {
             let coefficients = self.families[part].coefficients[..vectors(degree)].to_vec();

@@ -100,7 +100,7 @@ fn choose_format(
     let format = format.ok_or_else(|| anyhow::anyhow!("scene {}: no format fits its board", own.scene.name))?;
     let model = Model::new(&with_format(&own.scene, format.bits))?;
     let usage = total(&generate(&model)?.usage);
-    let simulated = model.scene == own.scene.for_hardware()
+    let simulated = model.scene == own.scene.clone().with_chosen_hardware()
         && own.bit_true.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
     Ok(Choice { index, contact_count, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
 }

@@ -71,11 +71,12 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
             svg: force_field(sensor, forces, peaks, outline)?,
         });
     }
-    if m.scene.estimator() != EstimatorKind::Search {
-        let result = Golden::new(&m.scene)?.run(frame)?;
+    if m.scene.model_estimator() != EstimatorKind::Search {
+        let golden = Golden::new(&m.scene)?;
+        let result = golden.run(frame)?;
         let contacts = result.extra.contacts.as_deref().unwrap_or_default();
         let outline = Outline { subarrays: &result.subarrays, contacts, ..outline };
-        let name = m.scene.estimator().name();
+        let name = golden.estimator().name();
         pictures.push(Picture {
             id: id(name),
             caption: format!("{what}: force of each contact, {name}"),

@@ -188,9 +188,8 @@ fn flags(all: &[Recorded]) -> Table {
         let frames = recorded.golden.len() as u64;
         let name = || text_cell(recorded.imported.summary.name.clone());
         for flag in &names {
-            let text = serde_json::to_value(flag).ok().and_then(|value| value.as_str().map(str::to_owned));
             let fixed = fixed.as_ref().map_or_else(empty_cell, |fixed| own(fixed, *flag));
-            rows.push(vec![name(), text_cell(text.unwrap_or_default()), own(&golden, *flag), fixed, count(frames)]);
+            rows.push(vec![name(), text_cell(flag.name()), own(&golden, *flag), fixed, count(frames)]);
         }
         if names.is_empty() {
             let none = || if fixed.is_some() { count(0) } else { empty_cell() };

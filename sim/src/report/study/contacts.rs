@@ -43,9 +43,9 @@ pub fn run(names: &[String]) -> Result<String> {
     let scene = Scene::builtin(SCENE)?;
     let cases = [Case::WHOLE, Case::Adaptive, Case::Contacts];
     let engine = |case: Case| {
-        let mut scene = scene.for_hardware();
+        let mut scene = scene.clone().with_chosen_hardware();
         scene.partition.case = case;
-        Golden::new(&scene)
+        Golden::reference(&scene)
     };
     let engines = cases.into_iter().map(engine).collect::<Result<Vec<Golden>, _>>()?;
     let mut rows = Vec::new();

@@ -52,7 +52,7 @@ pub fn masked(name: &str, dead: &[[usize; 2]]) -> Result<Scene> {
 /// # Errors
 /// A scene that one of the models refuses.
 pub fn measure(scene: &Scene) -> Result<Row> {
-    let (model, golden) = (Model::new(scene)?, Golden::new(&scene.for_hardware())?);
+    let (model, golden) = (Model::new(scene)?, Golden::reference(scene)?);
     let frames = one_contact(scene)?;
     let float: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame)).collect::<Result<_, _>>()?;
     let fixed: Vec<Reconstruction> = frames.iter().map(|frame| model.reconstruct(frame)).collect::<Result<_, _>>()?;

@@ -67,9 +67,9 @@ pub fn scenes(names: &[String]) -> Result<Vec<(String, Scene)>> {
 pub fn measure(name: &str, scene: &Scene) -> Result<Vec<Row>> {
     let frames = one_contact(scene)?;
     let row = |bits: u32| {
-        let mut scene = scene.for_hardware();
+        let mut scene = scene.clone();
         scene.fixed.input_bits = bits;
-        let (golden, model) = (Golden::new(&scene)?, Model::new(&scene)?);
+        let (golden, model) = (Golden::reference(&scene)?, Model::new(&scene)?);
         let float = |frames: &[Frame]| -> Result<Option<f64>> {
             let results: Vec<Reconstruction> =
                 frames.iter().map(|frame| golden.run(frame)).collect::<Result<_, _>>()?;

@@ -1,6 +1,6 @@
 //! The link over SPI: a controller with rates from 1 MHz to the highest allowed, and transactions that end anywhere.
 
-use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::fixed::{Cycles, Model, Plan};
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::wire::link::slip::{END, IDLE};
@@ -32,9 +32,12 @@ struct Board {
 
 /// A test board with an SPI of `rate`.
 fn over_spi(mut questions: Questions, rate: u32) -> Questions {
-    questions.model.scene.hardware.link = LinkKind::Spi;
-    let slowest = questions.model.board.spi_MHz.unwrap();
-    questions.model.board.spi_MHz = Some(slowest.max(f64::from(rate) / 1e6));
+    let change = |plan: &mut Plan| {
+        plan.scene.hardware.link = LinkKind::Spi;
+        let slowest = plan.board.spi_MHz.unwrap();
+        plan.board.spi_MHz = Some(slowest.max(f64::from(rate) / 1e6));
+    };
+    questions.model = questions.model.with_changed_plan(change).unwrap();
     questions
 }
 

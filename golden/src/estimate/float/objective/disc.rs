@@ -12,7 +12,9 @@
 //!
 //! Feeds `patch` and `symmetric`, which put point forces at mapped nodes.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
+
+use crate::physics::gauss::rule;
 
 /// Quadrature on the unit disc.
 #[derive(Clone, Debug)]
@@ -25,37 +27,19 @@ pub struct Disc {
     gauss: Vec<f64>,
 }
 
-/// Nodes and weights of Gauss–Legendre on 0 … 1.
-pub(crate) fn gauss_legendre(count: usize) -> Vec<[f64; 2]> {
-    let node = |k: usize| {
-        let mut x = (PI * (k as f64 + 0.75) / (count as f64 + 0.5)).cos();
-        let mut slope = 1.0;
-        // Newton's method converges quadratically from this start; ten steps are more than rounding needs.
-        for _ in 0..10 {
-            let (mut last, mut value) = (1.0, x);
-            for n in 2..=count {
-                let n = n as f64;
-                (last, value) = (value, ((2.0 * n - 1.0) * x * value - (n - 1.0) * last) / n);
-            }
-            slope = count as f64 * (x * value - last) / (x * x - 1.0);
-            x -= value / slope;
-        }
-        [0.5 * (1.0 - x), 1.0 / ((1.0 - x * x) * slope * slope)]
-    };
-    (0..count).map(node).collect()
-}
-
 impl Disc {
-    /// A quadrature of `rings` Gauss nodes in t with `angles` equal angles each; both at least 1.
+    /// A quadrature of `rings` Gauss nodes in t, 1 to 64, with `angles` equal angles each, at least 1.
     pub fn new(rings: usize, angles: usize) -> Disc {
         let mut disc = Disc { nodes: Vec::new(), heights: Vec::new(), gauss: Vec::new() };
-        for (ring, [t, weight]) in gauss_legendre(rings).into_iter().enumerate() {
+        for (ring, (z, weight)) in rule(rings).iter().enumerate() {
+            // From −1 … 1 to 0 … 1; the constant factor of the weights goes with their sum.
+            let t = 0.5 * (1.0 - z);
             let r = (1.0 - t * t).sqrt();
             for step in 0..angles {
                 let phi = TAU * (step as f64 + 0.5 * (ring % 2) as f64) / angles as f64;
                 disc.nodes.push([r * phi.cos(), r * phi.sin()]);
                 disc.heights.push(t);
-                disc.gauss.push(weight);
+                disc.gauss.push(*weight);
             }
         }
         disc
@@ -89,6 +73,15 @@ mod tests {
         assert!((mean(&|x, _| x * x) - 0.2).abs() < 1e-14);
         assert!((mean(&|x, _| x.powi(4)) - 3.0 / 35.0).abs() < 1e-14);
         assert!(mean(&|x, y| x * y).abs() < 1e-14 && mean(&|x, _| x).abs() < 1e-14);
+    }
+
+    /// There is one Gauss–Legendre rule: the nodes are its own to the last bit.
+    #[test]
+    fn nodes_are_those_of_the_rule() {
+        for rings in 1..=24 {
+            let heights = rule(rings).iter().map(|(z, _)| 0.5 * (1.0 - z));
+            assert!(Disc::new(rings, 1).heights.into_iter().eq(heights), "{rings}");
+        }
     }
 
     #[test]

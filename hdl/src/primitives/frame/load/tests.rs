@@ -14,7 +14,7 @@ const WRITABLE: &str = "[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"wr
 /// The stream as the model takes it; a byte is taken in one cycle and used in the next.
 #[derive(Clone)]
 struct Loader {
-    plan: Plan,
+    plan: Model,
     intake: Intake,
     /// A byte was taken in the cycle before; with it, unless it is skipped, the byte and its `tlast`.
     took: Option<Option<(u8, bool)>>,
@@ -31,7 +31,7 @@ struct Loader {
 }
 
 impl Loader {
-    fn new(plan: &Plan) -> Self {
+    fn new(plan: &Model) -> Self {
         Loader {
             plan: plan.clone(),
             intake: Intake::default(),
@@ -182,7 +182,7 @@ impl Reference for Loader {
 }
 
 /// Frames and images, whole, damaged, cut short and too long; a code in an image and an image in a frame; pauses and resets.
-fn stimulus(plan: &Plan, cycles: usize) -> Vec<Vec<Word>> {
+fn stimulus(plan: &Model, cycles: usize) -> Vec<Vec<Word>> {
     let mut random = fastrand::Rng::with_seed(3);
     let (bits, taxels) = (plan.formats().code_bits, plan.scene.sensor.taxels());
     let mut loader = Loader::new(plan);

@@ -3,9 +3,7 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::forces::{force, mu_word};
-use dermis_golden::fixed::stages::send::{
-    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_MORE_CONTACTS, FLAG_NO_CONTACT, FLAG_TABLES,
-};
+use dermis_golden::result::flags::StatusField;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
@@ -111,24 +109,24 @@ impl Requests {
                 result.words
             }
             1 => {
-                let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+                let flag = |set: bool, bit: StatusField| if set { bit.mask() } else { 0 };
                 let case = &self.model.cases()[inputs[1].number() as usize];
                 let number = if self.model.chooses() { case.number() } else { 0 };
-                let flags = flag(part.condition, FLAG_CONDITION)
-                    | flag(part.found, FLAG_FOUND)
-                    | flag(!frame.contact, FLAG_NO_CONTACT)
-                    | flag(inputs[16].number() == 1, FLAG_FRAMING)
-                    | flag(part.damaged, FLAG_COEFFICIENTS)
-                    | flag(self.model.has_writable_tables() && inputs[26].number() == 1, FLAG_TABLES)
-                    | flag(f.by_contact() && inputs[23].number() == 1, FLAG_MORE_CONTACTS)
-                    | number << CASE_SHIFT
-                    | part.frames << FRAMES_SHIFT;
+                let flags = flag(part.condition, CONDITION)
+                    | flag(part.found, FOUND)
+                    | flag(!frame.contact, NO_CONTACT)
+                    | flag(inputs[16].number() == 1, FRAMING)
+                    | flag(part.damaged, COEFFICIENTS)
+                    | flag(self.model.has_writable_tables() && inputs[26].number() == 1, TABLES)
+                    | flag(f.by_contact() && inputs[23].number() == 1, MORE_CONTACTS)
+                    | number << CASE.low
+                    | part.frames << FRAMES.low;
                 let position = if f.degree > 0 { part.position } else { [0; 2] };
                 [position[0], position[1], flags as i32]
             }
             2 => {
                 let version = if self.model.has_writable_tables() { inputs[25].number() as u32 } else { 0 };
-                [part.score, part.rescale as i32, (version << TABLES_SHIFT | part.normalise) as i32]
+                [part.score, part.rescale as i32, (version << TABLES_VERSION.low | part.normalise) as i32]
             }
             _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
         }
@@ -236,9 +234,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    let mut model = model(side, side, more);
-    model.threshold = threshold;
-    check_forces(model);
+    check_forces(model(side, side, more).with_changed_plan(|plan| plan.threshold = threshold).unwrap());
 }
 
 fn check_forces(model: Model) {

@@ -1,0 +1,441 @@
+//! The study: draws presses, spoils them, runs the engines, and judges their results.
+
+use super::faults::{Fault, Kind, Moments, Readings, FAULTS};
+use crate::data::frame::Frame;
+use crate::data::generator::draws::{DrawOptions, Draws};
+use crate::data::generator::GeneratorError;
+use crate::estimate::float::{Golden, GoldenError};
+use crate::fixed::{FixedError, Model};
+use crate::random::Random;
+use crate::result::checks::history::History;
+use crate::result::errors::Errors;
+use crate::result::flags::Flag;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::scene::Scene;
+use crate::spec::sensor::Sensor;
+use crate::study::noise::StudyError;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Largest e_t and e_n of a result that is right, and share of Σ|b|·area below which a force counts as none.
+const RIGHT: (f64, f64, f64) = (0.2, 0.1, 0.01);
+/// Noise over the peak of the engine that states it, where the study names none.
+const STATED: f64 = 5e-4;
+/// Moments of a stream.
+pub(super) const MOMENTS: usize = 12;
+/// Largest number of presses.
+const MOST_FRAMES: usize = 100_000;
+/// Frames per scene of a fault without contact, which differ little.
+const NO_CONTACT_FRAMES: usize = 2;
+/// Multiplier of the seed: neighbouring seeds have no random numbers in common.
+const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// What computes, and how it receives a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Path {
+    engine: Engine,
+    stream: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Engine {
+    Golden,
+    Stated,
+    Fixed,
+}
+
+/// The engines, each as `dermis reconstruct --frame` and `--stream` run it.
+pub const ENGINES: [Path; 6] = [
+    Path { engine: Engine::Golden, stream: false },
+    Path { engine: Engine::Golden, stream: true },
+    Path { engine: Engine::Stated, stream: false },
+    Path { engine: Engine::Stated, stream: true },
+    Path { engine: Engine::Fixed, stream: false },
+    Path { engine: Engine::Fixed, stream: true },
+];
+
+impl Path {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match (self.engine, self.stream) {
+            (Engine::Golden, false) => "golden, frame",
+            (Engine::Golden, true) => "golden, stream",
+            (Engine::Stated, false) => "golden, noise stated, frame",
+            (Engine::Stated, true) => "golden, noise stated, stream",
+            (Engine::Fixed, false) => "fixed, frame",
+            (Engine::Fixed, true) => "fixed, stream",
+        }
+    }
+}
+
+/// What to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorFaults {
+    /// Presses of each scene, 1 to 100 000.
+    pub frames: usize,
+    /// Seed of presses, noise and faults.
+    pub seed: u64,
+    /// Standard deviation of the noise over the largest stress; 0: none, but for the engine that states its noise.
+    pub noise: f64,
+    /// Names of faults; empty: all.
+    pub only: Vec<String>,
+    /// One size of each fault.
+    pub quick: bool,
+}
+
+impl Default for SensorFaults {
+    fn default() -> Self {
+        SensorFaults { frames: 6, seed: 1, noise: 0.0, only: Vec::new(), quick: false }
+    }
+}
+
+/// Frames of one engine by verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Counts {
+    /// All.
+    pub frames: usize,
+    /// With a flag that a clean frame does not have, or refused.
+    pub flagged: usize,
+    /// Without one, and wrong.
+    pub silent: usize,
+    /// Without one, and right.
+    pub right: usize,
+    /// Largest error of a force over its standard deviation, of the frames without a flag; `None` without any.
+    pub worst_z: Option<f64>,
+}
+
+impl Counts {
+    /// The counts of both.
+    pub fn plus(self, other: Counts) -> Counts {
+        Counts {
+            frames: self.frames + other.frames,
+            flagged: self.flagged + other.flagged,
+            silent: self.silent + other.silent,
+            right: self.right + other.right,
+            worst_z: [self.worst_z, other.worst_z].into_iter().flatten().reduce(f64::max),
+        }
+    }
+
+    /// Share of frames that are silently wrong; 0 without frames.
+    pub fn silent_share(&self) -> f64 {
+        self.silent as f64 / self.frames.max(1) as f64
+    }
+
+    /// Share of frames with a flag; 0 without frames.
+    pub fn flagged_share(&self) -> f64 {
+        self.flagged as f64 / self.frames.max(1) as f64
+    }
+}
+
+/// One line of the table: a fault of one size on all scenes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaultRow {
+    /// Name of the fault.
+    pub fault: &'static str,
+    /// Its size in words; empty where there is one.
+    pub size: String,
+    /// Whether a frame or its stream shows it.
+    pub kind: Kind,
+    /// The counts of each of [`ENGINES`].
+    pub engines: [Counts; ENGINES.len()],
+}
+
+impl Serialize for Kind {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(match self {
+            Kind::Clean => "clean",
+            Kind::Shown => "shown",
+            Kind::Hidden => "hidden",
+            Kind::NoContact => "no-contact",
+        })
+    }
+}
+
+/// A drawn press.
+struct Press {
+    exact_MPa: Vec<f64>,
+    /// Stress of another press.
+    other_MPa: Vec<f64>,
+    total_N: [f64; 3],
+    peak_MPa: f64,
+    peak_taxel: usize,
+    seed: u64,
+}
+
+impl Press {
+    fn random(&self, stream: u64) -> Random {
+        Random::new((self.seed ^ stream << 40).wrapping_mul(SPREAD))
+    }
+
+    /// Stress of a moment without noise: the load grows evenly, and at last as the fault has it.
+    fn stress_MPa(&self, moment: usize, moments: Moments, size: f64) -> Vec<f64> {
+        let grown = (moment + 1) as f64 / MOMENTS as f64;
+        let last = moment + 1 == MOMENTS;
+        let times = |b: &[f64], load: f64| b.iter().map(|b| load * b).collect();
+        match moments {
+            _ if last => self.exact_MPa.clone(),
+            Moments::All | Moments::Last => times(&self.exact_MPa, grown),
+            Moments::LastStep => times(&self.exact_MPa, (1.0 - size) * grown * MOMENTS as f64 / (MOMENTS - 1) as f64),
+            Moments::LastOther => times(&self.other_MPa, grown),
+        }
+    }
+
+    /// The stream with its fault; `noise` as a share of the peak.
+    fn spoiled(&self, sensor: &Sensor, fault: &Fault, size: f64, noise: f64) -> Vec<Vec<f64>> {
+        let (mut read, mut before) = (Vec::new(), Vec::new());
+        for moment in 0..MOMENTS {
+            let mut random = self.random(1 + moment as u64);
+            let normal: Vec<f64> = self.exact_MPa.iter().map(|_| random.normal()).collect();
+            let stress = self.stress_MPa(moment, fault.moments, size);
+            let now: Vec<f64> = std::iter::zip(stress, &normal).map(|(b, n)| b + noise * self.peak_MPa * n).collect();
+            let Press { peak_MPa, peak_taxel, .. } = *self;
+            let readings = Readings { sensor, now: &now, before: &before, noise: &normal, peak_MPa, peak_taxel };
+            let spoils = fault.moments == Moments::All || moment + 1 == MOMENTS;
+            read.push(if spoils { (fault.apply)(&readings, size, &mut self.random(0)) } else { now.clone() });
+            before = now;
+        }
+        read
+    }
+}
+
+/// What an engine says of a frame.
+struct Answer {
+    flags: BTreeSet<Flag>,
+    force_N: [f64; 3],
+    sigma_N: Option<[f64; 3]>,
+}
+
+impl Answer {
+    fn of(result: &Reconstruction) -> Answer {
+        // Those of contacts are independent.
+        let all: Option<Vec<[f64; 3]>> = result.contacts().into_iter().flatten().map(|own| own.sigma_N()).collect();
+        let sum =
+            |all: Vec<[f64; 3]>| [0, 1, 2].map(|axis| all.iter().map(|own| own[axis].powi(2)).sum::<f64>().sqrt());
+        let sigma_N = all.filter(|all| !all.is_empty()).map(sum);
+        Answer { flags: result.flags.iter().copied().collect(), force_N: result.resultant_N, sigma_N }
+    }
+}
+
+/// The engines of a scene.
+struct Engines<'a> {
+    scene: &'a Scene,
+    golden: Golden,
+    fixed: Model,
+}
+
+impl Engines<'_> {
+    fn new(scene: &Scene) -> Result<Engines<'_>, StudyError> {
+        Ok(Engines { scene, golden: Golden::new(scene)?, fixed: Model::new(scene)? })
+    }
+
+    /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it.
+    fn answers(&self, engine: Engine, stream: &[Vec<f64>], noise_MPa: f64) -> Result<[Option<Answer>; 2], StudyError> {
+        let frames = stream.iter().map(|stress| Frame::from_stress("spoiled", &self.scene.sensor, stress.clone()));
+        let frames: Vec<Frame> = frames.collect::<Result<_, _>>()?;
+        let Some(last) = frames.last() else { return Ok([None, None]) };
+        let result = match engine {
+            Engine::Golden => self.golden.run(last).map_err(StudyError::from),
+            Engine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
+            Engine::Fixed => self.fixed.reconstruct(last).map_err(StudyError::from),
+        };
+        let mut result = match result {
+            Err(
+                StudyError::Golden(GoldenError::TooStrong { .. }) | StudyError::Fixed(FixedError::TooStrong { .. }),
+            ) => {
+                return Ok([None, None]);
+            }
+            other => other?,
+        };
+        let (scene, estimator, input) = match engine {
+            Engine::Fixed => (&self.fixed.scene, self.fixed.estimator(), self.fixed.input()),
+            Engine::Golden | Engine::Stated => (self.scene, self.golden.estimator(), self.golden.input()),
+        };
+        let (mut in_stream, mut history) = (result.clone(), History::new(scene));
+        frames.iter().for_each(|frame| in_stream.add_history(scene, &mut history, std::slice::from_ref(frame)));
+        result.find_noise(scene, estimator, input, last);
+        Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
+    }
+
+    /// The verdicts of all [`ENGINES`] on a press with a fault; a clean press has the noise of its size.
+    fn judge(&self, press: &Press, fault: &Fault, size: f64, noise: f64) -> Result<Vec<Judged>, StudyError> {
+        let mut all = Vec::with_capacity(ENGINES.len());
+        for engine in [Engine::Golden, Engine::Stated, Engine::Fixed] {
+            let noise = if fault.kind == Kind::Clean { size } else { noise_of(engine, noise) };
+            let stream = press.spoiled(&self.scene.sensor, fault, size, noise);
+            let last = stream.last().map_or(&[][..], |last| last);
+            let truth_N = (fault.kind != Kind::NoContact).then_some(press.total_N);
+            let answers = self.answers(engine, &stream, noise * press.peak_MPa)?;
+            all.extend(answers.map(|answer| answer.map(|answer| answer.judged(&self.scene.sensor, last, truth_N))));
+        }
+        Ok(all)
+    }
+}
+
+/// Noise over the peak of the frames that an engine gets.
+fn noise_of(engine: Engine, noise: f64) -> f64 {
+    match engine {
+        Engine::Stated if noise == 0.0 => STATED,
+        _ => noise,
+    }
+}
+
+/// A result compared with the truth; `None` is a frame that the engine refuses.
+type Judged = Option<Verdict>;
+
+/// Flags and errors of a result.
+struct Verdict {
+    flags: BTreeSet<Flag>,
+    wrong: bool,
+    /// Largest error over its standard deviation, where the engine states one.
+    z: Option<f64>,
+}
+
+impl Answer {
+    /// Compared with the true force; `None` where nothing presses.
+    fn judged(self, sensor: &Sensor, last: &[f64], truth_N: Option<[f64; 3]>) -> Verdict {
+        let (tangential, normal, none) = RIGHT;
+        let wrong = match truth_N {
+            Some(truth_N) => {
+                let errors = Errors::new(truth_N, self.force_N);
+                errors.tangential.is_some_and(|e| e > tangential) || errors.normal.is_some_and(|e| e > normal)
+            }
+            None => {
+                let sizes: Vec<f64> = last.iter().map(|b| b.abs()).collect();
+                let [x, y, z] = self.force_N;
+                x.hypot(y).hypot(z) > none * sensor.sum_of_stress_N(&sizes)
+            }
+        };
+        let truth_N = truth_N.unwrap_or_default();
+        let z = |sigma: [f64; 3]| {
+            let all = (0..3).map(|axis| (self.force_N[axis] - truth_N[axis]).abs() / sigma[axis]);
+            all.filter(|z| z.is_finite()).reduce(f64::max)
+        };
+        Verdict { z: self.sigma_N.and_then(z), flags: self.flags, wrong }
+    }
+}
+
+/// One frame of the study.
+struct Task<'a> {
+    scene: usize,
+    fault: &'a Fault,
+    size: f64,
+    press: usize,
+}
+
+/// The flags that every one of the clean `judged` has; those of frames that are refused are none.
+fn always(judged: &[&Judged]) -> BTreeSet<Flag> {
+    let mut all = judged.iter().filter_map(|judged| judged.as_ref()).map(|verdict| verdict.flags.clone());
+    let first = all.next().unwrap_or_default();
+    all.fold(first, |both, own| both.intersection(&own).copied().collect())
+}
+
+/// The counts of one frame, where `carried` flags say nothing.
+fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
+    let one = Counts { frames: 1, ..Counts::default() };
+    match judged {
+        Some(verdict) if verdict.flags.is_subset(carried) => {
+            Counts { silent: verdict.wrong.into(), right: (!verdict.wrong).into(), worst_z: verdict.z, ..one }
+        }
+        _ => Counts { flagged: 1, ..one },
+    }
+}
+
+/// Spoils drawn presses of `scenes` and counts the verdicts of all engines; `progress` is called after every frame with the
+/// number of frames done and of all.
+///
+/// ```
+/// use dermis_golden::{spec::scene::Scene, study::sensor_faults::{sensor_faults, SensorFaults}};
+///
+/// let small = SensorFaults { frames: 1, quick: true, only: vec!["sign reversed".to_owned()], ..Default::default() };
+/// let rows = sensor_faults(&[Scene::builtin("eight-by-eight")?], &small, &|_, _| ())?;
+/// // A press that pulls is flagged by every engine.
+/// assert!(rows.len() == 1 && rows[0].engines.iter().all(|counts| counts.flagged == 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`StudyError`]: no frames, a fault that does not exist, a scene that one of the models refuses or on which no contact
+/// fits.
+pub fn sensor_faults(
+    scenes: &[Scene],
+    asked: &SensorFaults,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<FaultRow>, StudyError> {
+    let faults = chosen(asked)?;
+    let engines = scenes.iter().map(Engines::new).collect::<Result<Vec<_>, _>>()?;
+    let presses = scenes.iter().map(|scene| presses(scene, asked)).collect::<Result<Vec<_>, _>>()?;
+    let tasks_of = |fault: &'static Fault, size: f64| {
+        let most = if fault.kind == Kind::NoContact { NO_CONTACT_FRAMES } else { asked.frames };
+        let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(asked.frames)).map(move |press| (scene, press)));
+        all.map(move |(scene, press)| Task { scene, fault, size, press })
+    };
+    let mut lines: Vec<(&Fault, f64)> = Vec::new();
+    for fault in faults {
+        let sizes = if asked.quick { &fault.sizes[fault.sizes.len() / 2..][..1] } else { fault.sizes };
+        lines.extend(sizes.iter().map(|size| (fault, *size)));
+    }
+    // Clean frames with the noise of each engine, whose flags say nothing of a fault.
+    let clean = &FAULTS[0];
+    let noises = if asked.noise == 0.0 { vec![0.0, STATED] } else { vec![asked.noise] };
+    let controls: Vec<Task> = noises.into_iter().flat_map(|noise| tasks_of(clean, noise)).collect();
+    let tasks: Vec<Task> = lines.iter().flat_map(|(fault, size)| tasks_of(fault, *size)).collect();
+    let (done, total) = (AtomicUsize::new(0), controls.len() + tasks.len());
+    let judge = |task: &Task| {
+        let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, asked.noise);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+        judged
+    };
+    let judged = |tasks: &[Task]| tasks.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>, StudyError>>();
+    let (control, spoiled) = (judged(&controls)?, judged(&tasks)?);
+    let carried = |scene: usize, path: usize| {
+        let noise = noise_of(ENGINES[path].engine, asked.noise);
+        let own = std::iter::zip(&controls, &control).filter(|(task, _)| task.scene == scene && task.size == noise);
+        always(&own.map(|(_, judged)| &judged[path]).collect::<Vec<_>>())
+    };
+    let carried: Vec<Vec<BTreeSet<Flag>>> =
+        (0..scenes.len()).map(|scene| (0..ENGINES.len()).map(|path| carried(scene, path)).collect()).collect();
+    let row = |(fault, size): &(&'static Fault, f64)| {
+        let own =
+            std::iter::zip(&tasks, &spoiled).filter(|(task, _)| std::ptr::eq(task.fault, *fault) && task.size == *size);
+        let mut counts = [Counts::default(); ENGINES.len()];
+        for (task, judged) in own {
+            for (path, count) in counts.iter_mut().enumerate() {
+                *count = count.plus(counted(&judged[path], &carried[task.scene][path]));
+            }
+        }
+        FaultRow { fault: fault.name, size: fault.unit.text(*size), kind: fault.kind, engines: counts }
+    };
+    Ok(lines.iter().map(row).collect())
+}
+
+/// The faults that are asked for.
+fn chosen(asked: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
+    let fail = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
+    if !(1..=MOST_FRAMES).contains(&asked.frames) {
+        return fail("frames", asked.frames.to_string(), "a whole number from 1 to 100000");
+    }
+    if !(asked.noise >= 0.0 && asked.noise <= 1.0) {
+        return fail("noise", asked.noise.to_string(), "a number from 0 to 1");
+    }
+    if let Some(unknown) = asked.only.iter().find(|name| FAULTS.iter().all(|fault| fault.name != **name)) {
+        return fail("fault", format!("{unknown:?}"), "the name of a fault, as the table has it");
+    }
+    let wanted = |fault: &&Fault| asked.only.is_empty() || asked.only.iter().any(|name| name == fault.name);
+    Ok(FAULTS.iter().filter(wanted).collect())
+}
+
+/// The presses of a scene.
+fn presses(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Press>, StudyError> {
+    let draws = Draws::new(scene, DrawOptions { seed: asked.seed, ..DrawOptions::default() })?;
+    let press = |number: u64| -> Result<Press, GeneratorError> {
+        let (own, other) = (draws.frame(number)?, draws.frame(number + 1)?);
+        let peak_MPa = own.exact_MPa.iter().fold(0.0f64, |peak, b| b.max(peak));
+        let peak_taxel = own.exact_MPa.iter().position(|b| *b == peak_MPa).unwrap_or(0);
+        let seed = asked.seed.wrapping_mul(SPREAD) ^ number;
+        let (exact_MPa, other_MPa, total_N) = (own.exact_MPa, other.exact_MPa, own.total_N);
+        Ok(Press { exact_MPa, other_MPa, total_N, peak_MPa, peak_taxel, seed })
+    };
+    Ok((0..asked.frames as u64).map(press).collect::<Result<_, _>>()?)
+}
