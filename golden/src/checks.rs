@@ -11,6 +11,7 @@
 //! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
+//! | `baseline_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, `Reconstruction::find_noise` |
 //! | `residual_outlier` | – | `misfit` | above [`OUTLIER`] | the estimators `evidence` and `learned` |
 //! | `residual_correlation` | – | `misfit` | above [`CORRELATED`] | the same |
 //! | `network_misfit` | – | `misfit` | above 1 | both models, with a network, [`Misfit`](crate::misfit::Misfit) |
@@ -104,6 +105,10 @@ pub struct Checks {
     /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
+    /// Root mean square of the baseline in MPa that `evidence` finds and takes off the readings, over the taxels; `None` where
+    /// nothing looked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baseline_MPa: Option<f64>,
     /// Distance of the reading that the others explain least, in standard deviations; `None` but for `evidence`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_outlier: Option<f64>,
@@ -160,7 +165,7 @@ impl Checks {
     }
 
     /// Whether what the estimate leaves cannot be white noise of any size.
-    fn leaves_structure(&self) -> bool {
+    pub(crate) fn leaves_structure(&self) -> bool {
         self.residual_outlier.is_some_and(|size| size > OUTLIER)
             || self.residual_correlation.is_some_and(|size| size > CORRELATED)
     }

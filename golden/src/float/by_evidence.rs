@@ -7,7 +7,6 @@ use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use crate::checks::{largest_spread, relative_spread};
 use crate::evidence::{ContactEstimate, Evidence};
-use crate::flags::Flag;
 use crate::frame::Frame;
 use crate::partition::Subarray;
 use crate::reconstruct::{Reconstruction, SubarrayResult};
@@ -21,21 +20,13 @@ impl Golden {
             true => evidence.without_fit(input.stress_MPa, stated),
             false => evidence.solve(input.stress_MPa, stated),
         };
-        let forces = threshold(estimate.forces_N, self.scene.threshold.min_force_N);
+        let forces = threshold(estimate.forces_N.clone(), self.scene.threshold.min_force_N);
         let subarrays = vec![self.array_of(input, forces.resultant())];
         let mut result = self.finish(frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
-        result.checks.residual_outlier = estimate.outlier;
-        result.checks.residual_correlation = estimate.residual_correlation;
-        if estimate.failed {
-            result.flags.push(Flag::EstimateFailed);
-        }
-        if !estimate.suspects.is_empty() {
-            result.flags.push(Flag::TaxelSuspect);
-        }
-        result.extra.suspects = estimate.suspects;
+        result.add_findings(&estimate);
         result.extra.contacts = Some(estimate.contacts);
         result
     }

@@ -7,10 +7,10 @@
 //! | | unit |
 //! |---|---|
 //! | in: calibrated stress of the reconstructed frame | MPa |
-//! | out: standard deviation of the noise, flag `shear-unreliable` | MPa |
+//! | out: standard deviation of the noise, baseline, suspect taxels, flag `shear-unreliable` | MPa |
 
 use super::Reconstruction;
-use crate::evidence::Evidence;
+use crate::evidence::{Estimate, Evidence};
 use crate::flags::Flag;
 use crate::frame::Frame;
 use crate::input::{Input, InputError};
@@ -23,6 +23,16 @@ use crate::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 pub const FOUND_NOISE_LIMIT: f64 = 1.25e-4;
 
 impl Reconstruction {
+    /// Adds what `evidence` finds in the readings beside the contacts, with the flags.
+    pub(crate) fn add_findings(&mut self, estimate: &Estimate) {
+        self.checks.baseline_MPa = (!estimate.failed).then_some(estimate.baseline_MPa);
+        self.checks.residual_outlier = estimate.outlier;
+        self.checks.residual_correlation = estimate.residual_correlation;
+        self.flags.extend(estimate.failed.then_some(Flag::EstimateFailed));
+        self.flags.extend((!estimate.suspects.is_empty()).then_some(Flag::TaxelSuspect));
+        self.extra.suspects.clone_from(&estimate.suspects);
+    }
+
     /// Finds the noise of `stress`, the calibrated frame of this result, and flags the shear if it hides it. Leaves
     /// results as they are that do not come from the objective `sparse`, whose noise is stated, or whose sensor the
     /// estimator `evidence` refuses.
@@ -57,7 +67,10 @@ impl Reconstruction {
         }
         let estimate = Evidence::new(&whole).solve(&stress.stress_MPa, None);
         self.checks.noise_MPa = Some(estimate.noise_MPa);
-        if estimate.failed || estimate.noise_MPa > FOUND_NOISE_LIMIT * stress.peak_MPa() {
+        self.add_findings(&estimate);
+        // The search takes every reading as it is.
+        let disturbed = estimate.failed || !estimate.suspects.is_empty() || self.checks.leaves_structure();
+        if disturbed || estimate.noise_MPa.max(estimate.baseline_MPa) > FOUND_NOISE_LIMIT * stress.peak_MPa() {
             self.flags.push(Flag::ShearUnreliable);
             self.flags.sort();
             self.flags.dedup();
