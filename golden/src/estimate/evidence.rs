@@ -89,6 +89,7 @@ impl Evidence {
         for contact in &mut estimate.contacts {
             contact.force_N.iter_mut().chain(&mut contact.sigma_N).for_each(|force| *force *= peak);
         }
+        estimate.baseline_MPa *= peak;
         estimate.suspects = suspects;
         for own in &mut estimate.suspects {
             (own.stress_MPa, own.expected_MPa) = (own.stress_MPa * peak, own.expected_MPa * peak);

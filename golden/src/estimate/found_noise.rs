@@ -7,11 +7,11 @@
 //! | | unit |
 //! |---|---|
 //! | in: calibrated stress of the reconstructed frame | MPa |
-//! | out: standard deviation of the noise, flag `shear-unreliable` | MPa |
+//! | out: standard deviation of the noise, baseline, suspect taxels, flag `shear-unreliable` | MPa |
 
 use crate::data::frame::Frame;
 use crate::data::input::Input;
-use crate::estimate::evidence::Evidence;
+use crate::estimate::evidence::{Estimate, Evidence};
 use crate::result::flags::Flag;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::Case;
@@ -23,6 +23,16 @@ use crate::spec::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 pub const FOUND_NOISE_LIMIT: f64 = 1.25e-4;
 
 impl Reconstruction {
+    /// Adds what `evidence` finds in the readings beside the contacts, with the flags.
+    pub(crate) fn add_findings(&mut self, estimate: &Estimate) {
+        self.checks.baseline_MPa = (!estimate.failed).then_some(estimate.baseline_MPa);
+        self.checks.residual_outlier = estimate.outlier;
+        self.checks.residual_correlation = estimate.residual_correlation;
+        self.flags.extend(estimate.failed.then_some(Flag::EstimateFailed));
+        self.flags.extend((!estimate.suspects.is_empty()).then_some(Flag::TaxelSuspect));
+        self.extra.suspects.clone_from(&estimate.suspects);
+    }
+
     /// Finds the noise of `stress`, the calibrated frame of this result of `estimator`, and flags the shear if it hides it;
     /// `input` has the scene's input options. Leaves
     /// results as they are that do not come from the objective `sparse`, whose noise is stated, or whose sensor the
@@ -55,10 +65,13 @@ impl Reconstruction {
         }
         let estimate = Evidence::new(&whole).solve(&stress.stress_MPa, None);
         self.checks.noise_MPa = Some(estimate.noise_MPa);
-        if estimate.failed || estimate.noise_MPa > FOUND_NOISE_LIMIT * stress.peak_MPa() {
+        self.add_findings(&estimate);
+        // The search takes every reading as it is.
+        let disturbed = estimate.failed || !estimate.suspects.is_empty() || self.checks.leaves_structure();
+        if disturbed || estimate.noise_MPa.max(estimate.baseline_MPa) > FOUND_NOISE_LIMIT * stress.peak_MPa() {
             self.flags.push(Flag::ShearUnreliable);
-            self.flags.sort();
-            self.flags.dedup();
         }
+        self.flags.sort();
+        self.flags.dedup();
     }
 }

@@ -8,7 +8,7 @@
 //! | `shape_misfit` | – | the golden engine, with `patch` and `symmetric` |
 //! | `noise_MPa` | MPa | the estimators with evidence, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
 //! | `misfit_probability` | – | the estimators with evidence, where the noise is stated |
-//! | `residual_outlier`, `residual_correlation` | – | the estimators with evidence |
+//! | `baseline_MPa`, `residual_outlier`, `residual_correlation` | MPa, –, – | the estimators with evidence |
 //! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
 //! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
 //! | `plateau`, `line_share` | – | all, [`readings`] |
@@ -111,6 +111,10 @@ pub struct Checks {
     /// where no noise is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
+    /// Root mean square of the baseline in MPa that `evidence` finds and takes off the readings, over the taxels; `None` where
+    /// nothing looked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baseline_MPa: Option<f64>,
     /// Distance of the reading that the others explain least, in standard deviations; `None` but for estimators with evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_outlier: Option<f64>,
@@ -150,7 +154,7 @@ impl Checks {
     }
 
     /// Whether what the estimate leaves cannot be white noise of any size.
-    fn leaves_structure(&self) -> bool {
+    pub(crate) fn leaves_structure(&self) -> bool {
         self.residual_outlier.is_some_and(|size| size > OUTLIER)
             || self.residual_correlation.is_some_and(|size| size > CORRELATED)
     }

@@ -22,6 +22,8 @@ pub struct Estimate {
     pub rank: usize,
     /// Whether no fit explains the stress: the normal force is Σ b·area, the shear is not known.
     pub failed: bool,
+    /// Root mean square of the baseline over the readings in MPa; 0 where no fit was made.
+    pub baseline_MPa: f64,
     /// Taxels whose readings no force explains; they are taken as missing.
     pub suspects: Vec<SuspectTaxel>,
     /// Distance, in standard deviations, of the reading that the others explain least; `None` where no fit was made.

@@ -444,11 +444,10 @@ impl<'a> Fit<'a> {
         let sensor = &self.scene.cells.sensor;
         let residual = Residual::new(&self.readings, |k| self.counts(k), &stress);
         let least = if self.stated { 1.0 } else { FLOOR / self.sigma };
-        let above = |k: usize| {
-            let own = design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]);
-            self.b[self.taxels[k]] - own.sum::<f64>()
-        };
-        let load = (0..self.taxels.len()).filter(|&k| self.counts(k)).map(above).sum::<f64>();
+        let baseline = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
+        let counted = || (0..self.taxels.len()).filter(|&k| self.counts(k));
+        let load = counted().map(|k| self.b[self.taxels[k]] - baseline(k)).sum::<f64>();
+        let square = counted().map(|k| baseline(k).powi(2)).sum::<f64>() / (counted().count().max(1) as f64);
         Fitted {
             worst: residual.worst(least).map(|(k, size)| (self.taxels[k], size)),
             correlation: residual.correlation(sensor, &self.taxels),
@@ -456,7 +455,7 @@ impl<'a> Fit<'a> {
             left: self.sigma * residual.left(),
             wide: regions.wide,
             load: load * sensor.pitch_x_mm * sensor.pitch_y_mm,
-            estimate,
+            estimate: Estimate { baseline_MPa: square.sqrt(), ..estimate },
         }
     }
 }

@@ -10,7 +10,6 @@ use crate::data::input::Input;
 use crate::estimate::evidence::Evidence;
 use crate::estimate::learned::{Learned, LearnedError};
 use crate::result::checks::{largest_spread, relative_spread};
-use crate::result::flags::Flag;
 use crate::result::reconstruct::{ContactEstimate, Reconstruction};
 use crate::spec::scene::{EstimatorKind, Scene};
 
@@ -40,21 +39,13 @@ impl Estimator for ByEvidence {
             true => self.0.without_fit(&input.frame.stress_MPa, noise_MPa),
             false => self.0.solve(&input.frame.stress_MPa, noise_MPa),
         };
-        let forces = threshold(estimate.forces_N, array.scene.threshold.min_force_N);
+        let forces = threshold(estimate.forces_N.clone(), array.scene.threshold.min_force_N);
         let subarrays = vec![array.array_of(input, forces.resultant())];
         let mut result = array.finish(input.frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
-        result.checks.residual_outlier = estimate.outlier;
-        result.checks.residual_correlation = estimate.residual_correlation;
-        if estimate.failed {
-            result.flags.push(Flag::EstimateFailed);
-        }
-        if !estimate.suspects.is_empty() {
-            result.flags.push(Flag::TaxelSuspect);
-        }
-        result.extra.suspects = estimate.suspects;
+        result.add_findings(&estimate);
         result.extra.contacts = Some(estimate.contacts);
         result
     }
