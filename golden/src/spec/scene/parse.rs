@@ -12,7 +12,7 @@ use crate::spec::board::{Board, SEARCH_WIDTHS};
 use crate::spec::link_kind::LinkKind;
 use crate::spec::partition::{subarrays, Case, Grid};
 use crate::spec::scene::MAX_FLOAT_DEGREE;
-use crate::spec::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
+use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -147,12 +147,20 @@ fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
         let number = reader.number(path, |mm| mm > 0.0 && mm <= MAX_LENGTH_MM, &allowed)?;
         number.ok_or_else(|| reader.missing(path, allowed))
     };
-    Ok(Sensor {
+    let sensor = Sensor {
         rows: lines("sensor.rows")?,
         cols: lines("sensor.cols")?,
         pitch_x_mm: length("sensor.pitch_x_mm")?,
         pitch_y_mm: length("sensor.pitch_y_mm")?,
         thickness_mm: length("sensor.thickness_mm")?,
+    };
+    // The lengths are in range, each by itself; their ratios are not yet.
+    sensor.check().map(|()| sensor).map_err(|SensorError { field, allowed, .. }| {
+        let path = format!("sensor.{field}");
+        match reader.value(&path) {
+            Some(value) => reader.wrong(&path, value, allowed),
+            None => reader.missing(&path, allowed),
+        }
     })
 }
 

@@ -204,6 +204,21 @@ fn wrong_values_name_what_is_allowed() {
     assert!(text.contains("sensor.rows is missing"), "{text}");
 }
 
+/// Pitches and thickness that are in range each by itself, but whose ratio asks for a panic, all memory or half a minute.
+#[test]
+fn lengths_far_apart_are_refused_by_field() {
+    let far = [("1e-300", "4.0", "3.0", "pitch_y_mm"), ("1000.0", "1e-12", "1000.0", "pitch_y_mm")];
+    let thick = [("1.0", "1.0", "1001.0", "thickness_mm"), ("1.0", "2.0", "0.0005", "thickness_mm")];
+    for (x, y, h, field) in far.into_iter().chain(thick) {
+        let text = format!("[sensor]\nrows = 8\ncols = 8\npitch_x_mm = {x}\npitch_y_mm = {y}\nthickness_mm = {h}\n");
+        let error = Scene::parse(&text, "far.toml").unwrap_err().to_string();
+        assert!(
+            error.contains(&format!("sensor.{field} = ")) && error.contains("is not allowed; it must be from 1/"),
+            "{error}"
+        );
+    }
+}
+
 #[test]
 fn the_least_mu_max_still_has_formats() {
     for mu_max in ["0", "0.001"] {
