@@ -111,6 +111,14 @@ typedef enum {
    * `torn-frame`
    */
   DERMIS_FLAG_TORN_FRAME = (1 << 21),
+  /**
+   * `estimate-failed`
+   */
+  DERMIS_FLAG_ESTIMATE_FAILED = (1 << 22),
+  /**
+   * `taxel-suspect`
+   */
+  DERMIS_FLAG_TAXEL_SUSPECT = (1 << 23),
 } dermis_flag;
 
 

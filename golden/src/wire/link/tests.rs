@@ -181,7 +181,7 @@ fn time_on_the_wire_by_hand() {
 
 #[test]
 fn the_committed_page_is_the_generated_one() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/link/format.md");
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/wire/link/format.md");
     if std::env::var_os("DERMIS_ACCEPT").is_some() {
         std::fs::write(&path, markdown()).unwrap();
     }
