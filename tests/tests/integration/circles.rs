@@ -414,7 +414,9 @@ fn a_circle_of_rooms_is_found_where_no_modules_are_in_one() {
 
 #[test]
 fn the_floors_of_golden_are_in_order() {
-    let floors = ["random", "read", "write", "spec", "physics", "data", "result", "estimate", "fixed", "wire", "study"];
+    let floors = [
+        "random", "read", "write", "spec", "physics", "data", "result", "estimate", "fixed", "engine", "wire", "study",
+    ];
     in_order(&golden(), &[], &floors, false);
 }
 
