@@ -37,8 +37,7 @@ impl Checks {
     /// With the figures of `readings`, the frames of one reconstruction: the largest of each.
     pub fn with_readings(self, input: &Input, readings: &[Frame]) -> Checks {
         let upward: Vec<Upward> = readings.iter().map(|frame| Upward::new(input, frame)).collect();
-        let largest =
-            |figure: &dyn Fn(&Upward) -> Option<f64>| upward.iter().filter_map(|own| figure(own)).reduce(f64::max);
+        let largest = |figure: &dyn Fn(&Upward) -> Option<f64>| upward.iter().filter_map(figure).reduce(f64::max);
         Checks {
             full_scale_share: input.full_scale_share(readings),
             plateau: largest(&|own| own.plateau()),

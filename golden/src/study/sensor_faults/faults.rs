@@ -2,7 +2,7 @@
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: [`Readings`] | taxels, row-major | MPa |
+//! | in: `Readings` | taxels, row-major | MPa |
 //! | in: size | scalar | [`Unit`] |
 //! | out: readings | taxels, row-major | MPa |
 
@@ -277,7 +277,7 @@ pub const FAULTS: &[Fault] = &[
         })
     }),
     hidden("wrong unit", Times, &[10.0, 1e3, 1e-3], |r, s, _| r.of(|k| s * r.now[k])),
-    hidden("columns mirrored", One, ONE, |r, _, _| r.from(|[i, j]| [i, r.sensor.cols - 1 - j])),
+    hidden("mirrored", One, ONE, |r, _, _| r.from(|[i, j]| [i, r.sensor.cols - 1 - j])),
     hidden("rows and columns exchanged", One, ONE, |r, _, _| {
         let (rows, cols) = (r.sensor.rows, r.sensor.cols);
         r.of(|k| r.now[k % rows * cols + k / rows])

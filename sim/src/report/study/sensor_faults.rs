@@ -81,8 +81,10 @@ fn text(rows: &[FaultRow]) -> String {
     let z = |counts: &Counts| counts.worst_z.map_or("-".to_owned(), |z| format!("{z:.1}"));
     let sum = |Sum { engine, shown, hidden, clean }: Sum| {
         let share = |share: f64| percent(Some(share));
+        let (engine, given_as) = engine.rsplit_once(", ").unwrap_or((engine, ""));
         vec![
             engine.to_owned(),
+            given_as.to_owned(),
             shown.frames.to_string(),
             shown.flagged.to_string(),
             shown.silent.to_string(),
@@ -95,6 +97,7 @@ fn text(rows: &[FaultRow]) -> String {
     };
     let head = [
         "engine",
+        "given as",
         "frames",
         "flagged",
         "silently wrong",
@@ -104,6 +107,6 @@ fn text(rows: &[FaultRow]) -> String {
         "not told, silently wrong",
         "clean, flagged",
     ];
-    let all = aligned(1, &head, sums(rows).into_iter().map(sum).collect());
+    let all = aligned(2, &head, sums(rows).into_iter().map(sum).collect());
     format!("{shown}\n{hidden}\n{clean}\nSums:\n\n{all}\n{LEGEND}\n")
 }
