@@ -1,10 +1,20 @@
 //! What reconstructs frames, whichever it is: a model or a device.
 //!
 //! ```text
-//! frames ── Engine ── (noise of a search, where it is not stated) ── result
+//! frames ─┬─ Engine ────── result ──┬─ result with all figures and flags
+//!         └─ cross-check, history ──┘
 //! ```
 //!
-//! [`result`] is the one way by which the programs and the interfaces to other languages get a result.
+//! [`CheckedEngine`] gives the result of a frame, [`StreamChecks`] checks those of a stream: the programs and the interfaces to
+//! other languages have one of the two.
+
+mod cross_check;
+mod stream_checks;
+#[cfg(test)]
+mod tests;
+
+pub use cross_check::{CrossCheck, Finding};
+pub use stream_checks::{CheckPace, StreamChecks};
 
 use crate::data::frame::Frame;
 use crate::data::input::Input;
@@ -13,6 +23,7 @@ use crate::fixed::{FixedError, Model};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
 use std::error::Error;
+use std::sync::OnceLock;
 use thiserror::Error;
 
 /// An engine cannot reconstruct frames.
@@ -92,46 +103,49 @@ impl Engine for Model {
     }
 }
 
-/// Whether the noise of a frame is found where neither scene nor tare frames state it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FindNoise {
-    /// As [`Reconstruction::find_noise`] does, which takes longer than a search.
-    Yes,
-    /// The result stays as the engine gives it.
-    No,
+/// An engine with the cross-check of its results, which is prepared when it is first wanted.
+pub struct CheckedEngine<E: ?Sized> {
+    engine: Box<E>,
+    check: OnceLock<Option<CrossCheck>>,
 }
 
-impl From<bool> for FindNoise {
-    fn from(find: bool) -> FindNoise {
-        if find {
-            FindNoise::Yes
-        } else {
-            FindNoise::No
+impl<E: Engine + ?Sized> CheckedEngine<E> {
+    /// The engine, its cross-check not yet prepared.
+    pub fn new(engine: Box<E>) -> Self {
+        CheckedEngine { engine, check: OnceLock::new() }
+    }
+
+    /// The engine.
+    pub fn engine(&self) -> &E {
+        &self.engine
+    }
+
+    /// The result of the frames of one reconstruction; with `cross_check` with what the estimator `evidence` says of the same
+    /// frames, where the engine has another one. That takes longer than a search.
+    ///
+    /// ```
+    /// use dermis_golden::engine::{CheckedEngine, Engine};
+    /// use dermis_golden::{fixed::Model, estimate::float::Golden, data::frame::Frame, spec::scene::Scene};
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let frames = &Frame::shipped(&scene)[..1];
+    /// let engines: [Box<dyn Engine>; 2] = [Box::new(Golden::new(&scene)?), Box::new(Model::new(&scene)?)];
+    /// let [golden, fixed] = engines.map(|engine| CheckedEngine::new(engine).result(frames, true));
+    /// // The shear of the search differs from that of evidence by less than 10 %.
+    /// let (golden, fixed) = (golden?, fixed?);
+    /// assert!(golden.checks.tangential_difference.is_none() && fixed.checks.tangential_difference < Some(0.1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::reconstruct`].
+    pub fn result(&self, frames: &[Frame], cross_check: bool) -> Result<Reconstruction, EngineError> {
+        let mut result = self.engine.reconstruct(frames)?;
+        if cross_check {
+            if let Some(check) = self.check.get_or_init(|| CrossCheck::of(&*self.engine)) {
+                check.check(frames, result.resultant_N, &mut result.limits());
+            }
         }
+        Ok(result)
     }
-}
-
-/// The result of the frames of one reconstruction.
-///
-/// ```
-/// use dermis_golden::engine::{result, Engine, FindNoise};
-/// use dermis_golden::{fixed::Model, estimate::float::Golden, data::frame::Frame, spec::scene::Scene};
-///
-/// let scene = Scene::builtin("eight-by-eight")?;
-/// let frames = &Frame::shipped(&scene)[..1];
-/// let engines: [Box<dyn Engine>; 2] = [Box::new(Golden::reference(&scene)?), Box::new(Model::new(&scene)?)];
-/// let [golden, fixed] = engines.map(|engine| result(&*engine, frames, FindNoise::No));
-/// // The normal force differs by less than 0.1 %.
-/// assert!((fixed?.resultant_N[2] / golden?.resultant_N[2] - 1.0).abs() < 1e-3);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// As [`Engine::reconstruct`].
-pub fn result(engine: &dyn Engine, frames: &[Frame], find_noise: FindNoise) -> Result<Reconstruction, EngineError> {
-    let mut result = engine.reconstruct(frames)?;
-    if find_noise == FindNoise::Yes {
-        result.find_noise(engine.scene(), engine.estimator(), engine.input(), &engine.stress(frames)?);
-    }
-    Ok(result)
 }

@@ -9,13 +9,11 @@
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`deviations`] | standard deviations of forces that a search found |
 //! | [`misfit`] | how far a frame is from those of a network's training |
-//! | [`found_noise`] | the noise of a frame where neither scene nor tare frames state it |
 
 pub mod degree;
 pub mod deviations;
 pub mod evidence;
 pub mod float;
-pub mod found_noise;
 pub mod learned;
 pub mod misfit;
 pub mod segment;

@@ -158,7 +158,7 @@ class Scene:
         frames: Frame | np.ndarray[tuple[int, int], Any],
         engine: _Engine = "golden",
         *,
-        find_noise: bool = True,
+        cross_check: int = 1,
     ) -> Reconstruction: ...
     @overload
     def reconstruct(
@@ -166,11 +166,11 @@ class Scene:
         frames: Sequence[Frame] | np.ndarray[tuple[int, int, int], Any],
         engine: _Engine = "golden",
         *,
-        find_noise: bool = True,
+        cross_check: int = 1,
     ) -> Reconstructions: ...
     @overload
     def reconstruct(
-        self, frames: ArrayLike, engine: _Engine = "golden", *, find_noise: bool = True
+        self, frames: ArrayLike, engine: _Engine = "golden", *, cross_check: int = 1
     ) -> Reconstruction | Reconstructions: ...
     def trace(self, frame: Frame | ArrayLike) -> list[Stage]: ...
     def noise(
@@ -239,6 +239,7 @@ class Board:
         baud: int | None = None,
         timeout_s: float = 1.0,
         check: bool = False,
+        cross_check: int | None = None,
         tare: Frame | None = None,
     ) -> Board: ...
     def reconstruct(self, frame: Frame | ArrayLike) -> Reconstruction: ...

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use dermis_golden::data::frame::Frame as Stress;
+use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_sim::link::{open, require_uart, HostError, Session};
@@ -42,6 +43,9 @@ type Port = Session<Box<dyn serialport::SerialPort>>;
 ///     Seconds without an answer after which a request is sent again.
 /// check : bool, default False
 ///     Compare every answer with the bit-true model; a difference raises RuntimeError.
+/// cross_check : int, optional
+///     Cross-check every so many results with the estimator evidence, before they are returned; 0: never. Default: the newest
+///     results, beside the others, as often as there is time. checks["cross_check_age"] says how many results ago.
 /// tare : Frame, optional
 ///     Frame without contact, which takes the place of the scene's tare.
 ///
@@ -54,7 +58,7 @@ type Port = Session<Box<dyn serialport::SerialPort>>;
 #[pyclass(frozen, module = "dermis")]
 pub struct Board {
     /// `None` once it is closed.
-    session: Mutex<Option<Port>>,
+    session: Mutex<Option<(Port, StreamChecks)>>,
     scene: Py<Scene>,
 }
 
@@ -76,7 +80,7 @@ impl Board {
         let scene = self.scene.get();
         py.detach(|| {
             let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
-            let session = session.as_mut().ok_or_else(closed)?;
+            let (session, checks) = session.as_mut().ok_or_else(closed)?;
             let (readings, answer) = session.request(frame).map_err(failure)?;
             if let Some(Some(difference)) = &answer.difference {
                 return Err(PyRuntimeError::new_err(format!(
@@ -85,7 +89,8 @@ impl Board {
                 )));
             }
             let result = answer.decode(&session.model, &readings).map_err(fixed)?;
-            let result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
+            let mut result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
+            checks.add(std::slice::from_ref(&readings), result.resultant_N, &mut result.limits());
             Ok(Reconstruction::new(Arc::new(result), scene.lengths()))
         })
     }
@@ -94,7 +99,7 @@ impl Board {
 #[pymethods]
 impl Board {
     #[new]
-    #[pyo3(signature = (port, scene, *, baud = None, timeout_s = 1.0, check = false, tare = None))]
+    #[pyo3(signature = (port, scene, *, baud = None, timeout_s = 1.0, check = false, cross_check = None, tare = None))]
     fn new(
         py: Python<'_>,
         port: &str,
@@ -102,6 +107,7 @@ impl Board {
         baud: Option<u32>,
         timeout_s: f64,
         check: bool,
+        cross_check: Option<u64>,
         tare: Option<&Frame>,
     ) -> PyResult<Board> {
         let spec = scene.get().spec();
@@ -115,7 +121,9 @@ impl Board {
             let model = Model::new(spec).map_err(fixed)?;
             let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok).map_err(input)?;
             let client = open(port, baud, timeout).map_err(|error| failure(error.into()))?;
-            Session::new(client, model, None, tare.map(|tare| tare.0.as_ref()), true, check).map_err(failure)
+            let checks = StreamChecks::new(&model, cross_check.map_or(CheckPace::Beside, CheckPace::Every));
+            let session = Session::new(client, model, None, tare.map(|tare| tare.0.as_ref()), true, check);
+            Ok::<_, PyErr>((session.map_err(failure)?, checks))
         })?;
         Ok(Board { session: Mutex::new(Some(session)), scene })
     }
@@ -158,7 +166,7 @@ impl Board {
     fn link_errors(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
         py.detach(|| {
             let session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
-            let errors = session.as_ref().ok_or_else(closed)?.client.link_errors;
+            let errors = session.as_ref().ok_or_else(closed)?.0.client.link_errors;
             Ok((errors.repeated, errors.damaged))
         })
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dermis_golden::data::frame::{Frame as Stress, FrameError};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::spec::scene::Scene as Spec;
 use dermis_sim::engine::{self, EngineName, Engines};
 use numpy::PyArray3;
@@ -186,9 +187,10 @@ impl Scene {
     /// engine : "golden" or "fixed", default "golden"
     ///     The floating-point model, or the integers of the hardware bit for bit. Where the scene states no full scale
     ///     and "fixed" needs one, it takes the largest stress of all `frames`.
-    /// find_noise : bool, default True
-    ///     Where the search finds the shear and the scene states no noise: find the noise from the frame, and flag the
-    ///     shear that it hides. This takes longer than the search itself. `dermis reconstruct` does it, a stream does not.
+    /// cross_check : int, default 1
+    ///     Every so many results, the estimator evidence reads the frames too, where the engine has another estimator, and
+    ///     flags what noise, baseline or a faulty taxel hides from that, as `dermis reconstruct` does; 0: never. This takes
+    ///     longer than a search. checks["cross_check_age"] says how many results ago.
     ///
     /// Returns
     /// -------
@@ -202,25 +204,31 @@ impl Scene {
     /// ------
     /// InputError
     ///     An argument of another shape or type, a scene or frame that the model refuses.
-    #[pyo3(signature = (frames, engine = "golden", *, find_noise = true))]
+    #[pyo3(signature = (frames, engine = "golden", *, cross_check = 1))]
     fn reconstruct<'py>(
         &self,
         py: Python<'py>,
         frames: &Bound<'py, PyAny>,
         engine: &str,
-        find_noise: bool,
+        cross_check: u64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let name = EngineName::software(engine).map_err(model)?;
         let Frames { frames, single } = self::frames(&self.spec, frames)?;
         let engine = py.detach(|| self.engines.engine(name, &self.spec, &frames)).map_err(model)?;
-        let one = |frames: &[Stress]| py.detach(|| engine::result(&*engine, frames, find_noise.into())).map_err(model);
         if single {
-            let result = Reconstruction::new(Arc::new(one(&frames)?), self.lengths());
-            return Ok(Bound::new(py, result)?.into_any());
+            let result = py.detach(|| engine::result(&engine, &frames, cross_check > 0)).map_err(model)?;
+            return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), self.lengths()))?.into_any());
         }
+        let engine = engine.engine();
+        let mut checks = StreamChecks::new(engine, CheckPace::Every(cross_check));
+        let mut next = |frames: &[Stress]| {
+            let mut result = engine.reconstruct(frames).map_err(engine::typed)?;
+            checks.add(frames, result.resultant_N, &mut result.limits());
+            anyhow::Ok(Arc::new(result))
+        };
         let mut results = Vec::new();
         for frames in self.spec.input.frames_of_results(&frames) {
-            results.push(Arc::new(one(frames)?));
+            results.push(py.detach(|| next(frames)).map_err(model)?);
             // Ctrl-C ends a long call.
             py.check_signals()?;
         }

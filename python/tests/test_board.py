@@ -41,12 +41,11 @@ def test_a_board_answers_every_frame(port: str) -> None:
         answers = board.stream(sensor())
         assert iter(answers) is answers
         for frame, answer in zip(stress, answers, strict=True):
-            # Like a stream, a board's answer has no noise found from the frame.
-            model = scene.reconstruct(frame, "fixed", find_noise=False)
+            model = scene.reconstruct(frame, "fixed", cross_check=1)
             assert np.array_equal(answer.forces_N, model.forces_N)
             assert (answer.engine, answer.contacts, answer.flags) == ("board", None, model.flags)
         again = board.reconstruct(stress[0])
-        assert np.array_equal(again.forces_N, scene.reconstruct(stress[0], "fixed", find_noise=False).forces_N)
+        assert np.array_equal(again.forces_N, scene.reconstruct(stress[0], "fixed", cross_check=0).forces_N)
         assert board.link_errors == (0, 0)
         with pytest.raises(dermis.InputError, match="frame: wanted one frame"):
             board.reconstruct(np.stack(stress))

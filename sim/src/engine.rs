@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use anyhow::{anyhow, bail, Error, Result};
 use clap::ValueEnum;
 use dermis_golden::data::frame::Frame;
-use dermis_golden::engine::{Engine, EngineError, FindNoise};
+use dermis_golden::engine::{CheckedEngine, Engine, EngineError};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
@@ -65,16 +65,20 @@ impl EngineName {
     }
 }
 
-/// The result of the frames of one reconstruction: [`dermis_golden::engine::result`], with errors by their own types.
+/// The result of the frames of one reconstruction: [`CheckedEngine::result`], with errors by their own types.
 ///
 /// # Errors
 /// As [`Engine::reconstruct`].
-pub fn result(engine: &dyn Engine, frames: &[Frame], find_noise: FindNoise) -> Result<Reconstruction> {
-    dermis_golden::engine::result(engine, frames, find_noise).map_err(typed)
+pub fn result<E: Engine + ?Sized>(
+    engine: &CheckedEngine<E>,
+    frames: &[Frame],
+    cross_check: bool,
+) -> Result<Reconstruction> {
+    engine.result(frames, cross_check).map_err(typed)
 }
 
 /// An engine's error by its own type, from which exit codes and exceptions follow.
-fn typed(error: EngineError) -> Error {
+pub fn typed(error: EngineError) -> Error {
     match error {
         EngineError::Golden(error) => error.into(),
         EngineError::Fixed(error) => error.into(),
@@ -88,20 +92,24 @@ fn typed(error: EngineError) -> Error {
 /// The software engines of a scene for calls from other languages, each built when it is first needed.
 #[derive(Default)]
 pub struct Engines {
-    golden: Mutex<Option<Arc<SharedEngine>>>,
-    fixed: Mutex<Option<Arc<SharedEngine>>>,
+    golden: Cache,
+    fixed: Cache,
 }
+
+/// An engine that serves later calls too.
+type Cache = Mutex<Option<Arc<CheckedEngine<SharedEngine>>>>;
 
 /// The engine there is, or a new one; `build` says whether the new one serves later calls too.
 fn cached(
-    cache: &Mutex<Option<Arc<SharedEngine>>>,
-    build: impl FnOnce() -> Result<(Arc<SharedEngine>, bool)>,
-) -> Result<Arc<SharedEngine>> {
+    cache: &Cache,
+    build: impl FnOnce() -> Result<(Box<SharedEngine>, bool)>,
+) -> Result<Arc<CheckedEngine<SharedEngine>>> {
     let mut cache = cache.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(engine) = cache.as_ref() {
         return Ok(Arc::clone(engine));
     }
     let (engine, serves_all) = build()?;
+    let engine = Arc::new(CheckedEngine::new(engine));
     *cache = serves_all.then(|| Arc::clone(&engine));
     Ok(engine)
 }
@@ -112,13 +120,18 @@ impl Engines {
     ///
     /// # Errors
     /// A scene that the engine refuses, an engine that is not software.
-    pub fn engine(&self, name: EngineName, scene: &Scene, frames: &[Frame]) -> Result<Arc<SharedEngine>> {
+    pub fn engine(
+        &self,
+        name: EngineName,
+        scene: &Scene,
+        frames: &[Frame],
+    ) -> Result<Arc<CheckedEngine<SharedEngine>>> {
         match name {
-            EngineName::Golden => cached(&self.golden, || Ok((Arc::new(Golden::new(scene)?), true))),
+            EngineName::Golden => cached(&self.golden, || Ok((Box::new(Golden::new(scene)?), true))),
             EngineName::Fixed => cached(&self.fixed, || {
                 let model = Model::for_frames(scene, frames)?;
                 let of_scene = model.scene.input.full_scale_MPa == scene.input.full_scale_MPa;
-                Ok((Arc::new(model), of_scene))
+                Ok((Box::new(model), of_scene))
             }),
             EngineName::Rtl => bail!("engine = \"rtl\" is not allowed; it must be \"golden\" or \"fixed\""),
         }

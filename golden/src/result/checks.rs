@@ -6,9 +6,10 @@
 //! | `peak_MPa`, `mu_share`, `border_share` | MPa, –, – | [`Reconstruction::figures`](crate::result::reconstruct::Reconstruction::figures) |
 //! | `load_ratio` | – | the golden engine |
 //! | `shape_misfit` | – | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | the estimators with evidence, [`Reconstruction::find_noise`](crate::result::reconstruct::Reconstruction::find_noise) |
-//! | `misfit_probability` | – | the estimators with evidence, where the noise is stated |
-//! | `baseline_MPa`, `residual_outlier`, `residual_correlation` | MPa, –, – | the estimators with evidence |
+//! | `noise_MPa` | MPa | the estimators with evidence, the [cross-check](crate::engine::CrossCheck) of the others |
+//! | `misfit_probability` | – | the same, where the noise is stated |
+//! | `baseline_MPa`, `residual_outlier`, `residual_correlation` | MPa, –, – | the same |
+//! | `tangential_difference`, `normal_difference`, `cross_check_age` | –, –, results | the cross-check |
 //! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
 //! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
 //! | `plateau`, `line_share` | – | all, [`readings`] |
@@ -42,6 +43,8 @@ pub const LOUD: f64 = 0.1;
 pub const OUTLIER: f64 = 5.0;
 /// See [`OUTLIER`].
 pub const CORRELATED: f64 = 2.5;
+/// [`Checks::tangential_difference`] and [`Checks::normal_difference`] above which two estimates of one frame differ.
+pub const DIFFERENT: [f64; 2] = [0.12, 0.08];
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
 /// [`Checks::plateau`] above which readings are clipped: one frame in a thousand by chance.
@@ -96,11 +99,11 @@ pub struct Checks {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_misfit: Option<f64>,
     /// Standard deviation of the noise in MPa that the estimate rests on: the scene's, else the one found from the
-    /// frame. With `search` the one found from the frame; `None` where nothing looked for it.
+    /// frame; `None` where nothing looked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_MPa: Option<f64>,
-    /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` with `search`, or
-    /// where no noise is stated.
+    /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` where no noise is stated,
+    /// or without evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub misfit_probability: Option<f64>,
     /// What compressive forces at the network's μ leave of the stress, over what they leave of frames like those of its
@@ -108,20 +111,30 @@ pub struct Checks {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network_misfit: Option<f64>,
     /// Standard deviation of the shear over its size, the largest of all contacts or searched subarrays; `None` with `search`
-    /// where no noise is stated.
+    /// where no noise is stated, unless the cross-check tells it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear_spread: Option<f64>,
     /// Root mean square of the baseline in MPa that `evidence` finds and takes off the readings, over the taxels; `None` where
     /// nothing looked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline_MPa: Option<f64>,
-    /// Distance of the reading that the others explain least, in standard deviations; `None` but for estimators with evidence.
+    /// Distance of the reading that the others explain least, in standard deviations; `None` without evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_outlier: Option<f64>,
     /// Correlation of what the estimate leaves of neighbouring readings, in standard deviations of that of white noise;
-    /// `None` but for estimators with evidence.
+    /// `None` without evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_correlation: Option<f64>,
+    /// Difference of the shear from that of the cross-check, beyond the standard deviation of the latter, over the larger of
+    /// the two, or over 5 % of the normal force if that is more; `None` without a cross-check or where that fails.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tangential_difference: Option<f64>,
+    /// The same of the normal force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal_difference: Option<f64>,
+    /// Number of results since the one that was cross-checked last, whose figures these are; `None` without a cross-check.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_check_age: Option<u64>,
     /// Logarithm of the inverse probability that as many readings are the largest by rounding, see [`readings`]; `None` where
     /// all are equal.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -157,6 +170,12 @@ impl Checks {
     pub(crate) fn leaves_structure(&self) -> bool {
         self.residual_outlier.is_some_and(|size| size > OUTLIER)
             || self.residual_correlation.is_some_and(|size| size > CORRELATED)
+    }
+
+    /// Whether the cross-check reads another force.
+    pub(crate) fn differs(&self) -> bool {
+        let all = [self.tangential_difference, self.normal_difference];
+        std::iter::zip(all, DIFFERENT).any(|(difference, most)| difference.is_some_and(|size| size > most))
     }
 
     /// The figure behind `misfit`, in words: of the rules that raise it the first.

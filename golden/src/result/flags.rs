@@ -253,12 +253,23 @@ flags! {
     EstimateFailed = 22 "estimate-failed" {
         raised_when: "no fit explains half of Σ b·area, or the stress is implausible: the normal force is Σ b·area, its standard deviation half of the area times the sum of the sizes of b, the shear is 0 and not resolved",
         remedy: "check zero, unit and wiring of the readings",
-        raised_by: "golden model, with evidence",
+        raised_by: "golden model, with evidence; others by the cross-check",
     }
     TaxelSuspect = 23 "taxel-suspect" {
         raised_when: "a taxel reads what no force explains beside its neighbours: at least 8 standard deviations and 1 % of the peak off what a fit without it predicts. `suspects` names it with row, column, reading and expected stress; the estimate takes it as missing",
         remedy: "repair the taxel, or list it in `input.dead`",
-        raised_by: "golden model, with evidence",
+        raised_by: "golden model, with evidence; others by the cross-check",
+    }
+    EstimatesDiffer = 24 "estimates-differ" {
+        raised_when: "the estimator `evidence`, run beside another one, reads a shear or normal force that differs by more than 12 or 8 % and its standard deviation (`tangential_difference`, `normal_difference`); in a stream of a result `cross_check_age` results ago",
+        remedy: "trust neither: check zero, noise and taxels, and compare with `--engine golden`",
+        raised_by: "all engines without evidence",
+        rule: |checks, _| checks.differs(),
+        figure: |checks| {
+            let percent = |size: Option<f64>| size.map_or("–".to_owned(), |size| format!("{:.0} %", 1e2 * size));
+            let [shear, normal] = [checks.tangential_difference, checks.normal_difference].map(percent);
+            Some(format!("shear {shear}, normal force {normal}"))
+        },
     }
 }
 

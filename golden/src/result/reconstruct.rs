@@ -15,6 +15,7 @@ mod contact_estimate;
 mod contacts;
 mod extra;
 mod figures;
+mod limits;
 mod output;
 mod suspect_taxel;
 
@@ -22,12 +23,12 @@ pub use contact_estimate::ContactEstimate;
 pub use contacts::FoundContact;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
+pub use limits::Limits;
 pub use output::{shear_sigma_N, Resultant, Wrench};
 pub use suspect_taxel::SuspectTaxel;
 
 use crate::data::frame::{Forces, Frame};
 use crate::data::reception::Received;
-use crate::result::checks::history::History;
 use crate::result::checks::Checks;
 use crate::result::errors::Errors;
 use crate::result::flags::Flag;
@@ -152,19 +153,14 @@ impl Reconstruction {
         self
     }
 
-    /// Adds what the readings of a stream so far show, `frames` being those of this result; the flags `taxel-constant` and
-    /// `torn-frame`.
-    pub fn add_history(&mut self, scene: &Scene, history: &mut History, frames: &[Frame]) {
-        let checks = history.add(frames, self.checks);
-        self.add_checks(scene, checks);
+    /// What limits the result.
+    pub fn limits(&mut self) -> Limits<'_> {
+        Limits { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.extra.suspects }
     }
 
     /// Adds the figures of `checks` and the flags that they raise.
     pub(crate) fn add_checks(&mut self, scene: &Scene, checks: Checks) {
-        self.checks = checks;
-        self.flags.extend(checks.flags(scene));
-        self.flags.sort();
-        self.flags.dedup();
+        self.limits().add_checks(scene, checks);
     }
 }
 

@@ -107,9 +107,9 @@ pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_sce
 /// Reconstruct the forces of a frame, or of the frames of one result in the order of time.
 ///
 /// engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
-/// values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With find_noise, where
-/// the search finds the shear and the scene states no noise, the noise is found from the frame, and the shear flagged that
-/// it hides: `dermis reconstruct` does it, a stream does not.
+/// values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With cross_check the
+/// estimator evidence reads the frames too, where the engine has another one, and flags what noise, baseline or a faulty taxel
+/// hides from that: as `dermis reconstruct` does. It takes longer than a search.
 ///
 /// The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
 /// builds the model, which takes longer than the others.
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn dermis_reconstruct(
     engine: *const c_char,
     stress_MPa: *const f64,
     count: usize,
-    find_noise: bool,
+    cross_check: bool,
     result: *mut *mut dermis_result,
 ) -> dermis_status {
     guarded(|| {
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn dermis_reconstruct(
         let name = EngineName::software(unsafe { text("engine", engine) }?)?;
         let frames = unsafe { frames(&scene.spec, stress_MPa, count) }?;
         let engine = scene.engines.engine(name, &scene.spec, &frames)?;
-        let found = engine::result(&*engine, &frames, find_noise.into())?;
+        let found = engine::result(&engine, &frames, cross_check)?;
         result.write(dermis_result::of_model(found).into_raw());
         Ok(())
     })

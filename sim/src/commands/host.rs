@@ -9,7 +9,9 @@ use anyhow::{bail, Context, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
+use dermis_golden::engine::CrossCheck;
 use dermis_golden::fixed::Model;
+use dermis_golden::result::reconstruct::Limits;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::wire::link::{Counters, Identity, Kind};
 use dermis_golden::write::write;
@@ -185,20 +187,23 @@ fn send<P: Read + Write, R>(
 ) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
+    let check = CrossCheck::of(&session.model);
     for (index, request) in requests.iter().enumerate() {
         let (readings, answer) = ask(session, request)?;
-        if let Some(result) = answer.decode(&session.model, &readings)? {
+        let checked = |resultant_N: [f64; 3], limits: &mut Limits| {
+            check.iter().for_each(|check| check.check(std::slice::from_ref(&readings), resultant_N, limits));
+        };
+        if let Some(mut result) = answer.decode(&session.model, &readings)? {
+            checked(result.resultant_N, &mut result.limits());
             let sensor = &session.model.scene.sensor;
             let stress = session.model.stress(std::slice::from_ref(&readings))?;
             let full_scale_MPa = full_scale(&session.model.scene, &stress);
             text.push_str(&report::reconstruction(&result, sensor, full_scale_MPa));
             text.push_str(&report::equality(&answer));
         } else {
-            text.push_str(&report::resultants(
-                &readings.id,
-                &PhysicalAnswer::new(&session.model, &readings, &answer)?,
-                &answer,
-            ));
+            let mut physical = PhysicalAnswer::new(&session.model, &readings, &answer)?;
+            checked(physical.resultant_N, &mut physical.limits());
+            text.push_str(&report::resultants(&readings.id, &physical, &answer));
         }
         equal &= !matches!(answer.difference, Some(Some(_)));
         bar.set(index as u64 + 1);

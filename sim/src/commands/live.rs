@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
-use dermis_golden::engine::Engine;
+use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
@@ -148,7 +148,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
             hand.run(&*engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
         }
         (None, Some((input, name))) => {
-            let options = StreamOptions { queue: 1, policy: Policy::Latest };
+            let options = StreamOptions { queue: 1, policy: Policy::Latest, pace: CheckPace::Beside };
             let counts = run_stream(&*engine, (input, &name), options, &mut output)?;
             eprintln!("{}: {name} has ended after {} results; the last one is shown", scene.name, counts.answered);
         }

@@ -6,7 +6,7 @@ use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
-use dermis_golden::engine::FindNoise;
+use dermis_golden::engine::CheckedEngine;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
@@ -31,8 +31,8 @@ use crate::report;
 
 A stream has one frame per line: taxels separated by commas, row-major, or {\"id\": 7, \"stress_MPa\": [0.1, ...]}. Every
 line is answered by one of JSON: sequence, line, received_s, answered_s, dropped, and the fields of --json; a bad line by
-its number and the error. A recording has both, for dermis replay, dermis live and programs that read ROS 2 messages. The noise must be stated: it is not found from a stream's frames where the search finds the
-shear.")]
+its number and the error. A recording has both, for dermis replay, dermis live and programs that read ROS 2 messages. The
+estimator evidence reads the frames of another one too; checks.cross_check_age in a result says how many results ago.")]
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.
     scene: Option<String>,
@@ -69,8 +69,8 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
     if *name != EngineName::Golden {
         note_estimator(&scene);
     }
-    let engine = name.engine(&scene, Some(&frames), build_dir)?;
-    let result = engine::result(&*engine, &frames, FindNoise::Yes)?;
+    let checked = CheckedEngine::new(name.engine(&scene, Some(&frames), build_dir)?);
+    let (result, engine) = (engine::result(&checked, &frames, true)?, checked.engine());
     if *json {
         return Ok(serde_json::to_string(&result)? + "\n");
     }

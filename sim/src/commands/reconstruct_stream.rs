@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{anyhow, bail, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{value_parser, Args, ValueEnum};
-use dermis_golden::engine::Engine;
+use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_estimator;
@@ -38,6 +38,10 @@ pub(super) struct StreamArguments {
     /// Lines that may wait; default: 64, with --latest 1.
     #[arg(long, value_name = "N", requires = "stream", value_parser = value_parser!(u32).range(1..=4096))]
     queue: Option<u32>,
+    /// Cross-check every N-th result with the estimator evidence, before it is written, where the engine has another
+    /// estimator; 0: none. Default: every one; with --latest the newest ones, as often as there is time.
+    #[arg(long, value_name = "N", requires = "stream")]
+    check_every: Option<u64>,
     /// Leave out the forces of the taxels.
     #[arg(long, requires = "stream")]
     brief: bool,
@@ -66,7 +70,12 @@ impl StreamArguments {
         let policy = if self.latest { Policy::Latest } else { Policy::All };
         let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
         let (input, name) = open(source, scene, self.baud)?;
-        let options = StreamOptions { queue: queue as usize, policy };
+        let pace = match (self.check_every, self.latest) {
+            (Some(period), _) => CheckPace::Every(period),
+            (None, true) => CheckPace::Beside,
+            (None, false) => CheckPace::Every(1),
+        };
+        let options = StreamOptions { queue: queue as usize, policy, pace };
         let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, &scene.sensor)).transpose()?;
         let stop = Stop::default();
         // Without a recording there is nothing to complete.

@@ -7,11 +7,9 @@ use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::fixed::stages::send::{labels_of_beats, status_fields, Status, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
-use dermis_golden::result::checks::history::History;
 use dermis_golden::result::checks::Checks;
 use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
-use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
-use dermis_golden::spec::scene::Scene;
+use dermis_golden::result::reconstruct::{FoundContact, Limits, Reconstruction, SuspectTaxel};
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -158,6 +156,9 @@ pub struct PhysicalAnswer {
     pub flags: Vec<Flag>,
     /// The figures behind the flags.
     pub checks: Checks,
+    /// Taxels whose readings no force explains, as the cross-check has it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub suspects: Vec<SuspectTaxel>,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
     /// The contacts, that with the largest load first; of a board that tells them apart, if it sends forces or records.
@@ -172,12 +173,9 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
-    /// Adds what the readings of a stream so far show, `readings` being those of this answer.
-    pub fn add_history(&mut self, scene: &Scene, history: &mut History, readings: &Frame) {
-        self.checks = history.add(std::slice::from_ref(readings), self.checks);
-        self.flags.extend(self.checks.flags(scene));
-        self.flags.sort();
-        self.flags.dedup();
+    /// What limits the answer.
+    pub fn limits(&mut self) -> Limits<'_> {
+        Limits { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.suspects }
     }
 
     /// The answer to `readings`, in physical units.
@@ -212,6 +210,7 @@ impl PhysicalAnswer {
             loaded: answer.sums.map(|sums| sums.loaded),
             flags,
             checks,
+            suspects: Vec::new(),
             dropped_before: answer.dropped_before(),
             contacts: decoded.and_then(|result| result.contacts()),
             forces_N: answer.forces.as_ref().filter(|_| !model.sends_resultants()).map(forces),

@@ -5,8 +5,8 @@ use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
 use dermis_golden::data::frame::Frame;
+use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
-use dermis_golden::result::checks::history::History;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -31,17 +31,17 @@ struct Reply {
 }
 
 impl Reply {
-    /// The line for an answer to `readings`, which were asked for at `sent_s`, after those of `history`.
+    /// The line for an answer to `readings`, which were asked for at `sent_s`, with `checks`.
     fn new(
         model: &Model,
-        history: &mut History,
+        checks: &mut StreamChecks,
         id: Value,
         sent_s: f64,
         readings: &Frame,
         answer: &Answer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
-        physical.add_history(&model.scene, history, readings);
+        checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.limits());
         Ok(Reply { id, sent_s, answered_s: seconds(answer.received_at), readings: None, answer: physical })
     }
 }
@@ -76,14 +76,14 @@ pub(crate) fn run<P: Read + Write>(
     output: &mut dyn Write,
 ) -> Result<FramesSent> {
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
-    let (mut bytes, mut history) = (Vec::new(), History::new(&session.model.scene));
+    let (mut bytes, mut checks) = (Vec::new(), StreamChecks::new(&session.model, CheckPace::Beside));
     for number in 1.. {
         let text =
             match line::read(input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))? {
                 None => break,
                 Some(false) => Err((Value::Null, anyhow!("over {LONGEST_LINE} bytes"))),
                 Some(true) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
-                Some(true) => answer(session, &mut history, &bytes, number),
+                Some(true) => answer(session, &mut checks, &bytes, number),
             };
         let text = match text {
             Ok(reply) => {
@@ -108,20 +108,25 @@ pub(crate) fn run<P: Read + Write>(
 /// The answer to one line, or its id (null if it cannot be parsed) with the error.
 fn answer<P: Read + Write>(
     session: &mut Session<P>,
-    history: &mut History,
+    checks: &mut StreamChecks,
     bytes: &[u8],
     number: u64,
 ) -> Result<Reply, (Value, anyhow::Error)> {
     let text = std::str::from_utf8(bytes).map_err(|error| (Value::Null, error.into()))?;
     let (id, frame) = line::frame(text, number, &session.model.scene.sensor)
         .map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    reply(session, history, &id, &frame).map_err(|error| (id, error))
+    reply(session, checks, &id, &frame).map_err(|error| (id, error))
 }
 
-fn reply<P: Read + Write>(session: &mut Session<P>, history: &mut History, id: &Value, frame: &Frame) -> Result<Reply> {
+fn reply<P: Read + Write>(
+    session: &mut Session<P>,
+    checks: &mut StreamChecks,
+    id: &Value,
+    frame: &Frame,
+) -> Result<Reply> {
     let sent_s = seconds(SystemTime::now());
     let (frame, answer) = session.request(frame)?;
-    Reply::new(&session.model, history, id.clone(), sent_s, &frame, &answer)
+    Reply::new(&session.model, checks, id.clone(), sent_s, &frame, &answer)
 }
 
 /// Writes a line for each of so many scans of a board that scans its array.
@@ -134,11 +139,11 @@ pub(crate) fn run_scans<P: Read + Write>(
     output: &mut dyn Write,
 ) -> Result<FramesSent> {
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
-    let mut history = History::new(&session.model.scene);
+    let mut checks = StreamChecks::new(&session.model, CheckPace::Beside);
     for id in scans {
         let sent_s = seconds(SystemTime::now());
         let (readings, answer) = session.scan(&id)?;
-        let reply = Reply::new(&session.model, &mut history, id.into(), sent_s, &readings, &answer)?;
+        let reply = Reply::new(&session.model, &mut checks, id.into(), sent_s, &readings, &answer)?;
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;

@@ -13,11 +13,11 @@ use anyhow::Result;
 use dermis_golden::data::frame::{Contact, Forces, Frame};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::generate;
-use dermis_golden::engine::{Engine, FindNoise};
+use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
-use crate::engine;
+use crate::engine::typed;
 use crate::stream::{seconds, Answer, Outcome, Output};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
@@ -87,12 +87,14 @@ impl Hand {
     /// A scene that generator or engine refuse, an output that fails.
     pub fn run(&self, engine: &dyn Engine, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
         let scene = engine.scene();
+        let mut checks = StreamChecks::new(engine, CheckPace::Beside);
         for sequence in 0.. {
             let begun = Instant::now();
             let received_s = seconds(SystemTime::now());
             let frame = self.frame(scene, noise, sequence)?;
             let frames = vec![frame; scene.input.frames_per_result()];
-            let result = engine::result(engine, &frames, FindNoise::No)?;
+            let mut result = engine.reconstruct(&frames).map_err(typed)?;
+            checks.add(&frames, result.resultant_N, &mut result.limits());
             let answered_s = seconds(SystemTime::now());
             let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
             let (frames, received, result) = (&frames[..], &received[..], &result);

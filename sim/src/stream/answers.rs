@@ -6,8 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
-use dermis_golden::engine::{Engine, FindNoise};
-use dermis_golden::result::checks::history::History;
+use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
@@ -15,7 +14,7 @@ use serde::Serialize;
 use super::line;
 use super::queue::{Policy, Queue};
 use super::stop::Stop;
-use crate::engine;
+use crate::engine::typed;
 
 /// How a stream is read and answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +23,8 @@ pub struct StreamOptions {
     pub queue: usize,
     /// What happens where that many wait.
     pub policy: Policy,
+    /// When results are cross-checked.
+    pub pace: CheckPace,
 }
 
 /// What a stream had.
@@ -153,7 +154,7 @@ pub fn run_until(
     };
     stop.add(&queue);
     let (waiting, times, counts) = (Vec::new(), Vec::new(), Counts::default());
-    let mut stream = Stream { engine, history: History::new(engine.scene()), waiting, times, counts };
+    let mut stream = Stream { engine, checks: StreamChecks::new(engine, options.pace), waiting, times, counts };
     loop {
         if stop.stopped() {
             queue.close();
@@ -203,7 +204,7 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 /// The state of a stream.
 struct Stream<'a> {
     engine: &'a dyn Engine,
-    history: History,
+    checks: StreamChecks,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
     /// Seconds since 1970 when the line of each was read.
@@ -221,8 +222,8 @@ impl Stream<'_> {
                 return Ok(None);
             }
             let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
-            let mut result = engine::result(self.engine, &frames, FindNoise::No).map_err(|error| error.to_string())?;
-            result.add_history(self.engine.scene(), &mut self.history, &frames);
+            let mut result = self.engine.reconstruct(&frames).map_err(|error| typed(error).to_string())?;
+            self.checks.add(&frames, result.resultant_N, &mut result.limits());
             Ok(Some((frames, times, result)))
         });
         let line = received.number;
@@ -286,7 +287,7 @@ mod tests {
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }
 
-    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All };
+    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, pace: CheckPace::Every(1) };
 
     fn scene() -> Scene {
         Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search)
@@ -362,7 +363,7 @@ mod tests {
     #[test]
     fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let options = StreamOptions { queue: 1, policy: Policy::Latest };
+        let options = StreamOptions { queue: 1, policy: Policy::Latest, pace: CheckPace::Beside };
         let (counts, answers) = answers(&scene, EngineName::Golden, csv(&frames[0]).repeat(2000), options, true);
         assert_eq!(counts.answered + counts.dropped, 2000);
         assert!(counts.dropped > 0);

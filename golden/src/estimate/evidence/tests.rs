@@ -385,24 +385,3 @@ fn refused_by_field() {
         assert!(auto.model_estimator() == EstimatorKind::Search && Golden::new(&auto).is_ok(), "{field}");
     }
 }
-
-/// The search takes every reading as it is: its results say what `evidence` finds in them.
-#[test]
-fn search_is_warned_of_baseline_and_stuck_taxel() {
-    let scene = Scene::builtin("sensor-1").unwrap();
-    let golden = Golden::with(&scene, EstimatorKind::Search).unwrap();
-    let draws = Draws::new(&scene, DrawOptions { seed: 15, ..Default::default() }).unwrap();
-    for number in 0..10 {
-        let drawn = draws.frame(number).unwrap();
-        let peak = drawn.peak_MPa();
-        let mut slope = drawn.frame.clone();
-        slope.stress_MPa.iter_mut().enumerate().for_each(|(k, b)| *b += 1e-3 * peak * (k % 10) as f64);
-        let mut stuck = drawn.frame.clone();
-        stuck.stress_MPa[90] = 0.5 * peak;
-        for (frame, disturbed) in [(&drawn.frame, false), (&slope, true), (&stuck, true)] {
-            let mut result = golden.run(frame).unwrap();
-            result.find_noise(&scene, golden.estimator(), golden.input(), frame);
-            assert_eq!(result.flags.contains(&Flag::ShearUnreliable), disturbed, "{number}: {:?}", result.checks);
-        }
-    }
-}

@@ -10,6 +10,7 @@ use crate::data::input::Input;
 use crate::estimate::evidence::Evidence;
 use crate::estimate::learned::{Learned, LearnedError};
 use crate::result::checks::{largest_spread, relative_spread};
+use crate::result::flags::Flag;
 use crate::result::reconstruct::{ContactEstimate, Reconstruction};
 use crate::spec::scene::{EstimatorKind, Scene};
 
@@ -45,7 +46,12 @@ impl Estimator for ByEvidence {
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
-        result.add_findings(&estimate);
+        result.checks.baseline_MPa = (!estimate.failed).then_some(estimate.baseline_MPa);
+        result.checks.residual_outlier = estimate.outlier;
+        result.checks.residual_correlation = estimate.residual_correlation;
+        result.flags.extend(estimate.failed.then_some(Flag::EstimateFailed));
+        result.flags.extend((!estimate.suspects.is_empty()).then_some(Flag::TaxelSuspect));
+        result.extra.suspects = estimate.suspects;
         result.extra.contacts = Some(estimate.contacts);
         result
     }

@@ -85,9 +85,17 @@ impl Golden {
     /// # Errors
     /// As [`Golden::new`].
     pub fn with(scene: &Scene, kind: EstimatorKind) -> Result<Golden, GoldenError> {
+        scene.estimated_by(kind).require_golden()?;
+        Golden::with_input(scene, kind, Input::new(scene)?)
+    }
+
+    /// The same with input options that are loaded already.
+    ///
+    /// # Errors
+    /// As [`Golden::new`].
+    pub(crate) fn with_input(scene: &Scene, kind: EstimatorKind, input: Input) -> Result<Golden, GoldenError> {
         let scene = &scene.estimated_by(kind);
         scene.require_golden()?;
-        let input = Input::new(scene)?;
         let estimator = estimator(kind, scene, &input)?;
         let (misfit, deviations) = (Misfit::of_scene(scene, kind)?, Deviations::of_scene(scene, kind)?);
         Ok(Golden { array: Array::new(scene)?, input, kind, estimator, misfit, deviations })

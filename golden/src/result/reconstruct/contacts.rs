@@ -75,4 +75,11 @@ impl Reconstruction {
         let estimated = self.extra.contacts.as_ref().map(|all| all.iter().map(FoundContact::from).collect());
         estimated.or_else(|| self.extra.regions.as_ref().map(|all| all.iter().map(FoundContact::from).collect()))
     }
+
+    /// Standard deviation of the resultant in N, [x, y, normal], the contacts being independent; `None` unless each has one.
+    pub fn sigma_N(&self) -> Option<[f64; 3]> {
+        let all: Option<Vec<[f64; 3]>> = self.contacts()?.iter().map(FoundContact::sigma_N).collect();
+        let all = all.filter(|all| !all.is_empty())?;
+        Some([0, 1, 2].map(|axis| all.iter().map(|own| own[axis].powi(2)).sum::<f64>().sqrt()))
+    }
 }

@@ -14,7 +14,7 @@ use super::statistic::quantile;
 use super::StudyError;
 use crate::data::frame::Frame;
 use crate::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
-use crate::engine::{result, Engine, FindNoise};
+use crate::engine::Engine;
 use crate::estimate::deviations::{Deviations, Load, Subject};
 use crate::estimate::float::Golden;
 use crate::fixed::Model;
@@ -149,13 +149,7 @@ fn errors(
         let readings = readings(&drawn, &study.converter(level), scene)?;
         let of = |(drawn, reading): (&DrawnFrame, &Frame)| {
             let reading = reading.clone().mask_dead(&scene.input.dead);
-            let own = errors_of(
-                scene,
-                drawn,
-                &reading,
-                &result(&*engine, from_ref(&reading), FindNoise::No)?,
-                levels[level] * PEAK,
-            );
+            let own = errors_of(scene, drawn, &reading, &engine.reconstruct(from_ref(&reading))?, levels[level] * PEAK);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, levels.len() * draws);
             Ok(own)
         };

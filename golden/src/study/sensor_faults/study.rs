@@ -4,6 +4,7 @@ use super::faults::{Fault, Kind, Moments, Readings, FAULTS};
 use crate::data::frame::Frame;
 use crate::data::generator::draws::{DrawOptions, Draws};
 use crate::data::generator::GeneratorError;
+use crate::engine::{CheckedEngine, EngineError};
 use crate::estimate::float::{Golden, GoldenError};
 use crate::fixed::{FixedError, Model};
 use crate::random::Random;
@@ -209,12 +210,8 @@ struct Answer {
 
 impl Answer {
     fn of(result: &Reconstruction) -> Answer {
-        // Those of contacts are independent.
-        let all: Option<Vec<[f64; 3]>> = result.contacts().into_iter().flatten().map(|own| own.sigma_N()).collect();
-        let sum =
-            |all: Vec<[f64; 3]>| [0, 1, 2].map(|axis| all.iter().map(|own| own[axis].powi(2)).sum::<f64>().sqrt());
-        let sigma_N = all.filter(|all| !all.is_empty()).map(sum);
-        Answer { flags: result.flags.iter().copied().collect(), force_N: result.resultant_N, sigma_N }
+        let flags = result.flags.iter().copied().collect();
+        Answer { flags, force_N: result.resultant_N, sigma_N: result.sigma_N() }
     }
 }
 
@@ -222,12 +219,12 @@ impl Answer {
 struct Engines<'a> {
     scene: &'a Scene,
     golden: Golden,
-    fixed: Model,
+    fixed: CheckedEngine<Model>,
 }
 
 impl Engines<'_> {
     fn new(scene: &Scene) -> Result<Engines<'_>, StudyError> {
-        Ok(Engines { scene, golden: Golden::new(scene)?, fixed: Model::new(scene)? })
+        Ok(Engines { scene, golden: Golden::new(scene)?, fixed: CheckedEngine::new(Box::new(Model::new(scene)?)) })
     }
 
     /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it.
@@ -238,23 +235,23 @@ impl Engines<'_> {
         let result = match engine {
             Engine::Golden => self.golden.run(last).map_err(StudyError::from),
             Engine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
-            Engine::Fixed => self.fixed.reconstruct(last).map_err(StudyError::from),
+            Engine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
         };
-        let mut result = match result {
+        let result = match result {
             Err(
-                StudyError::Golden(GoldenError::TooStrong { .. }) | StudyError::Fixed(FixedError::TooStrong { .. }),
+                StudyError::Golden(GoldenError::TooStrong { .. })
+                | StudyError::Engine(EngineError::Fixed(FixedError::TooStrong { .. })),
             ) => {
                 return Ok([None, None]);
             }
             other => other?,
         };
-        let (scene, estimator, input) = match engine {
-            Engine::Fixed => (&self.fixed.scene, self.fixed.estimator(), self.fixed.input()),
-            Engine::Golden | Engine::Stated => (self.scene, self.golden.estimator(), self.golden.input()),
-        };
-        let (mut in_stream, mut history) = (result.clone(), History::new(scene));
-        frames.iter().for_each(|frame| in_stream.add_history(scene, &mut history, std::slice::from_ref(frame)));
-        result.find_noise(scene, estimator, input, last);
+        // The cross-check of each result of a stream is that of the frame alone.
+        let (mut in_stream, mut history) = (result.clone(), History::new(self.scene));
+        for frame in &frames {
+            let checks = history.add(std::slice::from_ref(frame), in_stream.checks);
+            in_stream.limits().add_checks(self.scene, checks);
+        }
         Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
     }
 

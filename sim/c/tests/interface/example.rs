@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::engine::{result, FindNoise};
+use dermis_golden::engine::CheckedEngine;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
@@ -123,15 +123,14 @@ fn its_numbers_are_those_of_the_rust_call() {
     let output = Command::new(example()).arg(SCENE).arg(&path).arg(terminal.path()).output().unwrap();
     let (printed, error) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success(), "{error}");
-    let golden = result(&Golden::new(&scene).unwrap(), std::slice::from_ref(&frame), FindNoise::Yes).unwrap();
+    let golden = Golden::new(&scene).unwrap().run(&frame).unwrap();
     assert!(golden.extra.contacts.as_ref().is_some_and(|contacts| !contacts.is_empty()));
     check(&printed, "golden", &golden);
-    let model = Model::new(&scene).unwrap();
-    let mut fixed = model.reconstruct(&frame).unwrap();
-    // The board's result is that of the bits, whose noise no one looked for.
-    check(&printed, "board", &fixed);
-    fixed.find_noise(&scene, model.estimator(), model.input(), &frame);
-    check(&printed, "fixed", &fixed);
+    let fixed = CheckedEngine::new(Box::new(Model::new(&scene).unwrap()));
+    // The board's result is that of the bits, without a cross-check.
+    for (engine, cross_check) in [("board", false), ("fixed", true)] {
+        check(&printed, engine, &fixed.result(std::slice::from_ref(&frame), cross_check).unwrap());
+    }
 }
 
 #[test]

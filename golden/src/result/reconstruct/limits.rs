@@ -1,0 +1,26 @@
+//! Limits: figures, flags and suspect taxels of a result, whatever its form.
+
+use super::SuspectTaxel;
+use crate::result::checks::Checks;
+use crate::result::flags::Flag;
+use crate::spec::scene::Scene;
+
+/// What limits a result, to be added to.
+pub struct Limits<'a> {
+    /// The figures behind the flags.
+    pub checks: &'a mut Checks,
+    /// Flags, sorted, without duplicates.
+    pub flags: &'a mut Vec<Flag>,
+    /// Taxels whose readings no force explains.
+    pub suspects: &'a mut Vec<SuspectTaxel>,
+}
+
+impl Limits<'_> {
+    /// Takes `checks` as the figures, and adds the flags that they raise.
+    pub fn add_checks(&mut self, scene: &Scene, checks: Checks) {
+        *self.checks = checks;
+        self.flags.extend(checks.flags(scene));
+        self.flags.sort();
+        self.flags.dedup();
+    }
+}
