@@ -14,7 +14,7 @@
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
 //! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::estimate::float`] |
 //!
-//! The table is made from recordings under known loads by [`known_loads`].
+//! The table is made from recordings under known loads by [`known_loads`], the noise from frames without load by [`unloaded`].
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
@@ -23,6 +23,7 @@ pub mod known_loads;
 pub mod tare;
 #[cfg(test)]
 mod tests;
+pub mod unloaded;
 
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::{InputSpec, Scene};
@@ -75,7 +76,7 @@ impl Input {
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
         let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
-        let stated_noise_MPa = scene.search.noise_floor_MPa;
+        let stated_noise_MPa = scene.search.noise_floor_MPa();
         let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec: spec.clone() };
         if table.is_none() && tare.is_none() {
             return Ok(input);

@@ -32,7 +32,7 @@ pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
 /// The scene's noise floor in LSBs, rounded down; a code counts if its magnitude is strictly larger.
 pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
     // The cast saturates.
-    (scene.search.noise_floor_MPa / codes.lsb_MPa()).floor() as i32
+    (scene.search.noise_floor_MPa() / codes.lsb_MPa()).floor() as i32
 }
 
 /// Sign, condition and centroids of one subarray's codes.
@@ -160,7 +160,7 @@ mod tests {
         let mut scene = Scene::builtin("sensor-1").unwrap();
         let codes = quantise(&[0.0], 8, 127.0);
         for (floor, expected) in [(0.0, 0), (2.9, 2), (1e300, i32::MAX)] {
-            scene.search.noise_floor_MPa = floor;
+            scene.search.noise_floor_MPa = Some(floor);
             assert_eq!(noise_floor_codes(&scene, &codes), expected);
         }
     }

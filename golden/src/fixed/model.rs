@@ -133,7 +133,7 @@ impl Model {
     pub fn for_frames(scene: &Scene, frames: &[Frame]) -> Result<Self, FixedError> {
         // The estimator is chosen for the scene as it stands, before a full scale is filled in.
         let mut scene = scene.clone().with_chosen_hardware();
-        let needs = scene.search.noise_floor_MPa > 0.0
+        let needs = scene.search.noise_floor_MPa() > 0.0
             || scene.threshold.min_force_N > 0.0
             || scene.input.average > 0
             || scene.scaled_input().is_some();

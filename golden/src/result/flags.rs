@@ -271,6 +271,11 @@ flags! {
             Some(format!("shear {shear}, normal force {normal}"))
         },
     }
+    NoiseNotStated = 25 "noise-not-stated" {
+        raised_when: "the search gives the shear, and neither `search.noise_floor_MPa` nor frames of `input.tare` tell the noise, which can hide it",
+        remedy: "`dermis check SCENE --stream` measures the noise of a device and writes it into the scene; state 0 for simulations without noise",
+        raised_by: "all engines, with a search",
+    }
 }
 
 // Rows stand in the order of their numbers, and C has as many bits.
@@ -365,8 +370,16 @@ pub fn frame_flags(scene: &Scene, estimator: EstimatorKind, frame: &Frame, codes
         (Flag::LoadOutside, load_outside(frame)),
         (Flag::MediumMismatch, medium_differs),
         (Flag::ShearUnreliable, estimator == EstimatorKind::Search && shear_unreliable(scene, frame, codes, noise_MPa)),
+        (Flag::NoiseNotStated, noise_not_stated(scene, estimator, noise_MPa)),
     ];
     only_raised(all).collect()
+}
+
+/// Whether the search of a scene gives the shear, and nobody states the noise; `noise_MPa` is that of scene or tare frames, 0
+/// if neither tells it.
+pub fn noise_not_stated(scene: &Scene, estimator: EstimatorKind, noise_MPa: f64) -> bool {
+    let searched = estimator == EstimatorKind::Search && scene.search.mu_max > 0.0;
+    searched && scene.search.noise_floor_MPa.is_none() && noise_MPa == 0.0
 }
 
 /// With known forces: the cells carry less than the load. Without: the largest |b| is in the outermost rows or columns
@@ -409,7 +422,7 @@ mod tests {
     fn flags(scene: &Scene, frame: &Frame, bits: u32, share: f64) -> Vec<Flag> {
         let peak = frame.peak_MPa();
         let full_scale = if peak > 0.0 { share * peak } else { 1.0 };
-        let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
+        let noise_MPa = scene.search.noise_floor_MPa() * scene.input.noise_share();
         frame_flags(scene, EstimatorKind::Search, frame, &quantise(&frame.stress_MPa, bits, full_scale), noise_MPa)
     }
 
@@ -463,6 +476,7 @@ mod tests {
             line_share: Some(1.0),
             constant_share: Some(1.0),
             torn_share: Some(1.0),
+            tangential_difference: Some(1.0),
             ..Checks::default()
         };
         let raised: Vec<Flag> = checks.flags(&scene).collect();
@@ -521,7 +535,7 @@ mod tests {
         let (mut scene, frame) = setting();
         assert_eq!(flags(&scene, &frame, 14, 1.0), []);
         assert_eq!(flags(&scene, &frame, 13, 1.0), [Flag::ShearUnreliable]);
-        scene.search.noise_floor_MPa = 6e-5 * frame.peak_MPa();
+        scene.search.noise_floor_MPa = Some(6e-5 * frame.peak_MPa());
         assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::ShearUnreliable]);
         // The mean of two frames has less noise.
         scene.input.average = 1;

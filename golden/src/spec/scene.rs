@@ -11,7 +11,7 @@
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
-//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
+//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (not stated) |
 //! | | `form` ("oblique"; "orthogonal"), `estimator` (chosen: [`Scene::model_estimator`]; "search", "evidence", "network", |
 //! | | "evidence+network", "combined"), `degree` (none; 1 … 8) |
 //! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …), `deviations` (none; a file) |
@@ -181,8 +181,9 @@ pub struct SearchSpec {
     pub objective: ObjectiveKind,
     /// Largest ratio of shear to normal force, 0.001 to 2; 0 means no shear and no search.
     pub mu_max: f64,
-    /// Stress in MPa up to which a reading counts as noise, ≥ 0.
-    pub noise_floor_MPa: f64,
+    /// Standard deviation of the noise of one reading in MPa, and the stress up to which a reading counts as noise, ≥ 0; 0 for
+    /// a simulation without noise. `None`: not stated.
+    pub noise_floor_MPa: Option<f64>,
     /// How Eq. 1 is computed.
     pub form: Form,
     /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::estimate::degree`].
@@ -454,13 +455,20 @@ impl Default for PartitionSpec {
     }
 }
 
+impl SearchSpec {
+    /// The noise floor in MPa; 0 where it is not stated.
+    pub fn noise_floor_MPa(&self) -> f64 {
+        self.noise_floor_MPa.unwrap_or(0.0)
+    }
+}
+
 impl Default for SearchSpec {
     fn default() -> Self {
         SearchSpec {
             estimator: None,
             objective: ObjectiveKind::default(),
             mu_max: 0.6,
-            noise_floor_MPa: 0.0,
+            noise_floor_MPa: None,
             form: Form::default(),
             degree: None,
             network: None,

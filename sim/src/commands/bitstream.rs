@@ -8,6 +8,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::SEARCH_WIDTHS;
 use dermis_golden::spec::scene::Scene;
 
+use super::inputs::note_hardware;
 use crate::flow::baseline::{with_search_width, Baselines};
 use crate::flow::bitstream::{make, Effort};
 use crate::progress::Progress;
@@ -70,6 +71,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         Some(width) => with_search_width(scene, width),
         None => scene,
     };
+    note_hardware(&scene)?;
     let model = Model::new(&scene)?;
     let Arguments { seeds, jobs, update_baselines, .. } = *arguments;
     let made = make(&model, build_dir, Effort { seeds, jobs, update_baselines })?;

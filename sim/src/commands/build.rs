@@ -13,7 +13,7 @@ use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;
 
-use super::inputs::{note_estimator, BoardOverride};
+use super::inputs::{note_hardware, BoardOverride};
 use crate::progress::Progress;
 use crate::report;
 
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
 /// Writes the generated files, each completely or not at all; returns their list and the resource tables.
 fn build(scene: &Scene, out: &Path, what: What, with_features: bool) -> Result<String> {
     // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
-    note_estimator(scene);
+    note_hardware(scene)?;
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = match what {

@@ -15,7 +15,8 @@ use dermis_golden::spec::scene::Scene;
 use dermis_golden::study::noise::expected::{expected, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
 
-use super::inputs::{estimator_instead, BoardOverride};
+use super::check_noise::NoiseArguments;
+use super::inputs::{estimator_instead, noise_not_stated, BoardOverride};
 use crate::progress::Progress;
 use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
 
@@ -38,6 +39,8 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    noise: NoiseArguments,
+    #[command(flatten)]
     board: BoardOverride,
 }
 
@@ -45,6 +48,7 @@ const EXAMPLES: &str = "Examples:
   dermis check my-scene.toml                         degree, expected errors, whether the board holds it
   dermis check my-scene.toml --peak 0.1 --draws 10   presses of 0.1 MPa
   dermis check eight-by-eight --target-board icebreaker --json
+  dermis check my-scene.toml --stream=/dev/ttyUSB0   measures the noise while nothing presses, and writes it into the scene
   dermis check build/sensor-1/rtl                    the files of a build against manifest.json
 
 A built-in name or a file is checked as a scene, a folder as a build. A scene that only the floating-point model takes is
@@ -80,6 +84,7 @@ fn text<T: serde::Serialize>(arguments: &Arguments, checked: &T, print: fn(&T) -
 fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     let refused = |error: anyhow::Error| anyhow!("checked as a scene: {error}");
     let scene = arguments.board.apply(Scene::load(&arguments.target).map_err(|error| refused(error.into()))?);
+    let scene = arguments.noise.measure(&arguments.target, scene)?;
     let bar = Progress::steps(&format!("{}: drawn frames", scene.name), 0);
     let golden = Golden::new(&scene).map_err(|error| refused(error.into()))?;
     let noise = StatedNoise::of(&scene, arguments.peak)?;
@@ -88,6 +93,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         Err(defect @ (FixedError::Internal(_) | FixedError::Beats { .. })) => return Err(defect.into()),
         Err(reason) => (None, Some(reason.to_string())),
     };
+    let noise_not_stated = noise_not_stated(&scene)?;
     let (peak_MPa, with_hardware) = (arguments.peak, hardware.is_some());
     let asked = Expectation { peak_MPa, draws: arguments.draws as usize, seed: arguments.seed, with_hardware };
     // A tiny array has no room for the contacts; the rest of the check still stands.
@@ -111,6 +117,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         hardware,
         hardware_refused,
         noise,
+        noise_not_stated,
         errors,
         not_drawn,
     })

@@ -13,7 +13,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::Input;
+use dermis_golden::result::flags;
 use dermis_golden::spec::scene::Scene;
+
+use crate::report;
 
 /// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";
@@ -45,13 +49,28 @@ pub(super) fn estimator_instead(scene: &Scene) -> Option<&'static str> {
     (hardware != scene.model_estimator()).then(|| hardware.name())
 }
 
-/// One line on standard error where the hardware computes another estimator than the floating-point model and the scene does
-/// not state it.
-pub(super) fn note_estimator(scene: &Scene) {
+/// Whether every result of the scene's hardware carries `noise-not-stated`.
+///
+/// # Errors
+/// Files of the input options that cannot be read.
+pub(super) fn noise_not_stated(scene: &Scene) -> Result<bool> {
+    Ok(flags::noise_not_stated(scene, scene.hardware_estimator(), Input::new(scene)?.noise_MPa()))
+}
+
+/// What a user of the hardware must know of the scene, a line each on standard error: where it computes another estimator than
+/// the floating-point model and the scene does not state it; where nobody states the noise.
+///
+/// # Errors
+/// As [`noise_not_stated`].
+pub(super) fn note_hardware(scene: &Scene) -> Result<()> {
     if let (Some(hardware), None) = (estimator_instead(scene), scene.hardware.estimator) {
         let (model, (_, reason)) = (scene.model_estimator().name(), scene.choose_for_hardware());
         eprintln!("{}: estimator {hardware} in hardware, {model} in floating point: {reason}", scene.name);
     }
+    if noise_not_stated(scene)? {
+        eprintln!("{}: {}", scene.name, report::NOISE_NOT_STATED);
+    }
+    Ok(())
 }
 
 /// Loads the scene and its frames, at least one.

@@ -12,7 +12,7 @@ use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
-use super::inputs::{note_estimator, BoardOverride};
+use super::inputs::{note_hardware, BoardOverride};
 use super::reconstruct_stream::{open, software_engine, stream_engine};
 use crate::engine::EngineName;
 use crate::link::{open_board, BoardEngine, Session};
@@ -97,7 +97,7 @@ impl Arguments {
     /// What computes the forces.
     fn engine(&self, scene: &Scene) -> Result<Box<dyn Engine>> {
         let Some(port) = &self.board else { return stream_engine(scene, self.engine) };
-        note_estimator(scene);
+        note_hardware(scene)?;
         let model = Model::new(scene)?;
         let client = open_board(port, &model, None, BOARD_TIMEOUT, "live --board")?;
         Ok(Box::new(BoardEngine::new(Session::new(client, model, None, None, true, false)?)))

@@ -40,6 +40,7 @@ pub mod boards;
 pub mod build;
 pub mod calibrate;
 pub mod check;
+mod check_noise;
 mod cli;
 pub mod converters;
 pub mod cosim;

@@ -166,7 +166,7 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     match noise {
         Some(noise) => writeln!(text, "noise_floor_MPa = {noise:?}  # standard deviation of one reading")?,
         None => {
-            text += "# noise_floor_MPa =    # standard deviation of one reading; `dermis check` then knows the errors to expect\n"
+            text += "# noise_floor_MPa =    # standard deviation of one reading; `dermis check --stream` measures it\n"
         }
     }
     text += "\n[input]\n";
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(text, by_answers.unwrap());
         let scene = Scene::parse(&text, "pad.toml").unwrap();
         assert_eq!((scene.sensor.rows, scene.sensor.cols, scene.sensor.pitch_y_mm), (4, 6, 2.5));
-        assert_eq!((scene.search.noise_floor_MPa, scene.input.full_scale_MPa), (0.001, None));
+        assert_eq!((scene.search.noise_floor_MPa(), scene.input.full_scale_MPa), (0.001, None));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use dermis_golden::fixed::Model;
 
-use super::inputs::{note_estimator, resolve, BoardOverride};
+use super::inputs::{note_hardware, resolve, BoardOverride};
 use crate::cosim::hardware::Hardware;
 use crate::cosim::power::{energies, estimate_power};
 use crate::report;
@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<String> {
     let scene = arguments.target.apply(scene);
     let model = Model::for_frames(&scene, &frames)?;
     energies(&model.board)?;
-    note_estimator(&scene);
+    note_hardware(&scene)?;
     let estimate = estimate_power(&Hardware::new(model, build)?, &frames)?;
     Ok(if arguments.json { serde_json::to_string(&estimate)? + "\n" } else { report::power(&estimate) })
 }

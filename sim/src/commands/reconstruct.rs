@@ -11,7 +11,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 
-use super::inputs::{note_estimator, resolve_one, BoardOverride};
+use super::inputs::{note_hardware, resolve_one, BoardOverride};
 use super::reconstruct_stream::StreamArguments;
 use crate::compare::{comparable_forces, difference};
 use crate::engine::{self, EngineName};
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
     // Large matrices take seconds.
     let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
     if *name != EngineName::Golden {
-        note_estimator(&scene);
+        note_hardware(&scene)?;
     }
     let checked = CheckedEngine::new(name.engine(&scene, Some(&frames), build_dir)?);
     let (result, engine) = (engine::result(&checked, &frames, true)?, checked.engine());

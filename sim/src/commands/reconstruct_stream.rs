@@ -10,7 +10,7 @@ use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::spec::scene::Scene;
 
-use super::inputs::note_estimator;
+use super::inputs::note_hardware;
 use crate::engine::EngineName;
 use crate::jobs::{Interrupt, Interrupted};
 use crate::recording::Recorder;
@@ -126,7 +126,7 @@ pub(super) fn stream_engine(scene: &Scene, name: EngineName) -> Result<Box<dyn E
     }
     require_blocks(scene)?;
     if name != EngineName::Golden {
-        note_estimator(scene);
+        note_hardware(scene)?;
     }
     name.engine(scene, None, Path::new(""))
 }

@@ -11,6 +11,11 @@ use super::document::percent_text;
 use super::table::markdown;
 use super::BUDGET_US;
 
+/// What is said of hardware whose noise nobody states.
+pub const NOISE_NOT_STATED: &str =
+    "the noise is not stated: every result of the hardware's search carries noise-not-stated; \
+                                    `dermis check SCENE --stream` measures it";
+
 /// A generated folder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BuildCheck {
@@ -52,6 +57,8 @@ pub struct SceneCheck {
     /// Noise, and the stress that it is compared with.
     #[serde(flatten)]
     pub noise: StatedNoise,
+    /// Whether every result of the hardware carries `noise-not-stated`.
+    pub noise_not_stated: bool,
     /// Errors on drawn frames.
     pub errors: Vec<ShapeRow>,
     /// Why there are none.
@@ -151,6 +158,9 @@ pub fn scene_check(check: &SceneCheck) -> String {
         (None, reason) => text += &format!("hardware    none: {}\n", reason.as_deref().unwrap_or_default()),
     }
     text += &noise(&check.noise);
+    if check.noise_not_stated {
+        text += &format!("            {NOISE_NOT_STATED}\n");
+    }
     match &check.not_drawn {
         Some(reason) => text += &format!("errors      none: {reason}\n"),
         None => text += &errors(&check.errors),

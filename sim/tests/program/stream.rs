@@ -145,3 +145,73 @@ fn a_serial_port_is_read() {
     child.stderr.take().unwrap().read_to_string(&mut rest).unwrap();
     child.wait().unwrap();
 }
+
+/// A stuck taxel in a stream of the bit-true search: every result is cross-checked, or as many as are wanted.
+#[test]
+fn results_of_a_search_are_cross_checked_in_a_stream() {
+    let mut stuck = frames()[1].clone();
+    stuck.stress_MPa[56] = 1.5 * stuck.peak_MPa();
+    for (every, ages) in [(None, [Some(0), Some(0)]), (Some("2"), [Some(0), Some(1)]), (Some("0"), [None; 2])] {
+        let more: Vec<&str> = every.into_iter().flat_map(|every| ["--check-every", every]).collect();
+        let mut child = dermis(&[&["--stream", "--brief", "--engine", "fixed"], &more[..]].concat());
+        child.stdin.take().unwrap().write_all(line(&stuck).repeat(2).as_bytes()).unwrap();
+        let answers: Vec<Value> = answers(&mut child).collect();
+        assert!(child.wait().unwrap().success());
+        for (answer, age) in std::iter::zip(&answers, ages) {
+            assert_eq!(answer["checks"]["cross_check_age"].as_u64(), age, "{answer}");
+            let suspect = answer["flags"].as_array().unwrap().contains(&"taxel-suspect".into());
+            assert_eq!((suspect, answer["suspects"][0]["row"].as_u64()), (age.is_some(), age.map(|_| 7)));
+        }
+    }
+}
+
+/// `dermis check --stream`: the scene of a new sensor states no noise, and everyone says so until it is measured.
+#[test]
+fn noise_of_a_device_is_measured_and_written_into_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str], input: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+        command.args(arguments).current_dir(folder.path());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        // A program that ends early does not read it.
+        let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+        let output = child.wait_with_output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let new =
+        ["new", "pad.toml", "--rows", "8", "--cols", "8", "--pitch", "4", "--thickness", "3", "--full-scale", "0.5"];
+    assert_eq!(run(&new, "").0, Some(0));
+    let frame = line(&frames()[1]);
+    let flags = || -> Vec<String> {
+        let json = run(&["reconstruct", "pad.toml", "--stream", "--engine", "fixed", "--check-every", "0"], &frame).1;
+        serde_json::from_value(serde_json::from_str::<Value>(&json).unwrap()["flags"].clone()).unwrap()
+    };
+    assert_eq!(flags(), ["noise-not-stated"]);
+    let said = "noise-not-stated; `dermis check SCENE --stream` measures it";
+    assert!(run(&["check", "pad.toml", "--draws", "1"], "").1.contains(said));
+    assert!(run(&["build", "pad.toml"], "").2.contains(said));
+
+    // Readings of noise alone, a standard deviation of 1.2e-4 MPa; while something presses nothing is written.
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+    let mut noisy = |pressed: f64| {
+        let readings = frames()[1].stress_MPa.iter().map(|b| (pressed * b + 1.2e-4 * normal()).to_string());
+        readings.collect::<Vec<_>>().join(",") + "\n"
+    };
+    let pressed: String = (0..20).map(|moment| noisy(f64::from(moment / 10))).collect();
+    let idle: String = (0..20).map(|_| noisy(0.0)).collect();
+    let measure = ["check", "pad.toml", "--stream", "--frames", "20", "--draws", "1"];
+    let (code, _, error) = run(&measure, &pressed);
+    assert!(code == Some(2) && error.contains("standard deviations off its mean"), "{error}");
+    let (code, _, error) = run(&measure, &idle[..idle.len() / 2]);
+    assert!(code == Some(2) && error.contains("of 20 frames"), "{error}");
+    assert_eq!(flags(), ["noise-not-stated"]);
+    let (code, text, error) = run(&measure, &idle);
+    assert!(code == Some(0) && error.contains("measured from 20 frames without load"), "{error}");
+    assert!(!text.contains(said), "{text}");
+    let noise_MPa = Scene::load(&folder.path().join("pad.toml").display().to_string()).unwrap().search.noise_floor_MPa;
+    assert!(noise_MPa.is_some_and(|noise| (noise / 1.2e-4 - 1.0).abs() < 0.1), "{noise_MPa:?}");
+    assert!(!flags().contains(&"noise-not-stated".to_owned()));
+}

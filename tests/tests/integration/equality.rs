@@ -62,7 +62,7 @@ fn clipped_codes_are_equal() {
 fn golden_judges_the_codes_that_the_hardware_gets() {
     let (mut scene, mut frames) = scene("eight-by-eight");
     // With a noise floor all frames have the full scale of the strongest, too coarse for a frame of a 200th of it.
-    scene.search.noise_floor_MPa = 1e-9;
+    scene.search.noise_floor_MPa = Some(1e-9);
     frames.truncate(2);
     let peak = frames[0].peak_MPa();
     let share = peak / frames[1].peak_MPa() / 200.0;

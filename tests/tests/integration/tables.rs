@@ -35,7 +35,7 @@ pub fn specimen(scene: &Scene) -> (TempDir, Scene) {
     fs::write(&path, table.to_csv(&scene.sensor)).unwrap();
     let mut specimen = scene.clone();
     specimen.input.calibration = Some(path);
-    (specimen.search.noise_floor_MPa, specimen.threshold.min_force_N) = (0.01, 0.02);
+    (specimen.search.noise_floor_MPa, specimen.threshold.min_force_N) = (Some(0.01), 0.02);
     if let Some([_, most]) = scene.hardware.table_range.thickness_mm {
         specimen.sensor.thickness_mm = most;
     }

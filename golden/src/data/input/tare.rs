@@ -21,7 +21,7 @@ use std::path::Path;
 /// ν: readings of the whole array that stand beside those of a taxel.
 const PRIOR: f64 = 8.0;
 /// Smallest number of frames whose spread is used.
-const LEAST_FRAMES: usize = 8;
+pub(super) const LEAST_FRAMES: usize = 8;
 /// Share of the live taxels that must vary for the spread to be used.
 const LEAST_VARYING: f64 = 0.5;
 
@@ -48,7 +48,7 @@ impl Tare {
     }
 
     /// Of frames of the scene's sensor, at least one.
-    fn of(frames: &[Frame], scene: &Scene) -> Tare {
+    pub(super) fn of(frames: &[Frame], scene: &Scene) -> Tare {
         let (taxels, count) = (scene.sensor.taxels(), frames.len());
         // Divided before adding, so that the sum does not overflow.
         let mean = |k: usize| frames.iter().map(|frame| frame.stress_MPa[k] / count as f64).sum::<f64>();

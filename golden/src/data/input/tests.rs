@@ -155,7 +155,7 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
 fn a_sliding_mean_has_the_noise_of_its_frames() {
     let mut scene = scene("sensor-1");
     (scene.input.average, scene.input.mean) = (3, MeanKind::Sliding);
-    scene.search.noise_floor_MPa = 1e-3;
+    scene.search.noise_floor_MPa = Some(1e-3);
     let input = Input::new(&scene).unwrap();
     let frame = hertz();
     let noisy = |seed| Converter { noise: 0.01, seed, ..Default::default() }.convert(&frame).unwrap();

@@ -19,7 +19,7 @@ fn searched(name: &str) -> Scene {
 /// The scene with stated noise, in units of the frames' peak.
 fn stated(name: &str, noise: f64) -> Scene {
     let mut scene = searched(name);
-    (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (noise * PEAK, Some(1.2 * PEAK));
+    (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (Some(noise * PEAK), Some(1.2 * PEAK));
     scene
 }
 
@@ -146,7 +146,7 @@ fn results_have_the_deviations_of_their_noise() {
             assert_eq!(shear, mu.map(|mu| mu * result.resultant_N[2]));
             let table = Deviations::of_scene(&scene, scene.model_estimator()).unwrap().unwrap();
             let size = result.resultant_N[2] / (own.peak_MPa() * 8.0);
-            let noise = scene.search.noise_floor_MPa.hypot(0.12 / 524_287.0 / 12f64.sqrt()) / own.peak_MPa();
+            let noise = scene.search.noise_floor_MPa().hypot(0.12 / 524_287.0 / 12f64.sqrt()) / own.peak_MPa();
             let [x, y, share] = table.at(noise, size);
             assert!((mu[0] - x).abs() < 1e-12 && (mu[1] - y).abs() < 1e-12);
             assert!((normal / result.resultant_N[2] - share).abs() < 1e-12);

@@ -304,7 +304,7 @@ fn noise_of_each_taxel_from_tare_frames() {
     assert!(result.checks.misfit_probability.unwrap() > 0.01, "{:?}", result.checks);
     // One noise for all does not fit: the right half is too loud for it.
     let one = Scene {
-        search: crate::spec::scene::SearchSpec { noise_floor_MPa: 0.001 * peak, ..scene.search.clone() },
+        search: crate::spec::scene::SearchSpec { noise_floor_MPa: Some(0.001 * peak), ..scene.search.clone() },
         ..scene.clone()
     };
     let other = Golden::new(&one).unwrap().run(&frame).unwrap();

@@ -193,7 +193,7 @@ pub fn limits(scene: &Scene, scale: Scale, force_exponent: i32) -> Result<Limits
     };
     let prepare = Prepare::new(scene, scale, full_scale.unwrap_or(1.0));
     let code_lsb = |full_scale: f64| full_scale / prepare.largest();
-    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
+    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa(), &code_lsb)?;
     let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
     let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
     Ok(Limits {

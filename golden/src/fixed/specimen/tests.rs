@@ -35,7 +35,7 @@ fn specimen(gain: f64) -> (tempfile::TempDir, Scene) {
     let path = folder.path().join("table.csv");
     std::fs::write(&path, table.to_csv(&scene.sensor)).unwrap();
     scene.input.calibration = Some(path);
-    (scene.search.noise_floor_MPa, scene.threshold.min_force_N) = (0.004, 0.01);
+    (scene.search.noise_floor_MPa, scene.threshold.min_force_N) = (Some(0.004), 0.01);
     (folder, scene)
 }
 

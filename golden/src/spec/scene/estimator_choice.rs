@@ -32,7 +32,7 @@ impl Scene {
     /// `search.estimator`; else the network where the scene names one and states, by `noise_floor_MPa`, noise that a real
     /// array has. A network that was trained for something else, or that the board cannot hold, is an error then.
     pub fn choose_for_hardware(&self) -> (EstimatorKind, String) {
-        let noise_MPa = self.search.noise_floor_MPa * self.input.noise_share();
+        let noise_MPa = self.search.noise_floor_MPa() * self.input.noise_share();
         let quiet = self.input.full_scale_MPa.is_some_and(|full| noise_MPa < QUIET * full);
         let search = |why: &str| (EstimatorKind::Search, why.to_owned());
         if let Some(stated) = self.search.estimator {

@@ -20,7 +20,7 @@ impl Scene {
     /// The level if the scene has none: the largest of the floors of input, noise and coefficients.
     fn floor(&self) -> f64 {
         let input = 1.0 / (f64::from(largest_code(self.fixed.input_bits)) * 12f64.sqrt());
-        let noise = self.input.full_scale_MPa.map_or(0.0, |full_scale| self.search.noise_floor_MPa / full_scale);
+        let noise = self.input.full_scale_MPa.map_or(0.0, |full_scale| self.search.noise_floor_MPa() / full_scale);
         let coefficients = 2f64.powi(COEFFICIENTS_SHARE - self.fixed.inverse_bits as i32);
         // Noise beyond full scale would truncate everything; the largest singular value is always kept.
         (self.input.noise_share() * input.max(noise)).max(coefficients).min(0.5)
@@ -39,13 +39,13 @@ mod tests {
         scene.fixed.inverse_bits = 32;
         let lsb = 1.0 / 524_287.0;
         assert!(near(&scene, lsb / 12f64.sqrt()));
-        scene.search.noise_floor_MPa = 1e-3;
+        scene.search.noise_floor_MPa = Some(1e-3);
         assert!(near(&scene, lsb / 12f64.sqrt()), "a noise in MPa says nothing without full scale");
         scene.input.full_scale_MPa = Some(0.1);
         assert!(near(&scene, 0.01));
         scene.input.average = 4;
         assert!(near(&scene, 0.0025));
-        scene.search.noise_floor_MPa = 1.0;
+        scene.search.noise_floor_MPa = Some(1.0);
         assert!(near(&scene, 0.5), "noise beyond full scale");
         scene.inverse.level = Some(0.3);
         assert!(near(&scene, 0.3));

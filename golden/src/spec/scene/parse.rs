@@ -261,7 +261,7 @@ fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
         estimator: estimator(reader, "search.estimator", &EstimatorKind::NAMES)?,
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
-        noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
+        noise_floor_MPa: floor,
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
         degree: degree(reader)?,
         network: file(reader, origin, "search.network")?,

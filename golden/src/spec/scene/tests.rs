@@ -75,7 +75,7 @@ fn every_field_is_read() {
     assert_eq!(scene.hardware.coefficient_check, CoefficientCheck::Signature);
     assert_eq!(scene.hardware.link.name(), "spi");
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
-    assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
+    assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa()), (1.0, 0.001));
     assert_eq!((scene.search.form, scene.search.degree), (Form::Orthogonal, Some(5)));
     assert_eq!(scene.inverse, InverseSpec { kind: InverseKind::Tikhonov, level: Some(1e-4) });
     assert_eq!(scene.threshold.min_force_N, 0.01);
@@ -348,19 +348,22 @@ fn auto_takes_the_network_in_hardware_where_noise_can_be() {
         let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
         scene.search.estimator = None;
         scene.hardware.estimator = None;
-        (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (1e-4, Some(0.1));
+        (scene.search.noise_floor_MPa, scene.input.full_scale_MPa) = (Some(1e-4), Some(0.1));
         change(&mut scene);
         assert_eq!(scene.hardware_estimator(), scene.choose_for_hardware().0);
         scene.choose_for_hardware()
     };
     assert_eq!(chosen(|_| {}), (EstimatorKind::Network, "the scene states noise and names a network".to_owned()));
     // Without a full scale nothing says that the noise is small.
-    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.full_scale_MPa) = (1e-8, None)).0, EstimatorKind::Network);
+    assert_eq!(
+        chosen(|s| (s.search.noise_floor_MPa, s.input.full_scale_MPa) = (Some(1e-8), None)).0,
+        EstimatorKind::Network
+    );
     type Change = fn(&mut Scene);
     let searched: [(Change, &str); 6] = [
         (|s| s.search.network = None, "names no network"),
-        (|s| s.search.noise_floor_MPa = 0.0, "states no noise"),
-        (|s| s.search.noise_floor_MPa = 9e-7, "below 1e-5 of full scale"),
+        (|s| s.search.noise_floor_MPa = Some(0.0), "states no noise"),
+        (|s| s.search.noise_floor_MPa = Some(9e-7), "below 1e-5 of full scale"),
         (|s| s.partition.case = Case::numbered(1).unwrap(), "partition.case = 1"),
         (|s| s.search.mu_max = 0.0, "mu_max"),
         (|s| s.hardware.search_width = Some(2), "search_width"),
@@ -370,8 +373,8 @@ fn auto_takes_the_network_in_hardware_where_noise_can_be() {
         assert!(taken == EstimatorKind::Search && reason.contains(why), "{why}: {reason}");
     }
     // Of a mean of 64 frames more noise is allowed in each.
-    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (7e-6, 6)).0, EstimatorKind::Search);
-    assert_eq!(chosen(|s| s.search.noise_floor_MPa = 1.1e-6).0, EstimatorKind::Network);
+    assert_eq!(chosen(|s| (s.search.noise_floor_MPa, s.input.average) = (Some(7e-6), 6)).0, EstimatorKind::Search);
+    assert_eq!(chosen(|s| s.search.noise_floor_MPa = Some(1.1e-6)).0, EstimatorKind::Network);
 }
 
 /// A name is an algorithm; a name of an earlier version is refused with the names that take its place.

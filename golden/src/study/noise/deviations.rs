@@ -166,7 +166,7 @@ fn bare(scene: &Scene) -> Scene {
     scene.input = InputSpec { dead: scene.input.dead.clone(), unipolar: scene.input.unipolar, ..InputSpec::default() };
     scene.threshold = ThresholdSpec::default();
     scene.output.forces = ForceOutput::Taxels;
-    scene.search.noise_floor_MPa = 0.0;
+    scene.search.noise_floor_MPa = Some(0.0);
     scene.search.deviations = None;
     scene.search.estimator = Some(EstimatorKind::Search);
     scene.hardware.estimator = Some(EstimatorKind::Search);

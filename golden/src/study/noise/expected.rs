@@ -64,7 +64,7 @@ impl StatedNoise {
 /// use dermis_golden::{study::noise::expected::{expected, Expectation, StatedNoise}, spec::scene::Scene};
 ///
 /// let mut scene = Scene::builtin("eight-by-eight")?;
-/// scene.search.noise_floor_MPa = 1e-4;
+/// scene.search.noise_floor_MPa = Some(1e-4);
 /// let asked = Expectation { peak_MPa: Some(0.2), draws: 4, seed: 1, with_hardware: true };
 /// let noise = StatedNoise::of(&scene, asked.peak_MPa)?;
 /// assert_eq!(noise.share(), Some(5e-4));
@@ -86,7 +86,7 @@ pub fn expected(
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.hardware.take_stress();
     bare.input = InputSpec { dead, unipolar, gain_spread, plausible_MPa, ..InputSpec::default() };
-    bare.search.noise_floor_MPa = 0.0;
+    bare.search.noise_floor_MPa = Some(0.0);
     bare.threshold = ThresholdSpec::default();
     let converter = Converter { gain_spread, unipolar, ..Converter::default() };
     let mut options = DrawOptions { seed: asked.seed, converter, ..DrawOptions::default() };
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn averaging_halves_the_noise_and_the_peak_relates_it() {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
-        scene.search.noise_floor_MPa = 4e-4;
+        scene.search.noise_floor_MPa = Some(4e-4);
         assert_eq!(StatedNoise::of(&scene, None).unwrap().share(), None);
         scene.input.full_scale_MPa = Some(0.4);
         assert_eq!(StatedNoise::of(&scene, None).unwrap().share(), Some(1e-3));
@@ -133,7 +133,7 @@ mod tests {
     fn less_noise_has_smaller_errors_and_the_hardware_has_larger_ones() {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
         let mut median = |noise: f64, estimator: usize| {
-            scene.search.noise_floor_MPa = noise;
+            scene.search.noise_floor_MPa = Some(noise);
             rows(&scene, Some(0.1))[estimator].summary.tangential.median.value
         };
         let (quiet, noisy, hardware) = (median(1e-6, 1), median(1e-3, 1), median(1e-4, 2));

@@ -155,8 +155,8 @@ impl Candidate {
             return Ok(Box::new(move |frame| Ok(golden.run(frame)?)));
         }
         let mut scene = stated.clone().with_chosen_hardware();
-        let noise_MPa = scene.search.noise_floor_MPa * scene.input.noise_share();
-        scene.search.noise_floor_MPa = 0.0;
+        let noise_MPa = scene.search.noise_floor_MPa() * scene.input.noise_share();
+        scene.search.noise_floor_MPa = Some(0.0);
         let model = Model::new(&scene)?;
         let deviations = Deviations::of_scene(&model.scene, model.estimator()).map_err(FixedError::from)?;
         Ok(Box::new(move |frame| {
@@ -204,7 +204,7 @@ pub(super) fn stated(scene: &Scene, converter: &Converter, told: bool) -> Scene 
     let mut scene = scene.clone();
     scene.input.unipolar = converter.unipolar;
     if told {
-        scene.search.noise_floor_MPa = deviation(converter) * PEAK / scene.input.noise_share();
+        scene.search.noise_floor_MPa = Some(deviation(converter) * PEAK / scene.input.noise_share());
         scene.input.gain_spread = converter.gain_spread;
     }
     scene

@@ -286,7 +286,7 @@ pub fn unlike_study(
     super::study::check_parameters(draws, 1, &[])?;
     // No noise is stated, and the hardware takes no noise floor without a full scale.
     let mut scene = scene.clone();
-    scene.search.noise_floor_MPa = 0.0;
+    scene.search.noise_floor_MPa = Some(0.0);
     let Some(misfit) = Misfit::of_scene(&scene, scene.model_estimator()).map_err(golden)? else {
         let value = scene.search.network.as_ref().map_or("none".to_owned(), |path| path.display().to_string());
         let allowed =

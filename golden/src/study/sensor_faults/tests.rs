@@ -220,8 +220,8 @@ fn silently_wrong_frames_are_no_more_than_measured() {
         let (shown, clean) = (of(path, &[Kind::Shown, Kind::NoContact]), of(path, &[Kind::Clean]));
         let name = ENGINES[path].name();
         assert!(shown.frames > 30 && shown.silent_share() <= most, "{name}: {} > {most}", shown.silent_share());
-        // Of a search, noise is found and flagged in every frame that is alone.
-        assert!(clean.flagged == 0 || name == "fixed, frame", "{name}: clean frames are flagged");
+        // Of a search, noise is found and flagged in every frame.
+        assert!(clean.flagged == 0 || name.starts_with("fixed"), "{name}: clean frames are flagged");
     }
 }
 

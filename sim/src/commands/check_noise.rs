@@ -1,0 +1,135 @@
+//! `dermis check --stream`: the noise of a device from frames without load, written into the scene's file.
+
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::{anyhow, ensure, Context, Result};
+use clap::{value_parser, Args};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::unloaded::noise_MPa;
+use dermis_golden::data::input::Input;
+use dermis_golden::spec::scene::{Scene, SearchSpec};
+use dermis_golden::write::write;
+use toml_edit::{value, DocumentMut};
+
+use super::reconstruct_stream::open;
+use crate::progress::Progress;
+use crate::stream::{line, Source};
+
+/// Digits of the noise that is written.
+const DIGITS: i32 = 3;
+
+/// Options of the measurement.
+#[derive(Args, Debug)]
+pub(super) struct NoiseArguments {
+    /// Measure the noise from frames of the device while nothing presses, and write it into the scene's file: from standard
+    /// input, or from =udp:HOST:PORT, a serial port, or a file.
+    #[arg(long, value_name = "SOURCE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
+    stream: Option<Source>,
+    /// Frames to measure.
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "stream", value_parser = value_parser!(u32).range(8..=100_000))]
+    frames: u32,
+    /// Bit rate of a serial port; default: that of the scene's board.
+    #[arg(long, value_name = "BIT/S", requires = "stream")]
+    baud: Option<u32>,
+}
+
+impl NoiseArguments {
+    /// Measures the noise where a stream is named, and writes it into the file of the scene, which is `target`; a built-in
+    /// scene stays as it is. Says what it did on standard error.
+    ///
+    /// # Errors
+    /// A source that fails or ends too early, a line without a frame, frames in which something presses, a file that cannot be
+    /// written.
+    pub(super) fn measure(&self, target: &str, scene: Scene) -> Result<Scene> {
+        let Some(source) = &self.stream else { return Ok(scene) };
+        let (input, name) = open(source, &scene, self.baud)?;
+        let bar = Progress::steps(&format!("{}: frames without load", scene.name), u64::from(self.frames));
+        let (mut input, mut bytes, mut frames) = (BufReader::new(input), Vec::new(), Vec::new());
+        for number in 1.. {
+            if frames.len() == self.frames as usize {
+                break;
+            }
+            let read = line::read(&mut input, &mut bytes).with_context(|| name.clone())?;
+            ensure!(read.is_some(), "{name}: ends after {} of {} frames (--frames)", frames.len(), self.frames);
+            ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
+            if !bytes.iter().all(u8::is_ascii_whitespace) {
+                frames
+                    .push(frame(&bytes, number, &scene).map_err(|reason| anyhow!("{name}: line {number}: {reason}"))?);
+                bar.set(frames.len() as u64);
+            }
+        }
+        drop(bar);
+        let found = noise_MPa(&scene, &Input::new(&scene)?, &frames).map_err(|error| anyhow!("{name}: {error}"))?;
+        let noise_MPa = rounded(found);
+        let stated = format!("noise_floor_MPa = {noise_MPa:?}");
+        let measured = format!("measured from {} frames without load", frames.len());
+        if Scene::builtin_names().contains(&target) {
+            eprintln!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
+        } else {
+            state(Path::new(target), noise_MPa, &measured)?;
+            eprintln!("{target}: {stated}, {measured}, is written");
+        }
+        Ok(Scene { search: SearchSpec { noise_floor_MPa: Some(noise_MPa), ..scene.search.clone() }, ..scene })
+    }
+}
+
+/// The frame of a line, or why there is none.
+fn frame(bytes: &[u8], number: u64, scene: &Scene) -> Result<Frame, String> {
+    let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
+    line::frame(text, number, &scene.sensor).map(|(_, frame)| frame).map_err(|none| none.reason)
+}
+
+/// With the digits that are written.
+fn rounded(noise_MPa: f64) -> f64 {
+    let unit = 10f64.powi(noise_MPa.log10().floor() as i32 + 1 - DIGITS);
+    let text = format!("{:e}", (noise_MPa / unit).round() * unit);
+    // Without the digits that binary rounding adds.
+    format!("{:.*e}", DIGITS as usize - 1, text.parse().unwrap_or(noise_MPa)).parse().unwrap_or(noise_MPa)
+}
+
+/// Writes the noise into the table `[search]` of a scene's file; all else in it stays, comments too.
+fn state(path: &Path, noise_MPa: f64, measured: &str) -> Result<()> {
+    let file = path.display();
+    let text = fs::read_to_string(path).with_context(|| file.to_string())?;
+    let mut document: DocumentMut = text.parse().with_context(|| file.to_string())?;
+    let mut noise = value(noise_MPa);
+    if let Some(value) = noise.as_value_mut() {
+        value.decor_mut().set_suffix(format!("  # {measured}"));
+    }
+    document["search"].or_insert(toml_edit::table())["noise_floor_MPa"] = noise;
+    let stated = document.to_string();
+    let reads = Scene::parse(&stated, &file.to_string())?.search.noise_floor_MPa;
+    ensure!(reads == Some(noise_MPa), "{file}: write [search] noise_floor_MPa = {noise_MPa:?} by hand");
+    Ok(write(path, stated.as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_rounded_to_the_digits_that_are_written() {
+        assert_eq!([1.23456e-4, 9.996e-4, 0.5].map(rounded), [1.23e-4, 1e-3, 0.5]);
+    }
+
+    #[test]
+    fn all_else_in_the_file_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pad.toml");
+        let sensor = "# my pad\n[sensor]\nrows = 2 # two\ncols = 2\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n";
+        for (search, wanted) in [
+            ("", "\n[search]\nnoise_floor_MPa = 0.001  # measured\n"),
+            ("[search]\nmu_max = 0.5 # wood\n", "[search]\nmu_max = 0.5 # wood\nnoise_floor_MPa = 0.001  # measured\n"),
+            (
+                "[search]\nnoise_floor_MPa = 9 # old\nmu_max = 0.5\n",
+                "[search]\nnoise_floor_MPa = 0.001  # measured\nmu_max = 0.5\n",
+            ),
+        ] {
+            fs::write(&path, format!("{sensor}{search}")).unwrap();
+            state(&path, 1e-3, "measured").unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), format!("{sensor}{wanted}"));
+        }
+    }
+}
