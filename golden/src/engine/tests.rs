@@ -13,7 +13,7 @@ fn frames(scene: &Scene, count: u64) -> Vec<[Frame; 3]> {
         let peak_MPa = drawn.peak_MPa();
         let (mut slope, mut stuck) = (drawn.frame.clone(), drawn.frame.clone());
         slope.stress_MPa.iter_mut().enumerate().for_each(|(k, b)| *b += 1e-3 * peak_MPa * (k % cols) as f64);
-        stuck.stress_MPa[cols * (cols - 1)] = 1.5 * peak_MPa;
+        stuck.stress_MPa[cols * (cols - 1)] = -0.5 * peak_MPa;
         [drawn.frame, slope, stuck]
     };
     (0..count).map(of).collect()

@@ -13,6 +13,10 @@
 //! Between two levels the logarithm of the deviation is linear in that of the noise. Below the first it is that of the first;
 //! above the last that of μ is that of the last, since |μ| is bounded, and that of the normal force grows with the noise. Where
 //! neither scene nor tare frames state the noise there are no deviations: that of a real array is far above its LSB.
+//! The maximum of the objective itself tells whether a frame is one of a contact without noise: a baseline, noise or a faulty
+//! taxel leaves forces where none can be, and lowers it. The table has the least one of the drawn frames whose noise hides no
+//! shear; a subarray with a lower one has the flag `score-low`.
+//!
 //! [`Subject`] has the fields of a scene that must be those of the table. A threshold takes forces away: with one there is no
 //! deviation of the normal force.
 //!
@@ -29,7 +33,7 @@ mod tests;
 
 use crate::data::frame::Frame;
 use crate::read::text_up_to;
-use crate::result::checks::{largest_spread, relative_spread, Checks};
+use crate::result::checks::{largest_spread, relative_spread, Checks, COUNTS_FROM};
 use crate::result::reconstruct::{shear_sigma_N, Reconstruction};
 use crate::spec::partition::Case;
 use crate::spec::scene::largest_code;
@@ -44,6 +48,8 @@ use thiserror::Error;
 const VERSION: u32 = 1;
 /// Largest file in bytes.
 const LARGEST_FILE: u64 = 1 << 20;
+/// Largest size of a score in bits: some 20 bits for each of 65536 taxels, as a status word holds it.
+const LARGEST_SCORE: f64 = (1 << 24) as f64;
 
 /// Tables that are part of the program, in JSON.
 const SHIPPED: [(&str, &str); 5] = [
@@ -78,6 +84,10 @@ pub struct Deviations {
     pub levels: Vec<f64>,
     /// Sizes, in taxels, that separate the classes, rising: one less than there are classes.
     pub sizes: Vec<f64>,
+    /// Least maximum of the objective, in bits, of the subarrays of frames whose noise hides no shear, a multiple of 1/64; `None`
+    /// in tables of earlier versions.
+    #[serde(default)]
+    pub least_score: Option<f64>,
     /// Per level and class: standard deviation of μ, [x, y], and that of the normal force over the force.
     pub sigma: Vec<Vec<[f64; 3]>>,
 }
@@ -198,6 +208,7 @@ impl Deviations {
             (!rising(&table.sizes), "its sizes do not rise from above 0"),
             (table.sigma.len() != table.levels.len(), "it has not a row per level"),
             (!table.sigma.iter().all(whole), "a row has not a deviation above 0 per class"),
+            (table.least_score.is_some_and(|score| score.abs() > LARGEST_SCORE), "its least score is out of range"),
         ];
         match faults.into_iter().find(|(fault, _)| *fault) {
             None => Ok(table),
@@ -212,8 +223,9 @@ impl Deviations {
         levels: Vec<f64>,
         sizes: Vec<f64>,
         sigma: Vec<Vec<[f64; 3]>>,
+        least_score: Option<f64>,
     ) -> Deviations {
-        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels, sizes, sigma }
+        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels, sizes, sigma, least_score }
     }
 
     /// The file, JSON with a line per level.
@@ -221,13 +233,14 @@ impl Deviations {
         let line = |row: &Vec<[f64; 3]>| serde_json::json!(row).to_string();
         let rows: Vec<String> = self.sigma.iter().map(line).collect();
         format!(
-            "{{\"version\": {}, \"subject\": {},\n\"draws\": {}, \"seed\": {},\n\"levels\": {},\n\"sizes\": {},\n\"sigma\": [\n{}\n]}}\n",
+            "{{\"version\": {}, \"subject\": {},\n\"draws\": {}, \"seed\": {},\n\"levels\": {},\n\"sizes\": {},\n\"least_score\": {},\n\"sigma\": [\n{}\n]}}\n",
             self.version,
             serde_json::json!(self.subject),
             self.draws,
             self.seed,
             serde_json::json!(self.levels),
             serde_json::json!(self.sizes),
+            serde_json::json!(self.least_score),
             rows.join(",\n")
         )
     }
@@ -250,9 +263,12 @@ impl Deviations {
         [between(x, next[0]), between(y, next[1]), between(normal, next[2])]
     }
 
-    /// Adds standard deviations to the searched subarrays of a result, and the figure and flag of the shear's spread;
-    /// `noise_MPa` is the standard deviation of a taxel of the calibrated `stress`. Nothing unless it is finite and above 0.
+    /// Adds the margin of the score to a result, and where `noise_MPa`, the standard deviation of a taxel of the calibrated
+    /// `stress`, is finite and above 0, standard deviations to the searched subarrays and the figure of the shear's spread; with
+    /// the flags of both.
     pub fn add(&self, result: &mut Reconstruction, scene: &Scene, stress: &Frame, noise_MPa: f64) {
+        let checks = Checks { score_margin: self.score_margin(result, scene, stress), ..result.checks };
+        result.add_checks(scene, checks);
         if !(noise_MPa > 0.0 && noise_MPa.is_finite()) {
             return;
         }
@@ -268,6 +284,23 @@ impl Deviations {
         }
         let checks = Checks { shear_spread: largest_spread(&spreads), ..result.checks };
         result.add_checks(scene, checks);
+    }
+}
+
+impl Deviations {
+    /// The least of what the objectives of the subarrays with a share of the load are above [`Deviations::least_score`].
+    fn score_margin(&self, result: &Reconstruction, scene: &Scene, stress: &Frame) -> Option<f64> {
+        let least = self.least_score?;
+        let own = |index: usize| {
+            let load = Load::of(result, scene, stress, index, 0.0)?;
+            Some((load.normal_N, result.subarrays[index].objective_value? - least))
+        };
+        let all: Vec<(f64, f64)> = (0..result.subarrays.len()).filter_map(own).collect();
+        let total_N: f64 = all.iter().map(|(normal_N, _)| normal_N).sum();
+        all.iter()
+            .filter(|(normal_N, _)| *normal_N >= COUNTS_FROM * total_N)
+            .map(|(_, margin)| *margin)
+            .reduce(f64::min)
     }
 }
 

@@ -102,6 +102,7 @@ impl Model {
                 raised: FlagSet::raised([
                     (Flag::NoContact, !contact),
                     (Flag::TooManyContacts, told.more_contacts),
+                    (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
                     (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
                     (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
                 ]),

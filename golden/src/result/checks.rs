@@ -12,6 +12,7 @@
 //! | `tangential_difference`, `normal_difference`, `cross_check_age` | –, –, results | the cross-check |
 //! | `network_misfit` | – | both models, with a network, [`Misfit`](crate::estimate::misfit::Misfit) |
 //! | `shear_spread` | – | all, with `search` where scene or tare frames state the noise ([`Deviations`](crate::estimate::deviations::Deviations)) |
+//! | `score_margin` | bits | all, with `search` and a table of [`Deviations`](crate::estimate::deviations::Deviations) |
 //! | `plateau`, `line_share` | – | all, [`readings`] |
 //! | `constant_share`, `torn_share` | – | streams, [`history`] |
 //!
@@ -125,6 +126,10 @@ pub struct Checks {
     /// `None` without evidence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_correlation: Option<f64>,
+    /// Maximum of the objective less the least one of clean drawn frames, in bits, the least of the searched subarrays with a
+    /// share of the load; `None` without a search or a table of [`Deviations`](crate::estimate::deviations::Deviations).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score_margin: Option<f64>,
     /// Difference of the shear from that of the cross-check, beyond the standard deviation of the latter, over the larger of
     /// the two, or over 5 % of the normal force if that is more; `None` without a cross-check or where that fails.
     #[serde(skip_serializing_if = "Option::is_none")]

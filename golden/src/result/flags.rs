@@ -276,6 +276,16 @@ flags! {
         remedy: "`dermis check SCENE --stream` measures the noise of a device and writes it into the scene; state 0 for simulations without noise",
         raised_by: "all engines, with a search",
     }
+    ScoreLow = 26 "score-low" {
+        raised_when: "the maximum of the objective of a searched subarray with 5 % of the load is below that of every drawn frame whose noise hides no shear (`score_margin` below 0), where there is a table of standard deviations",
+        remedy: "check zero, noise and taxels, and whether several contacts share the subarray",
+        raised_by: "all engines, with a search",
+        rule: |checks, _| checks.score_margin.is_some_and(|margin| margin < 0.0),
+        figure: |checks| checks.score_margin.map(|margin| format!("{margin:.0} bits above the least")),
+        bit: SCORE_LOW = StatusField::flag(
+            "score_low", 11, Feature::WholeSearch, "the score is below that of frames without noise, where the scene has a table of deviations"
+        ),
+    }
 }
 
 // Rows stand in the order of their numbers, and C has as many bits.
@@ -477,6 +487,7 @@ mod tests {
             constant_share: Some(1.0),
             torn_share: Some(1.0),
             tangential_difference: Some(1.0),
+            score_margin: Some(-1.0),
             ..Checks::default()
         };
         let raised: Vec<Flag> = checks.flags(&scene).collect();

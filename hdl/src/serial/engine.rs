@@ -60,7 +60,7 @@ impl Engine {
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
-        let forces = Forces::new(f, model.threshold, unrounded);
+        let forces = Forces::new(model, unrounded);
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),

@@ -11,8 +11,9 @@
 
 use dermis_golden::fixed::plan::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
 use dermis_golden::fixed::stages::send::{CONDITION, FOUND, FRAMING, STATUS_BEATS};
-use dermis_golden::fixed::words::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::result::flags::NO_CONTACT;
+use dermis_golden::fixed::words::formats::{FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
+use dermis_golden::fixed::Model;
+use dermis_golden::result::flags::{NO_CONTACT, SCORE_LOW};
 use rust_hdl::prelude::*;
 
 use super::pass_sequencer::SATURATION_BITS;
@@ -105,6 +106,8 @@ kernel_block!(
 struct Sizes {
     places: usize,
     wanted: usize,
+    /// A larger score is that of no clean frame.
+    score_limit: Option<i64>,
     /// Width of a word from the bank, and of the value p(μ*) in it.
     word: usize,
     value: usize,
@@ -118,9 +121,9 @@ struct Sizes {
 }
 
 impl Forces {
-    /// With the widths of `formats`; `threshold` is in force LSBs, the rounder takes words of `unrounded` bits.
-    pub fn new(formats: &Formats, threshold: i64, unrounded: usize) -> Self {
-        let f = formats;
+    /// With the widths and limits of `model`; the rounder takes words of `unrounded` bits.
+    pub fn new(model: &Model, unrounded: usize) -> Self {
+        let f = model.formats();
         let rescale_max = i64::from(f.raw_length_max.saturating_sub(f.vector_bits - 1));
         let headroom = i64::from(FORCE_BITS - f.search_bits[0]);
         let sizes = Sizes {
@@ -133,7 +136,8 @@ impl Forces {
             mu_step: f.mu_step,
             mu_fraction: f.mu_fraction,
             shift_base: i64::from(f.mu_fraction) + rescale_max - headroom,
-            threshold,
+            threshold: model.threshold,
+            score_limit: model.score_limit.map(i64::from),
             taxels: 4 * f.quads as u64,
         };
         let block = Forces {
@@ -243,14 +247,16 @@ fn kernel(sizes: Sizes) -> Kernel {
         threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
     };
     let settled_shift = force_shift(&k, sizes.shift_base, normalise, rescale);
+    let mut bits = vec![(FRAMING, framing), (NO_CONTACT, !*contact), (FOUND, found), (CONDITION, condition)];
+    bits.extend(sizes.score_limit.map(|limit| {
+        let low = found & k.signed_constant(sizes.score, limit).less(score.signed());
+        (SCORE_LOW, k.wire("score_low", low))
+    }));
+    let highest = bits.iter().map(|(field, _)| field.low).fold(0, u32::max);
     let state = Status {
         best,
         score,
-        flags: concat(&status_bits(
-            &k,
-            &[(FRAMING, framing), (NO_CONTACT, !*contact), (FOUND, found), (CONDITION, condition)],
-            FRAMING.low + 1,
-        )),
+        flags: concat(&status_bits(&k, &bits, highest + 1)),
         found,
         normalise,
         rescale,

@@ -12,12 +12,13 @@ use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::specimens::specimens;
 use super::widths::{widths, Shape};
+use crate::estimate::deviations::Deviations;
 use crate::estimate::misfit::Misfit;
 use crate::estimate::segment::{self, Segmenter};
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::load::Outcome;
 use crate::fixed::stages::prepare::{Prepare, Scale};
-use crate::fixed::words::formats::Formats;
+use crate::fixed::words::formats::{Formats, LOG_FRACTION};
 use crate::fixed::words::quantised::Quantised;
 use crate::physics::matrices::Matrices;
 use crate::spec::adc::timing::Timing;
@@ -147,6 +148,7 @@ fn of_shapes(
         noise_floor,
         threshold,
         prepare,
+        score_limit: score_limit(&scene, &planned)?,
         tables_version: 0,
         tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
@@ -165,6 +167,14 @@ fn of_shapes(
         cases: planned,
         dropped: Vec::new(),
     })
+}
+
+/// The word of the least score, see [`Plan::score_limit`].
+fn score_limit(scene: &Scene, cases: &[CasePlan]) -> Result<Option<i32>, FixedError> {
+    let table = Deviations::of_scene(scene, scene.hardware_estimator())?;
+    let whole = cases.len() == 1 && cases[0].parts.len() == 1;
+    let least = table.and_then(|table| table.least_score).filter(|_| whole);
+    Ok(least.map(|bits| -(bits * f64::from(1u32 << LOG_FRACTION)) as i32))
 }
 
 /// What depends on the specimen of the array and on what its user wants to see.

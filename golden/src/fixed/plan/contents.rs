@@ -32,6 +32,9 @@ pub struct Plan {
     pub prepare: Prepare,
     /// Noise floor in LSBs of a frame buffer word, rounded down.
     pub noise_floor: i32,
+    /// Word of a score above which it is that of no clean frame, where the whole array is searched for one μ and there is a
+    /// table of deviations. Words of scores fall with the objective.
+    pub score_limit: Option<i32>,
     /// `threshold.min_force_N` in force LSBs, rounded up.
     pub threshold: i64,
     /// Version of the tables: 0 for those of the bitstream.

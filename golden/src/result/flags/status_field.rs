@@ -1,7 +1,7 @@
 //! Status fields: where the words of a status hold what.
 
 use crate::spec::partition::Case;
-use crate::spec::scene::{CoefficientCheck, Scene};
+use crate::spec::scene::{CoefficientCheck, EstimatorKind, Scene};
 
 /// Beats of a status.
 pub const STATUS_BEATS: usize = 3;
@@ -13,6 +13,8 @@ const WORDS: usize = 3;
 pub enum Feature {
     /// Every hardware has the field.
     Always,
+    /// The whole array is searched for one μ.
+    WholeSearch,
     /// The coefficient memory is checked.
     CoefficientCheck,
     /// Each contact has a μ of its own.
@@ -32,6 +34,10 @@ impl Feature {
     pub fn is_in(self, scene: &Scene) -> bool {
         match self {
             Feature::Always => true,
+            Feature::WholeSearch => {
+                let searched = scene.hardware_estimator() == EstimatorKind::Search && scene.search.mu_max > 0.0;
+                searched && scene.partition.case == Case::WHOLE
+            }
             Feature::CoefficientCheck => scene.hardware.coefficient_check == CoefficientCheck::Signature,
             Feature::Contacts => scene.partition.case == Case::Contacts,
             Feature::Adaptive => scene.partition.case == Case::Adaptive,
@@ -45,6 +51,7 @@ impl Feature {
     pub fn setting(self) -> &'static str {
         match self {
             Feature::Always => "",
+            Feature::WholeSearch => "a search, `partition.case = 0`",
             Feature::CoefficientCheck => "`hardware.coefficient_check = \"signature\"`",
             Feature::Contacts => "`partition.case = \"contacts\"`",
             Feature::Adaptive => "`partition.case = \"adaptive\"`",

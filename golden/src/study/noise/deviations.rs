@@ -17,8 +17,10 @@ use crate::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
 use crate::engine::Engine;
 use crate::estimate::deviations::{Deviations, Load, Subject};
 use crate::estimate::float::Golden;
+use crate::fixed::words::formats::LOG_FRACTION;
 use crate::fixed::Model;
 use crate::result::checks::COUNTS_FROM;
+use crate::result::flags::SPARSE_NOISE_LIMIT;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, ForceOutput, InputSpec, Scene, ThresholdSpec};
 use rayon::prelude::*;
@@ -27,6 +29,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of errors within one standard deviation of a normal distribution.
 const WITHIN_ONE: f64 = 0.6827;
+/// Steps of a score in a bit.
+const SCORE_UNIT: f64 = (1u32 << LOG_FRACTION) as f64;
 /// Classes of sizes.
 const CLASSES: usize = 4;
 /// Levels of noise per decade.
@@ -39,6 +43,8 @@ const RATIO: [f64; 2] = [0.25, 0.83];
 /// A searched subarray of a frame: what it is looked up by, and the errors of μ, [x, y], and of the normal force over the
 /// force.
 struct Error {
+    /// Maximum of the objective.
+    score: f64,
     noise: f64,
     size: f64,
     off: [f64; 3],
@@ -77,7 +83,10 @@ pub fn measure_deviations(
         let class = |class: usize| within(own, &sizes, class).ok_or(StudyError::Unmeasured { noise: *level, draws });
         sigma.push((0..=sizes.len()).map(class).collect::<Result<Vec<_>, _>>()?);
     }
-    Ok(Deviations::new(subject, [draws as u64, seed], levels, sizes, sigma))
+    let quiet = errors.iter().flatten().filter(|error| error.noise <= SPARSE_NOISE_LIMIT);
+    // As the hardware's word has it.
+    let least_score = quiet.map(|error| (SCORE_UNIT * error.score).floor() / SCORE_UNIT).reduce(f64::min);
+    Ok(Deviations::new(subject, [draws as u64, seed], levels, sizes, sigma, least_score))
 }
 
 /// How often errors of frames are within the deviations of a table: per level, of μ along x and y, and of the normal force.
@@ -200,7 +209,8 @@ fn errors_of(
         let pressed = sum(&truth.fz) >= counts;
         let axes = [(&truth.fx, &own.fx), (&truth.fy, &own.fy), (&truth.fz, &own.fz)];
         let off = Some(axes).filter(|_| pressed)?.map(|(truth, own)| (sum(own) - sum(truth)).abs());
-        Some(Error { noise: load.noise, size: load.size, off: off.map(|off| off / load.normal_N) })
+        let score = result.subarrays[index].objective_value?;
+        Some(Error { score, noise: load.noise, size: load.size, off: off.map(|off| off / load.normal_N) })
     };
     (0..result.subarrays.len()).filter_map(of).collect()
 }

@@ -104,7 +104,7 @@ pub fn image_bytes(plan: &Plan) -> Option<usize> {
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
-/// whether records take the place of forces, condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, the quantised matrices with
+/// whether records take the place of forces, condition, noise floor and threshold in codes, limit of the score, zeros and gains of the taxels, dead taxels, the quantised matrices with
 /// the columns kept, the network, what finds the contacts, and the scan. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
     let (scene, sensor) = (&plan.scene, &plan.scene.sensor);
@@ -117,6 +117,7 @@ pub fn scene_hash(plan: &Plan) -> u32 {
         "both_signs": plan.scene.partition.condition == Condition::BothSigns,
         "noise_floor": plan.noise_floor,
         "threshold": plan.threshold,
+        "score_limit": plan.score_limit,
         "columns": plan.storage().columns,
         "zero": plan.prepare.zero,
         "gain": plan.prepare.gain,

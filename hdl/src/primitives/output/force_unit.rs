@@ -5,7 +5,7 @@ use dermis_golden::fixed::stages::resultants::Summed;
 use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING, TABLES_VERSION};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, TABLES};
+use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES};
 use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
@@ -155,6 +155,8 @@ struct Shape {
     base_shift: u64,
     /// Forces with a smaller |fz| are zero; `None` where the threshold is written.
     threshold: Option<u64>,
+    /// A larger score is that of no clean frame.
+    score_limit: Option<i64>,
     /// The scene has the coefficient check.
     checks: bool,
     /// Bits of the number of frames in a sliding mean; `None` where the mean does not slide.
@@ -194,6 +196,7 @@ impl ForceUnit {
             mu_step: f.mu_step,
             base_shift: force_shift(f, 0, 0).into(),
             threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
+            score_limit: model.score_limit.map(i64::from),
             checks: model.has_coefficient_check(),
             frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
             counts: model.cases().iter().map(|case| parts(model, case)).collect(),
@@ -396,11 +399,23 @@ impl Shape {
         let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
         let count = k.wire("count", count);
         let case = |below: u32| value_by_case(&k, which, &self.numbers, (below - CASE.low) as usize);
+        let low = self.score_limit.map(|limit| {
+            let low = found & k.signed_constant(self.score_bits, limit).less(score);
+            kept.status("scores_low", low)
+        });
+        // Between the number of the case and that of frames.
+        let between = |above: u32| match low {
+            None => case(above),
+            Some(low) => {
+                let more = k.constant((above - SCORE_LOW.low - 1) as usize, 0);
+                more.concat(low).concat(case(SCORE_LOW.low))
+            }
+        };
         let case = match self.frames_bits {
-            None => case(FORCE_BITS),
+            None => between(FORCE_BITS),
             Some(_) => {
                 let frames = kept.status("frames_held", frames).extend(WORD - FRAMES.low as usize);
-                frames.concat(case(FRAMES.low))
+                frames.concat(between(FRAMES.low))
             }
         };
         let mut bits = Vec::new();

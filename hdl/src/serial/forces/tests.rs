@@ -15,6 +15,7 @@ const SIZES: Sizes = Sizes {
     mu_fraction: 15,
     shift_base: 12,
     threshold: 1 << 20,
+    score_limit: Some(-1000),
     taxels: 24,
 };
 
@@ -61,7 +62,8 @@ impl Beats {
                     [(8, CONDITION), (7, FOUND), (9, FRAMING)].map(|(k, bit)| number(k) * i64::from(bit.mask()));
                 let no_contact = i64::from(!self.contact) * i64::from(NO_CONTACT.mask());
                 let [x, y] = [4, 5].map(|k| inputs[k].signed(0, position_bits()));
-                [x, y, flags.iter().sum::<i64>() + no_contact]
+                let low = inputs[7].number() == 1 && Some(inputs[6].signed(0, SIZES.score)) > SIZES.score_limit;
+                [x, y, flags.iter().sum::<i64>() + no_contact + i64::from(low) * i64::from(SCORE_LOW.mask())]
             }
             1 => [number(7) * inputs[6].signed(0, SIZES.score), number(11), number(10)],
             _ => [number(12), self.saturations as i64, self.cycles as i64],

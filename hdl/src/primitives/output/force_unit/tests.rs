@@ -30,6 +30,7 @@ struct Part {
     condition: bool,
     found: bool,
     damaged: bool,
+    score_low: bool,
     frames: u32,
     score: i32,
     saturations: u32,
@@ -78,7 +79,10 @@ impl Requests {
 
     fn keep(&mut self, inputs: &[Word]) {
         let [condition, found, damaged] = [14, 15, 17].map(|k| inputs[k].number() == 1);
+        let score = if found { inputs[19].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 };
         self.parts[inputs[4].number() as usize] = Part {
+            score,
+            score_low: found && self.model.score_limit.is_some_and(|limit| score > limit),
             position: [10, 11].map(|k| inputs[k].signed(0, position_bits()) as i32),
             normalise: inputs[12].number() as u32,
             rescale: inputs[13].number() as u32,
@@ -86,7 +90,6 @@ impl Requests {
             found,
             damaged: damaged && self.model.has_coefficient_check(),
             frames: if self.model.scene.input.slides() { inputs[18].number() as u32 } else { 0 },
-            score: if found { inputs[19].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
             saturations: inputs[20].number() as u32,
         };
     }
@@ -117,6 +120,7 @@ impl Requests {
                     | flag(!frame.contact, NO_CONTACT)
                     | flag(inputs[16].number() == 1, FRAMING)
                     | flag(part.damaged, COEFFICIENTS)
+                    | flag(part.score_low, SCORE_LOW)
                     | flag(self.model.has_writable_tables() && inputs[26].number() == 1, TABLES)
                     | flag(f.by_contact() && inputs[23].number() == 1, MORE_CONTACTS)
                     | number << CASE.low
@@ -248,6 +252,10 @@ fn beats_are_those_of_the_model() {
     is_the_model_s(4, "[search]\nmu_max = 0.0\n", 0);
     let written = "[search]\nmu_max = 0.05\n[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n";
     is_the_model_s(4, written, 0);
+    for (limit, more) in [(-1000, ""), (0, "[input]\naverage = 3\nmean = \"sliding\"\n"), (77_000, "")] {
+        let searched = model(4, 4, &format!("[search]\nmu_max = 0.05\n{more}"));
+        check_forces(searched.with_changed_plan(|plan| plan.score_limit = Some(limit)).unwrap());
+    }
     let sliding = "[input]\naverage = 3\nmean = \"sliding\"\n";
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
