@@ -143,7 +143,7 @@ impl<E: Engine + ?Sized> CheckedEngine<E> {
         let mut result = self.engine.reconstruct(frames)?;
         if cross_check {
             if let Some(check) = self.check.get_or_init(|| CrossCheck::of(&*self.engine)) {
-                check.check(frames, result.resultant_N, &mut result.limits());
+                check.check(frames, result.resultant_N, &mut result.diagnostics());
             }
         }
         Ok(result)

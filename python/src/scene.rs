@@ -223,7 +223,7 @@ impl Scene {
         let mut checks = StreamChecks::new(engine, CheckPace::Every(cross_check));
         let mut next = |frames: &[Stress]| {
             let mut result = engine.reconstruct(frames).map_err(engine::typed)?;
-            checks.add(frames, result.resultant_N, &mut result.limits());
+            checks.add(frames, result.resultant_N, &mut result.diagnostics());
             anyhow::Ok(Arc::new(result))
         };
         let mut results = Vec::new();

@@ -21,7 +21,7 @@ use crate::data::frame::Frame;
 use crate::estimate::float::Golden;
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;
-use crate::result::reconstruct::{Limits, Reconstruction, SuspectTaxel};
+use crate::result::reconstruct::{Diagnostics, Reconstruction, SuspectTaxel};
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Form, ObjectiveKind, Scene};
 
@@ -100,14 +100,14 @@ impl CrossCheck {
     }
 
     /// Adds figures and flags to the result with this resultant in N of `frames`, as [`CrossCheck::finding`] finds them.
-    pub fn check(&self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Limits) {
+    pub fn check(&self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
         if let Some(finding) = self.finding(frames, resultant_N) {
             self.add(&finding, 0, result);
         }
     }
 
     /// Adds what `finding` says, of a result `age` results ago, to one of this engine's.
-    pub fn add(&self, finding: &Finding, age: u64, result: &mut Limits) {
+    pub fn add(&self, finding: &Finding, age: u64, result: &mut Diagnostics) {
         let (own, found) = (*result.checks, &finding.checks);
         result.flags.extend(&finding.flags);
         result.suspects.clone_from(&finding.suspects);

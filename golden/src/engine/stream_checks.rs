@@ -12,7 +12,7 @@ use super::cross_check::{CrossCheck, Finding};
 use super::Engine;
 use crate::data::frame::Frame;
 use crate::result::checks::history::History;
-use crate::result::reconstruct::Limits;
+use crate::result::reconstruct::Diagnostics;
 use crate::spec::scene::Scene;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -34,40 +34,40 @@ struct Job {
     resultant_N: [f64; 3],
 }
 
-/// What a stream and the thread beside it hand to each other.
+/// What a stream and its worker hand to each other.
 #[derive(Default)]
-struct Desk {
+struct Exchange {
     job: Option<Job>,
     found: Option<(u64, Finding)>,
     closed: bool,
 }
 
-/// A desk, and the sign that something is on it.
+/// The thread beside a stream.
 #[derive(Default)]
-struct Shared {
-    desk: Mutex<Desk>,
+struct Worker {
+    exchange: Mutex<Exchange>,
     changed: Condvar,
 }
 
-impl Shared {
-    fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+impl Worker {
+    fn exchange(&self) -> MutexGuard<'_, Exchange> {
+        self.exchange.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Answers jobs until the desk is closed.
+    /// Answers jobs until the stream ends.
     fn work(&self, check: &CrossCheck) {
         loop {
-            let mut desk = self.desk();
+            let mut exchange = self.exchange();
             let job = loop {
-                match desk.job.take() {
-                    _ if desk.closed => return,
+                match exchange.job.take() {
+                    _ if exchange.closed => return,
                     Some(job) => break job,
-                    None => desk = self.changed.wait(desk).unwrap_or_else(PoisonError::into_inner),
+                    None => exchange = self.changed.wait(exchange).unwrap_or_else(PoisonError::into_inner),
                 }
             };
-            drop(desk);
+            drop(exchange);
             if let Some(finding) = check.finding(&job.frames, job.resultant_N) {
-                self.desk().found = Some((job.number, finding));
+                self.exchange().found = Some((job.number, finding));
             }
         }
     }
@@ -79,7 +79,7 @@ pub struct StreamChecks {
     history: History,
     check: Option<Arc<CrossCheck>>,
     pace: CheckPace,
-    beside: Option<Arc<Shared>>,
+    worker: Option<Arc<Worker>>,
     /// Number of the next result.
     next: u64,
     found: Option<(u64, Finding)>,
@@ -92,32 +92,32 @@ impl StreamChecks {
             CheckPace::Never | CheckPace::Every(0) => None,
             CheckPace::Every(_) | CheckPace::Beside => CrossCheck::of(engine).map(Arc::new),
         };
-        let beside = check.as_ref().filter(|_| pace == CheckPace::Beside).map(|check| {
-            let (shared, check) = (Arc::new(Shared::default()), Arc::clone(check));
-            let its = Arc::clone(&shared);
+        let worker = check.as_ref().filter(|_| pace == CheckPace::Beside).map(|check| {
+            let (worker, check) = (Arc::new(Worker::default()), Arc::clone(check));
+            let own = Arc::clone(&worker);
             // Not joined: the stream does not wait for a finding that nobody reads.
-            std::thread::spawn(move || its.work(&check));
-            shared
+            std::thread::spawn(move || own.work(&check));
+            worker
         });
         let (scene, history) = (engine.scene().clone(), History::new(engine.scene()));
-        StreamChecks { scene, history, check, pace, beside, next: 0, found: None }
+        StreamChecks { scene, history, check, pace, worker, next: 0, found: None }
     }
 
     /// Adds figures and flags to the next result, with this resultant in N, of `frames`: of a block its own, of a sliding mean
     /// all so far.
-    pub fn add(&mut self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Limits) {
+    pub fn add(&mut self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
         let number = self.next;
         self.next += 1;
         let new = if self.scene.input.slides() { 1 } else { frames.len() };
         let checks = self.history.add(&frames[frames.len().saturating_sub(new)..], *result.checks);
         result.add_checks(&self.scene, checks);
         let Some(check) = &self.check else { return };
-        match (&self.beside, self.pace) {
-            (Some(shared), _) => {
-                let mut desk = shared.desk();
-                desk.job = Some(Job { number, frames: frames.to_vec(), resultant_N });
-                self.found = desk.found.take().or(self.found.take());
-                shared.changed.notify_one();
+        match (&self.worker, self.pace) {
+            (Some(worker), _) => {
+                let mut exchange = worker.exchange();
+                exchange.job = Some(Job { number, frames: frames.to_vec(), resultant_N });
+                self.found = exchange.found.take().or(self.found.take());
+                worker.changed.notify_one();
             }
             (None, CheckPace::Every(period)) if number % period == 0 => {
                 self.found = check.finding(frames, resultant_N).map(|finding| (number, finding));
@@ -132,9 +132,9 @@ impl StreamChecks {
 
 impl Drop for StreamChecks {
     fn drop(&mut self) {
-        if let Some(shared) = &self.beside {
-            shared.desk().closed = true;
-            shared.changed.notify_one();
+        if let Some(worker) = &self.worker {
+            worker.exchange().closed = true;
+            worker.changed.notify_one();
         }
     }
 }

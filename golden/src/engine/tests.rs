@@ -37,7 +37,7 @@ fn search_is_warned_of_baseline_and_stuck_taxel() {
                 assert_eq!(single.flags.contains(&Flag::ShearUnreliable), disturbed, "{:?}", single.checks);
                 let (mut streamed, mut checks) =
                     (alone.clone(), StreamChecks::new(checked.engine(), CheckPace::Every(1)));
-                checks.add(&frames, alone.resultant_N, &mut streamed.limits());
+                checks.add(&frames, alone.resultant_N, &mut streamed.diagnostics());
                 assert_eq!((streamed.flags, streamed.extra.suspects), (single.flags, single.extra.suspects));
             }
         }
@@ -55,7 +55,7 @@ fn another_force_than_that_of_evidence_is_flagged() {
         let differs = |factor: [f64; 3]| {
             let mut result = engine.reconstruct(&frames).unwrap();
             let changed = std::array::from_fn(|axis| factor[axis] * result.resultant_N[axis]);
-            check.check(&frames, changed, &mut result.limits());
+            check.check(&frames, changed, &mut result.diagnostics());
             result.flags.contains(&Flag::EstimatesDiffer)
         };
         let all = [[1.0; 3], [1.5, 1.5, 1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.3], [0.0, 0.0, 1.0], [0.0; 3]];
@@ -81,7 +81,7 @@ fn ages(pace: CheckPace, wait: &dyn Fn()) -> Vec<(Option<u64>, bool)> {
     let result = |number: usize| {
         let frames = [if number == 2 { stuck.clone() } else { exact.clone() }];
         let mut result = engine.reconstruct(&frames).unwrap();
-        checks.add(&frames, result.resultant_N, &mut result.limits());
+        checks.add(&frames, result.resultant_N, &mut result.diagnostics());
         wait();
         (result.checks.cross_check_age, result.flags.contains(&Flag::TaxelSuspect))
     };

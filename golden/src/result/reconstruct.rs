@@ -13,17 +13,17 @@
 
 mod contact_estimate;
 mod contacts;
+mod diagnostics;
 mod extra;
 mod figures;
-mod limits;
 mod output;
 mod suspect_taxel;
 
 pub use contact_estimate::ContactEstimate;
 pub use contacts::FoundContact;
+pub use diagnostics::Diagnostics;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
-pub use limits::Limits;
 pub use output::{shear_sigma_N, Resultant, Wrench};
 pub use suspect_taxel::SuspectTaxel;
 
@@ -153,14 +153,14 @@ impl Reconstruction {
         self
     }
 
-    /// What limits the result.
-    pub fn limits(&mut self) -> Limits<'_> {
-        Limits { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.extra.suspects }
+    /// Its figures, flags and suspect taxels.
+    pub fn diagnostics(&mut self) -> Diagnostics<'_> {
+        Diagnostics { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.extra.suspects }
     }
 
     /// Adds the figures of `checks` and the flags that they raise.
     pub(crate) fn add_checks(&mut self, scene: &Scene, checks: Checks) {
-        self.limits().add_checks(scene, checks);
+        self.diagnostics().add_checks(scene, checks);
     }
 }
 

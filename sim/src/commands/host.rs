@@ -11,7 +11,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
 use dermis_golden::engine::CrossCheck;
 use dermis_golden::fixed::Model;
-use dermis_golden::result::reconstruct::Limits;
+use dermis_golden::result::reconstruct::Diagnostics;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::wire::link::{Counters, Identity, Kind};
 use dermis_golden::write::write;
@@ -190,11 +190,11 @@ fn send<P: Read + Write, R>(
     let check = CrossCheck::of(&session.model);
     for (index, request) in requests.iter().enumerate() {
         let (readings, answer) = ask(session, request)?;
-        let checked = |resultant_N: [f64; 3], limits: &mut Limits| {
-            check.iter().for_each(|check| check.check(std::slice::from_ref(&readings), resultant_N, limits));
+        let checked = |resultant_N: [f64; 3], diagnostics: &mut Diagnostics| {
+            check.iter().for_each(|check| check.check(std::slice::from_ref(&readings), resultant_N, diagnostics));
         };
         if let Some(mut result) = answer.decode(&session.model, &readings)? {
-            checked(result.resultant_N, &mut result.limits());
+            checked(result.resultant_N, &mut result.diagnostics());
             let sensor = &session.model.scene.sensor;
             let stress = session.model.stress(std::slice::from_ref(&readings))?;
             let full_scale_MPa = full_scale(&session.model.scene, &stress);
@@ -202,7 +202,7 @@ fn send<P: Read + Write, R>(
             text.push_str(&report::equality(&answer));
         } else {
             let mut physical = PhysicalAnswer::new(&session.model, &readings, &answer)?;
-            checked(physical.resultant_N, &mut physical.limits());
+            checked(physical.resultant_N, &mut physical.diagnostics());
             text.push_str(&report::resultants(&readings.id, &physical, &answer));
         }
         equal &= !matches!(answer.difference, Some(Some(_)));

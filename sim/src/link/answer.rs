@@ -9,7 +9,7 @@ use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::checks::Checks;
 use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
-use dermis_golden::result::reconstruct::{FoundContact, Limits, Reconstruction, SuspectTaxel};
+use dermis_golden::result::reconstruct::{Diagnostics, FoundContact, Reconstruction, SuspectTaxel};
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -173,9 +173,9 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
-    /// What limits the answer.
-    pub fn limits(&mut self) -> Limits<'_> {
-        Limits { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.suspects }
+    /// Its figures, flags and suspect taxels.
+    pub fn diagnostics(&mut self) -> Diagnostics<'_> {
+        Diagnostics { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.suspects }
     }
 
     /// The answer to `readings`, in physical units.

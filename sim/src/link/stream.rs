@@ -41,7 +41,7 @@ impl Reply {
         answer: &Answer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
-        checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.limits());
+        checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.diagnostics());
         Ok(Reply { id, sent_s, answered_s: seconds(answer.received_at), readings: None, answer: physical })
     }
 }

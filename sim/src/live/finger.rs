@@ -94,7 +94,7 @@ impl Hand {
             let frame = self.frame(scene, noise, sequence)?;
             let frames = vec![frame; scene.input.frames_per_result()];
             let mut result = engine.reconstruct(&frames).map_err(typed)?;
-            checks.add(&frames, result.resultant_N, &mut result.limits());
+            checks.add(&frames, result.resultant_N, &mut result.diagnostics());
             let answered_s = seconds(SystemTime::now());
             let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
             let (frames, received, result) = (&frames[..], &received[..], &result);

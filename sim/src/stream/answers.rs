@@ -223,7 +223,7 @@ impl Stream<'_> {
             }
             let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
             let mut result = self.engine.reconstruct(&frames).map_err(|error| typed(error).to_string())?;
-            self.checks.add(&frames, result.resultant_N, &mut result.limits());
+            self.checks.add(&frames, result.resultant_N, &mut result.diagnostics());
             Ok(Some((frames, times, result)))
         });
         let line = received.number;

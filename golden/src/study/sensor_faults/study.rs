@@ -250,7 +250,7 @@ impl Engines<'_> {
         let (mut in_stream, mut history) = (result.clone(), History::new(self.scene));
         for frame in &frames {
             let checks = history.add(std::slice::from_ref(frame), in_stream.checks);
-            in_stream.limits().add_checks(self.scene, checks);
+            in_stream.diagnostics().add_checks(self.scene, checks);
         }
         Ok([result, in_stream].map(|result| Some(Answer::of(&result))))
     }

@@ -1,12 +1,12 @@
-//! Limits: figures, flags and suspect taxels of a result, whatever its form.
+//! Diagnostics: figures, flags and suspect taxels of a result, whatever its form.
 
 use super::SuspectTaxel;
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;
 use crate::spec::scene::Scene;
 
-/// What limits a result, to be added to.
-pub struct Limits<'a> {
+/// Figures, flags and suspect taxels of a result, to be added to.
+pub struct Diagnostics<'a> {
     /// The figures behind the flags.
     pub checks: &'a mut Checks,
     /// Flags, sorted, without duplicates.
@@ -15,7 +15,7 @@ pub struct Limits<'a> {
     pub suspects: &'a mut Vec<SuspectTaxel>,
 }
 
-impl Limits<'_> {
+impl Diagnostics<'_> {
     /// Takes `checks` as the figures, and adds the flags that they raise.
     pub fn add_checks(&mut self, scene: &Scene, checks: Checks) {
         *self.checks = checks;
