@@ -9,7 +9,7 @@ use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::checks::Checks;
 use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
-use dermis_golden::result::reconstruct::{FoundContact, Limits, Reconstruction, SuspectTaxel};
+use dermis_golden::result::reconstruct::{FoundContact, Limits, MissingTaxel, Reconstruction, SuspectTaxel};
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -126,6 +126,7 @@ impl Answer {
     /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
         let figures = Checks { peak_MPa: frame.peak_MPa(), mu_share: self.mu_share(), ..Checks::default() };
+        let figures = figures.with_missing(&model.scene, frame);
         Ok(figures.with_readings(model.input(), std::slice::from_ref(readings)))
     }
 
@@ -159,6 +160,9 @@ pub struct PhysicalAnswer {
     /// Taxels whose readings no force explains, as the cross-check has it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub suspects: Vec<SuspectTaxel>,
+    /// Live taxels without a reading.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<MissingTaxel>,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
     /// The contacts, that with the largest load first; of a board that tells them apart, if it sends forces or records.
@@ -211,6 +215,7 @@ impl PhysicalAnswer {
             flags,
             checks,
             suspects: Vec::new(),
+            missing: MissingTaxel::all(&model.scene, frame, std::slice::from_ref(readings)),
             dropped_before: answer.dropped_before(),
             contacts: decoded.and_then(|result| result.contacts()),
             forces_N: answer.forces.as_ref().filter(|_| !model.sends_resultants()).map(forces),
