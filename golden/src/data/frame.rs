@@ -160,8 +160,8 @@ impl Frame {
 
     /// The stress of each taxel as it was read, in MPa, row-major; NaN where a reading is missing.
     pub fn readings(&self) -> Vec<f64> {
-        let reading = |(taxel, b): (usize, &f64)| if self.lacks(taxel) { f64::NAN } else { *b };
-        self.stress_MPa.iter().enumerate().map(reading).collect()
+        let own = |(taxel, b): (usize, &f64)| if self.lacks(taxel) { f64::NAN } else { *b };
+        self.stress_MPa.iter().enumerate().map(own).collect()
     }
 
     /// The stress of the paper's Eq. 2: S(x, y) = 10⁶ (y sin 100x + x cos 100y) N/m², x and y in metres from the first

@@ -32,6 +32,7 @@ use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::{InputSpec, Scene};
 use crate::spec::sliding;
 use calibration::{Calibration, CalibrationError};
+use missing::{mean_reading, readings};
 use std::borrow::Cow;
 use tare::Tare;
 use thiserror::Error;
@@ -255,18 +256,6 @@ impl Input {
 fn missing_in_all(frames: &[Frame]) -> Vec<usize> {
     let first = frames.first().map_or(&[][..], |first| &first.missing);
     first.iter().copied().filter(|taxel| frames.iter().all(|frame| frame.lacks(*taxel))).collect()
-}
-
-/// The readings of a taxel in the frames that have one.
-fn readings(frames: &[Frame], taxel: usize) -> impl Iterator<Item = f64> + Clone + '_ {
-    frames.iter().filter(move |frame| !frame.lacks(taxel)).map(move |frame| frame.stress_MPa[taxel])
-}
-
-/// Their mean; `None` where no frame has one.
-fn mean_reading(frames: &[Frame], taxel: usize) -> Option<f64> {
-    let count = readings(frames, taxel).count();
-    // Divided before adding, so that the sum does not overflow.
-    (count > 0).then(|| readings(frames, taxel).map(|reading| reading / count as f64).sum())
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {

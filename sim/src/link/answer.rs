@@ -231,8 +231,12 @@ mod tests {
 
     /// A frame's flags as a host tells them that asked for resultants, or for forces; the statuses are changed on the way.
     fn flags(model: &Model, change: &dyn Fn(&mut Status)) -> [Vec<Flag>; 2] {
-        let frame = Frame::shipped(&model.scene).remove(1);
-        let trace = model.run(&model.readings(std::slice::from_ref(&frame)).unwrap());
+        answers(model, &Frame::shipped(&model.scene).remove(1), change).map(|answer| answer.flags)
+    }
+
+    /// The answers to a frame of a host that asked for resultants, and of one that asked for forces.
+    fn answers(model: &Model, frame: &Frame, change: &dyn Fn(&mut Status)) -> [PhysicalAnswer; 2] {
+        let trace = model.run(&model.readings(std::slice::from_ref(frame)).unwrap());
         let changed = |mut status: Status| {
             change(&mut status);
             status.beats()
@@ -242,7 +246,22 @@ mod tests {
         let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
         let answer = Answer { sums, forces: None, labels, status, codes, difference: None, received_at };
         let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
-        [answer, whole].map(|answer| PhysicalAnswer::new(model, &frame, &answer).unwrap().flags)
+        [answer, whole].map(|answer| PhysicalAnswer::new(model, frame, &answer).unwrap())
+    }
+
+    #[test]
+    fn missing_readings_are_named_with_and_without_forces() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let model = Model::new(&scene).unwrap();
+        let mut stress = Frame::shipped(&scene).remove(1).stress_MPa;
+        (stress[27], stress[50]) = (f64::NAN, f64::NAN);
+        let frame = Frame::from_stress("lacking", &scene.sensor, stress).unwrap();
+        let wanted = model.reconstruct(&frame).unwrap();
+        for answer in answers(&model, &frame, &|_| ()) {
+            assert_eq!((&answer.missing, &answer.flags), (&wanted.extra.missing, &wanted.flags));
+            assert_eq!((answer.missing[0].row, answer.missing[0].col, answer.missing.len()), (3, 3, 2));
+            assert_eq!(answer.checks.missing_load, wanted.checks.missing_load);
+        }
     }
 
     #[test]

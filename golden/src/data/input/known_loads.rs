@@ -25,7 +25,7 @@
 //! | out: dead taxels | list | row, column |
 
 use super::calibration::Calibration;
-use super::{mean_reading, readings};
+use super::missing::{mean_reading, readings};
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::Scene;
 use serde::Serialize;

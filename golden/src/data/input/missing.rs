@@ -70,6 +70,18 @@ pub(crate) fn noise_MPa(input: &InputSpec, frame: &Frame) -> f64 {
     (squares / frame.stress_MPa.len().max(1) as f64).sqrt()
 }
 
+/// The readings of a taxel in the frames that have one.
+pub(super) fn readings(frames: &[Frame], taxel: usize) -> impl Iterator<Item = f64> + Clone + '_ {
+    frames.iter().filter(move |frame| !frame.lacks(taxel)).map(move |frame| frame.stress_MPa[taxel])
+}
+
+/// Their mean; `None` where no frame has one.
+pub(super) fn mean_reading(frames: &[Frame], taxel: usize) -> Option<f64> {
+    let count = readings(frames, taxel).count();
+    // Divided before adding, so that the sum does not overflow.
+    (count > 0).then(|| readings(frames, taxel).map(|reading| reading / count as f64).sum())
+}
+
 /// The missing taxels of a calibrated frame with their predicted stress.
 fn predict(input: &InputSpec, frame: &Frame) -> Vec<(usize, Predicted)> {
     if frame.missing.is_empty() {

@@ -14,7 +14,7 @@
 //! | out: zero | taxels | readings |
 //! | out: spread | taxels | readings, standard deviation of one frame |
 
-use super::{mean_reading, readings};
+use super::missing::{mean_reading, readings};
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::Scene;
 use std::ops::Not;

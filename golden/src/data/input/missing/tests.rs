@@ -126,13 +126,14 @@ fn named(result: &Reconstruction) -> Vec<usize> {
     result.extra.missing.iter().map(|own| own.row * 8 + own.col).collect()
 }
 
-/// One to five percent of the taxels missing: both engines name them and give the forces of the whole frame. With zeros in place of
+/// The peak and up to two other taxels missing, on a pitch wider than the cover: both engines name them and give the forces of the
+/// whole frame, within a bound each. With zeros in place of
 /// the readings, as a seeded fault, they do not.
 #[test]
 fn single_missing_readings_hardly_change_the_forces_of_both_engines() {
     let scene = scene();
     let engines: [(Box<dyn Engine>, [f64; 2]); 2] =
-        [(Box::new(Golden::new(&scene).unwrap()), [0.01, 0.02]), (Box::new(Model::new(&scene).unwrap()), [0.15, 0.06])];
+        [(Box::new(Golden::new(&scene).unwrap()), [0.01, 0.02]), (Box::new(Model::new(&scene).unwrap()), [0.03, 0.11])];
     for (engine, bound) in engines {
         let (mut worst, mut with_zeros) = ([0.0f64; 2], 0);
         for number in 0..8 {
@@ -149,8 +150,7 @@ fn single_missing_readings_hardly_change_the_forces_of_both_engines() {
             assert!(lacking.flags.contains(&Flag::TaxelMissing) && named(&lacking) == missing, "{:?}", lacking.flags);
             assert_eq!(lacking.checks.missing_share, Some(missing.len() as f64 / 64.0));
             let off = differences(&lacking, &whole);
-            println!("{} {number} {missing:?}: {off:?} {:?}", whole.engine, lacking.flags);
-            (0..2).for_each(|k| worst[k] = worst[k].max(if doubted(&lacking) { 0.0 } else { off[k] }));
+            (0..2).for_each(|k| worst[k] = worst[k].max(off[k]));
             let mut zeros = exact.clone();
             missing.iter().for_each(|&taxel| zeros.stress_MPa[taxel] = 0.0);
             let off = differences(&run(&zeros), &whole);
@@ -175,7 +175,6 @@ fn large_clusters_are_doubted_where_the_force_is_wrong() {
         for engine in [&golden as &dyn Engine, &fixed] {
             let found = engine.reconstruct(std::slice::from_ref(&lacking)).unwrap();
             let off = (found.resultant_N[2] / drawn.total_N[2] - 1.0).abs();
-            println!("{} {number}: {off} {:?} {:?}", found.engine, found.flags, found.checks);
             (wrong, silent) = (wrong + usize::from(off > 0.2), silent + usize::from(off > 0.2 && !doubted(&found)));
             right += usize::from(found.engine == "golden" && off < 0.05);
         }
