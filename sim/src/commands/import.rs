@@ -154,7 +154,7 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
         )?;
     }
     if summary.missing_readings > 0 {
-        writeln!(text, "                {} readings of single frames", summary.missing_readings)?;
+        writeln!(text, "missing         {} readings of single frames", summary.missing_readings)?;
     }
     if !summary.left_out.is_empty() {
         let numbers: Vec<String> = summary.left_out.iter().map(usize::to_string).collect();
