@@ -30,6 +30,31 @@ pub fn numbers<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonl
     borrowed(numpy.call_method1("ascontiguousarray", (array, "float64"))?.cast::<PyArrayDyn<f64>>()?)
 }
 
+/// The same of readings: NaN where one is masked or `None`.
+///
+/// # Errors
+/// As [`numbers`].
+pub fn readings<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    let numpy = value.py().import("numpy")?;
+    let masked = numpy.getattr("ma")?;
+    if value.is_instance(&masked.getattr("MaskedArray")?)? {
+        let numbers = value.call_method1("astype", ("float64",)).map_err(|error| input(format!("{name}: {error}")))?;
+        return self::numbers(name, &numbers.call_method1("filled", (f64::NAN,))?);
+    }
+    if value.cast::<PyArrayDyn<f64>>().is_ok() {
+        return numbers(name, value);
+    }
+    // None makes an array of objects.
+    let array = numpy.call_method1("asarray", (value,)).map_err(|error| input(format!("{name}: {error}")))?;
+    if array.getattr("dtype")?.getattr("kind")?.extract::<String>()? != "O" {
+        return numbers(name, &array);
+    }
+    let real = |item: Bound<'_, PyAny>| item.is_none() || item.extract::<f64>().is_ok();
+    let all_real = array.call_method0("ravel")?.try_iter()?.all(|item| item.is_ok_and(real));
+    let array = if all_real { array.call_method1("astype", ("float64",))? } else { array };
+    numbers(name, &array)
+}
+
 /// An argument called `name` as a vector of N finite numbers.
 ///
 /// # Errors

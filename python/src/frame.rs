@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
-use crate::arrays::{array, cube, grid, interleaved, numbers, shape};
+use crate::arrays::{array, cube, grid, interleaved, readings, shape};
 use crate::exceptions::input;
 
 /// The stress on every taxel at one moment, with its true forces where they are known.
@@ -47,10 +47,10 @@ impl Frame {
         &self.0.id
     }
 
-    /// Normal stress in MPa, shape (rows, cols); compression is positive.
+    /// Normal stress in MPa, shape (rows, cols); compression is positive, NaN where a reading is missing.
     #[getter]
     fn stress_MPa<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        grid(py, &self.0.stress_MPa, self.lengths())
+        grid(py, &self.0.readings(), self.lengths())
     }
 
     /// True force of all contacts in N, shape (3,): x, y, normal; None where it is not known.
@@ -86,10 +86,11 @@ pub struct Frames {
     pub single: bool,
 }
 
-/// The frames of the argument `frames`: an array of shape (rows, cols) or (time, rows, cols), a `Frame`, a list of them.
+/// The frames of the argument `frames`: an array of shape (rows, cols) or (time, rows, cols), a `Frame`, a list of them. A value
+/// that is NaN, masked or None is a missing reading.
 ///
 /// # Errors
-/// `InputError` for another shape or type, or a number that is not finite.
+/// `InputError` for another shape or type, or an infinite number.
 pub fn frames(scene: &Scene, value: &Bound<'_, PyAny>) -> PyResult<Frames> {
     if let Ok(frame) = value.cast::<Frame>() {
         return Ok(Frames { frames: vec![frame.get().0.as_ref().clone()], single: true });
@@ -97,7 +98,7 @@ pub fn frames(scene: &Scene, value: &Bound<'_, PyAny>) -> PyResult<Frames> {
     if let Some(frames) = listed(value)? {
         return Ok(Frames { frames, single: false });
     }
-    let array = numbers("frames", value)?;
+    let array = readings("frames", value)?;
     let (rows, cols) = (scene.sensor.rows, scene.sensor.cols);
     let single = array.ndim() == 2;
     if !(single || array.ndim() == 3) || array.shape()[array.ndim() - 2..] != [rows, cols] {

@@ -24,7 +24,12 @@ def with_value(value: float) -> np.ndarray:
         (lambda: SCENE.reconstruct(np.zeros((3, 4))), "frames has shape (3, 4), scene eight-by-eight wants (8, 8) or (time, 8, 8)"),
         (lambda: SCENE.reconstruct(np.zeros(64)), "frames has shape (64,)"),
         (lambda: SCENE.reconstruct(np.zeros((1, 1, 8, 8))), "frames has shape (1, 1, 8, 8)"),
-        (lambda: SCENE.reconstruct(with_value(np.nan)), "frame: stress_MPa[10] = NaN is not a finite number"),
+        (lambda: SCENE.reconstruct(with_value(-np.inf)), "frame: stress_MPa[10] = -inf is not a finite number"),
+        (
+            lambda: SCENE.reconstruct(np.where(np.arange(64).reshape(8, 8) < 13, np.nan, 0.1)),
+            "frame: 13 of 64 readings are missing, wanted at most 12 (input.missing_share = 0.2)",
+        ),
+        (lambda: SCENE.reconstruct([[None] * 7 + ["x"]] * 8), "frames has values of type object, wanted real numbers"),
         (lambda: SCENE.reconstruct(np.stack([FLAT, with_value(np.inf)])), "frame 1: stress_MPa[10] = inf is not a finite"),
         (lambda: SCENE.reconstruct(FLAT.astype(complex)), "frames has values of type complex128, wanted real numbers"),
         (lambda: SCENE.reconstruct([[1, 2], [3]]), "frames: "),

@@ -112,6 +112,34 @@ def test_what_an_engine_does_not_give_is_absent(tmp_path: Path) -> None:
     assert resultants.forces_N is None and resultants.resultant_N[2] > 1
 
 
+@pytest.mark.parametrize("engine", ["golden", "fixed"])
+def test_nan_none_and_masked_values_are_missing_readings(engine: str) -> None:
+    scene = dermis.Scene.from_name("eight-by-eight")
+    stress = scene.frames[1].stress_MPa
+    missing = np.zeros((8, 8), dtype=bool)
+    missing[3, 3] = missing[6, 2] = True
+    lacking = np.where(missing, np.nan, stress)
+    result = scene.reconstruct(lacking, engine)
+    assert "taxel-missing" in result.flags
+    assert [(own["row"], own["col"]) for own in result.to_dict()["missing"]] == [(3, 3), (6, 2)]
+    whole = scene.reconstruct(stress, engine)
+    bound = 0.02 if engine == "golden" else 0.1
+    assert np.abs(result.resultant_N - whole.resultant_N).max() < bound * whole.resultant_N[2]
+    masked = np.ma.masked_array(stress, mask=missing)
+    nones = [[None if absent else value for value, absent in zip(*row)] for row in zip(stress, missing)]
+    for other in [masked, np.ma.masked_array(stress.astype("float32"), mask=missing), nones, np.array(nones, dtype=object)]:
+        again = scene.reconstruct(other, engine)
+        if isinstance(other, np.ndarray) and other.dtype == "float32":
+            assert np.allclose(again.resultant_N, result.resultant_N, rtol=1e-2)
+        else:
+            assert again.to_dict() == result.to_dict()
+    # A frame in time has its own missing readings.
+    first, second = scene.reconstruct(np.stack([stress, lacking]), engine)
+    assert "taxel-missing" not in first.flags and "taxel-missing" in second.flags
+    [frame] = [dermis.Scene.from_name("eight-by-eight").frames[1]]
+    assert not np.isnan(frame.stress_MPa).any()
+
+
 def test_blocks_and_sliding_means_have_their_frames() -> None:
     text = SMALL + SEARCH + "[input]\naverage = 1\n"
     scene = dermis.Scene.from_toml(text)

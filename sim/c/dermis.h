@@ -119,6 +119,10 @@ typedef enum {
    * `taxel-suspect`
    */
   DERMIS_FLAG_TAXEL_SUSPECT = (1 << 23),
+  /**
+   * `taxel-missing`
+   */
+  DERMIS_FLAG_TAXEL_MISSING = (1 << 24),
 } dermis_flag;
 
 
@@ -289,7 +293,8 @@ size_t dermis_scene_frames_per_result(const dermis_scene *scene);
  * Reconstruct the forces of a frame, or of the frames of one result in the order of time.
  *
  * engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
- * values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With find_noise, where
+ * values, frame after frame of rows * cols; readings if the scene names a calibration or tare file; NaN where a reading is
+ * missing. With find_noise, where
  * the search finds the shear and the scene states no noise, the noise is found from the frame, and the shear flagged that
  * it hides: `dermis reconstruct` does it, a stream does not.
  *

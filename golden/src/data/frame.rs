@@ -5,12 +5,17 @@
 //!
 //! | field | shape | unit | range |
 //! |---|---|---|---|
-//! | stress | taxels, row-major | MPa | finite, compression positive |
+//! | stress | taxels, row-major | MPa | finite, compression positive; 0 where a reading is missing |
+//! | missing | list of taxels | – | ascending |
 //! | cell forces | 3 × taxels | N | finite, on the body |
 //! | resultant | 3 | N | finite, [x, y, normal] of the whole contact |
 //!
 //! A loaded frame is finite and has as many stresses as its sensor has taxels; [`Frame::check`] compares its sensor
 //! with the scene's.
+//!
+//! A reading that is NaN is missing in its frame, and in no other: `null` in JSON, an empty field, `nan` or `null` in CSV, a
+//! masked value in Python. [`Frame::from_stress`] alone makes a missing reading of NaN, [`Frame::readings`] the other way
+//! round. What estimators take for it is in [`crate::data::input::missing`].
 
 mod csv;
 mod error;
@@ -20,7 +25,7 @@ mod shipped;
 #[cfg(test)]
 mod tests;
 
-pub use csv::csv_hint;
+pub use csv::{csv_hint, reading};
 pub use error::FrameError;
 
 use crate::spec::scene::{Medium, Scene};
@@ -92,15 +97,18 @@ pub struct Frame {
     pub resultant_N: Option<[f64; 3]>,
     /// True force on each cell in N, if known.
     pub cell_forces_N: Option<Forces>,
-    /// Normal stress on each taxel in MPa, row-major; compression is positive.
+    /// Normal stress on each taxel in MPa, row-major; compression is positive. 0 on `missing` taxels, after
+    /// [`Input::complete`](crate::data::input::Input::complete) what the others predict.
     pub stress_MPa: Vec<f64>,
+    /// Taxels without a reading in this frame: row-major indices, ascending.
+    pub missing: Vec<usize>,
     /// Remarks of the frame's author.
     pub notes: Option<String>,
 }
 
 impl Frame {
-    /// A frame of stress alone, e.g. from a running sensor; `stress_MPa` is row-major, `id` the name in reports and
-    /// errors.
+    /// A frame of stress alone, e.g. from a running sensor; `stress_MPa` is row-major, NaN where a reading is missing; `id`
+    /// is the name in reports and errors.
     ///
     /// ```
     /// use dermis_golden::{data::frame::Frame, estimate::float::Golden, spec::scene::Scene};
@@ -108,12 +116,14 @@ impl Frame {
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let mut stress_MPa = vec![0.0; scene.sensor.taxels()];
     /// stress_MPa[27] = 0.25;
-    /// let frame = Frame::from_stress("one taxel", &scene.sensor, stress_MPa)?;
+    /// let frame = Frame::from_stress("one taxel", &scene.sensor, stress_MPa.clone())?;
     /// assert_eq!(frame.peak_MPa(), 0.25);
     /// // The largest force is on the taxel with the stress.
     /// let fz = Golden::new(&scene)?.run(&frame)?.forces_N.fz;
     /// assert!(fz.iter().all(|f| *f <= fz[27]));
     /// assert!(Frame::from_stress("too short", &scene.sensor, vec![0.0; 63]).is_err());
+    /// stress_MPa[28] = f64::NAN;
+    /// assert_eq!(Frame::from_stress("one missing", &scene.sensor, stress_MPa)?.missing, [28]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -129,10 +139,29 @@ impl Frame {
             resultant_N: None,
             cell_forces_N: None,
             stress_MPa,
+            missing: Vec::new(),
             notes: None,
         };
-        frame.check_values(id)?;
-        Ok(frame)
+        frame.with_missing(id)
+    }
+
+    /// The frame with its NaN as missing readings; `file` stands in errors.
+    fn with_missing(mut self, file: &str) -> Result<Frame, FrameError> {
+        self.missing = (0..self.stress_MPa.len()).filter(|&taxel| self.stress_MPa[taxel].is_nan()).collect();
+        self.missing.iter().for_each(|&taxel| self.stress_MPa[taxel] = 0.0);
+        self.check_values(file)?;
+        Ok(self)
+    }
+
+    /// Whether the taxel with this row-major index has no reading.
+    pub fn lacks(&self, taxel: usize) -> bool {
+        self.missing.binary_search(&taxel).is_ok()
+    }
+
+    /// The stress of each taxel as it was read, in MPa, row-major; NaN where a reading is missing.
+    pub fn readings(&self) -> Vec<f64> {
+        let own = |(taxel, b): (usize, &f64)| if self.lacks(taxel) { f64::NAN } else { *b };
+        self.stress_MPa.iter().enumerate().map(own).collect()
     }
 
     /// The stress of the paper's Eq. 2: S(x, y) = 10⁶ (y sin 100x + x cos 100y) N/m², x and y in metres from the first
@@ -154,17 +183,20 @@ impl Frame {
             resultant_N: None,
             cell_forces_N: None,
             stress_MPa: (0..sensor.taxels()).map(stress).collect(),
+            missing: Vec::new(),
             notes: None,
         }
     }
 
-    /// The frame with 0 MPa on the taxels `dead`, [row, col], so that they affect neither the peak nor the condition.
+    /// The frame with 0 MPa on the taxels `dead`, [row, col], so that they affect neither the peak nor the condition. Their
+    /// readings are not missing.
     pub fn mask_dead(mut self, dead: &[[usize; 2]]) -> Frame {
         let cols = self.sensor.cols;
         for [row, col] in dead {
             // A frame of another sensor may lack the taxel; the frame is checked where it is used.
             self.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
         }
+        self.missing.retain(|taxel| !dead.contains(&[taxel / cols, taxel % cols]));
         self
     }
 
@@ -173,11 +205,12 @@ impl Frame {
         self.stress_MPa.iter().fold(0.0, |peak, b| b.abs().max(peak))
     }
 
-    /// Checks that the frame's sensor is the scene's and that its values are finite and complete.
+    /// Checks that the frame's sensor is the scene's, that its values are finite and complete, and that no more readings are
+    /// missing than `input.missing_share` allows.
     ///
     /// # Errors
     /// [`FrameError::SensorMismatch`], which prints both sensors; [`FrameError::WrongCount`],
-    /// [`FrameError::NotFinite`].
+    /// [`FrameError::NotFinite`], [`FrameError::TooManyMissing`].
     pub fn check(&self, scene: &Scene) -> Result<(), FrameError> {
         if self.sensor != scene.sensor {
             return Err(FrameError::SensorMismatch {
@@ -187,7 +220,21 @@ impl Frame {
                 scene_sensor: Box::new(scene.sensor.clone()),
             });
         }
-        self.check_values(&self.id)
+        self.check_values(&self.id)?;
+        self.check_missing(&self.id, Some(scene))
+    }
+
+    /// Checks the number of missing readings, if the frame is of this scene's sensor; those of dead taxels do not count.
+    fn check_missing(&self, file: &str, scene: Option<&Scene>) -> Result<(), FrameError> {
+        let Some(scene) = scene.filter(|scene| scene.sensor == self.sensor) else { return Ok(()) };
+        let cols = self.sensor.cols;
+        let count = self.missing.iter().filter(|taxel| !scene.input.is_dead([*taxel / cols, *taxel % cols])).count();
+        let (taxels, most) = (self.sensor.taxels() - scene.input.dead.len(), scene.input.most_missing(&self.sensor));
+        if count <= most {
+            return Ok(());
+        }
+        let (file, share) = (file.to_string(), scene.input.missing_share);
+        Err(FrameError::TooManyMissing { file, count, taxels, share, most })
     }
 
     /// Checks counts and values; the fields are public and may have been changed.

@@ -104,6 +104,7 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         resultant_N: Some(resultant),
         cell_forces_N: Some(cell_forces),
         stress_MPa,
+        missing: Vec::new(),
         notes: None,
     })
 }

@@ -13,8 +13,9 @@
 //! | NumPy `.npy` | first six bytes | size | unit, pitch |
 //! | plain CSV | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch |
 //!
-//! Missing sensels become dead taxels, on which forces continue those around them; where nothing can press on them, as
-//! outside the outline of an insole, they may be stated to read 0 instead. Counts have no stress: without a stated full scale they are refused.
+//! A sensel without a reading in any frame becomes a dead taxel, on which forces continue those around it; where nothing can
+//! press on it, as outside the outline of an insole, it may be stated to read 0 instead. A sensel without a reading in some
+//! frames is missing in those. A frame that lacks more readings than `input.missing_share` allows is left out. Counts have no stress: without a stated full scale they are refused.
 
 mod crop;
 mod csv;
@@ -42,10 +43,11 @@ pub use summary::{FrameRecord, Summary, IDLE_SHARE};
 pub use units::Unit;
 
 use crate::data::frame::Frame;
+use crate::data::input::missing::complete;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::{Sensor, MAX_LENGTH_MM};
 use error::Source;
-use recording::{decoded, DeviceFigure, Recording, LARGEST_SIDE};
+use recording::{decoded, DeviceFigure, RawFrame, Recording, LARGEST_SIDE};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -148,8 +150,11 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         thickness_mm: settings.thickness_mm.unwrap_or(bare_mm),
     };
     let name = settings.name.clone().unwrap_or_else(|| name_of(file));
-    let (frames, records) = scene::frames(&recording, window, &sensor, &name, per_MPa)?;
     let dead: Vec<bool> = window.indices(recording.cols).map(|k| recording.missing[k]).collect();
+    let mut lacking = Scene::of_sensor(&sensor, &name);
+    lacking.input.dead = (0..dead.len()).filter(|&k| dead[k]).map(|k| [k / sensor.cols, k % sensor.cols]).collect();
+    let left_out = scene::leave_out(&mut recording, window, &lacking, &source)?;
+    let (frames, records) = scene::frames(&recording, window, &lacking, per_MPa)?;
     let alive: Vec<bool> = dead.iter().map(|dead| !dead).collect();
     let readings: Vec<f64> = window_readings(&recording, window);
     let largest_MPa = readings.iter().fold(0.0f64, |most, reading| most.max((reading / per_MPa).abs()));
@@ -158,7 +163,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     // A recording without load has no largest reading: one unit.
     let full_scale_MPa = if most_MPa > 0.0 { most_MPa } else { 1.0 / per_MPa };
     let unipolar = readings.iter().all(|reading| *reading >= 0.0);
-    let stress: Vec<&[f64]> = frames.iter().map(|frame| frame.stress_MPa.as_slice()).collect();
+    let complete: Vec<Frame> = frames.iter().map(|frame| complete(&lacking.input, frame.clone())).collect();
+    let stress: Vec<&[f64]> = complete.iter().map(|frame| frame.stress_MPa.as_slice()).collect();
     let summary = Summary {
         file: Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy().into_owned()),
         name,
@@ -167,6 +173,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         array: [recording.rows, recording.cols],
         window,
         missing: dead.iter().filter(|dead| **dead).count(),
+        missing_readings: frames.iter().map(|frame| frame.missing.len()).sum(),
+        left_out,
         missing_as_zero: settings.missing_as_zero,
         unit,
         units_per_MPa: per_MPa,
@@ -220,7 +228,7 @@ fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Resu
     }
 }
 
-/// Keeps the wanted frames, at least one.
+/// Keeps the wanted frames, at least one, and finds the sensels that they never read.
 fn select(recording: &mut Recording, wanted: Option<[usize; 2]>, source: &Source) -> Result<(), ImportError> {
     let count = recording.frames.len();
     if count == 0 {
@@ -232,6 +240,8 @@ fn select(recording: &mut Recording, wanted: Option<[usize; 2]>, source: &Source
     }
     recording.frames.truncate(last);
     recording.frames.drain(..first - 1);
+    let never = |k: usize| recording.frames.iter().all(|frame| frame.values[k].is_nan());
+    recording.missing = (0..recording.rows * recording.cols).map(never).collect();
     Ok(())
 }
 
@@ -255,7 +265,8 @@ fn scale(recording: &Recording, settings: &Settings, source: &Source) -> Result<
 /// The readings of all sensels that exist in the window.
 fn window_readings(recording: &Recording, window: Window) -> Vec<f64> {
     let alive: Vec<usize> = window.indices(recording.cols).filter(|k| !recording.missing[*k]).collect();
-    recording.frames.iter().flat_map(|frame| alive.iter().map(|k| frame.values[*k])).collect()
+    let of = |frame: &RawFrame| alive.iter().map(|k| frame.values[*k]).filter(|reading| !reading.is_nan()).collect();
+    recording.frames.iter().flat_map::<Vec<f64>, _>(of).collect()
 }
 
 /// A scene's name from a file's.

@@ -14,12 +14,15 @@
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
 //! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::estimate::float`] |
 //!
+//! A reading that a frame lacks is described in [`missing`].
+//!
 //! The table is made from recordings under known loads by [`known_loads`], the noise from frames without load by [`unloaded`].
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
 pub mod known_loads;
+pub mod missing;
 pub mod tare;
 #[cfg(test)]
 mod tests;
@@ -29,6 +32,8 @@ use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::{InputSpec, Scene};
 use crate::spec::sliding;
 use calibration::{Calibration, CalibrationError};
+use missing::{mean_reading, readings};
+use std::borrow::Cow;
 use tare::Tare;
 use thiserror::Error;
 
@@ -115,7 +120,8 @@ impl Input {
     }
 
     /// The mean of frames, each checked against the scene. Of a block of 2^k frames, id and known forces are those of the
-    /// first; of a sliding mean, of all frames since the start, those of the last.
+    /// first; of a sliding mean, of all frames since the start, those of the last. A taxel counts in the frames that have its
+    /// reading; it is missing in the mean if none has it, where its value is that of [`Input::complete`].
     ///
     /// # Errors
     /// [`InputError::Count`] unless there are 2^k frames, of a sliding mean at least one; [`InputError::Frame`] if one is
@@ -126,22 +132,67 @@ impl Input {
             return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
         };
         frames.iter().try_for_each(|frame| frame.check(scene))?;
+        let missing = missing_in_all(frames);
+        let frames = self.complete(frames);
         if self.spec.slides() {
             let mut mean = vec![0.0; first.stress_MPa.len()];
-            for (number, frame) in (1..).zip(frames) {
+            for (number, frame) in (1..).zip(&*frames) {
                 sliding::add(&mut mean, &frame.stress_MPa, number, average);
             }
-            return Ok(Frame { stress_MPa: mean, ..last.clone() });
+            return Ok(Frame { stress_MPa: mean, missing, ..last.clone() });
         }
         if got != wanted {
             return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
         }
-        let mut mean = first.clone();
+        let mut mean = Frame { missing, ..first.clone() };
         for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
             // Divided before adding, so that the sum does not overflow.
             *b = frames.iter().map(|frame| frame.stress_MPa[index] / got as f64).sum();
         }
         Ok(mean)
+    }
+
+    /// The frames of one reconstruction, of the scene's sensor, with a value for each missing reading: of a block, the mean of the
+    /// frames that have it; of a sliding mean, the mean before it, or the first reading. Where no frame has it, it is what the
+    /// other taxels predict, see [`missing`].
+    pub fn complete<'a>(&self, frames: &'a [Frame]) -> Cow<'a, [Frame]> {
+        if frames.iter().all(|frame| frame.missing.is_empty()) {
+            return Cow::Borrowed(frames);
+        }
+        let mut all = frames.to_vec();
+        let missing: Vec<usize> = (0..all[0].stress_MPa.len()).filter(|k| frames.iter().any(|f| f.lacks(*k))).collect();
+        for &taxel in &missing {
+            self.continue_taxel(frames, taxel, &mut all);
+        }
+        // The prediction needs every other value of its frame, which the means have given.
+        let nowhere = missing_in_all(frames);
+        for frame in all.iter_mut().filter(|_| !nowhere.is_empty()) {
+            let own = Frame { missing: nowhere.clone(), ..frame.clone() };
+            let stress = missing::complete(&self.spec, self.calibrate(&own)).stress_MPa;
+            nowhere.iter().for_each(|&taxel| frame.stress_MPa[taxel] = self.reading(taxel, stress[taxel]));
+        }
+        Cow::Owned(all)
+    }
+
+    /// Writes into `all` what the `frames` that have a reading of `taxel` give the others; nothing where none has one.
+    fn continue_taxel(&self, frames: &[Frame], taxel: usize, all: &mut [Frame]) {
+        let slides = self.spec.slides();
+        let first = if slides { readings(frames, taxel).next() } else { mean_reading(frames, taxel) };
+        let Some(first) = first else { return };
+        let mut mean = [first];
+        for (number, frame) in (1..).zip(all) {
+            if frame.lacks(taxel) {
+                frame.stress_MPa[taxel] = mean[0];
+            }
+            if slides {
+                sliding::add(&mut mean, &[frame.stress_MPa[taxel]], number, self.spec.average);
+            }
+        }
+    }
+
+    /// The reading of a taxel whose calibrated stress is `stress_MPa`.
+    fn reading(&self, taxel: usize, stress_MPa: f64) -> f64 {
+        self.scale.as_ref().map_or(stress_MPa, |(zero, gain)| stress_MPa / gain[taxel] + zero[taxel])
     }
 
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
@@ -159,7 +210,8 @@ impl Input {
         let (zero, gain) = (|k: usize| *zeros.get(k).unwrap_or(&0.0), |k: usize| *gains.get(k).unwrap_or(&1.0));
         let largest_gain = gains.iter().map(|gain| gain.abs()).reduce(f64::max).unwrap_or(1.0);
         let share = |frame: &Frame| {
-            let live = |k: &usize| !self.spec.is_dead([*k / frame.sensor.cols, *k % frame.sensor.cols]);
+            let dead = |k: usize| self.spec.is_dead([k / frame.sensor.cols, k % frame.sensor.cols]);
+            let live = |k: &usize| !dead(*k) && !frame.lacks(*k);
             let stress = |k: usize| {
                 let reading = frame.stress_MPa[k];
                 let code = largest_gain * reading.abs().max(zero(k).abs());
@@ -198,6 +250,12 @@ impl Input {
         }
         frame.mask_dead(&self.spec.dead)
     }
+}
+
+/// The taxels whose reading no frame has, ascending.
+fn missing_in_all(frames: &[Frame]) -> Vec<usize> {
+    let first = frames.first().map_or(&[][..], |first| &first.missing);
+    first.iter().copied().filter(|taxel| frames.iter().all(|frame| frame.lacks(*taxel))).collect()
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {

@@ -67,7 +67,13 @@ const EXPLAINED: f64 = 0.5;
 impl Evidence {
     /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.
     pub fn solve(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
-        let peak = (0..b.len()).filter(|&t| self.alive[t]).fold(0.0f64, |peak, t| b[t].max(peak));
+        self.solve_without(b, &[], noise_MPa)
+    }
+
+    /// The same without the readings of the taxels `missing`, row-major indices.
+    pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> Estimate {
+        let there: Vec<bool> = (0..b.len()).map(|t| self.alive[t] && !missing.contains(&t)).collect();
+        let peak = (0..b.len()).filter(|&t| there[t]).fold(0.0f64, |peak, t| b[t].max(peak));
         if peak <= 0.0 || !peak.is_finite() {
             let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
             return Estimate { forces_N, noise_MPa, ..Estimate::default() };
@@ -75,7 +81,7 @@ impl Evidence {
         // In units of the peak, so that no frame is too small or too large.
         let scaled: Vec<f64> = b.iter().map(|b| b / peak).collect();
         let Some((Fitted { mut estimate, worst, correlation, load, .. }, suspects)) =
-            suspect::fit(self, &scaled, noise_MPa.map(|noise| noise / peak))
+            suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / peak))
         else {
             return self.without_fit(b, noise_MPa);
         };

@@ -178,6 +178,7 @@ impl Model {
         let figures = result.figures(&self.scene, frame).with_readings(&self.input, readings);
         let checks = Checks { network_misfit, shear_spread, ..figures };
         result.add_checks(&self.scene, checks);
+        result.add_missing(&self.scene, frame, readings);
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, &self.scene, frame, noise_MPa);
         }

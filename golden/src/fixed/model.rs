@@ -140,7 +140,11 @@ impl Model {
         if needs && scene.input.full_scale_MPa.is_none() {
             let gain = Scale::new(&scene)?.largest;
             let peak = |frame: &Frame| frame.clone().mask_dead(&scene.input.dead).peak_MPa();
-            let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
+            let mut largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
+            for frame in frames.iter().filter(|frame| !frame.missing.is_empty()) {
+                frame.check(&scene)?;
+                largest = largest.max(gain * peak(&Input::new(&scene)?.complete(std::slice::from_ref(frame))[0]));
+            }
             let codes = f64::from(largest_code(scene.fixed.input_bits));
             // The largest reading takes the code before the last, which would count as saturated. Frames of zeros fit
             // any scale; 1 MPa is also the default of a single frame.
@@ -171,7 +175,7 @@ impl Model {
     pub(super) fn readings_at(&self, full_scale_MPa: f64, frames: &[Frame]) -> Vec<i32> {
         let full_scale = full_scale_MPa * self.prepare.reading_per_MPa;
         let codes = |frame: &Frame| quantise(&frame.stress_MPa, self.formats().code_bits, full_scale).codes;
-        frames.iter().flat_map(codes).collect()
+        self.input.complete(frames).iter().flat_map(codes).collect()
     }
 
     /// The readings that have these codes, as a frame named `id`: the other way round than [`Model::readings`], for codes that the

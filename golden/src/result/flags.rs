@@ -20,6 +20,7 @@ pub use set::FlagSet;
 pub use status_field::{Feature, StatusField, STATUS_BEATS};
 
 use crate::data::frame::Frame;
+use crate::data::input::missing;
 use crate::data::quantise::Codes;
 use crate::result::checks::{Checks, CONSTANT, LINE, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED, PLATEAU, TORN};
 use crate::spec::scene::{largest_code, EstimatorKind, ObjectiveKind, Scene};
@@ -136,7 +137,7 @@ flags! {
         raised_by: "all engines",
     }
     ShearUnreliable = 6 "shear-unreliable" {
-        raised_when: "stated noise, or rounding of the codes, above 5·10⁻⁵ of the peak, with `sparse`; where no noise is stated, noise found by `dermis reconstruct` above 1.25·10⁻⁴ (`noise_MPa`)",
+        raised_when: "stated noise, rounding of the codes, or the error of what is taken for missing readings, above 5·10⁻⁵ of the peak, with `sparse`; where no noise is stated, noise found by `dermis reconstruct` above 1.25·10⁻⁴ (`noise_MPa`)",
         remedy: "average, another objective, more bits",
         raised_by: "all engines, with a search",
         figure: |checks| checks.noise_figure(),
@@ -163,11 +164,17 @@ flags! {
         figure: |checks| Some(format!("{:.3} MPa", checks.peak_MPa)),
     }
     LoadMismatch = 10 "load-mismatch" {
-        raised_when: "the normal force is more than 10 % off the one of the same stress without shear (`load_ratio`)",
-        remedy: "another objective or partition",
-        raised_by: "golden model",
-        rule: |checks, _| checks.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH),
-        figure: |checks| checks.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
+        raised_when: "the normal force is more than 10 % off the one of the same stress without shear (`load_ratio`), or may be by missing readings (`missing_load`)",
+        remedy: "another objective or partition; repair the taxels that are missing",
+        raised_by: "golden model; with missing readings all engines",
+        rule: |checks, _| {
+            checks.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)
+                || checks.missing_load.is_some_and(|error| error > LOAD_MISMATCH)
+        },
+        figure: |checks| match checks.missing_load {
+            Some(error) if error > LOAD_MISMATCH => Some(format!("missing readings leave {:.0} % open", 1e2 * error)),
+            _ => checks.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
+        },
     }
     ShapeMismatch = 11 "shape-mismatch" {
         raised_when: "the contact that `patch` or `symmetric` fits leaves more of the stress than the stated noise explains (`shape_misfit` above 1)",
@@ -177,12 +184,12 @@ flags! {
         figure: |checks| checks.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
     }
     ShearNotResolved = 12 "shear-not-resolved" {
-        raised_when: "the shear of a contact, or with `search` and stated noise of a subarray, has a standard deviation above a third of it (`shear_spread`)",
+        raised_when: "the shear of a contact, or with `search` and stated noise of a subarray, has a standard deviation above a third of it (`shear_spread`), or missing readings leave as much open (`missing_shear`)",
         remedy: "average; the normal force still holds",
         raised_by: "all engines",
-        rule: |checks, _| checks.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED),
+        rule: |checks, _| checks.shear_error().is_some_and(|error| error > NOT_RESOLVED),
         figure: |checks| {
-            checks.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
+            checks.shear_error().map(|error| format!("standard deviation {:.0} % of the shear", 1e2 * error))
         },
     }
     Misfit = 13 "misfit" {
@@ -285,6 +292,13 @@ flags! {
         bit: SCORE_LOW = StatusField::flag(
             "score_low", 11, Feature::WholeSearch, "the score is below that of frames without noise, where the scene has a table of deviations"
         ),
+    }
+    TaxelMissing = 27 "taxel-missing" {
+        raised_when: "a live taxel has no reading in a frame: NaN, `null`, an empty field, a masked value (`missing_share` of the taxels). `missing` names it with row, column, number of frames and the stress that is taken for it",
+        remedy: "nothing for single readings; repair a taxel that is missing in most frames, or list it in `input.dead`",
+        raised_by: "all engines",
+        rule: |checks, _| checks.missing_share.is_some(),
+        figure: |checks| checks.missing_share.map(|share| format!("{:.1} % of the taxels", 1e2 * share)),
     }
 }
 
@@ -408,11 +422,11 @@ fn load_outside(frame: &Frame) -> bool {
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
 
-/// Of a search: compares the noise, or the standard deviation LSB/√12 of rounding, with the peak.
+/// Of a search: compares the noise, the standard deviation LSB/√12 of rounding, or that of predicted readings, with the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes, noise_MPa: f64) -> bool {
     let search = &scene.search;
     let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
-    let noise = noise_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
+    let noise = noise_MPa.max(codes.lsb_MPa() / 12f64.sqrt()).max(missing::noise_MPa(&scene.input, frame));
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
 }
@@ -488,6 +502,7 @@ mod tests {
             torn_share: Some(1.0),
             tangential_difference: Some(1.0),
             score_margin: Some(-1.0),
+            missing_share: Some(0.1),
             ..Checks::default()
         };
         let raised: Vec<Flag> = checks.flags(&scene).collect();

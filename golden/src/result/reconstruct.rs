@@ -16,6 +16,7 @@ mod contacts;
 mod diagnostics;
 mod extra;
 mod figures;
+mod missing_taxel;
 mod output;
 mod suspect_taxel;
 
@@ -24,6 +25,7 @@ pub use contacts::FoundContact;
 pub use diagnostics::Diagnostics;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
+pub use missing_taxel::MissingTaxel;
 pub use output::{shear_sigma_N, Resultant, Wrench};
 pub use suspect_taxel::SuspectTaxel;
 
@@ -156,6 +158,11 @@ impl Reconstruction {
     /// Its figures, flags and suspect taxels.
     pub fn diagnostics(&mut self) -> Diagnostics<'_> {
         Diagnostics { checks: &mut self.checks, flags: &mut self.flags, suspects: &mut self.extra.suspects }
+    }
+
+    /// Adds the taxels without a reading: `frame` is the calibrated mean of `readings`.
+    pub(crate) fn add_missing(&mut self, scene: &Scene, frame: &Frame, readings: &[Frame]) {
+        self.extra.missing = MissingTaxel::all(scene, frame, readings);
     }
 
     /// Adds the figures of `checks` and the flags that they raise.

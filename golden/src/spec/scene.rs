@@ -29,7 +29,7 @@
 //! | | `row_settling_us` (0), `channel_settling_us` (0), `samples` (1; 2, 4 … 256), `period_us` |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
-//! | | `plausible_MPa` (10) |
+//! | | `plausible_MPa` (10), `missing_share` (0.2; 0 … 0.5) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod adc_scan;
@@ -349,10 +349,15 @@ pub struct InputSpec {
     pub gain_spread: f64,
     /// Stress in MPa above which a result is flagged `implausible-stress`, above 0.
     pub plausible_MPa: f64,
+    /// Largest share of the live taxels whose readings may be missing in a frame, 0 to 0.5.
+    pub missing_share: f64,
 }
 
 /// Default of `input.plausible_MPa`: soft elastomers tear at about 10 MPa, and feet, hands and grippers stay below 2.
 pub const PLAUSIBLE_MPA: f64 = 10.0;
+
+/// Default of `input.missing_share`: a row and a column of a 10 × 10 array.
+pub const MISSING_SHARE: f64 = 0.2;
 
 /// The forces that a result holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -426,6 +431,12 @@ impl InputSpec {
         (0..sensor.taxels()).map(|taxel| !self.is_dead([taxel / sensor.cols, taxel % sensor.cols])).collect()
     }
 
+    /// Largest number of live taxels of `sensor` whose readings may be missing in a frame.
+    pub fn most_missing(&self, sensor: &Sensor) -> usize {
+        // A share such as 0.29 of 100 taxels is 28.999….
+        (self.missing_share * (sensor.taxels() - self.dead.len()) as f64 + 1e-9) as usize
+    }
+
     /// Whether a taxel, [row, col], is dead.
     pub fn is_dead(&self, taxel: [usize; 2]) -> bool {
         self.dead.binary_search(&taxel).is_ok()
@@ -444,6 +455,7 @@ impl Default for InputSpec {
             unipolar: false,
             gain_spread: 0.0,
             plausible_MPa: PLAUSIBLE_MPA,
+            missing_share: MISSING_SHARE,
         }
     }
 }

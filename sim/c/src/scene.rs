@@ -24,7 +24,7 @@ impl dermis_scene {
 /// The frames of the argument `stress_MPa` of `count` values, which are whole frames of a scene's sensor, at least one.
 ///
 /// # Errors
-/// Another number of values, one that is not finite.
+/// Another number of values, one that is infinite.
 ///
 /// # Safety
 /// As [`values`].
@@ -107,9 +107,9 @@ pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_sce
 /// Reconstruct the forces of a frame, or of the frames of one result in the order of time.
 ///
 /// engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
-/// values, frame after frame of rows * cols; readings if the scene names a calibration or tare file. With cross_check the
-/// estimator evidence reads the frames too, where the engine has another one, and flags what noise, baseline or a faulty taxel
-/// hides from that: as `dermis reconstruct` does. It takes longer than a search.
+/// values, frame after frame of rows * cols; readings if the scene names a calibration or tare file; NaN where a reading is
+/// missing. With cross_check the estimator evidence reads the frames too, where the engine has another one, and flags what
+/// noise, baseline or a faulty taxel hides from that: as `dermis reconstruct` does. It takes longer than a search.
 ///
 /// The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
 /// builds the model, which takes longer than the others.

@@ -74,7 +74,8 @@ const EXAMPLES: &str = "Examples:
   dermis import press.npy --units kPa --pitch 2.5,2.5 --thickness 3
   dermis import log.csv --size 4x4 --units N/cm2 --pitch 5,5 --json
 
-Reads the size, pitch and unit that the file states. Missing sensels (B, NaN, empty) become dead taxels. An array of
+Reads the size, pitch and unit that the file states. A sensel without a reading (B, NaN, empty) in any
+frame becomes a dead taxel; one without a reading in some frames is missing in those. An array of
 more than 2304 sensels is cropped around the contact; rows and columns in --crop choose another part.
 Then: dermis reconstruct DIR/NAME.toml --frame DIR/frames/NAME-0001.json, dermis report --recording DIR";
 
@@ -150,6 +151,17 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
             text,
             "                up to {} of the largest load is outside",
             percent_text(summary.outside_share())
+        )?;
+    }
+    if summary.missing_readings > 0 {
+        writeln!(text, "missing         {} readings of single frames", summary.missing_readings)?;
+    }
+    if !summary.left_out.is_empty() {
+        let numbers: Vec<String> = summary.left_out.iter().map(usize::to_string).collect();
+        writeln!(
+            text,
+            "left out        frame {}: more readings missing than input.missing_share allows",
+            numbers.join(", ")
         )?;
     }
     let count = summary.frames.len();

@@ -9,7 +9,7 @@ use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::checks::Checks;
 use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
-use dermis_golden::result::reconstruct::{Diagnostics, FoundContact, Reconstruction, SuspectTaxel};
+use dermis_golden::result::reconstruct::{Diagnostics, FoundContact, MissingTaxel, Reconstruction, SuspectTaxel};
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -126,6 +126,7 @@ impl Answer {
     /// The figures behind the flags that an answer with sums allows.
     fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
         let figures = Checks { peak_MPa: frame.peak_MPa(), mu_share: self.mu_share(), ..Checks::default() };
+        let figures = figures.with_missing(&model.scene, frame);
         Ok(figures.with_readings(model.input(), std::slice::from_ref(readings)))
     }
 
@@ -159,6 +160,9 @@ pub struct PhysicalAnswer {
     /// Taxels whose readings no force explains, as the cross-check has it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub suspects: Vec<SuspectTaxel>,
+    /// Live taxels without a reading.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<MissingTaxel>,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
     /// The contacts, that with the largest load first; of a board that tells them apart, if it sends forces or records.
@@ -211,6 +215,7 @@ impl PhysicalAnswer {
             flags,
             checks,
             suspects: Vec::new(),
+            missing: MissingTaxel::all(&model.scene, frame, std::slice::from_ref(readings)),
             dropped_before: answer.dropped_before(),
             contacts: decoded.and_then(|result| result.contacts()),
             forces_N: answer.forces.as_ref().filter(|_| !model.sends_resultants()).map(forces),
@@ -226,8 +231,12 @@ mod tests {
 
     /// A frame's flags as a host tells them that asked for resultants, or for forces; the statuses are changed on the way.
     fn flags(model: &Model, change: &dyn Fn(&mut Status)) -> [Vec<Flag>; 2] {
-        let frame = Frame::shipped(&model.scene).remove(1);
-        let trace = model.run(&model.readings(std::slice::from_ref(&frame)).unwrap());
+        answers(model, &Frame::shipped(&model.scene).remove(1), change).map(|answer| answer.flags)
+    }
+
+    /// The answers to a frame of a host that asked for resultants, and of one that asked for forces.
+    fn answers(model: &Model, frame: &Frame, change: &dyn Fn(&mut Status)) -> [PhysicalAnswer; 2] {
+        let trace = model.run(&model.readings(std::slice::from_ref(frame)).unwrap());
         let changed = |mut status: Status| {
             change(&mut status);
             status.beats()
@@ -237,7 +246,22 @@ mod tests {
         let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
         let answer = Answer { sums, forces: None, labels, status, codes, difference: None, received_at };
         let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
-        [answer, whole].map(|answer| PhysicalAnswer::new(model, &frame, &answer).unwrap().flags)
+        [answer, whole].map(|answer| PhysicalAnswer::new(model, frame, &answer).unwrap())
+    }
+
+    #[test]
+    fn missing_readings_are_named_with_and_without_forces() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let model = Model::new(&scene).unwrap();
+        let mut stress = Frame::shipped(&scene).remove(1).stress_MPa;
+        (stress[27], stress[50]) = (f64::NAN, f64::NAN);
+        let frame = Frame::from_stress("lacking", &scene.sensor, stress).unwrap();
+        let wanted = model.reconstruct(&frame).unwrap();
+        for answer in answers(&model, &frame, &|_| ()) {
+            assert_eq!((&answer.missing, &answer.flags), (&wanted.extra.missing, &wanted.flags));
+            assert_eq!((answer.missing[0].row, answer.missing[0].col, answer.missing.len()), (3, 3, 2));
+            assert_eq!(answer.checks.missing_load, wanted.checks.missing_load);
+        }
     }
 
     #[test]

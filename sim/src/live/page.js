@@ -30,6 +30,7 @@ class ArrayMap {
     const lines = (count, line) => Array.from({ length: count + 1 }, (_, k) => line(k)).join("");
     svg(this.svg, "path", { class: "grid", d: lines(cols, c => `M${c} 0v${rows * HIGH}`)
       + lines(rows, r => `M0 ${r * HIGH}h${cols}`) });
+    this.missing = svg(this.svg, "path", { class: "missing" });
     this.arrows = svg(this.svg, "path", { class: "arrows" });
     this.contact = svg(this.svg, "path", { class: "contact" });
     this.bars = svg(this.svg, "path", { class: "bars" });
@@ -37,13 +38,16 @@ class ArrayMap {
 
   draw(stress, peak, forces, longest, contacts, largest) {
     const cells = this.shades.map(sign => sign.map(() => ""));
+    let crosses = "";
     for (let k = 0; k < stress.length; k++) {
+      if (stress[k] === null) crosses += `M${k % cols} ${Math.floor(k / cols) * HIGH}l1 ${HIGH}m-1 0l1 ${-HIGH}`;
       const share = peak > 0 ? stress[k] / peak : 0;
       // The square root makes small values visible, in particular tension.
       const shade = Math.round(SHADES * Math.sqrt(Math.min(1, Math.abs(share))));
       if (shade > 0) cells[share > 0 ? 1 : 0][shade - 1] += `M${k % cols} ${Math.floor(k / cols) * HIGH}h1v${HIGH}h-1`;
     }
     this.shades.forEach((sign, s) => sign.forEach((path, k) => path.setAttribute("d", cells[s][k])));
+    this.missing.setAttribute("d", crosses);
     let path = "";
     for (let k = 0; k < (forces.fx || []).length; k++) {
       const [fx, fy] = [forces.fx[k], forces.fy[k]];

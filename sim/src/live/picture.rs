@@ -23,8 +23,8 @@ pub struct Picture<'a> {
     pub refused: u64,
     /// Number and error of the last refused line.
     pub refusal: Option<&'a str>,
-    /// Stress of each taxel in MPa, row-major.
-    pub stress_MPa: &'a [f64],
+    /// Stress of each taxel in MPa, row-major; null where a reading is missing.
+    pub stress_MPa: Vec<f64>,
     /// The contacts of the result.
     pub contacts: Vec<FoundContact>,
     /// The result.
@@ -89,7 +89,7 @@ impl<'a> Show<'a> {
                     dropped: *dropped,
                     refused: self.refused,
                     refusal: self.refusal.as_deref(),
-                    stress_MPa: &frame.stress_MPa,
+                    stress_MPa: frame.readings(),
                     contacts: contacts(result),
                     result,
                     truth: Truth::of(frame),

@@ -69,6 +69,7 @@ impl Lines {
         // Received times may go back.
         (self.gap, self.due) = (due.saturating_sub(self.due), due);
         self.count += 1;
+        // NaN, a missing reading, is written as null.
         self.line = Cursor::new(format!("{}\n", json!({"stress_MPa": frame.stress_MPa})).into_bytes());
         Ok(true)
     }

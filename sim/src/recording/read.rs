@@ -129,7 +129,7 @@ pub struct RecordedFrame {
     pub received: u64,
     /// Rows and columns.
     pub shape: [usize; 2],
-    /// Stress of each taxel in MPa, row-major.
+    /// Stress of each taxel in MPa, row-major; NaN where a reading is missing.
     pub stress_MPa: Vec<f64>,
 }
 
@@ -203,7 +203,7 @@ impl Frames {
         };
         let rows = image.data.chunks_exact(step);
         let stress_MPa: Vec<f64> = rows.flat_map(|own| own[..row].chunks_exact(size).map(value)).collect();
-        if let Some(taxel) = stress_MPa.iter().position(|stress| !stress.is_finite()) {
+        if let Some(taxel) = stress_MPa.iter().position(|stress| stress.is_infinite()) {
             let (row, col) = (taxel / shape[1], taxel % shape[1]);
             return Err(format!("row {row}, column {col}: {} is not a finite number", stress_MPa[taxel]));
         }
@@ -268,8 +268,8 @@ mod tests {
     #[test]
     fn what_is_no_frame_is_named_with_channel_and_number() {
         let good = image(DOUBLE, &bytes(VALUES));
-        let mut nan = VALUES;
-        nan[4] = f64::NAN;
+        let mut infinite = VALUES;
+        infinite[4] = f64::INFINITY;
         let cases: [(&str, &str, Vec<u8>, &str); 7] = [
             ("/camera", Image::NAME, good.clone(), "has no message of channel /dermis/stress; its channels: /camera"),
             (
@@ -280,7 +280,7 @@ mod tests {
             ),
             (STRESS, Image::NAME, image("mono8", &[0; 6]), "encoding \"mono8\" is not available: 64FC1, 32FC1"),
             (STRESS, Image::NAME, image(DOUBLE, &[0; 40]), "40 bytes with 20 per row are not 2×3 pixels of 64FC1"),
-            (STRESS, Image::NAME, image(DOUBLE, &bytes(nan)), "row 1, column 1: NaN is not a finite number"),
+            (STRESS, Image::NAME, image(DOUBLE, &bytes(infinite)), "row 1, column 1: inf is not a finite number"),
             (STRESS, Image::NAME, good[..50].to_vec(), "message 1: "),
             (STRESS, Image::NAME, vec![0, 1], "has 2 bytes, wanted CDR"),
         ];

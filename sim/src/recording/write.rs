@@ -95,7 +95,7 @@ impl Recorder {
 
     fn answer(&mut self, answer: &Answer, stamp: Stamp) -> Result<()> {
         for (frame, received_s) in answer.frames.iter().zip(answer.received) {
-            let data = bytes(&frame.stress_MPa);
+            let data = bytes(&frame.readings());
             self.message(STRESS, stamp, &image(&self.sensor, header(*received_s), &data))?;
         }
         let header = header(answer.received_s);

@@ -11,6 +11,8 @@ use crate::compare::Difference;
 
 /// Characters from zero to the largest force.
 const SHADES: [char; 8] = [' ', '.', ':', '-', '=', '+', '*', '#'];
+/// Largest number of missing taxels that are named.
+const SHOWN: usize = 8;
 /// Largest width of the map in characters; for wider arrays a character shows the largest force of a group of taxels.
 const PICTURE_COLUMNS: usize = 60;
 
@@ -77,6 +79,13 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     for own in result.contacts().into_iter().flatten() {
         let [x, y] = own.shear_sigma_N.map_or([None; 2], |sigma| sigma.map(Some));
         contact(own.centre_mm, own.force_N, [x, y, own.normal_sigma_N])?;
+    }
+    if !result.extra.missing.is_empty() {
+        let names: Vec<String> =
+            result.extra.missing.iter().take(SHOWN).map(|own| format!("row {}, column {}", own.row, own.col)).collect();
+        let more = result.extra.missing.len() - names.len();
+        let more = if more > 0 { format!("; {more} more") } else { String::new() };
+        writeln!(text, "missing         {}{more}", names.join("; "))?;
     }
     let flag = |flag: &Flag| {
         let name = flag.name();

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use dermis_golden::data::frame::{csv_hint, Frame};
+use dermis_golden::data::frame::{csv_hint, reading, Frame};
 use dermis_golden::spec::sensor::Sensor;
 use serde::Deserialize;
 use serde_json::Value;
@@ -18,7 +18,7 @@ const SHOWN: usize = 40;
 struct Request {
     #[serde(default)]
     id: Value,
-    stress_MPa: Vec<f64>,
+    stress_MPa: Vec<Option<f64>>,
 }
 
 /// Why a line holds no frame, with its id if that could be read.
@@ -56,7 +56,7 @@ pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, 
         true => {
             let request: Request =
                 serde_json::from_str(text).map_err(|error| NoFrame { id: Value::Null, reason: error.to_string() })?;
-            (request.id, request.stress_MPa)
+            (request.id, request.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect())
         }
         false => (Value::Null, numbers(text).map_err(|reason| NoFrame { id: Value::Null, reason: reason + hint() })?),
     };
@@ -71,12 +71,12 @@ pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, 
     }
 }
 
-/// The numbers of a line, separated by commas.
+/// The readings of a line, separated by commas; NaN where one is missing.
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |(index, cell): (usize, &str)| {
         let shown: String = cell.trim().chars().take(SHOWN).collect();
         let wrong = || format!("value {}: {shown:?} is not a finite number", index + 1);
-        cell.trim().parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
+        reading(cell).ok_or_else(wrong)
     };
     text.split(',').enumerate().map(number).collect()
 }
@@ -98,6 +98,16 @@ mod tests {
     }
 
     #[test]
+    fn missing_readings_are_named_by_every_form() {
+        for text in
+            ["{\"stress_MPa\": [0.1, null, 0.3, 2]}", "0.1,,0.3,2", "0.1, nan,0.3,2", "0.1,NaN,0.3,2", "0.1,null,0.3,2"]
+        {
+            let (_, frame) = frame(text, 1, &small()).unwrap();
+            assert_eq!((frame.missing, frame.stress_MPa), (vec![1], vec![0.1, 0.0, 0.3, 2.0]), "{text}");
+        }
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         let cases = [
             ("1,2,3", "line 1: stress_MPa has 3 values, wanted 4"),
@@ -106,7 +116,7 @@ mod tests {
             ("0,1;0,2;0,3;0,4", "values are separated by commas, and a decimal mark is a point"),
             ("0,1,0,2,0,3,0,4", "stress_MPa has 8 values, wanted 4; a decimal mark is a point, not a comma"),
             ("a,b,c,d", "value 1: \"a\" is not a finite number; a frame has no header line"),
-            ("1,nan,3,4", "value 2: \"nan\" is not a finite number"),
+            ("1,inf,3,4", "value 2: \"inf\" is not a finite number"),
             ("{\"stress\": []}", "unknown field `stress`"),
         ];
         for (text, wanted) in cases {

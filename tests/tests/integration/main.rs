@@ -22,6 +22,7 @@ mod flipped_bit;
 mod framing;
 mod link;
 mod lint;
+mod missing;
 mod netlist;
 mod power;
 mod proofs;

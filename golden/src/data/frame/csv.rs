@@ -1,35 +1,43 @@
 //! Frames in CSV: one line per row of taxels, one number in MPa per column, separated by commas; several frames follow
-//! one another.
+//! one another. A field that is empty, `nan` or `null` is a missing reading.
 
 use super::error::check_count;
 use super::{Frame, FrameError};
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
 
+/// Sensor, values, line numbers.
+type Values<'a> = (&'a Sensor, Vec<f64>, Vec<usize>);
+
 /// Reads a frame of the scene's sensor; blank lines are ignored.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-    let (sensor, stress) = values(text, file, scene)?;
-    check_count(file, "rows", stress.len() / sensor.cols, sensor.rows)?;
+    let (sensor, stress, lines) = values(text, file, scene)?;
+    check_count(file, "rows", lines.len(), sensor.rows)?;
     Frame::from_stress(stem, sensor, stress)
 }
 
 /// Reads one or more frames of the scene's sensor.
 pub(super) fn parse_all(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
-    let (sensor, stress) = values(text, file, scene)?;
-    let rows = stress.len() / sensor.cols;
+    let (sensor, stress, lines) = values(text, file, scene)?;
+    let rows = lines.len();
     if rows == 0 || !rows.is_multiple_of(sensor.rows) {
         check_count(file, "rows", rows, (rows / sensor.rows + 1) * sensor.rows)?;
     }
-    stress.chunks(sensor.taxels()).map(|frame| Frame::from_stress(stem, sensor, frame.to_vec())).collect()
+    let one = |(stress, lines): (&[f64], &[usize])| {
+        let frame = Frame::from_stress(stem, sensor, stress.to_vec())?;
+        frame.check_missing(&format!("{file}, line {}", lines[0]), scene)?;
+        Ok(frame)
+    };
+    stress.chunks(sensor.taxels()).zip(lines.chunks(sensor.rows)).map(one).collect()
 }
 
-/// The sensor and the values of all lines, `cols` each.
-fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a Sensor, Vec<f64>), FrameError> {
+/// The sensor, the values of all lines, `cols` each, and the number of each line.
+fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<Values<'a>, FrameError> {
     let sensor = match scene {
         Some(scene) => &scene.sensor,
         None => return Err(FrameError::NoSensor { file: file.to_string() }),
     };
-    let mut stress = Vec::with_capacity(sensor.taxels());
+    let (mut stress, mut lines) = (Vec::with_capacity(sensor.taxels()), Vec::with_capacity(sensor.rows));
     let filled = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     for (index, line) in filled {
         let hint = csv_hint(line, sensor.cols, stress.is_empty());
@@ -37,9 +45,9 @@ fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a S
         if got != wanted {
             return Err(FrameError::CsvRagged { file: file.to_string(), line: index + 1, got, wanted, hint });
         }
+        lines.push(index + 1);
         for (column, cell) in line.split(',').enumerate() {
-            let value = cell.trim().parse().ok().filter(|value: &f64| value.is_finite());
-            stress.push(value.ok_or_else(|| FrameError::CsvValue {
+            stress.push(reading(cell).ok_or_else(|| FrameError::CsvValue {
                 file: file.to_string(),
                 line: index + 1,
                 column: column + 1,
@@ -48,7 +56,23 @@ fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a S
             })?);
         }
     }
-    Ok((sensor, stress))
+    Ok((sensor, stress, lines))
+}
+
+/// The reading in a field of text: NaN where it is missing, `None` for anything else than a finite number or a missing reading.
+///
+/// ```
+/// use dermis_golden::data::frame::reading;
+///
+/// assert_eq!(reading(" -3e-1"), Some(-0.3));
+/// assert!([" ", "nan", "NaN", "null"].iter().all(|field| reading(field).is_some_and(f64::is_nan)));
+/// assert!(["inf", "1e400", "x", "-"].iter().all(|field| reading(field).is_none()));
+/// ```
+pub fn reading(field: &str) -> Option<f64> {
+    match field.trim() {
+        "" | "null" => Some(f64::NAN),
+        field => field.parse().ok().filter(|value: &f64| !value.is_infinite()),
+    }
 }
 
 /// A likely reason why a line of numbers separated by commas, of which `wanted` are expected, is none, as the end of an error;

@@ -86,7 +86,7 @@ pub enum FrameError {
         /// Number of values expected.
         wanted: usize,
     },
-    /// A value is NaN or infinite.
+    /// A value is infinite, or NaN where no reading can be missing.
     #[error("{file}: {field}[{index}] = {value} is not a finite number")]
     NotFinite {
         /// Path as given.
@@ -98,7 +98,31 @@ pub enum FrameError {
         /// The value.
         value: f64,
     },
-    /// A CSV cell is not a finite number.
+    /// More readings are missing than the scene allows.
+    #[error("{file}: {count} of {taxels} readings are missing, wanted at most {most} (input.missing_share = {share})")]
+    TooManyMissing {
+        /// Path as given, or the frame's name.
+        file: String,
+        /// Number of live taxels without a reading.
+        count: usize,
+        /// Number of live taxels.
+        taxels: usize,
+        /// The scene's largest share.
+        share: f64,
+        /// The number of taxels that it allows.
+        most: usize,
+    },
+    /// No frame has the reading of a live taxel.
+    #[error("{file}: no frame has a reading of row {row}, column {col}")]
+    NeverRead {
+        /// Path as given.
+        file: String,
+        /// Row of the taxel.
+        row: usize,
+        /// Its column.
+        col: usize,
+    },
+    /// A CSV cell is neither a finite number nor a missing reading.
     #[error("{file}, line {line}, value {column}: {value:?} is not a finite number{hint}")]
     CsvValue {
         /// Path as given.

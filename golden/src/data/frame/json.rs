@@ -1,4 +1,5 @@
-//! Frames in JSON. Only `stress_MPa` is required; unknown fields are ignored, at the top level and in every object.
+//! Frames in JSON. Only `stress_MPa` is required; unknown fields are ignored, at the top level and in every object. `null` is a
+//! missing reading.
 
 use super::{Contact, Forces, Frame, FrameError};
 use crate::spec::scene::{Medium, Scene};
@@ -15,7 +16,7 @@ struct Raw {
     contacts: Option<Vec<Contact>>,
     resultant_N: Option<[f64; 3]>,
     cell_forces_N: Option<Forces>,
-    stress_MPa: Vec<f64>,
+    stress_MPa: Vec<Option<f64>>,
     notes: Option<String>,
 }
 
@@ -33,7 +34,7 @@ struct Written<'a> {
     resultant_N: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cell_forces_N: Option<&'a Forces>,
-    stress_MPa: &'a [f64],
+    stress_MPa: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     notes: Option<&'a str>,
 }
@@ -49,7 +50,8 @@ impl Frame {
             contacts: &self.contacts,
             resultant_N: self.resultant_N,
             cell_forces_N: self.cell_forces_N.as_ref(),
-            stress_MPa: &self.stress_MPa,
+            // NaN is written as null.
+            stress_MPa: self.readings(),
             notes: self.notes.as_deref(),
         };
         // Numbers, texts and lists of them can always be written as JSON.
@@ -85,11 +87,11 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
         contacts: raw.contacts.unwrap_or_default(),
         resultant_N: raw.resultant_N,
         cell_forces_N: raw.cell_forces_N,
-        stress_MPa: raw.stress_MPa,
+        stress_MPa: raw.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect(),
+        missing: Vec::new(),
         notes: raw.notes,
     };
-    frame.check_values(file)?;
-    Ok(frame)
+    frame.with_missing(file)
 }
 
 /// Whether the medium's Poisson ratio is in range.

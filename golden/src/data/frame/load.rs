@@ -74,6 +74,8 @@ impl Frame {
     /// assert_eq!(json, csv);
     /// let error = Frame::parse("b.csv", "0.01, x\n0, 0\n", Some(&scene)).unwrap_err();
     /// assert_eq!(error.to_string(), "b.csv, line 1, value 2: \"x\" is not a finite number");
+    /// let error = Frame::parse("c.csv", "0.01, \n0, 0\n", Some(&scene)).unwrap_err();
+    /// assert_eq!(error.to_string(), "c.csv: 1 of 4 readings are missing, wanted at most 0 (input.missing_share = 0.2)");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -85,7 +87,10 @@ impl Frame {
     }
 
     fn parsed(parser: Parser, text: &str, path: &Path, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-        parser(without_mark(text), &path.display().to_string(), &stem(path), scene)
+        let file = path.display().to_string();
+        let frame = parser(without_mark(text), &file, &stem(path), scene)?;
+        frame.check_missing(&file, scene)?;
+        Ok(frame)
     }
 }
 

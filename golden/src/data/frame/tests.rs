@@ -33,6 +33,43 @@ fn csv_is_rows_of_numbers() {
     assert_eq!(frame.stress_MPa, [1.0, 2.0, -0.3, 4.0]);
 }
 
+/// A frame with missing readings is written and read again, in every form of text.
+#[test]
+fn missing_readings_are_read_and_written() {
+    let frame = json(r#""stress_MPa":[1,null,3,null]"#).unwrap();
+    assert_eq!((frame.stress_MPa.as_slice(), frame.missing.as_slice()), (&[1.0, 0.0, 3.0, 0.0][..], &[1, 3][..]));
+    assert!(frame.readings().iter().zip([false, true, false, true]).all(|(b, missing)| b.is_nan() == missing));
+    assert!(frame.to_json().contains("[1.0,null,3.0,null]"), "{}", frame.to_json());
+    assert_eq!(Frame::parse("f.json", &frame.to_json(), None).unwrap(), frame);
+    let mut scene = Scene::of_sensor(&frame.sensor, "small");
+    scene.input.missing_share = 0.5;
+    for field in ["", " ", "nan", "NaN", "-nan", "null"] {
+        let csv = Frame::parse("f.csv", &format!("1,{field}\n3,{field}\n"), Some(&scene)).unwrap();
+        assert_eq!((csv.missing, csv.stress_MPa), (frame.missing.clone(), frame.stress_MPa.clone()), "{field:?}");
+    }
+    // Infinite readings are none, and neither are NaN and null where a force is.
+    assert!(json(r#""stress_MPa":[1,2,3,4],"resultant_N":[0,0,null]"#).is_err());
+    let infinite = Frame::from_stress("now", &frame.sensor, vec![1.0, f64::NAN, f64::NEG_INFINITY, 0.0]).unwrap_err();
+    assert_eq!(infinite.to_string(), "now: stress_MPa[2] = -inf is not a finite number");
+}
+
+/// The error of a recording in one CSV file has the line at which the frame begins.
+#[test]
+fn a_frame_that_lacks_too_many_readings_is_named_by_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("zero.csv");
+    std::fs::write(&path, "1,2\n3,4\n\n5,6\n7,\n").unwrap();
+    let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 1.0 };
+    let mut scene = Scene::of_sensor(&sensor, "small");
+    let text = Frame::load_all(&path, Some(&scene)).unwrap_err().to_string();
+    assert!(
+        text.ends_with("zero.csv, line 4: 1 of 4 readings are missing, wanted at most 0 (input.missing_share = 0.2)"),
+        "{text}"
+    );
+    scene.input.missing_share = 0.25;
+    assert_eq!(Frame::load_all(&path, Some(&scene)).unwrap()[1].missing, [3]);
+}
+
 #[test]
 fn bad_json_is_refused_with_its_place() {
     let cases = [
@@ -116,7 +153,8 @@ fn bad_csv_is_refused_with_its_place() {
         ("1\t2\n3\t4\n", "line 1: 1 values, wanted 2; values are separated by commas"),
         ("1,2;3\n3,4;5\n", "line 1, value 2: \"2;3\" is not a finite number; values are separated by commas"),
         ("1,2\n3,x\n", "line 2, value 2: \"x\" is not a finite number"),
-        ("1,2\nNaN,4\n", "line 2, value 1: \"NaN\""),
+        ("1,2\ninf,4\n", "line 2, value 1: \"inf\" is not a finite number"),
+        ("1,2\nNaN,4\n", "f.csv: 1 of 4 readings are missing, wanted at most 0 (input.missing_share = 0.2)"),
         ("1,2\n1e400,4\n", "\"1e400\""),
         ("1,2\n", "rows has 1 values, wanted 2"),
         ("", "rows has 0 values, wanted 2"),

@@ -2,11 +2,13 @@
 //!
 //! Values are separated by commas, semicolons, tabs or spaces, whichever the last line has; with any but commas, a
 //! comma is a decimal point. With one value more than taxels the first is the time in s. Lines that start with
-//! `#` and a first line that begins with a name are skipped. `B`, `NaN` and empty cells mark a sensel as missing.
+//! `#` and a first line that begins with a name are skipped. `B`, `NaN`, `null` and empty cells are missing
+//! readings.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{reading, RawFrame, Recording};
+use super::recording::{reading, sensel, RawFrame, Recording};
+use crate::data::frame;
 use csv::{ReaderBuilder, StringRecord};
 
 /// Reads a recording of `size` rows and columns.
@@ -19,7 +21,6 @@ pub(super) fn parse(text: &str, size: Option<[usize; 2]>, source: &Source) -> Re
         .flexible(true)
         .has_headers(false)
         .from_reader(text.as_bytes());
-    let mut missing = vec![false; taxels];
     let mut frames: Vec<RawFrame> = Vec::new();
     for (index, record) in reader.records().enumerate() {
         let record = record.map_err(|error| source.field("CSV", error, "values and separators"))?;
@@ -35,15 +36,11 @@ pub(super) fn parse(text: &str, size: Option<[usize; 2]>, source: &Source) -> Re
             return Err(source.line(line, &whole, format!("{taxels} values, --size {rows}x{cols}, not {got}")));
         }
         let time_s = if timed { Some(reading(source, line, 1, &cells[0])?) } else { None };
-        let mut values = Vec::with_capacity(taxels);
-        for (taxel, cell) in cells.iter().skip(usize::from(timed)).enumerate() {
-            let absent = is_missing(cell);
-            missing[taxel] |= absent;
-            values.push(if absent { 0.0 } else { reading(source, line, taxel + 1 + usize::from(timed), cell)? });
-        }
+        let sensels = cells.iter().enumerate().skip(usize::from(timed));
+        let values = sensels.map(|(index, cell)| sensel(source, line, index + 1, cell)).collect::<Result<_, _>>()?;
         frames.push(RawFrame { number: frames.len() + 1, time_s, values, device: None });
     }
-    Ok(Recording::bare(Format::Csv, [rows, cols], missing, frames))
+    Ok(Recording::bare(Format::Csv, [rows, cols], frames))
 }
 
 /// The separator of the last line, which has values even where the first has names.
@@ -58,12 +55,8 @@ fn cells(record: &StringRecord, separator: u8) -> Vec<String> {
     cells.map(|cell| if separator == b',' { cell.to_string() } else { cell.replace(',', ".") }).collect()
 }
 
-/// Whether a cell has no reading.
-fn is_missing(cell: &str) -> bool {
-    cell.is_empty() || cell == "B" || cell.eq_ignore_ascii_case("nan")
-}
-
 /// Whether a first line has names: its first cell begins with a letter and is not a missing reading.
 fn is_names(cells: &[String]) -> bool {
-    cells.first().is_some_and(|cell| cell.starts_with(char::is_alphabetic) && !is_missing(cell))
+    let name = |cell: &str| cell.starts_with(char::is_alphabetic) && cell != "B" && frame::reading(cell).is_none();
+    cells.first().is_some_and(|cell| name(cell))
 }

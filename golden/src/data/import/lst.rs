@@ -166,7 +166,7 @@ fn assemble(header: Header, pages: Vec<Page>, source: &Source) -> Result<Recordi
         unit,
         bits: None,
         full_scale: None,
-        missing: vec![false; rows * cols],
+        missing: Vec::new(),
         frames,
     })
 }

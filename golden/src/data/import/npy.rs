@@ -6,7 +6,7 @@
 //! | `fortran_order` | both |
 //! | `shape` | (frames, rows, cols), (rows, cols) for one frame, (frames, taxels) beside a stated size |
 //!
-//! A value that is not a number marks its sensel as missing. The header is read here and not by a general reader of
+//! A value that is not a number is a missing reading. The header is read here and not by a general reader of
 //! Python literals: three fields of fixed kinds need no recursion and no allocation that a damaged header can inflate.
 
 use super::error::{ImportError, Source};
@@ -44,11 +44,10 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         return Err(source.field("bytes behind the NumPy header", data.len(), allowed));
     }
     let value = |index: usize| number(&data[index * header.width..][..header.width], &header);
-    let mut missing = vec![false; taxels];
     let mut frames = Vec::with_capacity(count);
     for frame in 0..count {
         let mut values = Vec::with_capacity(taxels);
-        for (taxel, absent) in missing.iter_mut().enumerate() {
+        for taxel in 0..taxels {
             let (row, col) = (taxel / cols, taxel % cols);
             let index = match (header.fortran, header.shape.len()) {
                 (false, _) => frame * taxels + taxel,
@@ -58,7 +57,6 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
                 (true, _) => frame + count * taxel,
             };
             let number = value(index);
-            *absent |= number.is_nan();
             if !number.is_nan() && !is_reading(number) {
                 let place = format!("frame {}, row {row}, column {col}", frame + 1);
                 return Err(source.field(&place, number, "a number up to 1e9 in magnitude, or NaN"));
@@ -67,7 +65,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         }
         frames.push(RawFrame { number: frame + 1, time_s: None, values, device: None });
     }
-    Ok(Recording::bare(Format::Npy, [rows, cols], missing, frames))
+    Ok(Recording::bare(Format::Npy, [rows, cols], frames))
 }
 
 /// Text of the header, and the bytes behind it.

@@ -3,6 +3,7 @@
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::units::Unit;
+use crate::data::frame;
 
 /// Largest magnitude of a reading, in any unit; beyond it sums would lose their meaning.
 const LARGEST_READING: f64 = 1e9;
@@ -25,7 +26,7 @@ pub(super) struct RawFrame {
     pub number: usize,
     /// Time from the start in s, if known.
     pub time_s: Option<f64>,
-    /// Readings, row-major; 0 where a sensel is missing.
+    /// Readings, row-major; NaN where one is missing.
     pub values: Vec<f64>,
     /// The device's own figure, if printed.
     pub device: Option<DeviceFigure>,
@@ -47,23 +48,14 @@ pub(super) struct Recording {
     pub bits: Option<u32>,
     /// Reading at which the device saturates, if stated.
     pub full_scale: Option<f64>,
-    /// Sensels that do not exist in some frame, row-major.
+    /// Sensels without a reading in any frame, row-major; empty before the frames are selected.
     pub missing: Vec<bool>,
     pub frames: Vec<RawFrame>,
 }
 
 impl Recording {
-    /// Frames of a format that states neither device, pitch, unit nor codes. A sensel that is missing in one frame reads 0
-    /// in all.
-    pub(super) fn bare(
-        format: Format,
-        [rows, cols]: [usize; 2],
-        missing: Vec<bool>,
-        mut frames: Vec<RawFrame>,
-    ) -> Self {
-        for frame in &mut frames {
-            frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0);
-        }
+    /// Frames of a format that states neither device, pitch, unit nor codes.
+    pub(super) fn bare(format: Format, [rows, cols]: [usize; 2], frames: Vec<RawFrame>) -> Self {
         Recording {
             format,
             device: None,
@@ -73,7 +65,7 @@ impl Recording {
             unit: None,
             bits: None,
             full_scale: None,
-            missing,
+            missing: Vec::new(),
             frames,
         }
     }
@@ -83,6 +75,15 @@ impl Recording {
 pub(super) fn reading(source: &Source, line: usize, column: usize, text: &str) -> Result<f64, ImportError> {
     let number = text.trim().parse().ok().filter(|value: &f64| is_reading(*value));
     number.ok_or_else(|| source.value(line, column, text, "a number up to 1e9 in magnitude"))
+}
+
+/// The reading of a sensel: NaN where it is missing, `B` as Tekscan writes it, or as [`frame::reading`] has it.
+pub(super) fn sensel(source: &Source, line: usize, column: usize, text: &str) -> Result<f64, ImportError> {
+    match text.trim() {
+        "B" => Ok(f64::NAN),
+        text if frame::reading(text).is_some_and(f64::is_nan) => Ok(f64::NAN),
+        text => reading(source, line, column, text),
+    }
 }
 
 /// Whether a number is finite and small enough.

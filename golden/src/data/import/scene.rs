@@ -6,11 +6,12 @@
 //! is `unipolar`.
 
 use super::crop::Window;
-use super::error::ImportError;
+use super::error::{ImportError, Source};
 use super::measure::Codes;
-use super::recording::Recording;
+use super::recording::{RawFrame, Recording};
 use super::summary::{FrameRecord, Summary};
-use crate::data::frame::Frame;
+use crate::data::frame::{Frame, FrameError};
+use crate::data::input::missing::complete;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
 use std::fmt::Write as _;
@@ -81,22 +82,54 @@ fn noise_floor(summary: &Summary) -> f64 {
     measured.max(rounding)
 }
 
-/// The frames of a window in MPa, with their records.
+/// Leaves out the frames that lack more readings in the window than `scene` allows; returns their numbers.
+///
+/// # Errors
+/// That of the first where none is left.
+pub(super) fn leave_out(
+    recording: &mut Recording,
+    window: Window,
+    scene: &Scene,
+    source: &Source,
+) -> Result<Vec<usize>, ImportError> {
+    let (missing, cols) = (&recording.missing, recording.cols);
+    let live = || window.indices(cols).filter(|k| !missing[*k]);
+    let lacking = |raw: &RawFrame| live().filter(|k| raw.values[*k].is_nan()).count();
+    let most = scene.input.most_missing(&scene.sensor);
+    let all = std::mem::take(&mut recording.frames);
+    let (whole, left_out): (Vec<RawFrame>, Vec<RawFrame>) = all.into_iter().partition(|raw| lacking(raw) <= most);
+    if let Some(first) = left_out.first().filter(|_| whole.is_empty()) {
+        let (file, count, taxels) =
+            (format!("{}, frame {}", source.file, first.number), lacking(first), live().count());
+        return Err(FrameError::TooManyMissing { file, count, taxels, share: scene.input.missing_share, most }.into());
+    }
+    recording.frames = whole;
+    Ok(left_out.iter().map(|raw| raw.number).collect())
+}
+
+/// The readings of a window, 0 where none exists in any frame.
+fn readings<'a>(recording: &'a Recording, window: Window, raw: &'a RawFrame) -> impl Iterator<Item = f64> + 'a {
+    window.indices(recording.cols).map(|k| if recording.missing[k] { 0.0 } else { raw.values[k] })
+}
+
+/// The frames of a window in MPa with their records; `scene` has the sensor and its dead taxels.
 pub(super) fn frames(
     recording: &Recording,
     window: Window,
-    sensor: &Sensor,
-    name: &str,
+    scene: &Scene,
     per_MPa: f64,
 ) -> Result<(Vec<Frame>, Vec<FrameRecord>), ImportError> {
+    let (sensor, name) = (&scene.sensor, &scene.name);
     let area_mm2 = sensor.pitch_x_mm * sensor.pitch_y_mm;
     let digits = recording.frames.len().to_string().len().max(4);
-    let frame = |(index, raw): (usize, &super::recording::RawFrame)| {
+    let sum = |values: &mut dyn Iterator<Item = f64>| values.filter(|value| !value.is_nan()).sum::<f64>();
+    let frame = |(index, raw): (usize, &RawFrame)| {
         let id = format!("{name}-{:0digits$}", index + 1);
-        let stress: Vec<f64> = window.indices(recording.cols).map(|k| raw.values[k] / per_MPa).collect();
-        let normal_N = area_mm2 * stress.iter().sum::<f64>();
-        let outside_N = area_mm2 / per_MPa * raw.values.iter().sum::<f64>() - normal_N;
+        let stress: Vec<f64> = readings(recording, window, raw).map(|reading| reading / per_MPa).collect();
+        let inside_N = area_mm2 * sum(&mut stress.iter().copied());
+        let outside_N = area_mm2 / per_MPa * sum(&mut raw.values.iter().copied()) - inside_N;
         let mut frame = Frame::from_stress(&id, sensor, stress)?;
+        let normal_N = sensor.sum_of_stress_N(&complete(&scene.input, frame.clone()).stress_MPa);
         let time = raw.time_s.map_or(String::new(), |seconds| format!(", {seconds:.4} s"));
         frame.source = Some(format!("recording, frame {}{time}", raw.number));
         let record = FrameRecord {

@@ -18,7 +18,7 @@ pub struct FrameRecord {
     pub number: usize,
     /// Time from the start in s, if known.
     pub time_s: Option<f64>,
-    /// Σ b·area of the window in N.
+    /// Σ b·area of the window in N, with what is taken for missing readings.
     pub normal_N: f64,
     /// Σ b·area of the sensels outside the window in N.
     pub outside_N: f64,
@@ -49,8 +49,14 @@ pub struct Summary {
     pub array: [usize; 2],
     /// The part of it that the scene has.
     pub window: Window,
-    /// Missing sensels in the window.
+    /// Sensels in the window without a reading in any frame.
     pub missing: usize,
+    /// Readings that frames lack beside those.
+    #[serde(default)]
+    pub missing_readings: usize,
+    /// Numbers of the frames that are left out because they lack too many readings.
+    #[serde(default)]
+    pub left_out: Vec<usize>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
     /// Unit of the readings.

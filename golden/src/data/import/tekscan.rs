@@ -15,7 +15,7 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{reading, side, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, side, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
 
 /// Width of Tekscan's counts.
@@ -41,7 +41,6 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         count.ok_or_else(|| source.missing(key, "the header of a Tekscan file states it before ASCII_DATA"))
     };
     let (rows, cols) = (size(header.rows, "ROWS")?, size(header.cols, "COLS")?);
-    let mut missing = vec![];
     let mut frames: Vec<RawFrame> = Vec::new();
     let mut left = 0;
     let mut last = 0;
@@ -62,12 +61,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         }
         let values = &mut frames.last_mut().ok_or_else(|| source.line(line, text, "Frame 1"))?.values;
         for (column, cell) in cells.enumerate() {
-            let absent = cell.trim() == "B";
-            if absent {
-                missing.resize(missing.len().max(values.len() + 1), false);
-                missing[values.len()] = true;
-            }
-            values.push(if absent { 0.0 } else { reading(source, line, column + 1, cell)? });
+            values.push(sensel(source, line, column + 1, cell)?);
         }
         left -= 1;
     }
@@ -75,11 +69,6 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         let number = frames.last().map_or(0, |frame| frame.number);
         return Err(source.line(last, "end of file", format!("{left} more rows of frame {number}, which has {rows}")));
     }
-    missing.resize(rows * cols, false);
-    // A sensel that is missing in one frame only is left out of all.
-    frames.iter_mut().for_each(|frame| {
-        frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0)
-    });
     let [x, y] = header.pitch_mm;
     Ok(Recording {
         format: Format::Tekscan,
@@ -90,7 +79,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         unit: header.unit,
         bits: Some(BITS),
         full_scale: header.saturation.and_then(|text| saturation(&text, header.unit)),
-        missing,
+        missing: Vec::new(),
         frames,
     })
 }

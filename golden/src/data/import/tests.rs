@@ -176,7 +176,8 @@ fn arrays_that_numpy_wrote() {
     for (name, bytes, settings, first, value) in cases {
         let imported = import("a.npy", bytes, &settings).unwrap();
         let dead = if name == "f4-fortran" { 1 } else { 0 };
-        assert_eq!(imported.summary.missing, dead, "{name}");
+        // A value that is not a number, in one of two frames.
+        assert_eq!((imported.summary.missing, imported.summary.missing_readings), (0, dead), "{name}");
         assert_eq!(imported.frames.len(), if first == 0 { 2 } else { 1 }, "{name}");
         for (index, frame) in imported.frames.iter().enumerate() {
             for (k, stress) in frame.stress_MPa.iter().enumerate().take(12 - dead) {
@@ -202,6 +203,65 @@ fn plain_csv_with_times_names_and_missing_values() {
         assert_eq!(imported.frames[0].stress_MPa, [0.25, 1.0, 2.0, 3.0, 0.0, 5.0], "{text}");
         assert_eq!((imported.summary.frames[0].time_s, imported.scene.input.dead), (Some(0.5), vec![[1, 1]]), "{text}");
     }
+}
+
+/// 20 moments of a press on 6 × 6 sensels as NumPy and as CSV, with 14 single readings missing in different sensels, and one moment
+/// that was lost: no sensel is dead, the missing ones are named, and the force is that of the whole recording.
+#[test]
+fn readings_missing_in_some_frames_are_missing_there_alone() {
+    let load = |t: usize, k: usize| {
+        let (x, y) = ((k % 6) as f64 - 2.3, (k / 6) as f64 - 2.8);
+        (30.0 + t as f64) * (-(x * x + y * y) / 3.0).exp()
+    };
+    let gap = |t: usize, k: usize| t < 14 && k == (t * 11 + 5) % 36;
+    let reading = |t: usize, k: usize| if gap(t, k) { f64::NAN } else { load(t, k) };
+    let bytes = |lost: Option<usize>| {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': (20, 6, 6), }}{}\n", " ".repeat(50));
+        let values = (0..720).map(|i| if lost == Some(i / 36) { f64::NAN } else { reading(i / 36, i % 36) });
+        let values: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
+        [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &values].concat()
+    };
+    let csv = |absent: &str| -> Vec<u8> {
+        let cell = |t: usize, k: usize| if gap(t, k) { absent.to_string() } else { load(t, k).to_string() };
+        let line = |t: usize| (0..36).map(|k| cell(t, k)).collect::<Vec<_>>().join(",") + "\n";
+        (0..20).map(line).collect::<String>().into_bytes()
+    };
+    let settings =
+        Settings { unit: Some(Unit::KiloPa), pitch_mm: Some([5.0, 5.0]), size: Some([6, 6]), ..Settings::default() };
+    let whole: Vec<f64> = (0..20).map(|t| 0.025 * (0..36).map(|k| load(t, k)).sum::<f64>()).collect();
+    let files = [
+        ("a.npy", bytes(None)),
+        ("a.csv", csv("nan")),
+        ("a.csv", csv("NaN")),
+        ("a.csv", csv("")),
+        ("a.csv", csv("B")),
+        ("a.csv", csv("null")),
+    ];
+    for (file, bytes) in files {
+        let imported = import(file, &bytes, &settings).unwrap();
+        let (summary, frames) = (&imported.summary, &imported.frames);
+        assert_eq!((summary.missing, summary.missing_readings, summary.left_out.len()), (0, 14, 0), "{file}");
+        assert!(imported.scene.input.dead.is_empty() && frames.len() == 20);
+        let golden = Golden::new(&imported.scene).unwrap();
+        for (t, (frame, record)) in frames.iter().zip(&summary.frames).enumerate() {
+            let gaps: Vec<usize> = (0..36).filter(|&k| gap(t, k)).collect();
+            assert_eq!(frame.missing, gaps, "{file} {t}");
+            assert!((record.normal_N / whole[t] - 1.0).abs() < 0.05, "{file} {t}: {} {}", record.normal_N, whole[t]);
+            let read = Frame::parse("a.json", &frame.to_json(), Some(&imported.scene)).unwrap();
+            assert_eq!(read, *frame);
+            let found = golden.run(&read).unwrap().resultant_N[2];
+            assert!((found / whole[t] - 1.0).abs() < 0.05, "{file} {t}: {found} {}", whole[t]);
+        }
+    }
+    // A frame without any reading is left out and named; alone it is an error.
+    let lost = import("a.npy", &bytes(Some(9)), &settings).unwrap();
+    assert_eq!((lost.frames.len(), lost.summary.left_out.as_slice()), (19, &[10][..]));
+    assert!(lost.scene.input.dead.is_empty() && lost.summary.frames.iter().all(|frame| frame.number != 10));
+    let cell = |t: usize, k: usize| if k % 3 == t { String::new() } else { load(t, k).to_string() };
+    let line = |t: usize| (0..36).map(|k| cell(t, k)).collect::<Vec<_>>().join(",") + "\n";
+    let holes = line(0) + &line(1);
+    let text = message("a.csv", holes.as_bytes(), &settings);
+    assert!(text.starts_with("a.csv, frame 1: ") && text.contains("input.missing_share = 0.2"), "{text}");
 }
 
 #[test]

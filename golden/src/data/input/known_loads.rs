@@ -10,6 +10,9 @@
 //! load in turn is left out, the table of the others is applied to its readings, and the difference from its stress is its
 //! residual. The smallest and the largest load are extrapolated then.
 //!
+//! A taxel counts in the frames that have its reading, and a load for the taxels that have one under it; a taxel with a reading
+//! under fewer than two different loads is dead.
+//!
 //! A load is saturated, and left out, where a tenth of the taxels read one value at an end of all readings in each of its frames,
 //! though readings under another load have noise. The load of the smallest stress may stand at an end.
 //!
@@ -22,6 +25,7 @@
 //! | out: dead taxels | list | row, column |
 
 use super::calibration::Calibration;
+use super::missing::{mean_reading, readings};
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::Scene;
 use serde::Serialize;
@@ -145,9 +149,11 @@ impl LoadFit {
         let (saturated, loads): (Vec<&KnownLoad>, Vec<&KnownLoad>) =
             loads.iter().partition(|load| is_saturated(load, loads));
         let place = |k: usize| [k / scene.sensor.cols, k % scene.sensor.cols];
-        let means: Vec<(f64, Vec<f64>)> =
-            loads.iter().map(|load| (load.stress_MPa, mean(&load.frames, taxels))).collect();
-        let all: Vec<&(f64, Vec<f64>)> = means.iter().collect();
+        let mean = |load: &&KnownLoad| -> Mean {
+            (load.stress_MPa, (0..taxels).map(|k| mean_reading(&load.frames, k)).collect())
+        };
+        let means: Vec<Mean> = loads.iter().map(mean).collect();
+        let all: Vec<&Mean> = means.iter().collect();
         if let Some(load) = saturated.first().filter(|_| different(&all) < 2) {
             return Err(LoadError::Saturated { stress_MPa: load.stress_MPa, different: different(&all) });
         }
@@ -166,12 +172,14 @@ impl LoadFit {
             return Err(LoadError::NotFinite { row, col });
         }
         let residual = |left_out: usize| -> Option<Residual> {
-            let others: Vec<&(f64, Vec<f64>)> =
+            let others: Vec<&Mean> =
                 means.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, mean)| mean).collect();
-            let (others, _) = (different(&others) >= 2).then(|| self::table(&others, taxels))?;
+            let (table, _) = (different(&others) >= 2).then(|| self::table(&others, taxels))?;
             let (stress_MPa, readings) = &means[left_out];
-            let off = |k: usize| others.gain[k] * (readings[k] - others.offset[k]) - stress_MPa;
-            let live: Vec<usize> = (0..taxels).filter(|&k| live[k]).collect();
+            let off = |k: usize| table.gain[k] * (readings[k].unwrap_or(0.0) - table.offset[k]) - stress_MPa;
+            let with_reading = |k: usize| others.iter().filter(|(_, readings)| readings[k].is_some()).count();
+            let there = |k: &usize| live[*k] && readings[*k].is_some() && with_reading(*k) >= 2;
+            let live: Vec<usize> = (0..taxels).filter(there).collect();
             let sum = |of: fn(f64) -> f64| live.iter().map(|&k| of(off(k))).sum::<f64>() / live.len() as f64;
             let largest = live.iter().copied().max_by(|&a, &b| off(a).abs().total_cmp(&off(b).abs()))?;
             Some(Residual {
@@ -186,10 +194,8 @@ impl LoadFit {
         let enough = different(&all) >= FEWEST_FOR_RESIDUALS;
         let residuals = (0..loads.len()).filter(|_| enough).filter_map(residual).collect();
         let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
-        let readings = &mut loads.iter().flat_map(|load| &load.frames).flat_map(|frame| {
-            let live = &live;
-            frame.stress_MPa.iter().enumerate().filter(|(k, _)| live[*k]).map(|(_, reading)| *reading)
-        });
+        let live_taxels = (0..taxels).filter(|&k| live[k]);
+        let readings = &mut live_taxels.flat_map(|k| loads.iter().flat_map(move |load| readings(&load.frames, k)));
         Ok(LoadFit {
             saturated_MPa: saturated.iter().map(|load| load.stress_MPa).collect(),
             noise_MPa: noise(&loads, &means, &table, &live),
@@ -213,28 +219,25 @@ impl LoadFit {
 
 /// Whether a load's readings stand at an end of those of all `loads`.
 fn is_saturated(load: &KnownLoad, loads: &[KnownLoad]) -> bool {
-    let Some(Frame { stress_MPa: first, .. }) = load.frames.first() else { return false };
-    let still =
-        |load: &KnownLoad, k: usize| load.frames.windows(2).all(|two| two[0].stress_MPa[k] == two[1].stress_MPa[k]);
-    let has_noise = |load: &KnownLoad| (0..first.len()).filter(|k| !still(load, *k)).count() * 2 > first.len();
-    let readings = || loads.iter().flat_map(|load| &load.frames).flat_map(|frame| frame.stress_MPa.iter().copied());
-    let ends = [readings().fold(f64::INFINITY, f64::min), readings().fold(f64::NEG_INFINITY, f64::max)];
-    let at = |end: f64| (0..first.len()).filter(|k| first[*k] == end && still(load, *k)).count() as f64;
+    let taxels = load.frames.first().map_or(0, |first| first.stress_MPa.len());
+    let still = |load: &KnownLoad, k: usize| readings(&load.frames, k).is_sorted_by(|a, b| a == b);
+    let has_noise = |load: &KnownLoad| (0..taxels).filter(|k| !still(load, *k)).count() * 2 > taxels;
+    let all = || loads.iter().flat_map(|load| (0..taxels).flat_map(|k| readings(&load.frames, k)));
+    let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
+    let stands = |k: usize, end: f64| readings(&load.frames, k).next() == Some(end) && still(load, k);
+    let at = |end: f64| (0..taxels).filter(|&k| stands(k, end)).count() as f64;
     let least = loads.iter().map(|load| load.stress_MPa.abs()).fold(f64::INFINITY, f64::min);
     load.frames.len() > 1
         && load.stress_MPa.abs() > least
-        && ends.iter().any(|end| at(*end) >= SATURATED_SHARE * first.len() as f64)
+        && ends.iter().any(|end| at(*end) >= SATURATED_SHARE * taxels as f64)
         && loads.iter().any(has_noise)
 }
 
-/// The mean reading of each taxel.
-fn mean(frames: &[Frame], taxels: usize) -> Vec<f64> {
-    let share = |k: usize| frames.iter().map(|frame| frame.stress_MPa[k] / frames.len() as f64).sum();
-    (0..taxels).map(share).collect()
-}
+/// The stress of a load in MPa and the mean reading of each taxel; `None` where no frame has one.
+type Mean = (f64, Vec<Option<f64>>);
 
 /// Number of different stresses.
-fn different(means: &[&(f64, Vec<f64>)]) -> usize {
+fn different(means: &[&Mean]) -> usize {
     let mut stresses: Vec<f64> = means.iter().map(|(stress, _)| *stress).collect();
     stresses.sort_by(f64::total_cmp);
     stresses.dedup();
@@ -242,36 +245,51 @@ fn different(means: &[&(f64, Vec<f64>)]) -> usize {
 }
 
 /// Table and live taxels of at least two different loads.
-fn table(means: &[&(f64, Vec<f64>)], taxels: usize) -> (Calibration, Vec<bool>) {
-    let count = means.len() as f64;
-    let centre = means.iter().map(|(stress, _)| stress / count).sum::<f64>();
-    let spread: f64 = means.iter().map(|(stress, _)| (stress - centre).powi(2)).sum();
-    let middle = |k: usize| means.iter().map(|(_, readings)| readings[k] / count).sum::<f64>();
-    // Against the first load, so that equal readings give exactly 0; the sum of the stresses' differences is 0.
-    let change =
-        |k: usize| means.iter().map(move |(stress, readings)| (stress - centre) * (readings[k] - means[0].1[k]));
-    let slope = |k: usize| change(k).sum::<f64>() / spread;
-    let slopes: Vec<f64> = (0..taxels).map(slope).collect();
-    let mut sorted = slopes.clone();
+fn table(means: &[&Mean], taxels: usize) -> (Calibration, Vec<bool>) {
+    let lines: Vec<Line> = (0..taxels).map(|k| Line::of(means, k)).collect();
+    let mut sorted: Vec<f64> = lines.iter().map(|line| line.slope).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[taxels / 2];
-    let live: Vec<bool> = slopes.iter().map(|slope| median != 0.0 && slope / median > DEAD_SHARE).collect();
-    let used = |k: usize| if live[k] { slopes[k] } else { median };
-    let gain = (0..taxels).map(|k| 1.0 / used(k)).collect();
-    let offset = (0..taxels).map(|k| middle(k) - if live[k] { slopes[k] * centre } else { 0.0 }).collect();
+    let live: Vec<bool> = lines.iter().map(|line| median != 0.0 && line.slope / median > DEAD_SHARE).collect();
+    let gain = lines.iter().zip(&live).map(|(line, live)| 1.0 / if *live { line.slope } else { median }).collect();
+    let of = |(line, live): (&Line, &bool)| line.reading - if *live { line.slope * line.stress_MPa } else { 0.0 };
+    let offset = lines.iter().zip(&live).map(of).collect();
     (Calibration { offset, gain }, live)
 }
 
+/// The straight line through the readings of a taxel.
+struct Line {
+    /// Mean stress of the loads under which it has a reading.
+    stress_MPa: f64,
+    /// Mean of these readings.
+    reading: f64,
+    /// Change of the reading per MPa; 0 where the loads do not differ.
+    slope: f64,
+}
+
+impl Line {
+    fn of(means: &[&Mean], k: usize) -> Line {
+        let points = || means.iter().filter_map(|(stress, readings)| Some((*stress, readings[k]?)));
+        let count = points().count().max(1) as f64;
+        let centre = points().map(|(stress, _)| stress / count).sum::<f64>();
+        let spread: f64 = points().map(|(stress, _)| (stress - centre).powi(2)).sum();
+        let first = points().next().map_or(0.0, |(_, reading)| reading);
+        // Against the first load, so that equal readings give exactly 0; the sum of the stresses' differences is 0.
+        let change = points().map(|(stress, reading)| (stress - centre) * (reading - first)).sum::<f64>();
+        let slope = if spread > 0.0 { change / spread } else { 0.0 };
+        Line { stress_MPa: centre, reading: points().map(|(_, reading)| reading / count).sum(), slope }
+    }
+}
+
 /// Standard deviation of a live taxel around the mean of its load.
-fn noise(loads: &[&KnownLoad], means: &[(f64, Vec<f64>)], table: &Calibration, live: &[bool]) -> Option<f64> {
+fn noise(loads: &[&KnownLoad], means: &[Mean], table: &Calibration, live: &[bool]) -> Option<f64> {
     let (mut squares, mut degrees) = (0.0, 0usize);
     for (load, (_, mean)) in loads.iter().zip(means) {
-        let taxels = || (0..live.len()).filter(|&k| live[k]);
-        let square = |frame: &Frame| -> f64 {
-            taxels().map(|k| (table.gain[k] * (frame.stress_MPa[k] - mean[k])).powi(2)).sum()
-        };
-        squares += load.frames.iter().map(square).sum::<f64>();
-        degrees += taxels().count() * (load.frames.len() - 1);
+        for (k, mean) in mean.iter().enumerate().filter(|(k, _)| live[*k]) {
+            let Some(mean) = mean else { continue };
+            squares += readings(&load.frames, k).map(|own| (table.gain[k] * (own - mean)).powi(2)).sum::<f64>();
+            degrees += readings(&load.frames, k).count() - 1;
+        }
     }
     (degrees > 0).then(|| (squares / degrees as f64).sqrt())
 }
@@ -366,6 +384,31 @@ mod tests {
         assert!((fit.full_scale_MPa - truth(63).1 * (163.0 + 0.2 / truth(0).1)).abs() < 0.1);
         let text = fit.table.to_csv(&scene.sensor);
         assert!(Calibration::parse(&text, "table.csv", &scene.sensor).is_ok());
+    }
+
+    /// Missing readings, in some frames or under a whole load, leave gain and offset as they are.
+    #[test]
+    fn missing_readings_do_not_count() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let mut all = loads(&scene, 2e-4, linear);
+        let mut lack = |load: usize, frames: std::ops::Range<usize>, taxel: usize| {
+            for frame in &mut all[load].frames[frames] {
+                frame.stress_MPa[taxel] = 0.0;
+                frame.missing.push(taxel);
+            }
+        };
+        lack(1, 0..19, 9);
+        lack(2, 0..20, 18);
+        (1..4).for_each(|load| lack(load, 0..20, 27));
+        let fit = LoadFit::new(&scene, &all).unwrap();
+        for k in [8, 9, 18] {
+            let (offset, gain) = truth(k);
+            assert!((fit.table.gain[k] / gain - 1.0).abs() < 4e-3 && (fit.table.offset[k] - offset).abs() < 0.5, "{k}");
+        }
+        // Under one load alone there is no gain.
+        assert_eq!(fit.dead, [[3, 3]]);
+        assert!((fit.noise_MPa.unwrap() / 2e-4 - 1.0).abs() < 0.05);
+        assert!(fit.residuals.len() == 4 && fit.residuals.iter().all(|residual| residual.rms_MPa < 3e-4));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The spread of one taxel over a few frames is itself uncertain: it counts as n − 1 readings beside ν = 8 of the whole
-//! array; a dead taxel takes s̄. An array that reads zero without contact, because it reads no tension or its converter is coarse, tells
+//! array; a dead taxel takes s̄. A taxel counts in the frames that have its reading. An array that reads zero without contact, because it reads no tension or its converter is coarse, tells
 //! nothing of its noise; then there is no spread.
 //!
 //! | | shape | unit |
@@ -14,8 +14,10 @@
 //! | out: zero | taxels | readings |
 //! | out: spread | taxels | readings, standard deviation of one frame |
 
+use super::missing::{mean_reading, readings};
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::Scene;
+use std::ops::Not;
 use std::path::Path;
 
 /// ν: readings of the whole array that stand beside those of a taxel.
@@ -40,32 +42,36 @@ impl Tare {
     /// Reads the frames of a file or folder, as [`Frame::load_all`] does.
     ///
     /// # Errors
-    /// [`FrameError`] if there is none, or one is not of the scene's sensor.
+    /// [`FrameError`] if there is none, one is not of the scene's sensor, or none has the reading of a live taxel.
     pub fn load(path: &Path, scene: &Scene) -> Result<Tare, FrameError> {
         let frames = Frame::load_all(path, Some(scene))?;
         frames.iter().try_for_each(|frame| frame.check(scene))?;
-        Ok(Tare::of(&frames, scene))
+        let (alive, cols) = (scene.input.alive(&scene.sensor), scene.sensor.cols);
+        match (0..alive.len()).find(|&k| alive[k] && frames.iter().all(|frame| frame.lacks(k))) {
+            Some(k) => Err(FrameError::NeverRead { file: path.display().to_string(), row: k / cols, col: k % cols }),
+            None => Ok(Tare::of(&frames, scene)),
+        }
     }
 
     /// Of frames of the scene's sensor, at least one.
     pub(super) fn of(frames: &[Frame], scene: &Scene) -> Tare {
         let (taxels, count) = (scene.sensor.taxels(), frames.len());
-        // Divided before adding, so that the sum does not overflow.
-        let mean = |k: usize| frames.iter().map(|frame| frame.stress_MPa[k] / count as f64).sum::<f64>();
-        let zero: Vec<f64> = (0..taxels).map(mean).collect();
-        let square = |k: usize| frames.iter().map(|frame| (frame.stress_MPa[k] - zero[k]).powi(2)).sum::<f64>();
+        let zero: Vec<f64> = (0..taxels).map(|k| mean_reading(frames, k).unwrap_or(0.0)).collect();
+        let square = |k: usize| readings(frames, k).map(|reading| (reading - zero[k]).powi(2)).sum::<f64>();
         let squares: Vec<f64> = (0..taxels).map(square).collect();
+        // n − 1 of each taxel.
+        let freedoms: Vec<f64> = (0..taxels).map(|k| readings(frames, k).count().saturating_sub(1) as f64).collect();
         let cols = scene.sensor.cols;
         let live: Vec<usize> = (0..taxels).filter(|k| !scene.input.is_dead([k / cols, k % cols])).collect();
         // Not by the squares, which rounding makes positive.
-        let varies = |k: usize| frames.iter().any(|frame| frame.stress_MPa[k] != frames[0].stress_MPa[k]);
+        let varies = |k: usize| readings(frames, k).is_sorted_by(|a, b| a == b).not();
         let varying = live.iter().filter(|&&k| varies(k)).count();
-        let freedom = count.saturating_sub(1) as f64;
         let shown = count >= LEAST_FRAMES && varying as f64 >= LEAST_VARYING * live.len() as f64;
         let spread = shown.then(|| {
-            let common = live.iter().map(|&k| squares[k]).sum::<f64>() / (freedom * live.len() as f64);
+            let of_live = |values: &[f64]| live.iter().map(|&k| values[k]).sum::<f64>();
+            let common = of_live(&squares) / of_live(&freedoms);
             let of = |(k, square): (usize, &f64)| match live.binary_search(&k) {
-                Ok(_) => ((PRIOR * common + square) / (PRIOR + freedom)).sqrt(),
+                Ok(_) => ((PRIOR * common + square) / (PRIOR + freedoms[k])).sqrt(),
                 Err(_) => common.sqrt(),
             };
             squares.iter().enumerate().map(of).collect()
@@ -101,6 +107,29 @@ mod tests {
             assert!((zero - 0.5).abs() < 0.4 * sigma(k), "{k}: {zero}");
             assert!((spread / sigma(k) - 1.0).abs() < 0.25, "{k}: {spread}");
         }
+    }
+
+    /// A taxel that half of the frames lack has the zero and the noise of the others; one that all lack has no zero.
+    #[test]
+    fn missing_readings_do_not_count() {
+        let (scene, mut frames) = frames(100, |_, normal| 0.5 + 0.01 * normal);
+        let whole = Tare::of(&frames, &scene);
+        for frame in frames.iter_mut().step_by(2) {
+            (frame.stress_MPa[9], frame.missing) = (0.0, vec![9]);
+        }
+        let tare = Tare::of(&frames, &scene);
+        assert!((tare.zero[9] - 0.5).abs() < 5e-3 && tare.zero[8] == whole.zero[8]);
+        assert!((tare.spread.unwrap()[9] / 0.01 - 1.0).abs() < 0.25);
+        let folder = tempfile::tempdir().unwrap();
+        for (number, frame) in frames.iter_mut().enumerate() {
+            frame.missing = vec![9];
+            std::fs::write(folder.path().join(format!("{number}.json")), frame.to_json()).unwrap();
+        }
+        let text = Tare::load(folder.path(), &scene).unwrap_err().to_string();
+        assert!(text.ends_with("no frame has a reading of row 1, column 1"), "{text}");
+        let mut dead = scene.clone();
+        dead.input.dead = vec![[1, 1]];
+        assert!(Tare::load(folder.path(), &dead).is_ok());
     }
 
     #[test]

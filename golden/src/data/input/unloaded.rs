@@ -1,6 +1,6 @@
 //! Unloaded frames: the noise of a device, from frames in which nothing presses.
 //!
-//! The standard deviation of a calibrated reading is that of its tare frames ([`Tare`]), the root mean square over the live
+//! Missing readings count for nothing. The standard deviation of a calibrated reading is that of its tare frames ([`Tare`]), the root mean square over the live
 //! taxels. Frames that cannot be without load are refused:
 //!
 //! ```text
@@ -90,7 +90,7 @@ pub fn noise_MPa(scene: &Scene, input: &Input, frames: &[Frame]) -> Result<f64, 
     let live: Vec<usize> = (0..alive.len()).filter(|k| alive[*k]).collect();
     let spread = spread.ok_or(UnloadedError::Constant)?;
     let noise_MPa = root_mean_square(&live.iter().map(|k| spread[*k]).collect::<Vec<_>>());
-    let off = |frame: &Frame, k: usize| frame.stress_MPa[k] - zero[k];
+    let off = |frame: &Frame, k: usize| if frame.lacks(k) { 0.0 } else { frame.stress_MPa[k] - zero[k] };
     let mean = |frame: &Frame| live.iter().map(|k| off(frame, *k)).sum::<f64>() / live.len() as f64;
     let means: Vec<f64> = stress.iter().map(mean).collect();
     let variance = means.iter().map(|mean| mean * mean).sum::<f64>() / (means.len() - 1) as f64;
@@ -136,6 +136,15 @@ mod tests {
         let touched = |number: usize, k: usize| if (number, k) == (50, 13) { 0.2 } else { 0.0 };
         assert!(matches!(found(100, 1, touched), Err(UnloadedError::Jump { row: 1, col: 5, .. })));
         assert!(matches!(found(7, 1, |_, _| 0.0), Err(UnloadedError::Few { frames: 7 })));
+    }
+
+    #[test]
+    fn missing_readings_change_nothing() {
+        let gap = |number: usize, k: usize| if (7 * number + k) % 31 == 0 { f64::NAN } else { 0.0 };
+        for seed in 0..20 {
+            let [whole, lacking] = [found(100, seed, |_, _| 0.0), found(100, seed, gap)].map(Result::unwrap);
+            assert!((lacking / whole - 1.0).abs() < 0.02, "{seed}: {lacking} {whole}");
+        }
     }
 
     #[test]

@@ -28,17 +28,22 @@ pub(super) const MOST: usize = 3;
 /// Largest number of fits of a frame.
 const FITS: usize = 5;
 
-/// The fit of `b` and its suspect taxels; `stated` is the noise, if it is known. `None` if the model is not representable.
-pub(super) fn fit(scene: &Evidence, b: &[f64], stated: Option<f64>) -> Option<(Fitted, Vec<SuspectTaxel>)> {
-    let mut found = Fit::new(scene, b, &scene.alive, stated).run();
+/// The fit of `b` on the taxels `there`, live and not missing, and its suspect taxels; `stated` is the noise, if it is known. `None` if the model is not representable.
+pub(super) fn fit(
+    scene: &Evidence,
+    b: &[f64],
+    there: &[bool],
+    stated: Option<f64>,
+) -> Option<(Fitted, Vec<SuspectTaxel>)> {
+    let mut found = Fit::new(scene, b, there, stated).run();
     let (mut suspects, mut tried): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
     for _ in 1..FITS {
         let worst = found.as_ref().and_then(|found| found.worst).filter(|(_, size)| *size > CANDIDATE);
         let worst = worst.map(|(taxel, _)| taxel).filter(|taxel| !tried.contains(taxel));
         let first = tried.is_empty() && suspects.is_empty() && found.as_ref().is_none_or(|found| !found.wide);
-        let screened = || scene.screen.as_ref().filter(|_| first)?.least_predicted(b);
+        let screened = || scene.screen.as_ref().filter(|_| first)?.least_predicted(b).filter(|taxel| there[*taxel]);
         let Some(taxel) = worst.or_else(screened).filter(|_| suspects.len() < MOST) else { break };
-        let mut used = scene.alive.clone();
+        let mut used = there.to_vec();
         suspects.iter().chain([&taxel]).for_each(|&taxel| used[taxel] = false);
         let other = Fit::new(scene, b, &used, stated).run();
         let better = |other: &Fitted| found.as_ref().is_none_or(|found| other.left <= WORSE * found.left);

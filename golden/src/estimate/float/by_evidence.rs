@@ -38,7 +38,7 @@ impl Estimator for ByEvidence {
         // No force is worth a fit of readings that no contact causes, such as counts without calibration.
         let estimate = match input.frame.peak_MPa() > array.scene.input.plausible_MPa {
             true => self.0.without_fit(&input.frame.stress_MPa, noise_MPa),
-            false => self.0.solve(&input.frame.stress_MPa, noise_MPa),
+            false => self.0.solve_without(&input.frame.stress_MPa, &input.frame.missing, noise_MPa),
         };
         let forces = threshold(estimate.forces_N.clone(), array.scene.threshold.min_force_N);
         let subarrays = vec![array.array_of(input, forces.resultant())];
@@ -52,6 +52,8 @@ impl Estimator for ByEvidence {
         result.flags.extend(estimate.failed.then_some(Flag::EstimateFailed));
         result.flags.extend((!estimate.suspects.is_empty()).then_some(Flag::TaxelSuspect));
         result.extra.suspects = estimate.suspects;
+        result.checks.missing_load =
+            (!input.frame.missing.is_empty()).then(|| normal_spread(&estimate.contacts)).flatten();
         result.extra.contacts = Some(estimate.contacts);
         result
     }
@@ -64,6 +66,13 @@ impl Estimator for ByEvidence {
     fn compares_load(&self) -> bool {
         false
     }
+}
+
+/// Twice the standard deviation of the normal force of all contacts over that force; `None` without one.
+fn normal_spread(contacts: &[ContactEstimate]) -> Option<f64> {
+    let normal: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
+    let variance: f64 = contacts.iter().map(|contact| contact.sigma_N[2].powi(2)).sum();
+    (normal > 0.0).then(|| 2.0 * variance.sqrt() / normal)
 }
 
 /// Standard deviation of the shear over its size, the largest of all contacts with a share of the load. Below a

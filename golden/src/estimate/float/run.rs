@@ -52,13 +52,14 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`].
     pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
-        self.run_readings(std::slice::from_ref(frame), frame, noise_MPa)
+        frame.check(self.scene())?;
+        let complete = self.input.complete(std::slice::from_ref(frame));
+        self.run_readings(std::slice::from_ref(frame), &complete[0], noise_MPa)
     }
 
-    /// Reconstructs `mean`, the average of the frames `readings`.
+    /// Reconstructs `mean`, the average of the frames `readings`, which have been checked.
     fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = self.scene();
-        mean.check(scene)?;
         let frame = self.input.calibrate(mean);
         let (filled, report) = match (scene.input.unipolar, self.estimator.clipped_readings()) {
             (false, _) | (true, Clipped::AsRead) => (frame.clone(), None),
@@ -75,6 +76,7 @@ impl Golden {
             ..result.figures(scene, &frame).with_readings(&self.input, readings)
         };
         result.add_checks(scene, checks);
+        result.add_missing(scene, &frame, readings);
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, scene, &frame, noise_MPa);
         }

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Both are relative to the largest range of a frame so far; zeros and offsets do not count, nor frames of few steps. The changes of the taxels beside,
-//! two to four, must have one sign: a taxel on the line between compression and tension may stand still.
+//! two to four, must have one sign: a taxel on the line between compression and tension may stand still. A missing reading neither
+//! changes nor stands still.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -21,6 +22,8 @@ use crate::spec::scene::Scene;
 
 /// Fewest frames for which a taxel must not have changed.
 const FEWEST: usize = 8;
+/// Fewest taxels beside it that must have changed.
+const FEWEST_BESIDE: usize = 2;
 
 /// Readings since a taxel last changed.
 #[derive(Clone, Debug)]
@@ -90,7 +93,7 @@ impl History {
         let (mut constant_share, mut torn_share) = (None, None);
         let taxels = self.alive.len();
         for frame in frames.iter().filter(|frame| frame.stress_MPa.len() == taxels) {
-            let (constant, torn) = self.add_one(&frame.stress_MPa);
+            let (constant, torn) = self.add_one(&frame.readings());
             constant_share = [constant_share, constant].into_iter().flatten().reduce(f64::max);
             torn_share = [torn_share, torn].into_iter().flatten().reduce(f64::max);
         }
@@ -99,10 +102,11 @@ impl History {
 
     /// The constant share and the torn share; `None` before there is a frame to compare with, and for one of few steps.
     fn add_one(&mut self, now: &[f64]) -> (Option<f64>, Option<f64>) {
-        let live = || (0..now.len()).filter(|k| self.alive[*k]);
+        let live = || (0..now.len()).filter(|k| self.alive[*k] && !now[*k].is_nan());
         let of = |taxels: &mut dyn Iterator<Item = usize>| range(taxels.map(|k| now[k]));
         let (whole, fine) = (self.range.max(of(&mut live())), is_fine(live().map(|k| now[k])));
         let torn = (!self.last.is_empty() && fine).then(|| {
+            let live = || live().filter(|k| !self.last[*k].is_nan());
             let change = |k: usize| (now[k] - self.last[k]).abs();
             let changed: Vec<usize> = live().filter(|k| change(*k) > 0.0).collect();
             let (Some(first), Some(last)) = (changed.first(), changed.last()) else { return 0.0 };
@@ -112,19 +116,28 @@ impl History {
         });
         let beside = |taxel: usize| self.beside[taxel].iter().map(|k| now[*k]).collect::<Vec<_>>();
         let run = |taxel: usize| match self.runs.get(taxel) {
+            Some(run) if now[taxel].is_nan() => run.clone(),
             Some(run) if self.last[taxel] == now[taxel] => Run { frames: run.frames + 1, ..run.clone() },
             _ => Run { frames: 1, beside: beside(taxel) },
         };
         let runs: Vec<Run> = (0..now.len()).map(run).collect();
-        let still = |taxel: &usize| runs[*taxel].frames >= FEWEST && runs[*taxel].beside.len() > 1;
+        let still = |taxel: &usize| runs[*taxel].frames >= FEWEST && runs[*taxel].beside.len() >= FEWEST_BESIDE;
         let least = |taxel: usize| {
             let changes = std::iter::zip(beside(taxel), &runs[taxel].beside).map(|(now, then)| now - then);
+            let changes: Vec<f64> = changes.filter(|change| !change.is_nan()).collect();
+            if changes.len() < FEWEST_BESIDE {
+                return 0.0;
+            }
             let ends = changes
+                .into_iter()
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], change| [change.min(low), change.max(high)]);
             ends[0].max(-ends[1]).max(0.0)
         };
         let constant = fine.then(|| live().filter(still).map(least).fold(0.0, f64::max) / whole);
-        (self.runs, self.last, self.range) = (runs, now.to_vec(), whole);
+        // The last reading of each taxel, which may be older than the last frame.
+        let last =
+            (0..now.len()).map(|k| if now[k].is_nan() { *self.last.get(k).unwrap_or(&f64::NAN) } else { now[k] });
+        (self.runs, self.last, self.range) = (runs, last.collect(), whole);
         (constant, torn)
     }
 }
@@ -202,6 +215,36 @@ mod tests {
             }),
             []
         );
+    }
+
+    /// A taxel that is missing for many frames does not stand still, and beside missing ones a stuck taxel is found; so is a torn
+    /// frame.
+    #[test]
+    fn missing_readings_neither_change_nor_stand_still() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let exact = press(&scene.sensor, 5.0, 8.0, [1.5, 0.7]);
+        const LAST: usize = 10;
+        let flags = |missing: &dyn Fn(usize) -> Vec<usize>, stuck: Option<usize>, torn: bool| -> Vec<Flag> {
+            let (mut history, mut checks) = (History::new(&scene), Checks::default());
+            for moment in 1..=LAST {
+                let times = |load: usize| exact.stress_MPa.iter().map(|b| load as f64 * b).collect::<Vec<f64>>();
+                let mut stress = times(moment);
+                if torn && moment == LAST {
+                    stress[32..].copy_from_slice(&times(LAST - 1)[32..]);
+                }
+                stuck.into_iter().for_each(|taxel| stress[taxel] = 0.3);
+                missing(moment).into_iter().for_each(|taxel| stress[taxel] = f64::NAN);
+                checks = history.add(&[Frame::from_stress("moment", &scene.sensor, stress).unwrap()], checks);
+            }
+            checks.flags(&scene).collect()
+        };
+        assert_eq!(flags(&|_| vec![27, 28], None, false), []);
+        assert_eq!(flags(&|moment| vec![20 + moment % 3, 27 + moment % 2], None, false), []);
+        assert_eq!(
+            flags(&|moment| if moment % 4 == 0 { vec![28] } else { vec![35] }, Some(27), false),
+            [Flag::TaxelConstant]
+        );
+        assert_eq!(flags(&|moment| vec![17 + moment % 2, 44], None, true), [Flag::TornFrame]);
     }
 
     #[test]

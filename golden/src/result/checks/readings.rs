@@ -9,7 +9,8 @@
 //! A reading that falls in steps of q is one of k equal largest by chance with q/D for each beside the first: the plateau is the
 //! negative logarithm of a probability. Ranges are relative to that of the frame, so that zeros and offsets do not count. Lines
 //! and largest readings that are equal because the frame is its own mirror image say nothing, nor do ranges of few steps, nor lines
-//! of the frame's least reading, as an array has that reads no tension.
+//! of the frame's least reading, as an array has that reads no tension. Missing readings count for nothing: a line is judged by
+//! those that it has, if they are at least half.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -42,9 +43,17 @@ impl Checks {
             full_scale_share: input.full_scale_share(readings),
             plateau: largest(&|own| own.plateau()),
             line_share: largest(&|own| own.line_share()),
+            missing_share: readings.iter().filter_map(|frame| missing_share(input, frame)).reduce(f64::max),
             ..self
         }
     }
+}
+
+/// The share of the live taxels without a reading; `None` where each has one.
+fn missing_share(input: &Input, frame: &Frame) -> Option<f64> {
+    let alive = input.spec().alive(&frame.sensor);
+    let missing = frame.missing.iter().filter(|taxel| alive[**taxel]).count();
+    (missing > 0).then(|| missing as f64 / alive.iter().filter(|alive| **alive).count() as f64)
 }
 
 /// Share of the range below which a difference of readings is rounding, of stress that was computed.
@@ -76,7 +85,7 @@ struct Upward {
     cols: Vec<Line>,
 }
 
-/// The readings of a row or column; those of dead taxels are missing.
+/// The readings of a row or column; `None` of dead taxels and of missing readings.
 type Line = Vec<Option<f64>>;
 
 fn range_of(line: &Line) -> f64 {
@@ -98,16 +107,25 @@ fn mirrored(lines: &[Line], sum: usize) -> bool {
         && pairs().any(|(i, one, _)| i != (sum - 1) / 2 && range_of(one) > 0.0)
 }
 
+/// Whether enough readings of a line are there to judge it.
+fn is_there(line: &Line) -> bool {
+    2 * line.iter().flatten().count() >= line.len()
+}
+
 /// Whether line k repeats the one before it.
 fn is_twin(lines: &[Line], k: usize) -> bool {
-    k > 0 && equal(&lines[k - 1], &lines[k], 0.0) && !mirrored(lines, 2 * k - 1)
+    k > 0
+        && is_there(&lines[k - 1])
+        && is_there(&lines[k])
+        && equal(&lines[k - 1], &lines[k], 0.0)
+        && !mirrored(lines, 2 * k - 1)
 }
 
 impl Upward {
     fn new(input: &Input, frame: &Frame) -> Upward {
         let Sensor { rows, cols, .. } = frame.sensor;
         let (sign, alive) = (input.sign(), input.spec().alive(&frame.sensor));
-        let reading = |k: usize| alive[k].then(|| sign * frame.stress_MPa[k]);
+        let reading = |k: usize| (alive[k] && !frame.lacks(k)).then(|| sign * frame.stress_MPa[k]);
         let rows_of = (0..rows).map(|i| (0..cols).map(|j| reading(i * cols + j)).collect()).collect();
         let cols_of = (0..cols).map(|j| (0..rows).map(|i| reading(i * cols + j)).collect()).collect();
         Upward { rows: rows_of, cols: cols_of }
@@ -149,7 +167,7 @@ impl Upward {
         let ranges: Vec<f64> = lines.iter().map(range_of).collect();
         let least = self.readings().fold(f64::INFINITY, f64::min);
         let (mut largest, mut first) = (0.0f64, 0);
-        while let Some(start) = (first..lines.len()).find(|&k| ranges[k] == 0.0) {
+        while let Some(start) = (first..lines.len()).find(|&k| ranges[k] == 0.0 && is_there(&lines[k])) {
             let end = (start..lines.len()).find(|&k| ranges[k] > 0.0).unwrap_or(lines.len());
             let sides = [start.checked_sub(1).map_or(0.0, |k| ranges[k]), ranges.get(end).copied().unwrap_or(0.0)];
             let (less, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
@@ -301,6 +319,30 @@ mod tests {
                 assert!(flags.is_empty(), "{id}: {flags:?} {checks:?}");
             }
         }
+    }
+
+    /// Missing readings are no fault: single ones, those of a row, of a block; and the faults beside them are found.
+    #[test]
+    fn missing_readings_are_no_fault_and_hide_none() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let exact = press(&scene.sensor, 5.0, 8.0, [1.5, 0.7]);
+        let input = Input::new(&scene).unwrap();
+        let flags = |frame: &Frame, missing: Vec<usize>| -> Vec<Flag> {
+            let mut frame = Frame { missing, ..frame.clone() };
+            frame.missing.iter().for_each(|&taxel| frame.stress_MPa[taxel] = 0.0);
+            Checks::default().with_readings(&input, &[frame]).flags(&scene).collect()
+        };
+        let block = (0..9).map(|k| (k / 3 + 2) * 8 + k % 3 + 2).collect();
+        let column = (0..8).map(|row| 8 * row + 3).collect();
+        for missing in [vec![27], (24..32).collect(), column, block] {
+            assert_eq!(flags(&exact, missing.clone()), [Flag::TaxelMissing], "{missing:?}");
+        }
+        let mut doubled = exact.clone();
+        doubled.stress_MPa.copy_within(24..32, 32);
+        assert_eq!(flags(&doubled, vec![26, 37]), [Flag::LineFault, Flag::TaxelMissing]);
+        let mut clipped = exact.clone();
+        clipped.stress_MPa.iter_mut().for_each(|b| *b = b.min(0.5 * exact.peak_MPa()));
+        assert_eq!(flags(&clipped, vec![27]), [Flag::Clipped, Flag::TaxelMissing]);
     }
 
     /// Dead taxels and falling readings change nothing.

@@ -10,11 +10,13 @@
 //! | `wrench` | a force per taxel, or a record for each contact | force and moment of the whole array |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
 //! | `suspects` | `search.estimator = "evidence"`, flag `taxel-suspect` | row, column, reading and expected stress of taxels taken as missing |
+//! | `missing` | flag `taxel-missing` | row, column, frames and stress of taxels without a reading |
 //! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
 //! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::contact_estimate::ContactEstimate;
+use super::missing_taxel::MissingTaxel;
 use super::output::{shear_sigma_N, Resultant, Wrench};
 use super::suspect_taxel::SuspectTaxel;
 use crate::data::frame::Forces;
@@ -62,6 +64,9 @@ pub struct Extra {
     /// Taxels whose readings no force explains; the estimate takes them as missing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub suspects: Vec<SuspectTaxel>,
+    /// Live taxels without a reading in a frame.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<MissingTaxel>,
 }
 
 /// Statistics of the estimated tension.

@@ -17,6 +17,7 @@ impl Reconstruction {
             network_misfit: None,
             ..self.checks
         }
+        .with_missing(scene, frame)
     }
 }
 

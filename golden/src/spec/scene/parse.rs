@@ -6,7 +6,7 @@ use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
     InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, TableRange,
-    TableStorage, ThresholdSpec, MAX_CONTACTS, PLAUSIBLE_MPA,
+    TableStorage, ThresholdSpec, MAX_CONTACTS, MISSING_SHARE, PLAUSIBLE_MPA,
 };
 use crate::spec::board::{Board, SEARCH_WIDTHS};
 use crate::spec::link_kind::LinkKind;
@@ -42,6 +42,7 @@ const SCHEMA: [(&str, &[&str]); 13] = [
             "unipolar",
             "gain_spread",
             "plausible_MPa",
+            "missing_share",
         ],
     ),
     ("output", &["forces"]),
@@ -405,6 +406,8 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
     let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    let half = |share: f64| (0.0..=0.5).contains(&share);
+    let missing_share = reader.number("input.missing_share", half, "a number from 0 to 0.5")?;
     // In range, so that the cast keeps the value.
     let average = reader.integer("input.average", 0..=12, Some(0))? as u32;
     Ok(InputSpec {
@@ -417,6 +420,7 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
         gain_spread: spread.unwrap_or(0.0),
         plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
+        missing_share: missing_share.unwrap_or(MISSING_SHARE),
     })
 }
 

@@ -66,6 +66,7 @@ fn every_field_is_read() {
         dead = [[3, 4], [0, 9], [3, 4]]
         unipolar = true
         plausible_MPa = 2.5
+        missing_share = 0.05
         [output]
         forces = "resultants""#;
     let scene = with(more).unwrap();
@@ -93,6 +94,7 @@ fn every_field_is_read() {
         unipolar: true,
         gain_spread: 0.0,
         plausible_MPa: 2.5,
+        missing_share: 0.05,
     };
     assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
     let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
@@ -175,6 +177,11 @@ fn wrong_values_name_what_is_allowed() {
         ("[input]\nunipolar = 1", "true or false"),
         ("[search]\ndegree = 9", "a whole number from 1 to 8"),
         ("[input]\nplausible_MPa = 0", "a number above 0"),
+        (
+            "[input]\nmissing_share = 0.51",
+            "input.missing_share = 0.51 is not allowed; it must be a number from 0 to 0.5",
+        ),
+        ("[input]\nmissing_share = -0.1", "a number from 0 to 0.5"),
         ("[input]\ntare = 1", "the name of a file"),
         ("[output]\nforces = \"all\"", "\"taxels\" or \"resultants\""),
         ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),

@@ -8,6 +8,8 @@ use dermis_c::link::*;
 use dermis_c::result::*;
 use dermis_c::scene::*;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::estimate::float::Golden;
+use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::Scene;
 
@@ -41,13 +43,13 @@ fn reconstruct(engine: *const c_char, stress: &[f64], count: usize) -> (dermis_s
 #[test]
 fn wrong_values_are_named() {
     let golden = c"golden".as_ptr();
-    let (mut nan, good) = (stress(), stress());
-    nan[3] = f64::NAN;
+    let (mut infinite, good) = (stress(), stress());
+    infinite[3] = f64::INFINITY;
     let engine = "engine = \"rtl\" is not allowed; it must be \"golden\" or \"fixed\"";
     let count = "count = 63 is not allowed; scene eight-by-eight has frames of 8 * 8 = 64 values";
     let utf8 = "engine is not UTF-8: invalid utf-8 sequence of 1 bytes from index 1";
     let cases = [
-        (reconstruct(golden, &nan, 64), "frame: stress_MPa[3] = NaN is not a finite number"),
+        (reconstruct(golden, &infinite, 64), "frame: stress_MPa[3] = inf is not a finite number"),
         (reconstruct(golden, &good, 63), count),
         (
             reconstruct(golden, &good, 0),
@@ -65,6 +67,39 @@ fn wrong_values_are_named() {
     let two = [good.clone(), good].concat();
     let (status, text) = reconstruct(golden, &two, 128);
     assert!(status == dermis_status::Input && text.contains("input.average"), "{text}");
+}
+
+/// NaN is a missing reading: the result is that of the Rust call and names the taxels; too many are refused.
+#[test]
+fn missing_readings_are_named() {
+    let spec = Scene::builtin("eight-by-eight").unwrap();
+    let mut lacking = stress();
+    (lacking[27], lacking[50]) = (f64::NAN, f64::NAN);
+    let frame = Frame::from_stress("frame", &spec.sensor, lacking.clone()).unwrap();
+    let wanted = [
+        (c"golden", Golden::new(&spec).unwrap().run(&frame).unwrap()),
+        (c"fixed", Model::new(&spec).unwrap().reconstruct(&frame).unwrap()),
+    ];
+    let scene = scene("eight-by-eight");
+    for (engine, wanted) in wanted {
+        let (mut result, mut flags) = (null_mut(), 0);
+        let status = unsafe { dermis_reconstruct(scene, engine.as_ptr(), lacking.as_ptr(), 64, false, &mut result) };
+        assert_eq!(status, dermis_status::Ok, "{}", last_error());
+        assert_eq!(unsafe { dermis_result_flags(result, &mut flags) }, dermis_status::Ok);
+        assert_ne!(flags & Flag::TaxelMissing.bit(), 0);
+        let json = unsafe { CStr::from_ptr(dermis_result_json(result)) }.to_str().unwrap();
+        assert_eq!(json, serde_json::to_string(&wanted).unwrap());
+        assert!(
+            json.contains("\"missing\":[{\"row\":3,\"col\":3,") && json.contains("{\"row\":6,\"col\":2,"),
+            "{json}"
+        );
+        unsafe { dermis_result_free(result) };
+    }
+    unsafe { dermis_scene_free(scene) };
+    lacking[..13].fill(f64::NAN);
+    let (status, text) = reconstruct(c"golden".as_ptr(), &lacking, 64);
+    let limit = "frame: 15 of 64 readings are missing, wanted at most 12 (input.missing_share = 0.2)";
+    assert!(status == dermis_status::Input && text == limit, "{text}");
 }
 
 #[test]
