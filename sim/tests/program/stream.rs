@@ -211,7 +211,7 @@ fn noise_of_a_device_is_measured_and_written_into_the_scene() {
     let (code, text, error) = run(&measure, &idle);
     assert!(code == Some(0) && error.contains("measured from 20 frames without load"), "{error}");
     assert!(!text.contains(said), "{text}");
-    let noise_MPa = Scene::load(&folder.path().join("pad.toml").display().to_string()).unwrap().search.noise_floor_MPa;
-    assert!(noise_MPa.is_some_and(|noise| (noise / 1.2e-4 - 1.0).abs() < 0.1), "{noise_MPa:?}");
+    let stated = Scene::load(&folder.path().join("pad.toml").display().to_string()).unwrap().search.noise_floor_MPa;
+    assert!(stated.is_some_and(|noise| (noise / 1.2e-4 - 1.0).abs() < 0.1), "{stated:?}");
     assert!(!flags().contains(&"noise-not-stated".to_owned()));
 }

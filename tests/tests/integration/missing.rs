@@ -5,7 +5,7 @@ use std::io::{Cursor, Read};
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::import::{import, Settings, Unit};
-use dermis_golden::engine::{result, Engine, FindNoise};
+use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;
@@ -82,7 +82,7 @@ fn lines(stress: &[f64]) -> Vec<String> {
 
 /// The results of a stream, all but the frame's name; and the recording of it.
 fn streamed(engine: &dyn Engine, input: Box<dyn Read + Send>, recorder: &mut Recorder) -> Vec<Reconstruction> {
-    let (options, mut all) = (StreamOptions { queue: 4, policy: Policy::All }, Vec::new());
+    let (options, mut all) = (StreamOptions { queue: 4, policy: Policy::All, pace: CheckPace::Never }, Vec::new());
     let mut output = |outcome: &Outcome| match outcome {
         Outcome::Answer(answer) => {
             all.push(answer.result.clone());
@@ -109,7 +109,7 @@ fn every_way_in_names_the_same_taxels_and_gives_the_same_forces() {
     let engines: [(Box<dyn Engine>, f64); 2] =
         [(Box::new(Golden::new(&scene).unwrap()), 0.02), (Box::new(Model::new(&scene).unwrap()), 0.1)];
     for (engine, bound) in engines {
-        let of = |frame: &Frame| result(&*engine, std::slice::from_ref(frame), FindNoise::No).unwrap();
+        let of = |frame: &Frame| engine.reconstruct(std::slice::from_ref(frame)).unwrap();
         let exact = of(&Frame::from_stress("whole", &scene.sensor, whole()).unwrap());
         let wanted = of(&Frame::from_stress("numbers", &scene.sensor, stress.clone()).unwrap());
         let named: Vec<[usize; 2]> = wanted.extra.missing.iter().map(|own| [own.row, own.col]).collect();
