@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dermis_golden::data::frame::{Frame as Stress, FrameError};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
-use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
+use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::spec::scene::Scene as Spec;
 use dermis_sim::engine::{self, EngineName, Engines};
 use numpy::PyArray3;

@@ -120,9 +120,21 @@ typedef enum {
    */
   DERMIS_FLAG_TAXEL_SUSPECT = (1 << 23),
   /**
+   * `estimates-differ`
+   */
+  DERMIS_FLAG_ESTIMATES_DIFFER = (1 << 24),
+  /**
+   * `noise-not-stated`
+   */
+  DERMIS_FLAG_NOISE_NOT_STATED = (1 << 25),
+  /**
+   * `score-low`
+   */
+  DERMIS_FLAG_SCORE_LOW = (1 << 26),
+  /**
    * `taxel-missing`
    */
-  DERMIS_FLAG_TAXEL_MISSING = (1 << 24),
+  DERMIS_FLAG_TAXEL_MISSING = (1 << 27),
 } dermis_flag;
 
 
@@ -294,9 +306,8 @@ size_t dermis_scene_frames_per_result(const dermis_scene *scene);
  *
  * engine is "golden", the floating-point model, or "fixed", the integers of the hardware bit for bit. stress_MPa has count
  * values, frame after frame of rows * cols; readings if the scene names a calibration or tare file; NaN where a reading is
- * missing. With find_noise, where
- * the search finds the shear and the scene states no noise, the noise is found from the frame, and the shear flagged that
- * it hides: `dermis reconstruct` does it, a stream does not.
+ * missing. With cross_check the estimator evidence reads the frames too, where the engine has another one, and flags what
+ * noise, baseline or a faulty taxel hides from that: as `dermis reconstruct` does. It takes longer than a search.
  *
  * The result belongs to the caller: dermis_result_free. After an error *result is NULL. The first call for a scene and engine
  * builds the model, which takes longer than the others.
@@ -305,7 +316,7 @@ dermis_status dermis_reconstruct(const dermis_scene *scene,
                                  const char *engine,
                                  const double *stress_MPa,
                                  size_t count,
-                                 bool find_noise,
+                                 bool cross_check,
                                  dermis_result **result);
 
 /**

@@ -119,7 +119,7 @@ impl StreamChecks {
                 self.found = exchange.found.take().or(self.found.take());
                 worker.changed.notify_one();
             }
-            (None, CheckPace::Every(period)) if number % period == 0 => {
+            (None, CheckPace::Every(period)) if number.is_multiple_of(period) => {
                 self.found = check.finding(frames, resultant_N).map(|finding| (number, finding));
             }
             _ => (),

@@ -7,7 +7,7 @@
 //! | mean of several frames | the mean of the frames that have the reading, where there is one |
 //! | checks of readings and of a stream | nothing |
 //!
-//! A cover smooths the stress. With readings of that covariance k, b̂ is the mean under those of the [`NEAREST`] nearest taxels that
+//! A cover smooths the stress. With readings of that covariance k, b̂ is the mean under those of the `NEAREST` nearest taxels that
 //! have one, R, and σ its standard deviation (kriging, Matheron 1963):
 //!
 //! ```text
