@@ -120,9 +120,29 @@ typedef enum {
    */
   DERMIS_FLAG_TAXEL_SUSPECT = (1 << 23),
   /**
+   * `estimates-differ`
+   */
+  DERMIS_FLAG_ESTIMATES_DIFFER = (1 << 24),
+  /**
+   * `noise-not-stated`
+   */
+  DERMIS_FLAG_NOISE_NOT_STATED = (1 << 25),
+  /**
+   * `score-low`
+   */
+  DERMIS_FLAG_SCORE_LOW = (1 << 26),
+  /**
    * `taxel-missing`
    */
-  DERMIS_FLAG_TAXEL_MISSING = (1 << 24),
+  DERMIS_FLAG_TAXEL_MISSING = (1 << 27),
+  /**
+   * `zero-limit`
+   */
+  DERMIS_FLAG_ZERO_LIMIT = (1 << 28),
+  /**
+   * `tare-suspect`
+   */
+  DERMIS_FLAG_TARE_SUSPECT = (1 << 29),
 } dermis_flag;
 
 
@@ -284,8 +304,8 @@ size_t dermis_scene_rows(const dermis_scene *scene);
 size_t dermis_scene_cols(const dermis_scene *scene);
 
 /**
- * Number of frames that one result takes: 2^average of a block, 1 of a sliding mean, which takes any number; 0 after an
- * error.
+ * Number of frames that one result takes: 2^average of a block, 1 of a sliding mean; 0 after an error. A sliding mean and a
+ * running zero take all frames since the start.
  */
 size_t dermis_scene_frames_per_result(const dermis_scene *scene);
 

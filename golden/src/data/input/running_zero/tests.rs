@@ -90,7 +90,7 @@ fn a_warm_side_does_not_change_the_forces() {
     }
 }
 
-/// As an incremental stream, and from all frames since the reset; with blocks too.
+/// As an incremental stream, and from all frames since the reset; with blocks and missing readings too.
 #[test]
 fn all_frames_since_the_reset_give_the_same() {
     for more in ["", "average = 1\n", "dead = [[0, 0]]\n", "average = 2\nmean = \"sliding\"\n"] {
@@ -98,9 +98,12 @@ fn all_frames_since_the_reset_give_the_same() {
         let press = press(&scene);
         let load = |moment: usize| if moment % 4 < 2 { 0.3 } else { 0.0 };
         let off = |moment: usize, taxel: usize| 1e-3 * (moment * taxel % 7) as f64;
-        let moments: Vec<Frame> = (0..12)
+        let mut moments: Vec<Frame> = (0..12)
             .map(|moment| frame(&scene, |taxel| load(moment) * press.stress_MPa[taxel] + off(moment, taxel)))
             .collect();
+        // A reading is missing in one frame, another in both of a block.
+        moments[3].missing = vec![7];
+        moments[6..8].iter_mut().for_each(|frame| frame.missing = vec![16]);
         let (all, mut differs) = (scene.input.frames_of_results(&moments), false);
         for engine in engines(&scene) {
             let mut state = State::default();
