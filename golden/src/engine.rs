@@ -17,8 +17,10 @@ pub use cross_check::{CrossCheck, Finding};
 pub use stream_checks::{CheckPace, StreamChecks};
 
 use crate::data::frame::Frame;
+use crate::data::input::running_zero::Drift;
 use crate::data::input::Input;
 use crate::estimate::float::{Golden, GoldenError};
+use crate::fixed::stages::prepare::Prepared;
 use crate::fixed::{FixedError, Model};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
@@ -40,6 +42,24 @@ pub enum EngineError {
     Device(Box<dyn Error + Send + Sync>),
 }
 
+/// What an engine has of the frames of a stream so far; the default is that after a reset.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// How far zeros have moved.
+    drift: Drift,
+    /// The state of the hardware, for its bit-true model.
+    prepared: Option<Prepared>,
+    /// Whether there were frames.
+    begun: bool,
+}
+
+impl State {
+    /// Whether there were frames since the reset.
+    pub fn has_begun(&self) -> bool {
+        self.begun
+    }
+}
+
 /// Reconstructs frames of one scene.
 pub trait Engine {
     /// The scene, what was filled in included: the estimator, the full scale of the frames.
@@ -51,11 +71,21 @@ pub trait Engine {
     /// The estimator that the engine computes.
     fn estimator(&self) -> EstimatorKind;
 
-    /// The forces of the mean of 2^k frames, k the scene's `input.average`; with a sliding mean of all frames so far.
+    /// The forces of the mean of 2^k frames, k the scene's `input.average`; with a sliding mean of all frames so far. Where
+    /// zeros run, the frames are all since a reset, and the mean is of the last 2^k.
     ///
     /// # Errors
     /// [`EngineError`]: a number of frames other than 2^k, frames of another sensor, a device that fails.
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError>;
+    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        self.reconstruct_after(&mut State::default(), frames)
+    }
+
+    /// The same where frames came before, of which `state` is; it is then that after these frames. Of a sliding mean all frames
+    /// are given, with the state after a reset.
+    ///
+    /// # Errors
+    /// As [`Engine::reconstruct`]; a device that begins with a reset.
+    fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError>;
 
     /// The stress in MPa of which [`Engine::reconstruct`] gives the forces: the calibrated mean of the frames.
     ///
@@ -80,8 +110,8 @@ impl Engine for Golden {
         Golden::estimator(self)
     }
 
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        Ok(self.run_averaged(frames)?)
+    fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        Ok(self.run_after(&mut state.drift, frames)?)
     }
 }
 
@@ -98,8 +128,9 @@ impl Engine for Model {
         Model::estimator(self)
     }
 
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        Ok(self.reconstruct_averaged(frames)?)
+    fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        let prepared = state.prepared.get_or_insert_with(|| self.prepare.empty());
+        Ok(Model::reconstruct_after(self, &mut state.drift, prepared, frames)?)
     }
 }
 

@@ -189,7 +189,7 @@ impl Engine {
         let which = count_bits(counts.len());
         let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
         let (forces, resultants) = (Forces::new(model), Resultants::new(model));
-        let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.scene.input.slides());
+        let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.scene.input.has_memory());
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),

@@ -358,6 +358,7 @@ mod tests {
             (Feature::CoefficientCheck, model(4, 4, "[hardware]\ncoefficient_check = \"signature\"\n")),
             (Feature::Adaptive, model(8, 8, "[partition]\ncases = [0, 1]\n")),
             (Feature::SlidingMean, model(4, 4, "[input]\nfull_scale_MPa = 0.5\naverage = 1\nmean = \"sliding\"\n")),
+            (Feature::RunningZero, model(4, 4, "[input]\nfull_scale_MPa = 0.5\nzero = \"running\"\n")),
             (
                 Feature::WritableTables,
                 model(4, 4, "[input]\nfull_scale_MPa = 0.5\n[hardware]\ntables = \"writable\"\n"),

@@ -198,7 +198,8 @@ impl Scene {
     ///     Of one frame; equal to what `dermis reconstruct` prints, to the last bit.
     /// Reconstructions
     ///     Of frames with an axis of time, a sequence: one result per frame; with input.average = k one per 2^k frames;
-    ///     with input.mean = "sliding" one per frame, of the mean of all frames up to it.
+    ///     with input.mean = "sliding" one per frame, of the mean of all frames up to it. With input.zero = "running"
+    ///     the zero follows the readings from the first of them on.
     ///
     /// Raises
     /// ------
@@ -222,13 +223,12 @@ impl Scene {
         let engine = engine.engine();
         let mut checks = StreamChecks::new(engine, CheckPace::Every(cross_check));
         let mut next = |frames: &[Stress]| {
-            let mut result = engine.reconstruct(frames).map_err(engine::typed)?;
-            checks.add(frames, result.resultant_N, &mut result.diagnostics());
+            let result = checks.next(engine, frames).map_err(engine::typed)?;
             anyhow::Ok(Arc::new(result))
         };
         let mut results = Vec::new();
         for frames in self.spec.input.frames_of_results(&frames) {
-            results.push(py.detach(|| next(frames)).map_err(model)?);
+            results.push(py.detach(|| next(self.spec.input.newest(frames))).map_err(model)?);
             // Ctrl-C ends a long call.
             py.check_signals()?;
         }

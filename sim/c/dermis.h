@@ -135,6 +135,14 @@ typedef enum {
    * `taxel-missing`
    */
   DERMIS_FLAG_TAXEL_MISSING = (1 << 27),
+  /**
+   * `zero-limit`
+   */
+  DERMIS_FLAG_ZERO_LIMIT = (1 << 28),
+  /**
+   * `tare-suspect`
+   */
+  DERMIS_FLAG_TARE_SUSPECT = (1 << 29),
 } dermis_flag;
 
 
@@ -296,8 +304,8 @@ size_t dermis_scene_rows(const dermis_scene *scene);
 size_t dermis_scene_cols(const dermis_scene *scene);
 
 /**
- * Number of frames that one result takes: 2^average of a block, 1 of a sliding mean, which takes any number; 0 after an
- * error.
+ * Number of frames that one result takes: 2^average of a block, 1 of a sliding mean; 0 after an error. A sliding mean and a
+ * running zero take all frames since the start.
  */
 size_t dermis_scene_frames_per_result(const dermis_scene *scene);
 

@@ -12,6 +12,7 @@
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
+//! | `zero = "running"` | the zero of each taxel follows its readings while nothing presses, [`running_zero`] |
 //! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::estimate::float`] |
 //!
 //! A reading that a frame lacks is described in [`missing`].
@@ -23,6 +24,7 @@
 pub mod calibration;
 pub mod known_loads;
 pub mod missing;
+pub mod running_zero;
 pub mod tare;
 #[cfg(test)]
 mod tests;
@@ -33,6 +35,7 @@ use crate::spec::scene::{InputSpec, Scene};
 use crate::spec::sliding;
 use calibration::{Calibration, CalibrationError};
 use missing::{mean_reading, readings};
+use running_zero::Drift;
 use std::borrow::Cow;
 use tare::Tare;
 use thiserror::Error;
@@ -46,6 +49,8 @@ pub struct Input {
     stated_noise_MPa: f64,
     /// The same of each taxel, from tare frames, and the number of those; `None` where the scene states it.
     taxel_noise_MPa: Option<(Vec<f64>, usize)>,
+    /// The largest |gain|, of which a code and the limit of a running zero are.
+    largest_gain: f64,
     spec: InputSpec,
 }
 
@@ -82,7 +87,8 @@ impl Input {
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
         let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
         let stated_noise_MPa = scene.search.noise_floor_MPa();
-        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec: spec.clone() };
+        let largest_gain = scene.hardware.largest_gain(table.as_ref().map(|table| table.gain.as_slice()));
+        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, largest_gain, spec: spec.clone() };
         if table.is_none() && tare.is_none() {
             return Ok(input);
         }
@@ -120,34 +126,45 @@ impl Input {
     }
 
     /// The mean of frames, each checked against the scene. Of a block of 2^k frames, id and known forces are those of the
-    /// first; of a sliding mean, of all frames since the start, those of the last. A taxel counts in the frames that have its
-    /// reading; it is missing in the mean if none has it, where its value is that of [`Input::complete`].
+    /// first; of a sliding mean, of all frames since the start, those of the last. Where zeros run, the frames are all since a
+    /// reset. A taxel counts in the frames that have its reading; it is missing in the mean if none has it, where its value is
+    /// that of [`Input::complete`].
     ///
     /// # Errors
-    /// [`InputError::Count`] unless there are 2^k frames, of a sliding mean at least one; [`InputError::Frame`] if one is
-    /// not of the scene's sensor.
+    /// [`InputError::Count`] unless there are 2^k frames, where zeros run a multiple of them, of a sliding mean at least one;
+    /// [`InputError::Frame`] if one is not of the scene's sensor.
     pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
+        self.average_after(&mut Drift::default(), scene, frames)
+    }
+
+    /// The same where zeros have a `drift` before the frames, which is then that after them.
+    ///
+    /// # Errors
+    /// As [`Input::average`].
+    pub fn average_after(&self, drift: &mut Drift, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
         let (average, wanted, got) = (self.spec.average, self.spec.frames_per_result(), frames.len());
-        let ([first, ..], [.., last]) = (frames, frames) else {
-            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
+        let count = || InputError::Count { scene: scene.name.clone(), average, wanted, got };
+        let fits = match self.spec.has_memory() {
+            true => got.is_multiple_of(wanted),
+            false => got == wanted,
         };
         frames.iter().try_for_each(|frame| frame.check(scene))?;
-        let missing = missing_in_all(frames);
-        let frames = self.complete(frames);
+        let all = self.without_drift(drift, if fits { frames } else { &[] });
+        let newest = self.spec.newest(&all);
+        let ([first, ..], [.., last]) = (newest, newest) else { return Err(count()) };
+        let missing = missing_in_all(newest);
+        let complete = self.complete(newest);
         if self.spec.slides() {
             let mut mean = vec![0.0; first.stress_MPa.len()];
-            for (number, frame) in (1..).zip(&*frames) {
+            for (number, frame) in (1..).zip(&*complete) {
                 sliding::add(&mut mean, &frame.stress_MPa, number, average);
             }
             return Ok(Frame { stress_MPa: mean, missing, ..last.clone() });
         }
-        if got != wanted {
-            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
-        }
         let mut mean = Frame { missing, ..first.clone() };
         for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
             // Divided before adding, so that the sum does not overflow.
-            *b = frames.iter().map(|frame| frame.stress_MPa[index] / got as f64).sum();
+            *b = complete.iter().map(|frame| frame.stress_MPa[index] / wanted as f64).sum();
         }
         Ok(mean)
     }
@@ -198,6 +215,11 @@ impl Input {
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
     pub fn zero(&self) -> Option<&[f64]> {
         self.scale.as_ref().map(|(zero, _)| zero.as_slice())
+    }
+
+    /// Limit of a running zero in readings; `None` where zeros are fixed.
+    fn zero_limit(&self) -> Option<f64> {
+        self.spec.running_zero().map(|running| running.limit_MPa / self.largest_gain)
     }
 
     /// The largest share of the stated full scale that the frames of one reconstruction reach; `None` if the scene

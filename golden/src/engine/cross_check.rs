@@ -18,6 +18,7 @@
 
 use super::Engine;
 use crate::data::frame::Frame;
+use crate::data::input::running_zero::Drift;
 use crate::estimate::float::Golden;
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;
@@ -81,10 +82,10 @@ impl CrossCheck {
         Some(CrossCheck { golden, scene: scene.clone(), trusts_readings: sparse && input.noise_MPa() == 0.0 })
     }
 
-    /// What it says of the result with this resultant in N, [x, y, normal], of `frames`, the readings of one result; `None`
-    /// for frames that `evidence` refuses.
-    pub fn finding(&self, frames: &[Frame], resultant_N: [f64; 3]) -> Option<Finding> {
-        let reference = self.golden.run_averaged(frames).ok()?;
+    /// What it says of the result with this resultant in N, [x, y, normal], of `frames`, the readings of one result, where
+    /// zeros have a `drift` before them; `None` for frames that `evidence` refuses.
+    pub fn finding(&self, frames: &[Frame], mut drift: Drift, resultant_N: [f64; 3]) -> Option<Finding> {
+        let reference = self.golden.run_after(&mut drift, frames).ok()?;
         let checks = reference.checks;
         let mut flags: Vec<Flag> = reference.flags.iter().copied().filter(|flag| OF_READINGS.contains(flag)).collect();
         let disturbed = !flags.is_empty() || checks.leaves_structure();
@@ -101,7 +102,7 @@ impl CrossCheck {
 
     /// Adds figures and flags to the result with this resultant in N of `frames`, as [`CrossCheck::finding`] finds them.
     pub fn check(&self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
-        if let Some(finding) = self.finding(frames, resultant_N) {
+        if let Some(finding) = self.finding(frames, Drift::default(), resultant_N) {
             self.add(&finding, 0, result);
         }
     }

@@ -9,10 +9,11 @@
 //! The age of a finding in results is `cross_check_age`.
 
 use super::cross_check::{CrossCheck, Finding};
-use super::Engine;
+use super::{Engine, EngineError, State};
 use crate::data::frame::Frame;
+use crate::data::input::running_zero::Drift;
 use crate::result::checks::history::History;
-use crate::result::reconstruct::Diagnostics;
+use crate::result::reconstruct::{Diagnostics, Reconstruction};
 use crate::spec::scene::Scene;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -31,6 +32,7 @@ pub enum CheckPace {
 struct Job {
     number: u64,
     frames: Vec<Frame>,
+    drift: Drift,
     resultant_N: [f64; 3],
 }
 
@@ -66,7 +68,7 @@ impl Worker {
                 }
             };
             drop(exchange);
-            if let Some(finding) = check.finding(&job.frames, job.resultant_N) {
+            if let Some(finding) = check.finding(&job.frames, job.drift, job.resultant_N) {
                 self.exchange().found = Some((job.number, finding));
             }
         }
@@ -76,6 +78,8 @@ impl Worker {
 /// The checks of the results of one engine in the order of time.
 pub struct StreamChecks {
     scene: Scene,
+    /// That after the frames of the last result of [`StreamChecks::next`].
+    state: State,
     history: History,
     check: Option<Arc<CrossCheck>>,
     pace: CheckPace,
@@ -100,12 +104,32 @@ impl StreamChecks {
             worker
         });
         let (scene, history) = (engine.scene().clone(), History::new(engine.scene()));
-        StreamChecks { scene, history, check, pace, worker, next: 0, found: None }
+        StreamChecks { scene, state: State::default(), history, check, pace, worker, next: 0, found: None }
+    }
+
+    /// The next result of `engine`, with figures and flags; of `frames` as [`StreamChecks::add`] has them.
+    ///
+    /// # Errors
+    /// As [`Engine::reconstruct_after`].
+    pub fn next(&mut self, engine: &(impl Engine + ?Sized), frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        if self.scene.input.slides() {
+            self.state = State::default();
+        }
+        let drift = self.state.drift.clone();
+        let mut result = engine.reconstruct_after(&mut self.state, frames)?;
+        self.state.begun = true;
+        self.add_after(drift, frames, result.resultant_N, &mut result.diagnostics());
+        Ok(result)
     }
 
     /// Adds figures and flags to the next result, with this resultant in N, of `frames`: of a block its own, of a sliding mean
-    /// all so far.
+    /// all so far. Zeros are fixed.
     pub fn add(&mut self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
+        self.add_after(Drift::default(), frames, resultant_N, result);
+    }
+
+    /// The same where zeros have a `drift` before the frames.
+    fn add_after(&mut self, drift: Drift, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
         let number = self.next;
         self.next += 1;
         let new = if self.scene.input.slides() { 1 } else { frames.len() };
@@ -115,12 +139,12 @@ impl StreamChecks {
         match (&self.worker, self.pace) {
             (Some(worker), _) => {
                 let mut exchange = worker.exchange();
-                exchange.job = Some(Job { number, frames: frames.to_vec(), resultant_N });
+                exchange.job = Some(Job { number, frames: frames.to_vec(), drift, resultant_N });
                 self.found = exchange.found.take().or(self.found.take());
                 worker.changed.notify_one();
             }
             (None, CheckPace::Every(period)) if number.is_multiple_of(period) => {
-                self.found = check.finding(frames, resultant_N).map(|finding| (number, finding));
+                self.found = check.finding(frames, drift, resultant_N).map(|finding| (number, finding));
             }
             _ => (),
         }

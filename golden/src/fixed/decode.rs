@@ -10,9 +10,11 @@ use self::records::Records;
 use super::error::FixedError;
 use super::model::Model;
 use super::plan::contents::CasePlan;
+use super::stages::prepare::Prepared;
 use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
+use crate::data::input::running_zero::Drift;
 use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::estimate::float::objective::Estimate;
 use crate::result::checks::Checks;
@@ -46,9 +48,24 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
-        let stress = self.stress(frames)?;
-        let trace = self.run(&self.readings_at(full_scale(&self.scene, &stress), frames));
-        self.decode_stress(frames, &stress, "fixed", &trace.beats, &trace.status)
+        self.reconstruct_after(&mut Drift::default(), &mut self.prepare.empty(), frames)
+    }
+
+    /// The same where frames came before: zeros have a `drift`, and `prepared` is what the hardware has of them. Both are then
+    /// those after these frames.
+    ///
+    /// # Errors
+    /// As [`Model::stress`].
+    pub fn reconstruct_after(
+        &self,
+        drift: &mut Drift,
+        prepared: &mut Prepared,
+        frames: &[Frame],
+    ) -> Result<Reconstruction, FixedError> {
+        let stress = self.stress_after(drift, frames)?;
+        self.add(prepared, &self.readings_at(full_scale(&self.scene, &stress), frames));
+        let trace = self.run_prepared(prepared);
+        self.decode_stress(frames, (&stress, drift.share()), "fixed", &trace.beats, &trace.status)
     }
 
     /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
@@ -63,14 +80,16 @@ impl Model {
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
-        self.decode_stress(readings, &self.stress(readings)?, engine, beats, status)
+        let mut drift = Drift::default();
+        let stress = self.stress_after(&mut drift, readings)?;
+        self.decode_stress(readings, (&stress, drift.share()), engine, beats, status)
     }
 
-    /// The same for `frame`, the [`Model::stress`] of the readings.
+    /// The same for `frame`, the [`Model::stress`] of the readings; `zero_share` as in [`Checks`].
     fn decode_stress(
         &self,
         readings: &[Frame],
-        frame: &Frame,
+        (frame, zero_share): (&Frame, Option<f64>),
         engine: &str,
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
@@ -175,8 +194,9 @@ impl Model {
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
-        let figures = result.figures(&self.scene, frame).with_readings(&self.input, readings);
-        let checks = Checks { network_misfit, shear_spread, ..figures };
+        let newest = self.scene.input.newest(readings);
+        let figures = result.figures(&self.scene, frame).with_readings(&self.input, newest);
+        let checks = Checks { network_misfit, shear_spread, zero_share, ..figures };
         result.add_checks(&self.scene, checks);
         result.add_missing(&self.scene, frame, readings);
         if let Some(deviations) = &self.deviations {

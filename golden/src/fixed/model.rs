@@ -8,6 +8,7 @@ use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
 use crate::data::frame::Frame;
+use crate::data::input::running_zero::Drift;
 use crate::data::input::Input;
 use crate::data::quantise::{quantise, Codes};
 use crate::data::reception::full_scale;
@@ -154,13 +155,18 @@ impl Model {
     }
 
     /// The stress that [`Model::reconstruct_averaged`] reconstructs: the calibrated mean of 2^average frames, or the sliding
-    /// one of all frames, in MPa.
+    /// one of all frames, in MPa; where zeros run, the frames are all since a reset.
     ///
     /// # Errors
     /// [`InputError`](crate::data::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
     /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
-        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
+        self.stress_after(&mut Drift::default(), frames)
+    }
+
+    /// The same where zeros have a `drift` before the frames, which is then that after them.
+    pub(super) fn stress_after(&self, drift: &mut Drift, frames: &[Frame]) -> Result<Frame, FixedError> {
+        Ok(self.input.calibrate(&self.input.average_after(drift, &self.scene, frames)?))
     }
 
     /// The converter's codes for the frames of one reconstruction, frame after frame, row-major.
@@ -175,7 +181,10 @@ impl Model {
     pub(super) fn readings_at(&self, full_scale_MPa: f64, frames: &[Frame]) -> Vec<i32> {
         let full_scale = full_scale_MPa * self.prepare.reading_per_MPa;
         let codes = |frame: &Frame| quantise(&frame.stress_MPa, self.formats().code_bits, full_scale).codes;
-        self.input.complete(frames).iter().flat_map(codes).collect()
+        // Of the frames since a reset, those of each result.
+        let results = if self.scene.input.slides() { frames.len() } else { self.scene.input.frames_per_result() };
+        let complete = frames.chunks(results.max(1)).flat_map(|frames| self.input.complete(frames).into_owned());
+        complete.flat_map(|frame| codes(&frame)).collect()
     }
 
     /// The readings that have these codes, as a frame named `id`: the other way round than [`Model::readings`], for codes that the

@@ -52,7 +52,7 @@ const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "forces"];
 
 impl Model {
     /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array;
-    /// with a sliding mean all frames since a reset.
+    /// with a sliding mean or a running zero all frames since a reset.
     pub fn run(&self, codes: &[i32]) -> Trace {
         let mut prepared = self.prepare.empty();
         self.add(&mut prepared, codes);
@@ -105,6 +105,7 @@ impl Model {
                     (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
                     (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
                     (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
+                    (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),
                 ]),
                 score: told.score.unwrap_or(0),
                 rescale: s.rescale,

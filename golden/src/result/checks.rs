@@ -15,12 +15,15 @@
 //! | `score_margin` | bits | all, with `search` and a table of [`Deviations`](crate::estimate::deviations::Deviations) |
 //! | `plateau`, `line_share`, `missing_share` | – | all, [`readings`] |
 //! | `missing_load`, `missing_shear` | – | all, where a reading is missing |
+//! | `pull_share` | – | all, [`pull`] |
+//! | `zero_share` | – | all, with `input.zero = "running"`, [`running_zero`](crate::data::input::running_zero) |
 //! | `constant_share`, `torn_share` | – | streams, [`history`] |
 //!
 //! The flag of a figure, its limit and its words are in the flag's row, [`crate::result::flags`].
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
 pub mod history;
+pub mod pull;
 pub mod readings;
 #[cfg(test)]
 mod tests;
@@ -66,6 +69,8 @@ pub const TORN: f64 = 0.08;
 /// row, 95 % of the normal forces that are wrong by more than 10 %, and 90 % of the shears that are wrong by more than 20 %,
 /// are beyond the limits of the flags.
 const ERROR_PER_OPEN: [f64; 2] = [2.0, 33.0];
+/// [`Checks::pull_share`] above which zeros are too high. Presses with shear have at most 0.003 on the shipped sensors.
+pub const PULL: f64 = 0.1;
 
 /// Ratio to the normal force below which a shear counts as none.
 const NO_SHEAR: f64 = 0.01;
@@ -176,6 +181,12 @@ pub struct Checks {
     /// The same of the shear; `None` too with evidence, whose `shear_spread` holds it, and without a search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing_shear: Option<f64>,
+    /// Largest sum of stress below zero over that and the largest above, see [`pull`]; `None` where none is significant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pull_share: Option<f64>,
+    /// Largest distance of a running zero from the stored one, over its limit; `None` where zeros are fixed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero_share: Option<f64>,
 }
 
 impl Checks {

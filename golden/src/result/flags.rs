@@ -22,7 +22,7 @@ pub use status_field::{Feature, StatusField, STATUS_BEATS};
 use crate::data::frame::Frame;
 use crate::data::input::missing;
 use crate::data::quantise::Codes;
-use crate::result::checks::{Checks, CONSTANT, LINE, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED, PLATEAU, TORN};
+use crate::result::checks::{Checks, CONSTANT, LINE, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED, PLATEAU, PULL, TORN};
 use crate::spec::scene::{largest_code, EstimatorKind, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -300,6 +300,21 @@ flags! {
         rule: |checks, _| checks.missing_share.is_some(),
         figure: |checks| checks.missing_share.map(|share| format!("{:.1} % of the taxels", 1e2 * share)),
     }
+    ZeroLimit = 28 "zero-limit" {
+        raised_when: "with `input.zero = \"running\"`, the zero of a taxel is at its limit (`zero_share` of 1): what its reading has drifted beyond stays in the forces, or a touch below the limit was taken for drift",
+        remedy: "take the tare again; if the taxel drifts, raise `input.zero_limit_MPa`",
+        raised_by: "all engines",
+        rule: |checks, _| checks.zero_share.is_some_and(|share| share >= 1.0),
+        figure: |checks| checks.zero_share.map(|share| format!("{:.0} % of the limit", 1e2 * share)),
+        bit: ZERO_LIMIT = StatusField::flag("zero_limit", 12, Feature::RunningZero, "a running zero is at its limit"),
+    }
+    TareSuspect = 29 "tare-suspect" {
+        raised_when: "the stress is significantly below zero somewhere, by more than a ninth of what presses most (`pull_share` above 0.1): the tare was taken under load, or zeros have drifted up",
+        remedy: "take the tare again with nothing on the array; `input.zero = \"running\"` follows within its limit",
+        raised_by: "all engines",
+        rule: |checks, _| checks.pull_share.is_some_and(|share| share > PULL),
+        figure: |checks| checks.pull_share.map(|share| format!("{:.0} % of push and pull", 1e2 * share)),
+    }
 }
 
 // Rows stand in the order of their numbers, and C has as many bits.
@@ -503,6 +518,8 @@ mod tests {
             tangential_difference: Some(1.0),
             score_margin: Some(-1.0),
             missing_share: Some(0.1),
+            zero_share: Some(1.0),
+            pull_share: Some(1.0),
             ..Checks::default()
         };
         let raised: Vec<Flag> = checks.flags(&scene).collect();

@@ -30,6 +30,7 @@
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
 //! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | | `plausible_MPa` (10), `missing_share` (0.2; 0 … 0.5) |
+//! | | `zero` ("fixed"; "running" with `zero_average`, 10; 1 … 16, and `zero_limit_MPa`, 1/64 of the full scale) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod adc_scan;
@@ -308,6 +309,15 @@ impl HardwareSpec {
         self.has_writable_tables() && self.table_range.dead_taxels > 0
     }
 
+    /// The largest |gain|, which gives a code its meaning: that of `gains`, the scene's table, or 1; where tables are written
+    /// that of [`TableRange`].
+    pub fn largest_gain(&self, gains: Option<&[f64]>) -> f64 {
+        match self.table_range.gain {
+            Some([_, most]) if self.has_writable_tables() => most,
+            _ => gains.map_or(1.0, |gains| gains.iter().fold(0.0, |most, gain| gain.abs().max(most))),
+        }
+    }
+
     /// Takes frames of stress, which need neither calibration nor converters: the tables are in the bitstream, codes come as a
     /// stream. The formats remain those of [`TableRange`]'s coefficients, so that a frame has the same forces.
     pub fn take_stress(&mut self) {
@@ -326,6 +336,35 @@ pub enum MeanKind {
     Block,
     /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::spec::sliding`].
     Sliding,
+}
+
+/// What the zero of each taxel is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Zero {
+    /// The stored one: the mean of the tare frames, else the table's offset, else 0.
+    #[default]
+    Fixed,
+    /// It starts as the stored one and follows the readings while nothing presses: [`crate::data::input::running_zero`].
+    Running(RunningZero),
+}
+
+/// How the zero of each taxel follows its readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunningZero {
+    /// The zero takes 2^−average of what a reading is off; 1 to 16.
+    pub average: u32,
+    /// Largest distance from the stored zero in MPa, and largest stress in MPa that is no touch; above 0, at most the full
+    /// scale.
+    pub limit_MPa: f64,
+}
+
+impl RunningZero {
+    /// Default of `input.zero_average`: a second at 1 kHz.
+    pub const AVERAGE: u32 = 10;
+    /// Default of `input.zero_limit_MPa` over the full scale.
+    pub const LIMIT_SHARE: f64 = 1.0 / 64.0;
+    /// Least limit over the noise of a frame, so that noise on any of 256 × 256 taxels is no touch.
+    pub const LEAST_OVER_NOISE: f64 = 5.0;
 }
 
 /// Table `[input]`; its meaning is in [`crate::data::input`].
@@ -351,6 +390,8 @@ pub struct InputSpec {
     pub plausible_MPa: f64,
     /// Largest share of the live taxels whose readings may be missing in a frame, 0 to 0.5.
     pub missing_share: f64,
+    /// What the zero of each taxel is.
+    pub zero: Zero,
 }
 
 /// Default of `input.plausible_MPa`: soft elastomers tear at about 10 MPa, and feet, hands and grippers stay below 2.
@@ -413,16 +454,39 @@ impl InputSpec {
         self.mean == MeanKind::Sliding
     }
 
+    /// How the zero follows the readings; `None` where it is fixed.
+    pub fn running_zero(&self) -> Option<RunningZero> {
+        match self.zero {
+            Zero::Fixed => None,
+            Zero::Running(running) => Some(running),
+        }
+    }
+
+    /// Whether a result depends on frames before its own: on all since a reset.
+    pub fn has_memory(&self) -> bool {
+        self.slides() || self.running_zero().is_some()
+    }
+
+    /// Of frames since a reset, those that the mean of the last result is of.
+    pub fn newest<'a, T>(&self, frames: &'a [T]) -> &'a [T] {
+        match self.mean {
+            MeanKind::Block => &frames[frames.len().saturating_sub(self.frames_per_result())..],
+            MeanKind::Sliding => frames,
+        }
+    }
+
     /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.
     pub fn frames_held(&self, frames: usize) -> Option<usize> {
         self.slides().then(|| frames.min(sliding::most_frames(self.average)))
     }
 
-    /// The frames of each result, where `frames` arrive after a reset: blocks of 2^average of them, or all up to each.
+    /// The frames of each result, where `frames` arrive after a reset: blocks of 2^average of them, or all up to each where
+    /// a result depends on those before.
     pub fn frames_of_results<'a, T>(&self, frames: &'a [T]) -> Vec<&'a [T]> {
-        match self.mean {
-            MeanKind::Block => frames.chunks(self.frames_per_result()).collect(),
-            MeanKind::Sliding => (1..=frames.len()).map(|count| &frames[..count]).collect(),
+        let each = self.frames_per_result();
+        match self.has_memory() {
+            false => frames.chunks(each).collect(),
+            true => (1..=frames.len().div_ceil(each)).map(|k| &frames[..frames.len().min(k * each)]).collect(),
         }
     }
 
@@ -456,6 +520,7 @@ impl Default for InputSpec {
             gain_spread: 0.0,
             plausible_MPa: PLAUSIBLE_MPA,
             missing_share: MISSING_SHARE,
+            zero: Zero::default(),
         }
     }
 }

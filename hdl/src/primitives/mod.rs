@@ -36,7 +36,7 @@ pub use arithmetic::unfolder::Unfolder;
 pub use frame::arrival::Arrival;
 #[cfg(test)]
 pub(crate) use frame::average::tests::Sums;
-pub use frame::average::Average;
+pub use frame::average::{Average, FrameMarks};
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
 pub use frame::calibrate::{Calibrate, CALIBRATION_FILE};

@@ -1,9 +1,10 @@
-//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires.
+//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires. Where
+//! zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{Average, Calibrate, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
+use crate::primitives::{Average, Calibrate, FrameMarks, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::wire::Wire;
 
 /// Codes in, words of the frame buffer out.
@@ -63,7 +64,7 @@ impl Prepare {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
         let load = Load::new(model);
-        let average = Average::new(taxels, bits, model.prepare.average, model.prepare.mean);
+        let average = Average::new(taxels, bits, model.prepare.average, model.prepare.mean, FrameMarks::new(model));
         Prepare {
             clk: Default::default(),
             rst: Default::default(),

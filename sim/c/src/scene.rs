@@ -97,8 +97,8 @@ pub unsafe extern "C" fn dermis_scene_cols(scene: *const dermis_scene) -> usize 
     number(scene, |spec| spec.sensor.cols)
 }
 
-/// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean, which takes any number; 0 after an
-/// error.
+/// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean; 0 after an error. A sliding mean and a
+/// running zero take all frames since the start.
 #[no_mangle]
 pub unsafe extern "C" fn dermis_scene_frames_per_result(scene: *const dermis_scene) -> usize {
     number(scene, |spec| spec.input.frames_per_result())

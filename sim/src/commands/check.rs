@@ -11,6 +11,7 @@ use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::result::checks::pull::tare_load;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::study::noise::expected::{expected, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
@@ -88,6 +89,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     let bar = Progress::steps(&format!("{}: drawn frames", scene.name), 0);
     let golden = Golden::new(&scene).map_err(|error| refused(error.into()))?;
     let noise = StatedNoise::of(&scene, arguments.peak)?;
+    let tare_load = tare_load(&scene)?;
     let (hardware, hardware_refused) = match Model::new(&scene) {
         Ok(model) => (Some(hardware(&scene, &model)?), None),
         Err(defect @ (FixedError::Internal(_) | FixedError::Beats { .. })) => return Err(defect.into()),
@@ -118,6 +120,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         hardware_refused,
         noise,
         noise_not_stated,
+        tare_load,
         errors,
         not_drawn,
     })

@@ -6,7 +6,7 @@
 //! | given | none | the scene, its shipped frames |
 //! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
 //!
-//! One reconstruction takes 2^k frames, where k is the scene's `input.average`; with a sliding mean any number.
+//! One reconstruction takes 2^k frames, where k is the scene's `input.average`; with a sliding mean or a running zero all since a reset.
 
 use std::path::{Path, PathBuf};
 
@@ -124,7 +124,7 @@ pub(super) fn resolve_specimen(
     }
 }
 
-/// Loads the scene and the frames of one reconstruction, 2^k or all of a sliding mean; without `--frame`, where one frame
+/// Loads the scene and the frames of one reconstruction, 2^k or all of a sliding mean or a running zero; without `--frame`, where one frame
 /// gives a result, the first shipped frame.
 ///
 /// # Errors
@@ -135,7 +135,7 @@ pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<
     let (average, wanted) = (scene.input.average, scene.input.frames_per_result());
     if files.is_empty() && wanted == 1 {
         frames.truncate(1);
-    } else if !scene.input.slides() && files.len() != wanted {
+    } else if !scene.input.has_memory() && files.len() != wanted {
         let (origin, got) = (named.unwrap_or(&scene.name), files.len());
         bail!(
             "{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, \

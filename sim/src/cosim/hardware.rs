@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::Input;
-use dermis_golden::engine::{Engine, EngineError};
+use dermis_golden::engine::{Engine, EngineError, State};
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
@@ -198,8 +198,8 @@ impl Hardware {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }
 
-    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results. With a sliding mean
-    /// these are all frames since the reset, of which the last is sent.
+    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results. With a sliding mean or a
+    /// running zero these are all frames since the reset, of which the last are sent.
     ///
     /// # Errors
     /// A frame of another sensor, or a number of frames that the scene does not average.
@@ -250,8 +250,12 @@ impl Engine for Hardware {
         self.model.estimator()
     }
 
-    /// In the verilated hardware (engine `rtl`).
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+    /// In the verilated hardware (engine `rtl`), which begins with a reset.
+    fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+        if state.has_begun() && self.scene().input.running_zero().is_some() {
+            let text = "engine rtl: give all frames since a reset, with input.zero = \"running\"";
+            return Err(EngineError::Device(text.into()));
+        }
         let [forces, status] = self.words(frames).map_err(device_error)?;
         Ok(self.model.decode(frames, "rtl", &forces, &status)?)
     }

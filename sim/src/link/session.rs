@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::Input;
-use dermis_golden::engine::{Engine, EngineError};
+use dermis_golden::engine::{Engine, EngineError, State};
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::link_kind::LinkKind;
@@ -155,7 +155,7 @@ impl<P: std::io::Read + std::io::Write> Engine for BoardEngine<P> {
         self.model.estimator()
     }
 
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+    fn reconstruct_after(&self, _: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
         self.result(frames).map_err(device_error)
     }
 }

@@ -93,8 +93,7 @@ impl Hand {
             let received_s = seconds(SystemTime::now());
             let frame = self.frame(scene, noise, sequence)?;
             let frames = vec![frame; scene.input.frames_per_result()];
-            let mut result = engine.reconstruct(&frames).map_err(typed)?;
-            checks.add(&frames, result.resultant_N, &mut result.diagnostics());
+            let result = checks.next(engine, &frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
             let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
             let (frames, received, result) = (&frames[..], &received[..], &result);

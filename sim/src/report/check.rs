@@ -1,6 +1,7 @@
 //! What `dermis check` finds, as JSON and as text.
 
 use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::result::checks::pull::TareLoad;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_golden::study::noise::expected::StatedNoise;
 use dermis_golden::study::noise::ShapeRow;
@@ -59,6 +60,9 @@ pub struct SceneCheck {
     pub noise: StatedNoise,
     /// Whether every result of the hardware carries `noise-not-stated`.
     pub noise_not_stated: bool,
+    /// What seems to have pressed while the tare was taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tare_load: Option<TareLoad>,
     /// Errors on drawn frames.
     pub errors: Vec<ShapeRow>,
     /// Why there are none.
@@ -156,6 +160,11 @@ pub fn scene_check(check: &SceneCheck) -> String {
             text += &hardware.text(board);
         }
         (None, reason) => text += &format!("hardware    none: {}\n", reason.as_deref().unwrap_or_default()),
+    }
+    if let Some(TareLoad { row, col, stress_MPa }) = check.tare_load {
+        text += &format!(
+            "tare        something pressed: {stress_MPa:.4} MPa above the table's offset at row {row}, column {col}; take it again\n"
+        );
     }
     text += &noise(&check.noise);
     if check.noise_not_stated {

@@ -222,8 +222,7 @@ impl Stream<'_> {
                 return Ok(None);
             }
             let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
-            let mut result = self.engine.reconstruct(&frames).map_err(|error| typed(error).to_string())?;
-            self.checks.add(&frames, result.resultant_N, &mut result.diagnostics());
+            let result = self.checks.next(self.engine, &frames).map_err(|error| typed(error).to_string())?;
             Ok(Some((frames, times, result)))
         });
         let line = received.number;

@@ -119,7 +119,9 @@ pub fn drawn_scene(random: &mut Rng) -> String {
     let scale = pick(random, &["", "full_scale_MPa = 1.0", "full_scale_MPa = 1e-300", "full_scale_MPa = 1e300"]);
     let dead = pick(random, &["", "", "", "", "", "", "dead = [[0, 0]]", "dead = [[0, 1], [1, 0], [1, 1]]"]);
     let unipolar = pick(random, &["false", "false", "false", "false", "false", "true"]);
-    table("input", vec![scale.to_owned(), dead.to_owned(), format!("unipolar = {unipolar}")]);
+    let running = ["zero = \"running\"", "zero = \"running\"\nzero_average = 1\nzero_limit_MPa = 0.01"];
+    let zero = pick(random, &["", "", "", "", "", running[0], running[1]]);
+    table("input", vec![scale.to_owned(), dead.to_owned(), format!("unipolar = {unipolar}"), zero.to_owned()]);
     table("output", vec![format!("forces = \"{}\"", pick(random, &["taxels", "resultants"]))]);
     if random.u8(..8) == 0 {
         let poisson = pick(random, &["0.3", "0.49", "0.4999"]);

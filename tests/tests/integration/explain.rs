@@ -81,6 +81,21 @@ fn a_sliding_mean_costs_what_two_builds_differ_by() {
     assert!(saved("[fixed]\nlanes = 36\n", "sliding mean")[0] > 0);
 }
 
+/// With it and without it.
+#[test]
+fn a_running_zero_costs_what_two_builds_differ_by() {
+    let input = |zero: &str| model(&format!("[fixed]\nlanes = 36\n[input]\nfull_scale_MPa = 1.0\nzero = \"{zero}\"\n"));
+    let (running, fixed) = (input("running"), input("fixed"));
+    let [with, without] = [&running, &fixed].map(|model| total(&generate(model).unwrap().usage));
+    let of = |model: &Model| explain(model).unwrap().into_iter().find(|e| e.feature == "running zero").unwrap();
+    assert!(of(&running).present && !of(&fixed).present);
+    for costs in [of(&running).costs.unwrap(), of(&fixed).saved.unwrap()] {
+        assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+        assert_eq!(costs.cycles, 4);
+        assert!((100..1500).contains(&costs.luts), "{costs:?}");
+    }
+}
+
 #[test]
 fn what_the_scene_has_is_not_left_out() {
     let all = explain(&model("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n")).unwrap();
@@ -92,7 +107,9 @@ fn what_the_scene_has_is_not_left_out() {
 fn absent_stages_leave_no_logic() {
     let verilog = |more: &str| verilog_code(&model(more).scene);
     let bare = verilog("[search]\nmu_max = 0\n");
-    for word in ["taylor", "candidates", "sums [", "means [", "frames_held [", "entries [", "x__mu [", "below <="] {
+    for word in
+        ["taylor", "candidates", "sums [", "drifts [", "means [", "frames_held [", "entries [", "x__mu [", "below <="]
+    {
         assert!(!bare.contains(word), "{word}");
     }
     let sliding = verilog("[search]\nmu_max = 0\n[input]\naverage = 2\nmean = \"sliding\"\n");

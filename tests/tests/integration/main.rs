@@ -27,6 +27,7 @@ mod netlist;
 mod power;
 mod proofs;
 mod resources;
+mod running_zero;
 mod scale;
 mod scan;
 mod scenes;

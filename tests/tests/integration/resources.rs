@@ -71,12 +71,12 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         },
         // Contacts: segmentation, window, the mask of the window, moments of the records.
         || contacts(8),
-        // Six subarrays, groups of rows, a list of columns, a sliding mean.
+        // Six subarrays, groups of rows, a list of columns, a sliding mean, a running zero.
         || {
             small(
                 "partition",
                 "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 8\nprune_bits = 10\n\
-                 [input]\naverage = 3\nmean = \"sliding\"\n",
+                 [input]\naverage = 3\nmean = \"sliding\"\nzero = \"running\"\nfull_scale_MPa = 1.0\n",
             )
         },
         // All of the paper's cases, chosen per frame.

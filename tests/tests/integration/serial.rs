@@ -137,6 +137,7 @@ fn what_it_has_not_is_refused_by_field() {
         (sensor(8, 8, "[partition]\nrows = 2\ncols = 2\n"), ["partition.case", "1"]),
         (sensor(8, 8, "[input]\naverage = 2\n"), ["input.average", "2"]),
         (sensor(8, 8, "[input]\naverage = 2\nmean = \"sliding\"\n"), ["input.average", "2"]),
+        (sensor(8, 8, "[input]\nfull_scale_MPa = 1.0\nzero = \"running\"\n"), ["input.zero", "running"]),
         (sensor(8, 8, "[output]\nforces = \"resultants\"\n"), ["output.forces", "resultants"]),
         (sensor(8, 8, "[fixed]\nlanes = 8\n"), ["fixed.lanes", "8"]),
         // The coefficients of 25 quads need more block RAMs than the board has.

@@ -10,7 +10,11 @@ use dermis_hdl::language::Change;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::cosim::stress::{stress, Outcome};
 use dermis_sim::report;
-use dermis_tests::{build_dir, scene, variants, wanted};
+use dermis_tests::{build_dir, nightly, scene, variants, wanted};
+
+/// A running zero under blocks of frames.
+const RUNNING: &str =
+    "[search]\nmu_max = 0.0\n[input]\naverage = 1\nfull_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 1\n";
 
 /// A few taxels, so that a reset at every cycle of a frame takes a second.
 fn small(rows: usize, cols: usize, more: &str) -> Scene {
@@ -82,6 +86,8 @@ fn sums_without_a_search_and_averaged_frames_recover() {
     // The mean starts again after a reset and after a frame cut short.
     let sliding = "[search]\nmu_max = 0.0\n[input]\naverage = 2\nmean = \"sliding\"\n";
     check(&small(4, 4, sliding), &[], 100_000);
+    // A running zero goes on after a frame cut short, and starts again after a reset.
+    check(&small(2, 2, RUNNING), &[], 100_000);
     let sums = check(&unsearched(), &[], 200_000);
     assert_eq!(sums[2].resets, sums[2].possible_reset_cycles);
 }
@@ -90,7 +96,8 @@ fn sums_without_a_search_and_averaged_frames_recover() {
 fn images_of_tables_are_taken_or_refused() {
     // An image with coefficients is longer.
     let covers = "[hardware.table_range]\nthickness_mm = [2.0, 4.0]\n";
-    let scenes = [("", 200_000), ("average = 2\nmean = \"sliding\"\n", 200_000), (covers, 800_000)];
+    let running = "zero = \"running\"\nzero_average = 3\n";
+    let scenes = [(running, 200_000), ("", 200_000), ("average = 2\nmean = \"sliding\"\n", 200_000), (covers, 800_000)];
     for (more, cycles) in variants(&scenes, 1) {
         let written = format!("[hardware]\ntables = \"writable\"\n[input]\nfull_scale_MPa = 1.0\n{more}");
         check(&small(4, 3, &format!("[search]\nmu_max = 0.05\n{written}")), &[], *cycles);
@@ -127,6 +134,15 @@ fn a_defect_is_found() {
         ("tlast", Change::value("arrival", "waits", |k| k.constant(1, 0))),
     ];
     are_found(&small(4, 6, "[partition]\ncase = 3\n[search]\nmu_max = 0.05\n"), &defects);
+    if nightly() {
+        // A frame that is dropped leaves its steps; the next one comes before they are written; a reset leaves drifts.
+        let defects = [
+            ("tlast", Change::value("prepare__calibrate", "early", |k| k.constant(1, 0))),
+            ("tlast", Change::within("prepare__calibrate", "s_axis_tready", |k| [k.named("takes"), k.named("moves")])),
+            ("reset", Change::value("prepare__calibrate", "stored", |k| k.named("word"))),
+        ];
+        are_found(&small(2, 2, RUNNING), &defects);
+    }
 }
 
 /// The first of these defects is found by its experiment, in `make nightly` all.

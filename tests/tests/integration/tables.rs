@@ -85,10 +85,10 @@ fn sequence(scene: &Scene) -> (Hardware, Vec<Vector>) {
     assert_eq!(refused.load(&other_image), Outcome::Refused);
     let mut spoiled = own.clone();
     assert_eq!(spoiled.load(&broken_image), Outcome::Broken);
-    // Only a refused image leaves a sliding mean as it was.
-    let [second, last] = if scene.input.slides() { [&[1, 2][..], &[5, NOISE]] } else { [&[2][..], &[NOISE]] };
+    // Only a refused image leaves a sliding mean and a running zero as they were.
+    let [second, last] = if scene.input.has_memory() { [&[NOISE, 2][..], &[NOISE, 5]] } else { [&[2][..], &[5]] };
     let vectors = vec![
-        frame(&built, &[1]),
+        frame(&built, &[NOISE]),
         other,
         frame(&refused, second),
         Vector::of_image(&own),
@@ -96,7 +96,7 @@ fn sequence(scene: &Scene) -> (Hardware, Vec<Vector>) {
         broken,
         frame(&spoiled, &[4]),
         Vector::of_image(&own),
-        frame(&own, &[5]),
+        frame(&own, &[NOISE]),
         frame(&own, last),
     ];
     assert!(frame(&own, &[3]).expected.beats != frame(&built, &[3]).expected.beats, "the tables matter");
@@ -116,9 +116,11 @@ fn is_equal(scene: &Scene, what: &str) {
 fn hardware_with_loaded_tables_is_the_specimen_s() {
     let full_scale = "[input]\nfull_scale_MPa = 1.0\n";
     let sliding = "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\naverage = 2\nmean = \"sliding\"\n";
+    let running = "[input]\nfull_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 1\nzero_limit_MPa = 0.05\n";
     let scenes = [
         (COVERS, "another cover, dead taxels"),
         (sliding, "two subarrays, sliding mean"),
+        (running, "a running zero"),
         (PARTS, "another cover, two subarrays"),
         (full_scale, "whole array"),
     ];

@@ -15,6 +15,7 @@ use super::golden::Golden;
 use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};
 use crate::data::frame::Frame;
+use crate::data::input::running_zero::Drift;
 use crate::physics::matrices::Matrices;
 use crate::result::checks::Checks;
 use crate::result::reconstruct::{Reconstruction, Unipolar};
@@ -54,11 +55,17 @@ impl Golden {
     pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         frame.check(self.scene())?;
         let complete = self.input.complete(std::slice::from_ref(frame));
-        self.run_readings(std::slice::from_ref(frame), &complete[0], noise_MPa)
+        self.run_readings(std::slice::from_ref(frame), &complete[0], noise_MPa, None)
     }
 
-    /// Reconstructs `mean`, the average of the frames `readings`, which have been checked.
-    fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+    /// Reconstructs `mean`, the average of the frames `readings`, which have been checked; `zero_share` as in [`Checks`].
+    fn run_readings(
+        &self,
+        readings: &[Frame],
+        mean: &Frame,
+        noise_MPa: f64,
+        zero_share: Option<f64>,
+    ) -> Result<Reconstruction, GoldenError> {
         let scene = self.scene();
         let frame = self.input.calibrate(mean);
         let (filled, report) = match (scene.input.unipolar, self.estimator.clipped_readings()) {
@@ -73,6 +80,7 @@ impl Golden {
         let checks = Checks {
             network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
             load_ratio: if compares_load { self.load_ratio(&filled, &result) } else { None },
+            zero_share,
             ..result.figures(scene, &frame).with_readings(&self.input, readings)
         };
         result.add_checks(scene, checks);
@@ -117,7 +125,8 @@ impl Golden {
     }
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
-    /// first. With a sliding mean the frames are all those since the start, and known forces those of the last.
+    /// first. With a sliding mean the frames are all those since the start, and known forces those of the last; where zeros
+    /// run, they are all those since the start too, and the last 2^k are averaged.
     ///
     /// ```
     /// use dermis_golden::{data::frame::Frame, data::generator::converter::Converter, estimate::float::Golden, spec::scene::Scene};
@@ -137,8 +146,17 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
-        let mean = self.input.average(self.scene(), frames)?;
-        let mut result = self.run_readings(frames, &mean, self.input.noise_of_mean_MPa(frames.len()))?;
+        self.run_after(&mut Drift::default(), frames)
+    }
+
+    /// The same where zeros have a `drift` before the frames, which is then that after them.
+    ///
+    /// # Errors
+    /// As [`Golden::run_averaged`].
+    pub fn run_after(&self, drift: &mut Drift, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
+        let mean = self.input.average_after(drift, self.scene(), frames)?;
+        let noise_MPa = self.input.noise_of_mean_MPa(frames.len());
+        let mut result = self.run_readings(self.scene().input.newest(frames), &mean, noise_MPa, drift.share())?;
         result.extra.mean_frames = self.scene().input.frames_held(frames.len());
         Ok(result)
     }

@@ -12,7 +12,8 @@ use crate::spec::partition::{subarrays, Case};
 use crate::spec::quads::Quads;
 use crate::spec::scene::MAX_DEGREE;
 use crate::spec::scene::{
-    CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec, TableRange, TableStorage,
+    CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, RunningZero, Scene, SearchSpec, TableRange, TableStorage,
+    Zero,
 };
 use crate::spec::sliding::most_frames;
 
@@ -66,6 +67,7 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     }
     let written = plan.has_writable_tables();
     let table = input.calibration.is_some() || written;
+    let running = input.running_zero();
     let tare = table || input.tare.is_some();
     add("tare frame", tare, "a zero per taxel".into(), &|| {
         scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
@@ -77,6 +79,13 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let writable = (TableStorage::Writable, Some(full_scale));
         plain(&with(&|s| (s.hardware.tables, s.input.full_scale_MPa) = writable))
     });
+    let runs = |s: &mut Scene| {
+        let limit_MPa = full_scale * RunningZero::LIMIT_SHARE;
+        s.input.zero = Zero::Running(RunningZero { average: RunningZero::AVERAGE, limit_MPa });
+        s.input.full_scale_MPa = Some(full_scale);
+    };
+    let average = running.map_or(RunningZero::AVERAGE, |running| running.average);
+    add("running zero", running.is_some(), format!("a gain of 2^−{average}"), &|| plain(&with(&runs)));
     let range = &scene.hardware.table_range;
     let covers = range.thickness_mm.unwrap_or(OTHER_COVERS.map(|of_own| of_own * scene.sensor.thickness_mm));
     let own = [
@@ -169,6 +178,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let plan = plain(&with(change)).ok();
         all.iter_mut().filter(|feature| feature.name == name).for_each(|f| f.without_feature = plan.clone());
     };
+    if running.is_some() {
+        without("running zero", &|s| s.input.zero = Zero::Fixed);
+    }
     if slides {
         without("sliding mean", &|s| s.input.mean = MeanKind::Block);
     }

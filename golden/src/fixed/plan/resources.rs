@@ -6,7 +6,7 @@
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
-//! | prepare | zero and gain; sums of several frames, or their sliding mean | taxels × `code_bits` and 18; taxels × `input_bits` |
+//! | prepare | drift of a running zero and its step; zero and gain; sums of several frames, or their sliding mean | taxels × those of the limit, once with `zero_average` more; taxels × `code_bits` and 18; taxels × `input_bits` |
 //! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
@@ -22,6 +22,7 @@ use serde::Serialize;
 
 use super::storage::{word_bits, LaidOut, Storage};
 use crate::estimate::segment::{Segmenter, BASINS, WEIGHT_BITS, WIDTH, WORD_BITS};
+use crate::fixed::stages::prepare::running_zero::RunningZero;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
@@ -40,6 +41,8 @@ pub const SEARCH_BUFFERS: usize = 3;
 pub enum Holds {
     /// Zero and gain of each taxel.
     Calibration,
+    /// Drift of each taxel's running zero, and its next step.
+    Drift,
     /// Sums of the frames that are averaged, or their sliding mean.
     Average,
     /// One lane of the quads of a frame, in the layout of a case.
@@ -117,6 +120,7 @@ impl std::fmt::Display for Holds {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Holds::Calibration => write!(f, "calibration"),
+            Holds::Drift => write!(f, "drift of the zeros"),
             Holds::Average => write!(f, "average"),
             Holds::Frame { case, lane } => write!(f, "frame, case {case}, lane {lane}"),
             Holds::TaxelOrder => write!(f, "taxel order"),
@@ -239,9 +243,13 @@ impl Resources {
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
         let mut memories = Vec::new();
         let gains = input.calibration.is_some() || scene.hardware.has_writable_tables();
+        let running = RunningZero::of_scene(scene);
         if gains || input.tare.is_some() {
             let gain = if gains { GAIN_BITS } else { 0 };
             memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize));
+        }
+        if let Some(zero) = &running {
+            memories.push(memory(Holds::Drift, taxels, (zero.moved_bits() + zero.step_bits()) as usize));
         }
         if input.average > 0 {
             memories.push(memory(Holds::Average, taxels, f.input_bits as usize));
@@ -283,7 +291,8 @@ impl Resources {
         }
         let values = f.sweep_steps(cases.iter().map(frame_quads).max().unwrap_or(0));
         memories.push(memory(Holds::Values, values, f.search_width * f.search_bits[0] as usize));
-        let calibrate = if gains { board.multipliers_for(f.code_bits + 1, GAIN_BITS) } else { 0 };
+        let difference = f.code_bits + if running.is_some() { 2 } else { 1 };
+        let calibrate = if gains { board.multipliers_for(difference, GAIN_BITS) } else { 0 };
         // Operands times μ, and the size of μ.
         let scale = 4 * board.multipliers_for(f.data_bits, MU_BITS);
         let of = |wanted: bool, count: usize| if wanted { count } else { 0 };

@@ -5,6 +5,8 @@
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
 //!                       or sliding mean           b ← b + ⌊(2^k s − b − c) / 2^g + 1/2⌋: likewise
 //! ```
+//! Where the zero runs, its drift is taken off `code − zero` ([`running_zero`]).
+//!
 //! | word | bits | LSB |
 //! |---|---|---|
 //! | code | `code_bits` | full scale / (largest gain · (2^(code_bits − 1) − 1)), in the readings' unit |
@@ -18,6 +20,8 @@
 //! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
 //! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
+pub mod running_zero;
+
 use crate::data::frame::FrameError;
 use crate::data::input::calibration::Calibration;
 use crate::data::input::tare::Tare;
@@ -28,6 +32,7 @@ use crate::fixed::words::arith::{round_shift, saturate};
 use crate::spec::scene::largest_code;
 use crate::spec::scene::{MeanKind, Scene};
 use crate::spec::sliding::gain_shift;
+use running_zero::{Drift, RunningZero};
 
 /// Fraction bits of a gain word.
 pub const GAIN_FRACTION: u32 = 16;
@@ -45,19 +50,23 @@ pub struct Prepare {
     pub average: u32,
     /// How frames are averaged.
     pub mean: MeanKind,
+    /// How zeros follow the readings, if they do.
+    pub running: Option<RunningZero>,
     /// Reading per MPa at the largest gain, in the readings' unit: 1 / (largest |gain|).
     pub reading_per_MPa: f64,
     code_bits: u32,
     taxels: usize,
 }
 
-/// What the stage has made of the frames so far: the words of the frame buffer.
+/// What the stage has made of the frames so far: the words of the frame buffer, and the state for the next frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prepared {
     /// A word per taxel, row-major.
     pub words: Vec<i32>,
     /// Number of frames in them.
     pub frames: usize,
+    /// How far zeros have moved.
+    pub drift: Drift,
 }
 
 /// Conversion of a scene's readings to MPa, in floating point.
@@ -87,7 +96,7 @@ impl Scale {
         let table = table.map_err(InputError::from)?;
         let tare = spec.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, scene)?.zero));
         let tare = tare.transpose()?;
-        let largest = table.as_ref().map_or(1.0, |table| table.gain.iter().fold(0.0f64, |most, g| most.max(g.abs())));
+        let largest = scene.hardware.largest_gain(table.as_ref().map(|table| table.gain.as_slice()));
         if !scene.hardware.has_writable_tables() {
             return Ok(Scale { tare, table, largest });
         }
@@ -100,7 +109,7 @@ impl Scale {
             let place = [taxel / scene.sensor.cols, taxel % scene.sensor.cols];
             return Err(FixedError::TableRange { place, gain: table.gain[taxel], allowed: [least, most] });
         }
-        Ok(Scale { tare, table: Some(table), largest: most })
+        Ok(Scale { tare, table: Some(table), largest })
     }
 }
 
@@ -119,14 +128,17 @@ impl Prepare {
                 gain[row * scene.sensor.cols + col] = 0;
             }
         }
+        let taxels = scene.sensor.taxels();
+        let running = RunningZero::of_scene(scene);
         Prepare {
             zero: scale.tare.as_deref().or(offset).map(codes),
             gain,
+            running,
             average: scene.input.average,
             mean: scene.input.mean,
             reading_per_MPa,
             code_bits,
-            taxels: scene.sensor.taxels(),
+            taxels,
         }
     }
 
@@ -135,10 +147,20 @@ impl Prepare {
         f64::from(largest_code(self.code_bits)) * f64::from(1u32 << self.average)
     }
 
-    /// One calibrated sample of taxel `taxel`, saturated to `code_bits`.
-    pub fn calibrate(&self, taxel: usize, code: i32) -> i64 {
-        let zero = self.zero.as_ref().map_or(0, |zero| i64::from(zero[taxel]));
-        let difference = i64::from(code) - zero;
+    /// The calibrated samples of a frame, or the first of them if it ends `early`, each saturated to `code_bits`.
+    fn calibrate(&self, drift: &mut Drift, codes: &[i32], early: bool) -> Vec<i64> {
+        let zero = |taxel: usize| self.zero.as_ref().map_or(0, |zero| i64::from(zero[taxel]));
+        let off: Vec<i64> = codes.iter().enumerate().map(|(taxel, &code)| i64::from(code) - zero(taxel)).collect();
+        let direction = |taxel: usize| self.gain.as_ref().map_or(1, |gain| i64::from(gain[taxel].signum()));
+        let differences = match &self.running {
+            Some(running) => running.follow(drift, &off, direction, early),
+            None => off,
+        };
+        differences.into_iter().enumerate().map(|(taxel, difference)| self.scaled(taxel, difference)).collect()
+    }
+
+    /// The sample of taxel `taxel`, saturated to `code_bits`, from what its code is above its zero.
+    fn scaled(&self, taxel: usize, difference: i64) -> i64 {
         let scaled = match &self.gain {
             Some(gain) => round_shift(difference * i64::from(gain[taxel]), GAIN_FRACTION),
             None => difference,
@@ -148,19 +170,23 @@ impl Prepare {
 
     /// No frames yet.
     pub fn empty(&self) -> Prepared {
-        Prepared { words: vec![0; self.taxels], frames: 0 }
+        Prepared { words: vec![0; self.taxels], frames: 0, drift: Drift::new(self.taxels) }
     }
 
-    /// Calibrates frames of codes and adds them to `prepared`, frame after frame, each row-major.
+    /// Calibrates frames of codes and adds them to `prepared`, frame after frame, each row-major. A block that is complete
+    /// makes room for the next.
     pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
         for frame in codes.chunks(self.taxels) {
+            if self.mean == MeanKind::Block && prepared.frames == 1 << self.average {
+                self.restart_mean(prepared);
+            }
+            let samples = self.calibrate(&mut prepared.drift, frame, false);
             let shift = match self.mean {
                 MeanKind::Block => None,
                 MeanKind::Sliding => Some(gain_shift(prepared.frames + 1, self.average)),
             };
             let half_down = (prepared.frames % 2) as i64;
-            for (taxel, (word, &code)) in prepared.words.iter_mut().zip(frame).enumerate() {
-                let sample = self.calibrate(taxel, code);
+            for (word, sample) in prepared.words.iter_mut().zip(samples) {
                 let added = match shift {
                     None => sample,
                     Some(shift) => round_shift((sample << self.average) - i64::from(*word) - half_down, shift),
@@ -172,7 +198,19 @@ impl Prepare {
         }
     }
 
-    /// The words after all `codes` since a reset: 2^average frames, or any number with a sliding mean.
+    /// What an early `tlast` leaves, which drops a frame after its first `codes`: a mean starts again, a running zero goes on.
+    pub fn cut(&self, prepared: &mut Prepared, codes: &[i32]) {
+        self.restart_mean(prepared);
+        self.calibrate(&mut prepared.drift, codes, true);
+    }
+
+    fn restart_mean(&self, prepared: &mut Prepared) {
+        prepared.words.fill(0);
+        prepared.frames = 0;
+    }
+
+    /// The words after all `codes` since a reset: 2^average frames, with a running zero a multiple of them; or any number with
+    /// a sliding mean.
     pub fn run(&self, codes: &[i32]) -> Prepared {
         let mut prepared = self.empty();
         self.add(&mut prepared, codes);
@@ -182,16 +220,17 @@ impl Prepare {
     /// Latency in cycles between the input stream and `receive`.
     pub fn latency(&self) -> u64 {
         let calibrate = match (&self.zero, &self.gain) {
-            (None, None) => 0,
+            (None, None) if self.running.is_none() => 0,
             (_, None) => 2,
             (_, Some(_)) => 4,
         };
+        let running = if self.running.is_some() { 2 } else { 0 };
         let average = match self.mean {
             MeanKind::Block if self.average == 0 => 0,
             MeanKind::Block => 2,
             MeanKind::Sliding => 3,
         };
-        calibrate + average
+        calibrate + running + average
     }
 }
 
@@ -208,13 +247,13 @@ mod tests {
             zero: Some(vec![10, -3]),
             gain: Some(vec![half, 2 * half]),
             average: 1,
-            mean: MeanKind::Block,
-            reading_per_MPa: 1.0,
             code_bits: 8,
             taxels: 2,
+            ..Prepare::default()
         };
         // (15 − 10)/2 = 2.5 rounds to 3; 127 + 3 is held to 127.
-        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2 });
+        let drift = Drift::new(2);
+        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2, drift });
         let sliding = Prepare { zero: None, gain: None, average: 2, mean: MeanKind::Sliding, taxels: 1, ..prepare };
         let mut words = sliding.empty();
         let mut after = |code: i32| {

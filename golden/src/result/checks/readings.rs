@@ -67,7 +67,7 @@ pub(super) fn range(readings: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The smallest difference of two readings; `None` where all are equal.
-fn step(readings: impl Iterator<Item = f64>) -> Option<f64> {
+pub(super) fn step(readings: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = readings.collect();
     sorted.sort_by(f64::total_cmp);
     let least = ROUNDING * (sorted.last()? - sorted.first()?);

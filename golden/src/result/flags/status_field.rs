@@ -23,6 +23,8 @@ pub enum Feature {
     Adaptive,
     /// The mean of the frames slides.
     SlidingMean,
+    /// Zeros follow the readings.
+    RunningZero,
     /// Tables are written at run time.
     WritableTables,
     /// The hardware scans the array itself.
@@ -42,6 +44,7 @@ impl Feature {
             Feature::Contacts => scene.partition.case == Case::Contacts,
             Feature::Adaptive => scene.partition.case == Case::Adaptive,
             Feature::SlidingMean => scene.input.slides(),
+            Feature::RunningZero => scene.input.running_zero().is_some(),
             Feature::WritableTables => scene.hardware.has_writable_tables(),
             Feature::Scan => scene.hardware.adc_scan.is_some(),
         }
@@ -56,6 +59,7 @@ impl Feature {
             Feature::Contacts => "`partition.case = \"contacts\"`",
             Feature::Adaptive => "`partition.case = \"adaptive\"`",
             Feature::SlidingMean => "`input.mean = \"sliding\"`",
+            Feature::RunningZero => "`input.zero = \"running\"`",
             Feature::WritableTables => "`hardware.tables = \"writable\"`",
             Feature::Scan => "`hardware.source = \"adc-scan\"`",
         }

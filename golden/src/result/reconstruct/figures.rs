@@ -2,6 +2,7 @@
 
 use super::Reconstruction;
 use crate::data::frame::Frame;
+use crate::result::checks::pull::pull_share;
 use crate::result::checks::{Checks, COUNTS_FROM};
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
@@ -12,6 +13,7 @@ impl Reconstruction {
         Checks {
             peak_MPa: frame.peak_MPa(),
             mu_share: mu_share(scene, self),
+            pull_share: pull_share(scene, frame),
             border_share: border_share(&scene.sensor, &self.forces_N.fz),
             load_ratio: None,
             network_misfit: None,

@@ -5,8 +5,8 @@ use super::estimator::FORMER_NAMES;
 use super::reader::{number_of, Reader};
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
-    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, TableRange,
-    TableStorage, ThresholdSpec, MAX_CONTACTS, MISSING_SHARE, PLAUSIBLE_MPA,
+    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, RunningZero, Scene, SceneError,
+    SearchSpec, TableRange, TableStorage, ThresholdSpec, Zero, MAX_CONTACTS, MISSING_SHARE, PLAUSIBLE_MPA,
 };
 use crate::spec::board::{Board, SEARCH_WIDTHS};
 use crate::spec::link_kind::LinkKind;
@@ -43,6 +43,9 @@ const SCHEMA: [(&str, &[&str]); 13] = [
             "gain_spread",
             "plausible_MPa",
             "missing_share",
+            "zero",
+            "zero_average",
+            "zero_limit_MPa",
         ],
     ),
     ("output", &["forces"]),
@@ -421,7 +424,30 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         gain_spread: spread.unwrap_or(0.0),
         plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
         missing_share: missing_share.unwrap_or(MISSING_SHARE),
+        zero: zero(reader, full_scale_MPa)?,
     })
+}
+
+/// A fixed zero has neither rate nor limit. The limit of a running one is beyond the noise, so that noise is no touch.
+fn zero(reader: &Reader, full_scale_MPa: Option<f64>) -> Result<Zero, SceneError> {
+    let (path, limit) = ("input.zero", "input.zero_limit_MPa");
+    let average = "input.zero_average";
+    if !reader.choice(path, &[("fixed", false), ("running", true)])? {
+        return match [average, limit].into_iter().find_map(|field| Some((field, reader.value(field)?))) {
+            Some((field, value)) => Err(reader.wrong(field, value, "left out, or input.zero = \"running\"")),
+            None => Ok(Zero::Fixed),
+        };
+    }
+    // In range, so that the cast keeps the value.
+    let average = reader.integer(average, 1..=16, Some(i64::from(RunningZero::AVERAGE)))? as u32;
+    let noise_MPa = reader.value("search.noise_floor_MPa").and_then(number_of).unwrap_or(0.0);
+    let least = RunningZero::LEAST_OVER_NOISE * noise_MPa;
+    let in_range = |mpa: f64| mpa > 0.0 && mpa >= least && full_scale_MPa.is_none_or(|most| mpa <= most);
+    let allowed = "a number above 0, at least 5 times search.noise_floor_MPa, at most input.full_scale_MPa";
+    let stated = reader.number(limit, in_range, allowed)?;
+    let by_full_scale = full_scale_MPa.map(|most| RunningZero::LIMIT_SHARE * most).filter(|mpa| in_range(*mpa));
+    let limit_MPa = stated.or(by_full_scale).ok_or_else(|| reader.missing(limit, allowed))?;
+    Ok(Zero::Running(RunningZero { average, limit_MPa }))
 }
 
 /// A sliding mean of one frame is no mean.

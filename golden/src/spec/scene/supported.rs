@@ -31,6 +31,8 @@
 //! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
 //! are taken, no average of frames, `input_bits` for a result and a sign.
 //!
+//! `input.zero = "running"`: not the serial engine, which has no stage before `receive`.
+//!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
 
@@ -255,6 +257,12 @@ impl Scene {
             rule(input.calibration.is_some(), "input.calibration", path(&input.calibration), none),
             rule(input.tare.is_some(), "input.tare", path(&input.tare), none),
             rule(
+                input.running_zero().is_some(),
+                "input.zero",
+                "running".to_string(),
+                "fixed on a board with the serial engine",
+            ),
+            rule(
                 self.output.forces == ForceOutput::Resultants,
                 "output.forces",
                 "resultants".to_string(),
@@ -384,6 +392,7 @@ impl Scene {
             ("input.tare", input.tare.is_some()),
             ("hardware.tables", self.hardware.has_writable_tables()),
             ("hardware.source", self.hardware.adc_scan.is_some()),
+            ("input.zero", self.input.running_zero().is_some()),
         ];
         asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
     }
@@ -394,6 +403,7 @@ impl Scene {
             "input.calibration" => path(&self.input.calibration),
             "hardware.tables" => writable(),
             "hardware.source" => "adc-scan".to_string(),
+            "input.zero" => "running".to_string(),
             _ => path(&self.input.tare),
         }
     }

@@ -67,6 +67,9 @@ fn every_field_is_read() {
         unipolar = true
         plausible_MPa = 2.5
         missing_share = 0.05
+        zero = "running"
+        zero_average = 8
+        zero_limit_MPa = 0.005
         [output]
         forces = "resultants""#;
     let scene = with(more).unwrap();
@@ -95,6 +98,7 @@ fn every_field_is_read() {
         gain_spread: 0.0,
         plausible_MPa: 2.5,
         missing_share: 0.05,
+        zero: Zero::Running(RunningZero { average: 8, limit_MPa: 0.005 }),
     };
     assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
     let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
@@ -175,6 +179,28 @@ fn wrong_values_name_what_is_allowed() {
         ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
         ("[input]\ndead = [3]", "a list of [row, col]"),
         ("[input]\nunipolar = 1", "true or false"),
+        ("[input]\nzero = \"moving\"", "input.zero = \"moving\" is not allowed; it must be \"fixed\" or \"running\""),
+        (
+            "[input]\nzero_average = 8",
+            "input.zero_average = 8 is not allowed; it must be left out, or input.zero = \"run",
+        ),
+        (
+            "[input]\nzero = \"fixed\"\nzero_limit_MPa = 1",
+            "input.zero_limit_MPa = 1 is not allowed; it must be left out",
+        ),
+        ("[input]\nzero = \"running\"", "input.zero_limit_MPa is missing"),
+        ("[input]\nzero = \"running\"\nzero_limit_MPa = 0", "input.zero_limit_MPa = 0 is not allowed"),
+        ("[input]\nzero = \"running\"\nzero_limit_MPa = 2\nfull_scale_MPa = 1", "at most input.full_scale_MPa"),
+        ("[input]\nzero = \"running\"\nzero_limit_MPa = 1\nzero_average = 17", "from 1 to 16"),
+        (
+            "[search]\nnoise_floor_MPa = 0.01\n[input]\nzero = \"running\"\nzero_limit_MPa = 0.04",
+            "at least 5 times search.noise_floor_MPa",
+        ),
+        // The default of the limit is below the noise.
+        (
+            "[search]\nnoise_floor_MPa = 0.01\n[input]\nzero = \"running\"\nfull_scale_MPa = 1",
+            "input.zero_limit_MPa is missing",
+        ),
         ("[search]\ndegree = 9", "a whole number from 1 to 8"),
         ("[input]\nplausible_MPa = 0", "a number above 0"),
         (

@@ -22,14 +22,17 @@ impl Identity {
     /// The identity of the hardware of `plan`.
     ///
     /// # Errors
-    /// [`LinkError`]: the scene averages or chooses its case per frame, for which there is no packet; a payload is too long; the
-    /// board lacks the link or its clock is too slow for the bit rate.
+    /// [`LinkError`]: the scene averages, or its zero runs, so that a request that is repeated would count twice; it chooses its
+    /// case per frame, for which there is no packet; a payload is too long; the board lacks the link or its clock is too slow for the bit rate.
     pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
         let scene = &plan.scene;
         let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
         if scene.input.average > 0 {
             return refuse("input.average", scene.input.average.to_string());
+        }
+        if scene.input.running_zero().is_some() {
+            return refuse("input.zero", "running".to_string());
         }
         if plan.chooses() {
             return refuse("partition.case", scene.partition.case.to_string());

@@ -1,6 +1,6 @@
 use super::*;
 use crate::spec::link_kind::LinkKind;
-use crate::spec::scene::Scene;
+use crate::spec::scene::{RunningZero, Scene, Zero};
 use proptest::prelude::*;
 
 /// Everything that a decoder finds in `wire`.
@@ -152,6 +152,8 @@ fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
         Identity::of(&model).unwrap_err().to_string()
     };
     assert!(refused(&|scene| scene.input.average = 2).starts_with("input.average = 2: "));
+    let running = Zero::Running(RunningZero { average: 10, limit_MPa: 0.01 });
+    assert!(refused(&|scene| scene.input.zero = running).starts_with("input.zero = running: "));
     let long = refused(&|scene| scene.sensor.rows = 800);
     assert_eq!(long, "scene eight-by-eight: forces of 6400 taxels take 76836 bytes, a packet holds 65535");
 }

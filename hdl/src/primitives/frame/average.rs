@@ -1,6 +1,7 @@
 //! Sums of 2^k frames, taxel by taxel, or their sliding mean.
 
 use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::Plan;
 use dermis_golden::spec::scene::MeanKind;
 use rust_hdl::prelude::*;
 
@@ -8,7 +9,7 @@ use super::sliding_mean;
 use crate::kernel_block;
 use crate::language::{Body, Builder, Contents, Kernel, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::stream::pass_through::wires;
+use crate::primitives::stream::pass_through::low_wires;
 use crate::wire::Wire;
 
 /// ```text
@@ -19,6 +20,8 @@ use crate::wire::Wire;
 /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
 /// k = 0 the stream passes through. Module `sliding_mean` has the kernel of a sliding mean.
 ///
+/// Where zeros run, the bit above a word says whether one is at its limit; it goes on with the number of frames.
+///
 /// Latency two cycles, of a sliding mean three; all registers advance together while the output is free.
 #[derive(dermis_hdl_derive::Block)]
 pub struct Average {
@@ -26,7 +29,7 @@ pub struct Average {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's word, `bits` wide, two's complement; valid with `s_axis_tvalid`.
+    /// A taxel's word, `bits` wide, two's complement, where zeros run with a bit above it; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
     /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
@@ -42,7 +45,8 @@ pub struct Average {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of the sums; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// Number of frames in a sliding mean, up to 2^(k+1) − 1; valid with `m_axis_tvalid`. Otherwise one bit, 0.
+    /// Number of frames in a sliding mean, up to 2^(k+1) − 1; above it, where zeros run, whether one is at its limit. Valid
+    /// with `m_axis_tvalid`. Otherwise one bit, 0.
     pub frames: Wire<Out>,
     kernel: Body,
 }
@@ -54,14 +58,39 @@ kernel_block!(
     outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, frames]
 );
 
+/// What goes with the words of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameMarks {
+    /// Bits of the number of frames in a sliding mean; 0 where the mean does not slide.
+    pub frames_bits: usize,
+    /// Whether a running zero is at its limit.
+    pub limited: bool,
+}
+
+impl FrameMarks {
+    /// Those of `model`.
+    pub fn new(model: &Plan) -> Self {
+        let input = &model.scene.input;
+        let frames_bits = if input.slides() { sliding_mean::frames_bits(input.average) } else { 0 };
+        FrameMarks { frames_bits, limited: input.running_zero().is_some() }
+    }
+
+    /// Width of their wire, the number below; one constant bit where there is none.
+    pub fn bits(self) -> usize {
+        (self.frames_bits + usize::from(self.limited)).max(1)
+    }
+}
+
 impl Average {
-    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean.
-    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind) -> Self {
+    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean; with
+    /// the `marks` of a frame.
+    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind, marks: FrameMarks) -> Self {
         let slides = mean == MeanKind::Sliding;
+        let offered_bits = bits + usize::from(marks.limited);
         let block = Average {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
+            s_axis_tdata: Wire::new(offered_bits),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -69,25 +98,26 @@ impl Average {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            frames: Wire::new(if slides { sliding_mean::frames_bits(power) } else { 1 }),
+            frames: Wire::new(marks.bits()),
             kernel: Body::default(),
         };
         block.bind(match power {
-            _ if slides => sliding_mean::kernel(taxels, bits, power),
+            _ if slides => sliding_mean::kernel(taxels, bits, power, marks.limited),
             0 => {
-                let k = wires("average", bits, "No averaging: the stream passes through.");
-                k.wire("frames", k.constant(1, 0));
+                let k = low_wires("average", [offered_bits, bits], "No averaging: the stream passes through.");
+                let none = k.constant(1, 0);
+                k.wire("frames", if marks.limited { k.named("s_axis_tdata").top() } else { none });
                 k.finish()
             }
-            _ => kernel(taxels, bits, power as usize),
+            _ => kernel(taxels, bits, power as usize, marks.limited),
         })
     }
 }
 
-fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
+fn kernel(taxels: usize, bits: usize, power: usize, limited: bool) -> Kernel {
     let k = Builder::new("average");
     let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power);
-    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits + usize::from(limited)));
     let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
     let sums = k.memory("sums", taxels, wide, Contents::Undefined).holds(Holds::Average);
     let taxel = k.state("taxel", index, rst, 0);
@@ -121,7 +151,7 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
                 missed.set(zero(1));
             });
         });
-        word.set(data);
+        word.set(data.low(bits));
         sofar.set(sums.read(*taxel));
         held_taxel.set(*taxel);
         held_first.set(frame.is(0));
@@ -131,7 +161,15 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
         last_out.set(*held_last);
     });
     sums.write(moves & *held, *held_taxel, sum);
-    k.wire("frames", zero(1));
+    if limited {
+        let (held_limit, frames) = (k.register("held_limit", bit), k.register("frames", bit));
+        k.when(moves, || {
+            held_limit.set(data.top());
+            frames.set(*held_limit);
+        });
+    } else {
+        k.wire("frames", zero(1));
+    }
     k.finish()
 }
 

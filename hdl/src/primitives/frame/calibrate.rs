@@ -1,11 +1,13 @@
 //! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table that a memory file initialises.
 
 use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::stages::prepare::running_zero::RunningZero;
 use dermis_golden::fixed::stages::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
 
+use super::running_zero::{follow, Beat, Followed, RECOVERY};
 use crate::kernel_block;
-use crate::language::{Body, Builder, Contents, Expr, Type};
+use crate::language::{Body, Builder, Contents, Expr, MemoryPort, Net, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::stream::pass_through::wires;
 use crate::wire::Wire;
@@ -14,7 +16,8 @@ use crate::wire::Wire;
 /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
 /// ```
 /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
-/// table, where the stream passes through. The taxel count restarts at `tlast`, as in `receive`.
+/// table, where the stream passes through. A running zero takes its drift off the difference, which takes 2 cycles more. The
+/// taxel count restarts at `tlast`, as in `receive`.
 #[derive(dermis_hdl_derive::Block)]
 pub struct Calibrate {
     /// Clock; registers change on its rising edge.
@@ -29,7 +32,8 @@ pub struct Calibrate {
     pub s_axis_tready: Signal<Out, Bit>,
     /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's stress in codes, `bits` wide, two's complement, saturated; valid with `m_axis_tvalid`.
+    /// A taxel's stress in codes, `bits` wide, two's complement, saturated; above it, where zeros run, whether one is at its
+    /// limit. Valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
     /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
@@ -61,10 +65,17 @@ pub const CALIBRATION_FILE: &str = "calibration.hex";
 impl Calibrate {
     /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not.
     pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Self {
-        Calibrate::of(prepare.zero.as_deref(), prepare.gain.as_deref(), taxels, bits, written)
+        let Prepare { zero, gain, running, .. } = prepare;
+        Calibrate::of([zero, gain].map(|table| table.as_deref()), running.as_ref(), taxels, bits, written)
     }
 
-    fn of(zero: Option<&[i32]>, gain: Option<&[i32]>, taxels: usize, bits: usize, written: bool) -> Self {
+    fn of(
+        [zero, gain]: [Option<&[i32]>; 2],
+        running: Option<&RunningZero>,
+        taxels: usize,
+        bits: usize,
+        written: bool,
+    ) -> Self {
         let block = Calibrate {
             clk: Default::default(),
             rst: Default::default(),
@@ -72,7 +83,7 @@ impl Calibrate {
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(bits),
+            m_axis_tdata: Wire::new(bits + usize::from(running.is_some())),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -82,11 +93,12 @@ impl Calibrate {
             incomplete: Default::default(),
             kernel: Body::default(),
         };
-        let k = match zero {
-            None => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
-            Some(_) => Builder::new("calibrate"),
+        let passes = zero.is_none() && running.is_none();
+        let k = match passes {
+            true => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
+            false => Builder::new("calibrate"),
         };
-        let stream = zero.is_some().then(|| {
+        let stream = (!passes).then(|| {
             let bit = |name: &str| k.input(name, 1);
             let (rst, data) = (bit("rst"), k.input("s_axis_tdata", bits));
             Stream { rst, data, offered: bit("s_axis_tvalid"), tlast: bit("s_axis_tlast"), ready: bit("m_axis_tready") }
@@ -98,9 +110,9 @@ impl Calibrate {
             ("incomplete", 1),
         ];
         let write = write.map(|(name, bits)| k.input(name, bits));
-        if let Some((zero, stream)) = zero.zip(stream) {
-            let table = Table { zero, gain, written: written.then_some(write) };
-            calibrated(&k, stream, table, bits);
+        if let Some(stream) = stream {
+            let table = Table { zero, gain, running, written: written.then_some(write) };
+            calibrated(&k, stream, table, [taxels, bits]);
         }
         let kernel = k.finish();
         block.bind(kernel)
@@ -114,8 +126,9 @@ impl Calibrate {
 
 /// The table, and how it is written.
 struct Table<'a, 'k> {
-    zero: &'a [i32],
+    zero: Option<&'a [i32]>,
     gain: Option<&'a [i32]>,
+    running: Option<&'a RunningZero>,
     /// Whether, where, what; whether the table is not whole.
     written: Option<[Expr<'k>; 4]>,
 }
@@ -129,18 +142,17 @@ struct Stream<'k> {
     ready: Expr<'k>,
 }
 
-fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, bits: usize) {
-    let Stream { rst, data, offered, tlast, ready } = stream;
-    let Table { zero, gain, written } = table;
-    let taxels = zero.len();
-    let (gain_bits, steps) = gain.map_or((0, 2), |_| (GAIN_BITS as usize, 4));
+/// The memory with the words of `table`, of codes of `bits` bits; none without a zero.
+fn entries<'k>(k: &'k Builder, table: &Table<'_, 'k>, [taxels, bits]: [usize; 2]) -> Option<MemoryPort<'k>> {
+    let (zero, gain) = (table.zero?, table.gain);
+    let gain_bits = gain.map_or(0, |_| GAIN_BITS as usize);
     let word = |taxel: usize| {
         let gain = gain.map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
         vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
     };
     let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words: (0..taxels).map(word).collect() };
     let entries = k.memory("entries", taxels, bits + gain_bits, contents).holds(Holds::Calibration);
-    let entries = match written {
+    Some(match table.written {
         None => entries,
         Some([write, taxel, entry, _]) => {
             // Nothing is read during the reset in which it is written.
@@ -148,46 +160,87 @@ fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, bits
             entries.write(write, taxel, entry);
             entries
         }
-    };
+    })
+}
+
+fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, [taxels, bits]: [usize; 2]) {
+    let Stream { rst, data, offered, tlast, ready } = stream;
+    let entries = entries(k, &table, [taxels, bits]);
+    let Table { gain, running, written, .. } = table;
+    let (gain_bits, steps) = gain.map_or((0, 2), |_| (GAIN_BITS as usize, 4));
+    let steps = steps + if running.is_some() { 2 } else { 0 };
     let taxel = k.state("taxel", Type::unsigned(count_bits(taxels)), rst, 0);
-    let entry = k.register("entry", Type::unsigned(bits + gain_bits));
+    let entry = entries.map(|entries| {
+        let entry = k.register("entry", Type::unsigned(bits + gain_bits));
+        (entry, entries)
+    });
     let code = k.register("code", Type::signed(bits));
     let valids = k.state("valids", Type::unsigned(steps), rst, 0);
     let lasts = k.register("lasts", Type::unsigned(steps));
     let moves = k.wire("moves", !valids.top() | ready);
-    k.wire("s_axis_tready", moves & !rst);
+    let running = running.map(|zero| {
+        let waits = k.state("waits", Type::unsigned(RECOVERY), rst, 0).comment("After an early `tlast`.");
+        let end = k.wire("at_end", taxel.is(taxels as u64 - 1));
+        (zero, waits, end)
+    });
+    let takes = running.map_or(moves, |(_, waits, _)| k.wire("takes", moves & !waits.any()));
+    let offered = running.map_or(offered, |(_, waits, _)| offered & !waits.any());
+    k.wire("s_axis_tready", takes & !rst);
     k.wire("m_axis_tvalid", valids.top());
     k.wire("m_axis_tlast", lasts.top());
 
-    let difference = k.wire("difference", *code - entry.low(bits).signed());
-    let result = match gain {
-        None => difference,
-        Some(_) => {
+    let difference = match &entry {
+        None => *code,
+        Some((entry, _)) => k.wire("difference", *code - entry.low(bits).signed()),
+    };
+    let of_entry = |(entry, _): &(Net<'k>, MemoryPort<'k>)| entry.slice(bits, gain_bits).signed();
+    let factor = gain.and(entry.as_ref()).map(of_entry);
+    let followed = running.map(|(zero, waits, end)| {
+        let early = k.wire("early", tlast & !end);
+        k.when(moves, || waits.set(waits.low(RECOVERY - 1).concat(offered & early)));
+        let (taxel, off, gain, valid) = (*taxel, difference, factor, valids.at(2));
+        follow(k, zero, taxels, Beat { rst, moves, offered, taxel, end, early, off, gain, valid })
+    });
+    let (difference, factor, limited) = match followed {
+        None => (difference, factor, None),
+        Some(Followed { difference, gain, limited }) => (difference, gain, Some(limited)),
+    };
+    let (result, limited) = match factor {
+        None => (difference, limited),
+        Some(factor) => {
             let held = k.register("held", difference.ty());
             let held_gain = k.register("held_gain", Type::signed(gain_bits));
             let dropped = GAIN_FRACTION as usize - 1;
             let product = k.register("product", Type::signed(difference.bits() + gain_bits - dropped));
             k.when(moves, || {
                 held.set(difference);
-                held_gain.set(entry.slice(bits, gain_bits).signed());
+                held_gain.set(factor);
                 product.set((*held * *held_gain).shift_right(dropped));
             });
-            k.wire("rounded", product.round_shift(1))
+            let limited = limited.map(|limited| {
+                let limits = k.register("limits", Type::unsigned(2));
+                k.when(moves, || limits.set(limits.low(1).concat(limited)));
+                limits.top()
+            });
+            (k.wire("rounded", product.round_shift(1)), limited)
         }
     };
     let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
     let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
     let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
-    let stress = k.register("m_axis_tdata", Type::unsigned(bits));
+    let stress = k.register("m_axis_tdata", Type::unsigned(bits + usize::from(limited.is_some())));
     k.when(moves, || {
         valids.set(valids.low(steps - 1).concat(offered));
         let after = tlast | taxel.is(taxels as u64 - 1);
         k.when(offered, || taxel.set(after.mux(k.constant(taxel.bits(), 0), taxel.plus(1))));
         lasts.set(lasts.low(steps - 1).concat(tlast));
-        entry.set(entries.read(*taxel));
+        if let Some((entry, entries)) = &entry {
+            entry.set(entries.read(*taxel));
+        }
         code.set(data.signed());
         let calibrated = clipped.mux(limit, result.low(bits));
-        let whole = |[.., incomplete]: [Expr<'k>; 4]| incomplete.mux(k.constant(bits, 0), calibrated);
+        let calibrated = limited.map_or(calibrated, |limited| limited.concat(calibrated));
+        let whole = |[.., incomplete]: [Expr<'k>; 4]| incomplete.mux(k.constant(calibrated.bits(), 0), calibrated);
         stress.set(written.map_or(calibrated, whole));
     });
 }
@@ -202,11 +255,53 @@ pub(crate) mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
+    /// Drifts and steps of the taxels, and what the frames so far have told.
+    struct Drift {
+        zero: RunningZero,
+        moved: Vec<i64>,
+        steps: Vec<i64>,
+        rests: bool,
+        pressed: bool,
+        /// A zero at its limit: in this frame, in the one before.
+        limited: [bool; 2],
+    }
+
+    impl Drift {
+        fn new(zero: &RunningZero, taxels: usize) -> Self {
+            let [moved, steps] = [(); 2].map(|()| vec![0; taxels]);
+            Drift { zero: zero.clone(), moved, steps, rests: false, pressed: false, limited: [false; 2] }
+        }
+
+        /// What is left of a difference, the last one of its frame or not, and what goes with it.
+        fn follow(&mut self, taxel: usize, off: i64, gain: Option<i64>, [end, early]: [bool; 2]) -> (i64, bool) {
+            let (limit, unit) = (i64::from(self.zero.limit), 1 << self.zero.average);
+            let step = if self.rests { self.steps[taxel] } else { 0 };
+            let moved = (self.moved[taxel] + step).min(limit * unit).max(-limit * unit);
+            let rest = off - (2 * moved + unit).div_euclid(2 * unit);
+            let dead = self.zero.dead.contains(&taxel) || gain == Some(0);
+            let load = |off: i64| if gain.is_some_and(|gain| gain < 0) { -off } else { off };
+            self.moved[taxel] = moved;
+            self.steps[taxel] = if dead { 0 } else { rest.min(limit).max(-limit) };
+            self.pressed |= !dead && load(off) > limit && load(rest) > limit;
+            self.limited[0] |= moved.abs() == limit * unit;
+            let told = self.limited[1];
+            if end || early {
+                self.rests = end && !self.pressed;
+                self.limited = [false, if end { self.limited[0] } else { told }];
+                self.pressed = false;
+            }
+            (rest, told)
+        }
+    }
+
     /// The arithmetic in integers, and the beats in the block.
     pub(crate) struct Table {
         bits: usize,
         zero: Vec<i32>,
         gain: Option<Vec<i32>>,
+        drift: Option<Drift>,
+        /// Cycles in which no beat is taken.
+        waits: usize,
         taxel: usize,
         pipe: VecDeque<Option<(i64, bool)>>,
         reset: bool,
@@ -217,7 +312,13 @@ pub(crate) mod tests {
         pub(crate) fn new(zero: &[i32], gain: Option<&[i32]>, bits: usize) -> Self {
             let pipe = vec![None; if gain.is_some() { 4 } else { 2 }].into();
             let (zero, gain) = (zero.to_vec(), gain.map(<[i32]>::to_vec));
-            Table { bits, zero, gain, taxel: 0, pipe, reset: false }
+            Table { bits, zero, gain, drift: None, waits: 0, taxel: 0, pipe, reset: false }
+        }
+
+        /// With zeros that run.
+        fn running(self, zero: &RunningZero) -> Self {
+            let pipe = [vec![None; 2], self.pipe.into()].concat().into();
+            Table { drift: Some(Drift::new(zero, self.zero.len())), pipe, ..self }
         }
     }
 
@@ -227,29 +328,43 @@ pub(crate) mod tests {
             let leaving = self.pipe[0];
             let bit = |bit: bool| self.reset.then(|| Word::from(bit));
             vec![
-                bit((leaving.is_none() || ready) && !rst),
+                bit((leaving.is_none() || ready) && !rst && self.waits == 0),
                 bit(leaving.is_some()),
                 leaving.map(|(_, last)| Word::from(last)),
-                leaving.map(|(stress, _)| Word::of_fields(&[stress], self.bits)),
+                leaving.map(|(stress, _)| Word::of_fields(&[stress], self.bits + usize::from(self.drift.is_some()))),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             let [rst, valid, last, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            let before = self.taxel;
             if self.pipe[0].is_none() || ready {
-                let taken = valid.then(|| {
+                let taken = (valid && self.waits == 0).then(|| {
                     let difference = inputs[1].signed(0, self.bits) - i64::from(self.zero[self.taxel]);
                     let gain = self.gain.as_ref().map(|gain| i64::from(gain[self.taxel]));
+                    let end = self.taxel + 1 == self.zero.len();
+                    let followed = self
+                        .drift
+                        .as_mut()
+                        .map(|drift| drift.follow(self.taxel, difference, gain, [end, last && !end]));
+                    let (difference, limited) = followed.unwrap_or((difference, false));
                     let stress = gain.map_or(difference, |gain| round_shift(difference * gain, GAIN_FRACTION));
-                    self.taxel = if last || self.taxel + 1 == self.zero.len() { 0 } else { self.taxel + 1 };
-                    (saturate(stress, self.bits as u32).0, last)
+                    self.taxel = if last || end { 0 } else { self.taxel + 1 };
+                    let stress = saturate(stress, self.bits as u32).0;
+                    // The bit above an unsigned word.
+                    let above = i64::from(limited) << self.bits;
+                    (if self.drift.is_some() { above | (stress & ((1 << self.bits) - 1)) } else { stress }, last)
                 });
+                let early =
+                    last && taken.is_some() && self.drift.is_some() && self.taxel == 0 && before + 1 < self.zero.len();
+                self.waits = if early { 3 } else { self.waits.saturating_sub(1) };
                 self.pipe.push_back(taken);
                 self.pipe.pop_front();
             }
             if rst {
                 self.pipe.iter_mut().for_each(|beat| *beat = None);
-                (self.taxel, self.reset) = (0, true);
+                self.drift = self.drift.take().map(|drift| Drift::new(&drift.zero, self.zero.len()));
+                (self.taxel, self.waits, self.reset) = (0, 0, true);
             }
         }
     }
@@ -271,7 +386,7 @@ pub(crate) mod tests {
             })
             .collect();
         for gain in [None, Some(&gain[..])] {
-            let block = Calibrate::of(Some(&zero), gain, TAXELS, BITS, false);
+            let block = Calibrate::of([Some(&zero), gain], None, TAXELS, BITS, false);
             check(block.kernel.kernel(), &stimulus, &mut Table::new(&zero, gain, BITS));
         }
         // What is written during a reset is used from then on.
@@ -283,11 +398,63 @@ pub(crate) mod tests {
             [&[Word::from(true)], &rest[..], &write].concat()
         });
         let written: Vec<Vec<Word>> = writes.chain(stimulus).collect();
-        let block = Calibrate::of(Some(&[0; TAXELS]), Some(&[0; TAXELS]), TAXELS, BITS, true);
+        let block = Calibrate::of([Some(&[0; TAXELS]); 2], None, TAXELS, BITS, true);
         check(block.kernel.kernel(), &written, &mut Table::new(&zero, Some(&gain), BITS));
         // Until the table is whole every stress is 0.
         let mut incomplete = written.clone();
         incomplete.iter_mut().for_each(|inputs| inputs[8] = true.into());
         check(block.kernel.kernel(), &incomplete, &mut Table::new(&zero, Some(&[0; TAXELS]), BITS));
+    }
+
+    /// Codes that drift, presses, stalls, resets, early and missing `tlast`; of the fewest taxels too, back to back.
+    #[test]
+    fn zeros_follow_the_codes_of_frames_without_a_press() {
+        const BITS: usize = 9;
+        for (taxels, [with_zero, with_gain], dead) in [
+            (4, [true, false], vec![]),
+            (4, [true, true], vec![]),
+            (7, [true, true], vec![2, 5]),
+            (6, [false, false], vec![1]),
+        ] {
+            let mut random = fastrand::Rng::with_seed(11);
+            let zero: Vec<i32> = (0..taxels).map(|_| if with_zero { random.i32(-60..60) } else { 0 }).collect();
+            let gain: Vec<i32> = (0..taxels).map(|taxel| [1 << 16, -(1 << 16), 0, 40_000][taxel % 4]).collect();
+            let gain = with_gain.then_some(&gain[..]);
+            let running = RunningZero { average: 3, limit: 20, dead };
+            let (mut taxel, mut level, mut frames) = (0, 0, [0; 3]);
+            let mut reference = Table::new(&zero, gain, BITS).running(&running);
+            let stimulus: Vec<Vec<Word>> = (0..9000)
+                .map(|cycle| {
+                    let rst = cycle < 2 || random.u16(..1500) == 0;
+                    // Half of the time at full speed.
+                    let stalls = cycle / 500 % 2 == 0;
+                    let [offered, ready] = [(); 2].map(|()| !stalls || random.u8(..8) > 0);
+                    let last = if random.u8(..60) == 0 { random.bool() } else { taxel + 1 == taxels };
+                    if taxel == 0 {
+                        // Frames at rest, pressed, pulled; the level changes slowly.
+                        level = [0, 0, 0, 120, -100][random.usize(..5)] * i32::from(random.bool());
+                    }
+                    let drift = (cycle as i32 / 300 * 7 + taxel as i32 * 5) % 55 - 27;
+                    let code = (zero[taxel] + drift + level + random.i32(-2..=2)).clamp(-256, 255);
+                    let data = Word::of_fields(&[code.into()], BITS);
+                    let beat = vec![rst.into(), data, offered.into(), last.into(), ready.into()];
+                    let inputs = [beat, vec![Word::default(); 4]].concat();
+                    let accepts = reference.outputs(&inputs)[0] == Some(true.into());
+                    reference.clock(&inputs);
+                    taxel = reference.taxel;
+                    if let Some(drift) = reference.drift.as_ref().filter(|_| accepts && offered && taxel == 0) {
+                        frames[0] += usize::from(drift.rests);
+                        frames[1] += usize::from(!drift.rests);
+                        frames[2] += usize::from(drift.limited[1]);
+                    }
+                    inputs
+                })
+                .collect();
+            assert!(frames.iter().all(|count| *count > 50), "{frames:?}");
+            let stored = with_zero.then_some(&zero[..]);
+            let block = Calibrate::of([stored, gain], Some(&running), taxels, BITS, false);
+            let table = Table::new(&zero, gain, BITS).running(&running);
+            check(block.kernel.kernel(), &stimulus, &mut { table });
+        }
     }
 }

@@ -6,4 +6,5 @@ pub(crate) mod calibrate;
 pub(crate) mod frame_stats;
 pub(crate) mod input_mask;
 pub(crate) mod load;
+mod running_zero;
 pub(crate) mod sliding_mean;

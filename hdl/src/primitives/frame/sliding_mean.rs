@@ -20,12 +20,13 @@ pub fn frames_bits(power: u32) -> usize {
     power as usize + 1
 }
 
-/// For words of `bits` bits of `taxels` taxels, at least three; the last gain is 2^−`power`.
-pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
+/// For words of `bits` bits of `taxels` taxels, at least three; the last gain is 2^−`power`. With the bit `limited` above a
+/// word, which leaves above the number of frames.
+pub fn kernel(taxels: usize, bits: usize, power: u32, limited: bool) -> Kernel {
     let k = Builder::new("average");
     let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power as usize);
     let (shift, count) = (Type::unsigned(count_bits(power as usize + 1)), Type::unsigned(frames_bits(power)));
-    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits + usize::from(limited)));
     let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
     let means = k.memory("means", taxels, wide, Contents::Undefined).holds(Holds::Average);
     k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
@@ -40,8 +41,9 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
     let held_odd = k.register("held_odd", bit);
     let [held_last, added_last, last_out] =
         ["held_last", "added_last", "m_axis_tlast"].map(|name| k.register(name, bit));
+    let marks = Type::unsigned(count.bits + usize::from(limited));
     let [held_frames, added_frames, frames] =
-        ["held_frames", "added_frames", "frames"].map(|name| k.register(name, count));
+        ["held_frames", "added_frames", "frames"].map(|name| k.register(name, marks));
     let (mean, mean_out) = (k.register("mean", Type::signed(wide)), k.register("m_axis_tdata", Type::unsigned(wide)));
     let moved = k.register("moved", Type::signed(wide + 2));
 
@@ -72,13 +74,13 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
             });
         });
         held.set(offered);
-        word.set(data.signed());
+        word.set(data.low(bits).signed());
         sofar.set(means.read(*taxel).signed());
         held_taxel.set(*taxel);
         held_gain.set(*gain);
         held_odd.set(*odd);
         held_last.set(tlast);
-        held_frames.set(next);
+        held_frames.set(if limited { data.top().concat(next) } else { next });
         added.set(*held);
         mean.set(stored);
         moved.set(difference.shift_right_by(*held_gain));

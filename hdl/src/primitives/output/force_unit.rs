@@ -5,7 +5,7 @@ use dermis_golden::fixed::stages::resultants::Summed;
 use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING, TABLES_VERSION};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES};
+use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT};
 use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
@@ -16,8 +16,8 @@ use crate::primitives::address::counter::count_bits;
 use crate::primitives::address::quad_address::lane_of;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
+use crate::primitives::frame::average::FrameMarks;
 use crate::primitives::frame::load::{THRESHOLD_BITS, VERSION_WORD_BITS};
-use crate::primitives::frame::sliding_mean::frames_bits;
 use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
 use crate::primitives::output::status_bits::status_bits;
 use crate::primitives::pass::raw_length::shift_bits;
@@ -75,7 +75,8 @@ pub struct ForceUnit {
     pub framing: Signal<In, Bit>,
     /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,
-    /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
+    /// Number of frames in a sliding mean, above it whether a running zero is at its limit, without both one bit, 0; valid with
+    /// `start`.
     pub frames: Wire<In>,
     /// Score of the best candidate, signed, 2^−6; valid with `start`.
     pub score: Wire<In>,
@@ -159,8 +160,8 @@ struct Shape {
     score_limit: Option<i64>,
     /// The scene has the coefficient check.
     checks: bool,
-    /// Bits of the number of frames in a sliding mean; `None` where the mean does not slide.
-    frames_bits: Option<usize>,
+    /// What goes with a frame.
+    marks: FrameMarks,
     /// Subarrays, or labels, and number of each case.
     counts: Vec<usize>,
     numbers: Vec<usize>,
@@ -198,7 +199,7 @@ impl ForceUnit {
             threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
             score_limit: model.score_limit.map(i64::from),
             checks: model.has_coefficient_check(),
-            frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
+            marks: FrameMarks::new(model),
             counts: model.cases().iter().map(|case| parts(model, case)).collect(),
             contacts: f.by_contact(),
             tells_labels: model.summed() == Some(Summed::Label),
@@ -225,7 +226,7 @@ impl ForceUnit {
             found: Default::default(),
             framing: Default::default(),
             damaged: Wire::new(1),
-            frames: Wire::new(shape.frames_bits.unwrap_or(1)),
+            frames: Wire::new(shape.marks.bits()),
             score: Wire::new(shape.score_bits),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
@@ -313,7 +314,7 @@ impl Shape {
         let rescale = k.input("rescale", self.rescale_bits);
         let (condition, found) = (k.input("condition", 1), k.input("found", 1));
         let (framing, damaged) = (k.input("framing", 1), k.input("damaged", 1));
-        let frames = k.input("frames", self.frames_bits.unwrap_or(1));
+        let frames = k.input("frames", self.marks.bits());
         let score = k.input("score", self.score_bits).signed();
         let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
         let (labels, overflow) = (k.input("labels", Quads::LANES * self.label_bits()), k.input("overflow", 1));
@@ -411,11 +412,21 @@ impl Shape {
                 more.concat(low).concat(case(SCORE_LOW.low))
             }
         };
-        let case = match self.frames_bits {
-            None => between(FORCE_BITS),
-            Some(_) => {
-                let frames = kept.status("frames_held", frames).extend(WORD - FRAMES.low as usize);
-                frames.concat(between(FRAMES.low))
+        let FrameMarks { frames_bits, limited } = self.marks;
+        let case = match self.marks == FrameMarks::default() {
+            true => between(FORCE_BITS),
+            false => {
+                let marks = kept.status("frames_held", frames);
+                let low = match limited {
+                    false => between(FRAMES.low),
+                    true => {
+                        let limited = marks.top().shift_left((ZERO_LIMIT.low - CASE.low) as usize);
+                        between(FRAMES.low) | limited.extend((FRAMES.low - CASE.low) as usize)
+                    }
+                };
+                let none = k.constant(WORD - FRAMES.low as usize, 0);
+                let frames = if frames_bits > 0 { marks.low(frames_bits).extend(none.bits()) } else { none };
+                frames.concat(low)
             }
         };
         let mut bits = Vec::new();

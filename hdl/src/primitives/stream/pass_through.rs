@@ -5,13 +5,19 @@ use crate::language::Builder;
 /// A kernel of `block` that connects `m_axis` to `s_axis`, of `bits` bits each; `why` is a comment that says what is
 /// omitted, on one line.
 pub fn wires(block: &str, bits: usize, why: &str) -> Builder {
+    low_wires(block, [bits; 2], why)
+}
+
+/// The same where `m_axis` takes but the low bits: bits of `s_axis` and `m_axis`.
+pub fn low_wires(block: &str, [bits, low]: [usize; 2], why: &str) -> Builder {
     let k = Builder::new(block);
     k.comment(why);
     k.input("rst", 1);
-    let streams = [("s_axis_tdata", "m_axis_tdata", bits), ("s_axis_tvalid", "m_axis_tvalid", 1)];
-    let handshake = [("s_axis_tlast", "m_axis_tlast", 1), ("m_axis_tready", "s_axis_tready", 1)];
-    for (from, to, bits) in streams.into_iter().chain(handshake) {
-        k.wire(to, k.input(from, bits));
+    k.wire("m_axis_tdata", k.input("s_axis_tdata", bits).low(low));
+    let handshake =
+        [("s_axis_tvalid", "m_axis_tvalid"), ("s_axis_tlast", "m_axis_tlast"), ("m_axis_tready", "s_axis_tready")];
+    for (from, to) in handshake {
+        k.wire(to, k.input(from, 1));
     }
     k
 }

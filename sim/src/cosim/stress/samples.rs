@@ -8,7 +8,7 @@ use dermis_golden::fixed::{Cycles, Model};
 /// Largest number of shipped frames used.
 const SHIPPED: usize = 4;
 
-/// The codes of one reconstruction and the bit-true model's results; with a sliding mean those of the first frame after a
+/// The codes of one reconstruction and the bit-true model's results; where these depend on frames before, those after a
 /// reset.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
@@ -31,10 +31,15 @@ impl Sample {
         Sample::after(model, codes, &mut model.prepare.empty())
     }
 
-    /// With the results of `codes` after the frames in a sliding mean, which are then in it too.
-    pub(crate) fn after(model: &Model, codes: Vec<i32>, mean: &mut Prepared) -> Sample {
-        model.add(mean, &codes);
-        let trace = model.run_prepared(mean);
+    /// With the results of `codes` after the frames of which `prepared` is; it is then of these too.
+    fn after(model: &Model, codes: Vec<i32>, prepared: &mut Prepared) -> Sample {
+        model.add(prepared, &codes);
+        Sample::of(model, codes, prepared)
+    }
+
+    /// With the results of `prepared`, which is of these codes and of those before.
+    pub(super) fn of(model: &Model, codes: Vec<i32>, prepared: &Prepared) -> Sample {
+        let trace = model.run_prepared(prepared);
         let forces = trace.beats.len();
         let beats = [trace.beats, trace.status].concat();
         Sample {
@@ -49,7 +54,7 @@ impl Sample {
 
     /// The same codes as the second reconstruction after a reset, behind `first`.
     pub(crate) fn behind(&self, model: &Model, first: &Sample) -> Sample {
-        match model.scene.input.slides() {
+        match model.scene.input.has_memory() {
             false => self.clone(),
             true => Sample::after(model, self.codes.clone(), &mut model.prepare.run(&first.codes)),
         }

@@ -2,7 +2,8 @@
 //!
 //! A frame is complete with its last taxel. An earlier `tlast` drops the frame's codes; a missing `tlast` on the last
 //! taxel changes nothing. Both set [`FRAMING`] in all subarrays of the next complete frame, which may be the same
-//! frame. A reset clears the flag. A sliding mean holds the complete frames since the last early `tlast` or reset.
+//! frame. A reset clears the flag. A sliding mean holds the complete frames since the last early `tlast` or reset; a running
+//! zero follows all since the last reset, as [`Prepare::cut`](dermis_golden::fixed::stages::prepare::Prepare::cut) says.
 //!
 //! With writable tables a beat may be a byte of an image; the model takes it as the hardware does.
 
@@ -38,8 +39,8 @@ pub(super) struct Scoreboard<'a> {
     /// With the tables that the hardware has.
     model: Cow<'a, Model>,
     samples: &'a [Sample],
-    /// The frames in a sliding mean.
-    mean: Prepared,
+    /// What the hardware has of the frames so far.
+    prepared: Prepared,
     /// Codes accepted of the current frame.
     accepted: usize,
     /// What has come of an image of tables.
@@ -57,7 +58,7 @@ impl<'a> Scoreboard<'a> {
         Scoreboard {
             model: Cow::Borrowed(model),
             samples,
-            mean: model.prepare.empty(),
+            prepared: model.prepare.empty(),
             intake: Intake::default(),
             accepted: 0,
             framing_error: false,
@@ -99,16 +100,21 @@ impl<'a> Scoreboard<'a> {
             self.outcome.wrong_tlast += 1;
             self.framing_error = true;
         }
+        let has_memory = self.model.scene.input.has_memory();
+        let frame = (self.accepted - 1) / taxels * taxels..self.accepted;
         if last && !at_end {
             self.outcome.cut += 1;
             self.accepted = 0;
-            self.mean = self.model.prepare.empty();
+            self.model.prepare.cut(&mut self.prepared, &codes[frame.clone()]);
+        }
+        if at_end && has_memory {
+            self.model.add(&mut self.prepared, &codes[frame]);
         }
         if at_end && self.accepted == codes.len() {
             self.outcome.frames_in += 1;
             let flagged = std::mem::take(&mut self.framing_error);
-            let sample = match self.model.scene.input.slides() {
-                true => Cow::Owned(Sample::after(&self.model, codes.clone(), &mut self.mean)),
+            let sample = match has_memory {
+                true => Cow::Owned(Sample::of(&self.model, codes.clone(), &self.prepared)),
                 false if self.model.has_writable_tables() => Cow::Owned(Sample::new(&self.model, codes.clone())),
                 false => Cow::Borrowed(&self.samples[sample]),
             };
@@ -139,7 +145,7 @@ impl<'a> Scoreboard<'a> {
         };
         *counts += 1;
         (self.accepted, self.framing_error) = (0, false);
-        self.mean = self.model.prepare.empty();
+        self.prepared = self.model.prepare.empty();
     }
 
     /// Checks a delivered beat.
@@ -188,7 +194,7 @@ impl<'a> Scoreboard<'a> {
             self.count_image(outcome);
         }
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
-        self.mean = self.model.prepare.empty();
+        self.prepared = self.model.prepare.empty();
         self.pending.clear();
     }
 }

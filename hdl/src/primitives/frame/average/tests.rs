@@ -92,7 +92,7 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
             inputs
         })
         .collect();
-    let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block);
+    let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block, FrameMarks::default());
     check(average.kernel.kernel(), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
@@ -184,7 +184,8 @@ fn every_frame_gives_the_mean_so_far() {
             })
             .collect();
         assert!(most > 2 << power, "{most} frames");
-        let average = Average::new(TAXELS, BITS, power, MeanKind::Sliding);
+        let marks = FrameMarks { frames_bits: sliding_mean::frames_bits(power), limited: false };
+        let average = Average::new(TAXELS, BITS, power, MeanKind::Sliding, marks);
         check(average.kernel.kernel(), &stimulus, &mut Means::new(power));
     }
 }

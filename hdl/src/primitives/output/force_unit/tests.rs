@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use dermis_golden::fixed::stages::forces::{force, mu_word};
-use dermis_golden::result::flags::StatusField;
+use dermis_golden::result::flags::{StatusField, ZERO_LIMIT};
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
@@ -89,9 +89,17 @@ impl Requests {
             condition,
             found,
             damaged: damaged && self.model.has_coefficient_check(),
-            frames: if self.model.scene.input.slides() { inputs[18].number() as u32 } else { 0 },
+            frames: if self.model.scene.input.has_memory() { inputs[18].number() as u32 } else { 0 },
             saturations: inputs[20].number() as u32,
         };
+    }
+
+    /// The word of what goes with a frame: the number of frames, above it whether a zero is at its limit.
+    fn frames(&self, marks: u32) -> u32 {
+        let input = &self.model.scene.input;
+        let bits = if input.slides() { input.average + 1 } else { 0 };
+        let limited = if input.running_zero().is_some() { marks >> bits << ZERO_LIMIT.low } else { 0 };
+        limited | (marks & ((1 << bits) - 1)) << FRAMES.low
     }
 
     fn answer(&mut self, entry: Entry, inputs: &[Word]) -> [i32; 3] {
@@ -124,7 +132,7 @@ impl Requests {
                     | flag(self.model.has_writable_tables() && inputs[26].number() == 1, TABLES)
                     | flag(f.by_contact() && inputs[23].number() == 1, MORE_CONTACTS)
                     | number << CASE.low
-                    | part.frames << FRAMES.low;
+                    | self.frames(part.frames);
                 let position = if f.degree > 0 { part.position } else { [0; 2] };
                 [position[0], position[1], flags as i32]
             }
@@ -258,6 +266,10 @@ fn beats_are_those_of_the_model() {
     }
     let sliding = "[input]\naverage = 3\nmean = \"sliding\"\n";
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
+    let running = "zero = \"running\"\nfull_scale_MPa = 1.0\n";
+    for input in [format!("{sliding}{running}"), format!("[input]\n{running}")] {
+        is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{input}[partition]\nrows = 2\ncols = 1\n"), 1000);
+    }
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
     is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
     for more in ["", "[output]\nforces = \"resultants\"\n"] {
