@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::tare::require_readings;
 use dermis_golden::data::input::Input;
 use dermis_golden::engine::{Engine, EngineError, State};
 use dermis_golden::fixed::Model;
@@ -56,7 +57,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
             client.load(specimen, !identity.supports(Kind::FrameForResultants))?;
         }
         let model = specimen.unwrap_or(hardware);
-        let offset = tare.map(|tare| offset(model.input(), tare));
+        let offset = tare.map(|tare| offset(&model.scene, model.input(), tare)).transpose()?;
         Ok(Session { client, model, identity, offset, forces, check })
     }
 
@@ -162,8 +163,12 @@ impl<P: std::io::Read + std::io::Write> Engine for BoardEngine<P> {
 
 /// What to subtract from readings before a board subtracts the zero of its own `input`, so that `tare` is subtracted in
 /// total.
-fn offset(input: &Input, tare: &Frame) -> Vec<f64> {
-    less(tare, input.zero().unwrap_or_default()).stress_MPa
+///
+/// # Errors
+/// A tare frame that lacks the reading of a live taxel.
+fn offset(scene: &Scene, input: &Input, tare: &Frame) -> Result<Vec<f64>> {
+    require_readings(&tare.id, std::slice::from_ref(tare), scene)?;
+    Ok(less(tare, input.zero().unwrap_or_default()).stress_MPa)
 }
 
 /// The frame minus `offset`, an empty one being zero.
@@ -215,11 +220,15 @@ mod tests {
         std::fs::write(&path, own.to_json()).unwrap();
         let sent = |scene: &Scene| {
             let model = Model::new(scene).unwrap();
-            let sent = less(&pressed, &offset(&Input::new(scene).unwrap(), &later));
+            let sent = less(&pressed, &offset(scene, &Input::new(scene).unwrap(), &later).unwrap());
             model.stress(&[sent]).unwrap().stress_MPa
         };
         assert_eq!(sent(&scene), vec![0.25; 64]);
         (scene.input.tare, scene.input.full_scale_MPa) = (Some(path), Some(1.0));
         assert_eq!(sent(&scene), vec![0.25; 64]);
+        // A taxel without a reading has no zero.
+        let lacking = Frame { missing: vec![9], ..later.clone() };
+        let error = offset(&scene, &Input::new(&scene).unwrap(), &lacking).unwrap_err().to_string();
+        assert_eq!(error, "reads: no frame has a reading of row 1, column 1");
     }
 }

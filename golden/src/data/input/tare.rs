@@ -38,6 +38,18 @@ pub struct Tare {
     pub frames: usize,
 }
 
+/// Checks that each live taxel has a reading in some frame, without which it has no zero; `file` stands in the error.
+///
+/// # Errors
+/// [`FrameError::NeverRead`]
+pub fn require_readings(file: &str, frames: &[Frame], scene: &Scene) -> Result<(), FrameError> {
+    let (alive, cols) = (scene.input.alive(&scene.sensor), scene.sensor.cols);
+    match (0..alive.len()).find(|&k| alive[k] && frames.iter().all(|frame| frame.lacks(k))) {
+        Some(k) => Err(FrameError::NeverRead { file: file.to_string(), row: k / cols, col: k % cols }),
+        None => Ok(()),
+    }
+}
+
 impl Tare {
     /// Reads the frames of a file or folder, as [`Frame::load_all`] does.
     ///
@@ -46,11 +58,8 @@ impl Tare {
     pub fn load(path: &Path, scene: &Scene) -> Result<Tare, FrameError> {
         let frames = Frame::load_all(path, Some(scene))?;
         frames.iter().try_for_each(|frame| frame.check(scene))?;
-        let (alive, cols) = (scene.input.alive(&scene.sensor), scene.sensor.cols);
-        match (0..alive.len()).find(|&k| alive[k] && frames.iter().all(|frame| frame.lacks(k))) {
-            Some(k) => Err(FrameError::NeverRead { file: path.display().to_string(), row: k / cols, col: k % cols }),
-            None => Ok(Tare::of(&frames, scene)),
-        }
+        require_readings(&path.display().to_string(), &frames, scene)?;
+        Ok(Tare::of(&frames, scene))
     }
 
     /// Of frames of the scene's sensor, at least one.
