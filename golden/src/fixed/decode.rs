@@ -198,7 +198,7 @@ impl Model {
         let figures = result.figures(&self.scene, frame).with_readings(&self.input, newest);
         let checks = Checks { network_misfit, shear_spread, zero_share, ..figures };
         result.add_checks(&self.scene, checks);
-        result.add_missing(&self.scene, frame, readings);
+        result.add_missing(&self.scene, frame, newest);
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, &self.scene, frame, noise_MPa);
         }
