@@ -73,38 +73,33 @@ impl Evidence {
     /// The same without the readings of the taxels `missing`, row-major indices.
     pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> Estimate {
         let there: Vec<bool> = (0..b.len()).map(|t| self.alive[t] && !missing.contains(&t)).collect();
-        let peak = (0..b.len()).filter(|&t| there[t]).fold(0.0f64, |peak, t| b[t].max(peak));
-        if peak <= 0.0 || !peak.is_finite() {
+        let Some(unit) = peak(b, &there) else {
             let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
             return Estimate { forces_N, noise_MPa, ..Estimate::default() };
-        }
+        };
         // In units of the peak, so that no frame is too small or too large.
-        let scaled: Vec<f64> = b.iter().map(|b| b / peak).collect();
-        let Some((Fitted { mut estimate, worst, correlation, load, .. }, suspects)) =
-            suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / peak))
-        else {
+        let scaled: Vec<f64> = b.iter().map(|b| b / unit).collect();
+        let explained = |fitted: &Fitted| {
+            let normal: f64 = fitted.estimate.forces_N.fz.iter().sum();
+            normal.is_finite() && normal >= EXPLAINED * fitted.load
+        };
+        let Some(fitted) = suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / unit)).filter(explained) else {
             return self.without_fit(b, noise_MPa);
         };
-        let normal: f64 = estimate.forces_N.fz.iter().sum();
-        if !normal.is_finite() || normal < EXPLAINED * load {
-            return self.without_fit(b, noise_MPa);
-        }
-        estimate.noise_MPa = noise_MPa.unwrap_or(estimate.noise_MPa * peak);
-        let Forces { fx, fy, fz } = &mut estimate.forces_N;
-        [fx, fy, fz].into_iter().flatten().for_each(|force| *force *= peak);
-        for contact in &mut estimate.contacts {
-            contact.force_N.iter_mut().chain(&mut contact.sigma_N).for_each(|force| *force *= peak);
-        }
-        estimate.baseline_MPa *= peak;
-        estimate.suspects = suspects;
-        for own in &mut estimate.suspects {
-            (own.stress_MPa, own.expected_MPa) = (own.stress_MPa * peak, own.expected_MPa * peak);
-        }
-        Estimate { outlier: worst.map(|(_, size)| size), residual_correlation: Some(correlation), ..estimate }
+        let mut estimate = fitted.estimate;
+        estimate.scale(unit);
+        estimate.noise_MPa = noise_MPa.unwrap_or(estimate.noise_MPa);
+        estimate
     }
 
     /// What stress `b` in MPa says without a fit: Σ b·area.
     pub fn without_fit(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
         failed::estimate(self, b, noise_MPa)
     }
+}
+
+/// The largest of the readings `b` that are `used`; `None` without one above 0 that is finite.
+fn peak(b: &[f64], used: &[bool]) -> Option<f64> {
+    let peak = b.iter().zip(used).filter(|(_, used)| **used).fold(0.0f64, |peak, (b, _)| b.max(peak));
+    (peak > 0.0 && peak.is_finite()).then_some(peak)
 }

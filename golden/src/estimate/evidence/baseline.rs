@@ -7,14 +7,16 @@
 //! ```
 //!
 //! S holds one size for the offset, one for the slopes, one for the bends, and each is the one that makes the stress most
-//! probable (MacKay 1992): with v the posterior variances of its coefficients,
+//! probable. With c and v the posterior means and variances of its coefficients, the stress alone says c/(1 − v) with the variance
+//! v/(1 − v), so that (Tipping and Faul 2003)
 //!
 //! ```text
-//! size² ← size² Σ c² / Σ (1 − v)
+//! size² ← size² mean((c²/(1 − v) − v)/(1 − v))        z² = mean(c²/(v (1 − v)))
 //! ```
 //!
-//! A term that the frame does not need gets a size of nearly 0 and costs nothing; one that it needs makes the standard
-//! deviations grow as far as the unloaded taxels leave it unknown. A baseline is small: [`LARGEST`] of the peak, so that an
+//! Where z² is at most [`NEEDED`], the size is [`LEAST`]: noise alone gives every frame some offset and slope, and one that were
+//! free to follow it would make the shear up to 1.2 times as uncertain. So a term that the frame does not need costs nothing; one
+//! that it needs makes the standard deviations grow as far as the unloaded taxels leave it unknown. A baseline is small: [`LARGEST`] of the peak, so that an
 //! even pressure on the whole array is no offset.
 //!
 //! The rounds begin with the plane through the half of the taxels that lies closest to one (least trimmed squares,
@@ -35,7 +37,10 @@ const GROUPS: [usize; TERMS] = [0, 1, 1, 2, 2, 2];
 pub(super) const TERMS: usize = 6;
 /// Terms of the first plane.
 const PLANE: usize = 3;
-/// Smallest size, of the peak: it has no effect, and grows from there within a few rounds if the frame needs it.
+/// z² above which a baseline is no noise. With 4 the medians are the same, but what noise alone leaves of neighbours is alike
+/// more often.
+const NEEDED: f64 = 3.0;
+/// Smallest size, of the peak: it has no effect.
 const LEAST: f64 = 1e-5;
 /// Largest size, of the peak.
 pub(super) const LARGEST: f64 = 0.05;
@@ -69,14 +74,16 @@ impl Sizes {
 
     /// The sizes that make the stress most probable, from means and variances of the coefficients c.
     pub fn found(self, posterior: [[f64; 2]; TERMS]) -> Sizes {
-        let (mut square, mut known) = ([0.0; 3], [0.0; 3]);
+        let (mut size, mut z, mut terms) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         for (&group, [mean, variance]) in GROUPS.iter().zip(posterior) {
-            square[group] += mean * mean;
-            known[group] += 1.0 - variance;
+            let free = (1.0 - variance).max(f64::EPSILON);
+            size[group] += (mean * mean / free - variance) / free;
+            z[group] += mean * mean / (variance * free);
+            terms[group] += 1.0;
         }
-        let next = |group: usize| {
-            let ratio = if known[group] > 0.0 { square[group] / known[group] } else { 1.0 };
-            (self.0[group] * ratio.sqrt()).clamp(LEAST, LARGEST)
+        let next = |group: usize| match z[group] > NEEDED * terms[group] {
+            true => (self.0[group] * (size[group] / terms[group]).max(0.0).sqrt()).clamp(LEAST, LARGEST),
+            false => LEAST,
         };
         Sizes([0, 1, 2].map(next))
     }

@@ -32,6 +32,17 @@ pub struct Estimate {
     pub residual_correlation: Option<f64>,
 }
 
+impl Estimate {
+    /// Makes it that of readings `unit` times as large.
+    pub(super) fn scale(&mut self, unit: f64) {
+        let Forces { fx, fy, fz } = &mut self.forces_N;
+        let of_contacts = self.contacts.iter_mut().flat_map(|own| own.force_N.iter_mut().chain(&mut own.sigma_N));
+        let of_suspects = self.suspects.iter_mut().flat_map(|own| [&mut own.stress_MPa, &mut own.expected_MPa]);
+        let all = [fx, fy, fz].into_iter().flatten().chain(of_contacts).chain(of_suspects);
+        all.chain([&mut self.noise_MPa, &mut self.baseline_MPa]).for_each(|value| *value *= unit);
+    }
+}
+
 impl SuspectTaxel {
     /// The taxel with this row-major index.
     pub(super) fn new(sensor: &Sensor, taxel: usize, stress_MPa: f64, expected_MPa: f64) -> SuspectTaxel {

@@ -17,7 +17,7 @@ use super::envelope::{envelope, from_stress};
 use super::estimate::Estimate;
 use super::estimator::Evidence;
 use super::model::{Design, Products, Readings};
-use super::prior::factor;
+use super::prior::{factor, remainder};
 use super::residual::Residual;
 use super::{clipped, noise};
 use crate::data::frame::Forces;
@@ -32,7 +32,7 @@ const FLOOR: f64 = 1e-4;
 /// Largest first noise where it is not known.
 const UNKNOWN: f64 = 0.02;
 /// Largest number of rounds.
-const ROUNDS: usize = 16;
+const ROUNDS: usize = 8;
 /// Smallest number of rounds: the envelope has left the first, too wide one.
 const LEAST_ROUNDS: usize = 4;
 /// Square of the distance of two μ, in standard deviations, below which contacts that touch are one: the 95 % quantile
@@ -47,14 +47,17 @@ const PASSES: usize = 2;
 /// Steps of the ascent.
 const STEPS: usize = 4;
 /// Largest variance of a pressure, in units of its own, that may be left out because there are more coefficients than
-/// readings: with more the shear counts as not known.
-const WIDE: f64 = 0.01;
+/// readings: with more the shear counts as not known. On drawn contacts of up to 0.7 of a 6 × 6 or 8 × 8 array, which leave up to
+/// 0.09, the errors are those of smaller ones.
+const WIDE: f64 = 0.1;
 /// Coefficients of a contact beside which larger ones take none.
 const LEAST_RANK: usize = 8;
 /// Steps with the noise, baseline and clipped readings of a pass: the next round goes on from there.
 const PASS_STEPS: usize = 1;
 /// Change of μ per round, in units of mu_max, below which the rounds end.
 const SETTLED: f64 = 1e-3;
+/// The same in standard deviations of μ.
+const SETTLED_SIGMA: f64 = 0.1;
 
 /// One frame.
 pub(super) struct Fit<'a> {
@@ -99,14 +102,12 @@ pub(super) struct Fitted {
     pub estimate: Estimate,
     /// The reading that the others explain least: taxel, and its distance in standard deviations.
     pub worst: Option<(usize, f64)>,
-    /// Correlation of what neighbours leave, in standard deviations.
-    pub correlation: f64,
-    /// Of each taxel that is not used: mean and variance of its stress.
-    pub predicted: Vec<(usize, [f64; 2])>,
+    /// The stress on each taxel that is not used.
+    pub predicted: Vec<(usize, f64)>,
     /// Σ b·area that no baseline explains, of the readings that count.
     pub load: f64,
-    /// Root mean square of what is left of a reading.
-    pub left: f64,
+    /// Log evidence of the readings that count, without the constant.
+    pub evidence: f64,
     /// Whether a pressure has more coefficients than the readings can tell.
     pub wide: bool,
 }
@@ -191,8 +192,9 @@ impl<'a> Fit<'a> {
             self.p = regions.pressure(&top.posterior.w, self.p.len());
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
             let most = before.iter().zip(&self.mu).map(moved).fold(0.0, f64::max);
-            let settled = most <= SETTLED * self.scene.prior.mu_max && before.len() == self.mu.len();
-            if round == ROUNDS {
+            let settled = before.len() == self.mu.len() && most <= self.settled(&top);
+            // Where the shear stays open, the regions are all that the rounds have to find.
+            if round == ROUNDS || (regions.wide && round >= SEGMENTED) {
                 break (regions, top);
             }
             if round >= LEAST_ROUNDS {
@@ -219,6 +221,13 @@ impl<'a> Fit<'a> {
             found = self.advised(adviser, found)?;
         }
         self.estimate(&found, round)
+    }
+
+    /// Change of μ per round below which the rounds end.
+    fn settled(&self, top: &Top) -> f64 {
+        let least = SETTLED * self.scene.prior.mu_max;
+        let spread = |all: Mat<f64>| (0..all.nrows()).map(|i| all[(i, i)].sqrt()).fold(f64::INFINITY, f64::min);
+        self.scene.prior.covariance(&top.slope).map_or(least, |all| least.max(SETTLED_SIGMA * spread(all)))
     }
 
     /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
@@ -288,10 +297,11 @@ impl<'a> Fit<'a> {
             let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
             of_contact.push((own, on_own));
         }
+        let remainder = remainder(self.sigma);
         let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
         let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
             let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
-            let (factor, rest) = factor(cells, own, on_own, length, most);
+            let (factor, rest) = factor(cells, own, on_own, length, remainder, most);
             (rest > WIDE, factor)
         };
         let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
@@ -445,17 +455,22 @@ impl<'a> Fit<'a> {
         let residual = Residual::new(&self.readings, |k| self.counts(k), &stress);
         let least = if self.stated { 1.0 } else { FLOOR / self.sigma };
         let baseline = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
-        let counted = || (0..self.taxels.len()).filter(|&k| self.counts(k));
-        let load = counted().map(|k| self.b[self.taxels[k]] - baseline(k)).sum::<f64>();
-        let square = counted().map(|k| baseline(k).powi(2)).sum::<f64>() / (counted().count().max(1) as f64);
+        let counted: Vec<usize> = (0..self.taxels.len()).filter(|&k| self.counts(k)).collect();
+        let load = counted.iter().map(|&k| self.b[self.taxels[k]] - baseline(k)).sum::<f64>();
+        let square = counted.iter().map(|&k| baseline(k).powi(2)).sum::<f64>() / (counted.len().max(1) as f64);
+        let worst = residual.worst(least).map(|(k, size)| (self.taxels[k], size));
         Fitted {
-            worst: residual.worst(least).map(|(k, size)| (self.taxels[k], size)),
-            correlation: residual.correlation(sensor, &self.taxels),
-            predicted: self.missing.iter().map(|&k| (self.taxels[k], stress[k])).collect(),
-            left: self.sigma * residual.left(),
+            worst,
+            predicted: self.missing.iter().map(|&k| (self.taxels[k], stress[k][0])).collect(),
+            evidence: top.posterior.value,
             wide: regions.wide,
             load: load * sensor.pitch_x_mm * sensor.pitch_y_mm,
-            estimate: Estimate { baseline_MPa: square.sqrt(), ..estimate },
+            estimate: Estimate {
+                baseline_MPa: square.sqrt(),
+                outlier: worst.map(|(_, size)| size),
+                residual_correlation: Some(residual.correlation(sensor, &self.taxels)),
+                ..estimate
+            },
         }
     }
 }

@@ -59,11 +59,6 @@ impl Residual {
         Some((k, size / others.max(least)))
     }
 
-    /// Root mean square of what is left, over the noise that the precisions assume.
-    pub fn left(&self) -> f64 {
-        (self.square / self.freedom.max(1.0)).sqrt()
-    }
-
     /// C over the neighbours among the readings of `taxels`.
     pub fn correlation(&self, sensor: &Sensor, taxels: &[usize]) -> f64 {
         let mut of_taxel = vec![None; sensor.taxels()];

@@ -208,7 +208,8 @@ fn stuck_taxels_are_named() {
     let scene = scene("sensor-1");
     let evidence = Evidence::new(&scene);
     let draws = Draws::new(&scene, DrawOptions { seed: 12, ..Default::default() }).unwrap();
-    for (number, taxel, share) in [(0, 33, 1.0), (1, 9, 0.3), (2, 90, -0.2), (3, 71, 0.3)] {
+    // The last one reads far more than the press: what it leaves is fitted in its own units.
+    for (number, taxel, share) in [(0, 33, 1.0), (1, 9, 0.3), (2, 90, -0.2), (3, 71, 0.3), (4, 28, 30.0)] {
         let drawn = draws.frame(number).unwrap();
         let mut b = drawn.exact_MPa.clone();
         b[taxel] = share * drawn.peak_MPa();
