@@ -83,7 +83,8 @@ impl Evidence {
             let normal: f64 = fitted.estimate.forces_N.fz.iter().sum();
             normal.is_finite() && normal >= EXPLAINED * fitted.load
         };
-        let Some(fitted) = suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / unit)).filter(explained) else {
+        let Some(fitted) = suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / unit)).filter(explained)
+        else {
             return self.without_fit(b, noise_MPa);
         };
         let mut estimate = fitted.estimate;
