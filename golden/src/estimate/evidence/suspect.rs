@@ -33,7 +33,7 @@ pub(super) const MOST: usize = 3;
 /// Largest number of fits of a frame.
 const FITS: usize = 4;
 
-/// The fit of `b` on the taxels `there`, live and not missing, without its suspect taxels; `stated` is the noise, if it is known.
+/// The fit of `b` on the taxels `there`, live and not missing, but for its suspect ones; `stated` is the noise, if it is known.
 /// `None` if the model is not representable.
 pub(super) fn fit(scene: &Evidence, b: &[f64], there: &[bool], stated: Option<f64>) -> Option<Fitted> {
     let mut found = Fit::new(scene, b, there, stated).run();
