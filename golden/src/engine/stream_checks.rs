@@ -99,7 +99,7 @@ impl StreamChecks {
         let worker = check.as_ref().filter(|_| pace == CheckPace::Beside).map(|check| {
             let (worker, check) = (Arc::new(Worker::default()), Arc::clone(check));
             let own = Arc::clone(&worker);
-            // Not joined: the stream does not wait for a finding that nobody reads.
+            // Not joined: the stream does not wait for a finding after its end.
             std::thread::spawn(move || own.work(&check));
             worker
         });
