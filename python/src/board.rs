@@ -99,6 +99,7 @@ impl Board {
 #[pymethods]
 impl Board {
     #[new]
+    #[allow(clippy::too_many_arguments)]
     #[pyo3(signature = (port, scene, *, baud = None, timeout_s = 1.0, check = false, cross_check = None, tare = None))]
     fn new(
         py: Python<'_>,
