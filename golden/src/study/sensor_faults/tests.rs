@@ -210,7 +210,8 @@ fn rows_depend_on_the_seed_alone() {
 /// The small variant of the guide's table: one press, one size of each fault.
 #[test]
 fn silently_wrong_frames_are_no_more_than_measured() {
-    const MOST: [f64; ENGINES.len()] = [0.07, 0.07, 0.03, 0.02, 0.01, 0.01];
+    // One frame of 38, or none.
+    const MOST: [f64; ENGINES.len()] = [0.03, 0.03, 0.03, 0.01, 0.03, 0.01];
     let rows = rows(&SensorFaults { frames: 1, quick: true, ..Default::default() });
     let of = |path: usize, kinds: &[Kind]| {
         let own = rows.iter().filter(|row| kinds.contains(&row.kind)).map(|row| row.engines[path]);
