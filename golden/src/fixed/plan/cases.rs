@@ -136,6 +136,7 @@ fn of_shapes(
         }
         planned.push(CasePlan { case, parts: parts(case, &scene.sensor)?, formats, quantised, storage });
     }
+    let score_limit = score_limit(&scene)?;
     if let [only] = cases[..] {
         scene.partition.case = only;
     }
@@ -148,7 +149,7 @@ fn of_shapes(
         noise_floor,
         threshold,
         prepare,
-        score_limit: score_limit(&scene, &planned)?,
+        score_limit,
         tables_version: 0,
         tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
@@ -170,10 +171,11 @@ fn of_shapes(
 }
 
 /// The word of the least score, see [`Plan::score_limit`].
-fn score_limit(scene: &Scene, cases: &[CasePlan]) -> Result<Option<i32>, FixedError> {
-    let table = Deviations::of_scene(scene, scene.hardware_estimator())?;
-    let whole = cases.len() == 1 && cases[0].parts.len() == 1;
-    let least = table.and_then(|table| table.least_score).filter(|_| whole);
+fn score_limit(scene: &Scene) -> Result<Option<i32>, FixedError> {
+    if scene.partition.case != Case::WHOLE {
+        return Ok(None);
+    }
+    let least = Deviations::of_scene(scene, scene.hardware_estimator())?.and_then(|table| table.least_score);
     Ok(least.map(|bits| -(bits * f64::from(1u32 << LOG_FRACTION)) as i32))
 }
 
