@@ -1,5 +1,6 @@
-//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires. Where
-//! zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
+//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires.
+//!
+//! Where zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;

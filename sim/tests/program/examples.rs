@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 66] = [
+const NOT_RUN: [(&str, &str); 67] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis live sensor-1", PAGE),
@@ -38,6 +38,7 @@ const NOT_RUN: [(&str, &str); 66] = [
     ("dermis table --cosim", "make run"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
     ("dermis stability", "a minute; one of its groups is run with a picture, all in the guide"),
+    ("dermis check my-scene.toml --stream=/dev/ttyUSB0", "a device; stream.rs"),
     ("dermis check my-scene.toml", "a quarter of a minute; the same for sensor-1 is run"),
     ("dermis deviations my-scene.toml", "a minute; the same for eight-by-eight with fewer draws is run"),
     ("dermis deviations sensor-1 --check", "a quarter of a minute; guide.rs"),
