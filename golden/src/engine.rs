@@ -19,7 +19,7 @@ pub use cross_check::{CrossCheck, Finding};
 pub use stream_checks::{CheckPace, StreamChecks};
 
 use crate::data::frame::Frame;
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::data::input::Input;
 use crate::estimate::float::{Golden, GoldenError};
 use crate::fixed::stages::prepare::Prepared;

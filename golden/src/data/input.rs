@@ -22,6 +22,7 @@
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
+pub mod drift;
 pub mod known_loads;
 pub mod missing;
 pub mod running_zero;
@@ -34,8 +35,8 @@ use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::{InputSpec, Scene};
 use crate::spec::sliding;
 use calibration::{Calibration, CalibrationError};
+use drift::Drift;
 use missing::{mean_reading, readings};
-use running_zero::Drift;
 use std::borrow::Cow;
 use tare::Tare;
 use thiserror::Error;

@@ -18,7 +18,7 @@
 
 use super::Engine;
 use crate::data::frame::Frame;
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::estimate::float::Golden;
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;

@@ -11,7 +11,7 @@
 use super::cross_check::{CrossCheck, Finding};
 use super::{Engine, EngineError, State};
 use crate::data::frame::Frame;
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::result::checks::history::History;
 use crate::result::reconstruct::{Diagnostics, Reconstruction};
 use crate::spec::scene::Scene;

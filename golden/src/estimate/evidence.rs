@@ -73,7 +73,7 @@ impl Evidence {
     /// The same without the readings of the taxels `missing`, row-major indices.
     pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> Estimate {
         let there: Vec<bool> = (0..b.len()).map(|t| self.alive[t] && !missing.contains(&t)).collect();
-        let Some(unit) = peak(b, &there) else {
+        let Some(unit) = suspect::peak(b, &there) else {
             let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
             return Estimate { forces_N, noise_MPa, ..Estimate::default() };
         };
@@ -97,10 +97,4 @@ impl Evidence {
     pub fn without_fit(&self, b: &[f64], noise_MPa: Option<f64>) -> Estimate {
         failed::estimate(self, b, noise_MPa)
     }
-}
-
-/// The largest of the readings `b` that are `used`; `None` without one above 0 that is finite.
-fn peak(b: &[f64], used: &[bool]) -> Option<f64> {
-    let peak = b.iter().zip(used).filter(|(_, used)| **used).fold(0.0f64, |peak, (b, _)| b.max(peak));
-    (peak > 0.0 && peak.is_finite()).then_some(peak)
 }

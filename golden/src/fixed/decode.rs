@@ -14,7 +14,7 @@ use super::stages::prepare::Prepared;
 use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::estimate::float::objective::Estimate;
 use crate::result::checks::Checks;

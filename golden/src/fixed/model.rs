@@ -8,7 +8,7 @@ use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
 use crate::data::frame::Frame;
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::data::input::Input;
 use crate::data::quantise::{quantise, Codes};
 use crate::data::reception::full_scale;

@@ -77,8 +77,11 @@ impl NoiseArguments {
 
 /// The frame of a line, or why there is none.
 fn frame(bytes: &[u8], number: u64, scene: &Scene) -> Result<Frame, String> {
-    let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-    line::frame(text, number, &scene.sensor).map(|(_, frame)| frame).map_err(|none| none.reason)
+    let line = format!("line {number}: ");
+    let text = std::str::from_utf8(bytes).map_err(|error| format!("{line}{error}"))?;
+    // A frame of the wrong length names its line by itself.
+    let named = |reason: String| if reason.starts_with(&line) { reason } else { line.clone() + &reason };
+    line::frame(text, number, &scene.sensor).map(|(_, frame)| frame).map_err(|none| named(none.reason))
 }
 
 /// With the digits that are written.

@@ -18,7 +18,6 @@
 
 use super::estimator::Evidence;
 use super::fit::{Fit, Fitted};
-use super::peak;
 use crate::result::reconstruct::SuspectTaxel;
 
 /// Distance of a reading from its prediction, in standard deviations, from which a fit without it is made.
@@ -69,6 +68,12 @@ pub(super) fn fit(scene: &Evidence, b: &[f64], there: &[bool], stated: Option<f6
     let suspect = |&(taxel, mean): &(usize, f64)| SuspectTaxel::new(&scene.cells.sensor, taxel, b[taxel], mean);
     found.estimate.suspects = missing.map(suspect).collect();
     Some(found)
+}
+
+/// The largest of the readings `b` that are `used`; `None` without one above 0 that is finite.
+pub(super) fn peak(b: &[f64], used: &[bool]) -> Option<f64> {
+    let peak = b.iter().zip(used).filter(|(_, used)| **used).fold(0.0f64, |peak, (b, _)| b.max(peak));
+    (peak > 0.0 && peak.is_finite()).then_some(peak)
 }
 
 impl Fitted {

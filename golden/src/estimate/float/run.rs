@@ -15,7 +15,7 @@ use super::golden::Golden;
 use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};
 use crate::data::frame::Frame;
-use crate::data::input::running_zero::Drift;
+use crate::data::input::drift::Drift;
 use crate::physics::matrices::Matrices;
 use crate::result::checks::Checks;
 use crate::result::reconstruct::{Reconstruction, Unipolar};
