@@ -55,8 +55,7 @@ impl NoiseArguments {
             ensure!(read.is_some(), "{name}: ends after {} of {} frames (--frames)", frames.len(), self.frames);
             ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
             if !bytes.iter().all(u8::is_ascii_whitespace) {
-                frames
-                    .push(frame(&bytes, number, &scene).map_err(|reason| anyhow!("{name}: line {number}: {reason}"))?);
+                frames.push(frame(&bytes, number, &scene).map_err(|reason| anyhow!("{name}: {reason}"))?);
                 bar.set(frames.len() as u64);
             }
         }

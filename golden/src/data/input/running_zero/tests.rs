@@ -221,7 +221,7 @@ fn the_cross_check_has_the_drift_of_the_stream() {
     let mut scene = scene("");
     scene.search.mu_max = 0.3;
     let press = press(&scene);
-    let drift = |taxel: usize| if taxel % 2 == 0 { 0.9 * LIMIT } else { -0.9 * LIMIT };
+    let drift = |taxel: usize| if taxel.is_multiple_of(2) { 0.9 * LIMIT } else { -0.9 * LIMIT };
     let engine = Golden::reference(&scene).unwrap();
     let mut checks = StreamChecks::new(&engine, CheckPace::Every(200));
     let mut noise = |load: f64| {
