@@ -434,7 +434,7 @@ pub(crate) mod tests {
                         // Frames at rest, pressed, pulled; the level changes slowly.
                         level = [0, 0, 0, 120, -100][random.usize(..5)] * i32::from(random.bool());
                     }
-                    let drift = (cycle as i32 / 300 * 7 + taxel as i32 * 5) % 55 - 27;
+                    let drift = (cycle / 300 * 7 + taxel as i32 * 5) % 55 - 27;
                     let code = (zero[taxel] + drift + level + random.i32(-2..=2)).clamp(-256, 255);
                     let data = Word::of_fields(&[code.into()], BITS);
                     let beat = vec![rst.into(), data, offered.into(), last.into(), ready.into()];
