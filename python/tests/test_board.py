@@ -37,7 +37,7 @@ def test_a_board_answers_every_frame(port: str) -> None:
     def sensor() -> Iterator[np.ndarray]:
         yield from stress
 
-    with dermis.Board(port, scene, check=True, timeout_s=5) as board:
+    with dermis.Board(port, scene, check=True, cross_check=1, timeout_s=5) as board:
         answers = board.stream(sensor())
         assert iter(answers) is answers
         for frame, answer in zip(stress, answers, strict=True):

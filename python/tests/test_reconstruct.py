@@ -86,7 +86,8 @@ def test_what_an_engine_does_not_give_is_absent(tmp_path: Path) -> None:
     assert np.linalg.eigvalsh(contact.mu_covariance).min() > 0
     assert np.abs(contact.force_N - frame.resultant_N).max() < 5 * contact.sigma_N.max()
     assert np.linalg.norm(contact.centre_mm) < 1
-    assert fixed.contacts is None and "shear_spread" not in fixed.checks
+    alone = scene.reconstruct(frame, "fixed", cross_check=0)
+    assert fixed.contacts is None and "shear_spread" in fixed.checks and "shear_spread" not in alone.checks
     assert scene.reconstruct(frame.stress_MPa).error is None
     # Regions tell contacts apart, without standard deviations.
     text = "[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 2\npitch_y_mm = 4\nthickness_mm = 3\n"
