@@ -72,33 +72,45 @@ fn engines_with_evidence_have_no_cross_check() {
     assert!(CrossCheck::of(&Golden::with(&scene, EstimatorKind::Search).unwrap()).is_none());
 }
 
-/// The ages and flags of results 0 to 4 where only result 2 has a stuck taxel.
-fn ages(pace: CheckPace, wait: &dyn Fn()) -> Vec<(Option<u64>, bool)> {
+/// A stream of a search, and its frames without and with a stuck taxel.
+fn stream() -> (Golden, [Frame; 2]) {
     let scene = Scene::builtin("eight-by-eight").unwrap();
-    let engine = Golden::with(&scene, EstimatorKind::Search).unwrap();
-    let mut checks = StreamChecks::new(&engine, pace);
     let [exact, _, stuck] = frames(&scene, 1).remove(0);
-    let result = |number: usize| {
-        let frames = [if number == 2 { stuck.clone() } else { exact.clone() }];
-        let mut result = engine.reconstruct(&frames).unwrap();
-        checks.add(&frames, result.resultant_N, &mut result.diagnostics());
-        wait();
-        (result.checks.cross_check_age, result.flags.contains(&Flag::TaxelSuspect))
-    };
-    (0..5).map(result).collect()
+    (Golden::with(&scene, EstimatorKind::Search).unwrap(), [exact, stuck])
 }
 
+/// Age of the finding in the next result, of this frame, and whether it names a suspect taxel.
+fn next(checks: &mut StreamChecks, engine: &Golden, frame: &Frame) -> (Option<u64>, bool) {
+    let result = checks.next(engine, std::slice::from_ref(frame)).unwrap();
+    (result.checks.cross_check_age, result.flags.contains(&Flag::TaxelSuspect))
+}
+
+/// Of five results only the third has a stuck taxel.
 #[test]
 fn findings_of_a_stream_have_their_age() {
+    let (engine, [exact, stuck]) = stream();
+    let ages = |pace: CheckPace| -> Vec<(Option<u64>, bool)> {
+        let mut checks = StreamChecks::new(&engine, pace);
+        (0..5).map(|number| next(&mut checks, &engine, if number == 2 { &stuck } else { &exact })).collect()
+    };
     let some = |all: [u64; 5], flagged: [bool; 5]| std::iter::zip(all.map(Some), flagged).collect::<Vec<_>>();
-    let nothing = || ();
-    assert_eq!(ages(CheckPace::Every(1), &nothing), some([0; 5], [false, false, true, false, false]));
-    assert_eq!(ages(CheckPace::Every(2), &nothing), some([0, 1, 0, 1, 0], [false, false, true, true, false]));
-    assert_eq!(ages(CheckPace::Every(0), &nothing), vec![(None, false); 5]);
-    assert_eq!(ages(CheckPace::Never, &nothing), vec![(None, false); 5]);
-    // The thread beside has more time for each result than a fit takes, but for the first there is none yet.
-    let second = || std::thread::sleep(std::time::Duration::from_secs(1));
-    let beside = ages(CheckPace::Beside, &second);
-    assert!(beside[0] == (None, false) && beside[4].0 >= Some(1), "{beside:?}");
-    assert!(beside.iter().any(|(_, flagged)| *flagged), "{beside:?}");
+    assert_eq!(ages(CheckPace::Every(1)), some([0; 5], [false, false, true, false, false]));
+    assert_eq!(ages(CheckPace::Every(2)), some([0, 1, 0, 1, 0], [false, false, true, true, false]));
+    assert_eq!(ages(CheckPace::Every(0)), vec![(None, false); 5]);
+    assert_eq!(ages(CheckPace::Never), vec![(None, false); 5]);
+}
+
+/// The thread beside a stream is not waited for: its finding comes with a later result.
+#[test]
+fn findings_beside_a_stream_come_with_later_results() {
+    const TRIES: usize = 600;
+    let (engine, [_, stuck]) = stream();
+    let mut checks = StreamChecks::new(&engine, CheckPace::Beside);
+    assert_eq!(next(&mut checks, &engine, &stuck), (None, false));
+    let found = (0..TRIES).find_map(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        let (age, flagged) = next(&mut checks, &engine, &stuck);
+        flagged.then_some(age)
+    });
+    assert!(found.flatten() >= Some(1), "{found:?}");
 }
