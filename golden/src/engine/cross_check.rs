@@ -38,7 +38,7 @@ pub struct CrossCheck {
     golden: Golden,
     /// The engine's scene.
     scene: Scene,
-    /// Whether the engine searches with the objective `sparse`, and nobody states the noise.
+    /// Whether the engine searches with the objective `sparse`, and neither scene nor tare frames give the noise.
     trusts_readings: bool,
 }
 

@@ -414,8 +414,8 @@ pub fn frame_flags(scene: &Scene, estimator: EstimatorKind, frame: &Frame, codes
     only_raised(all).collect()
 }
 
-/// Whether the search of a scene gives the shear, and nobody states the noise; `noise_MPa` is that of scene or tare frames, 0
-/// if neither tells it.
+/// Whether the search of a scene gives the shear while its noise is not known; `noise_MPa` is that of the scene or its tare
+/// frames, 0 if neither gives it. A scene that states 0 has known noise.
 pub fn noise_not_stated(scene: &Scene, estimator: EstimatorKind, noise_MPa: f64) -> bool {
     let searched = estimator == EstimatorKind::Search && scene.search.mu_max > 0.0;
     searched && scene.search.noise_floor_MPa.is_none() && noise_MPa == 0.0

@@ -58,7 +58,7 @@ pub(super) fn noise_not_stated(scene: &Scene) -> Result<bool> {
 }
 
 /// What a user of the hardware must know of the scene, a line each on standard error: where it computes another estimator than
-/// the floating-point model and the scene does not state it; where nobody states the noise.
+/// the floating-point model and the scene does not state it; where the noise is not stated.
 ///
 /// # Errors
 /// As [`noise_not_stated`].

@@ -12,7 +12,7 @@ use super::document::percent_text;
 use super::table::markdown;
 use super::BUDGET_US;
 
-/// What is said of hardware whose noise nobody states.
+/// Warning of a search in hardware whose noise is not stated.
 pub const NOISE_NOT_STATED: &str =
     "the noise is not stated: every result of the hardware's search carries noise-not-stated; \
                                     `dermis check SCENE --stream` measures it";
