@@ -9,6 +9,7 @@ use super::stream_in::WORD_BYTES;
 use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, Wishbone, ID_BITS};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
+use crate::language::RustHdl;
 use crate::primitives::{Dff, Queue};
 use crate::scan::require_stream;
 use crate::wire::Wire;
@@ -72,7 +73,7 @@ macro_rules! core {
                 pub $wire_out: Wire<Out>,
             )+
             // Registered, because the engine is large and its reset has a long route.
-            restart: Dff,
+            restart: RustHdl<Dff>,
             stream_in: StreamIn,
             tables_in: TablesIn,
             labels: Queue,

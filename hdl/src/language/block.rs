@@ -7,7 +7,7 @@ use rust_hdl::prelude::*;
 
 use super::compile::limbs;
 use super::error::KernelError;
-use super::hierarchy::visit;
+use super::hierarchy::{visit, Hierarchy};
 use super::kernel::{Kernel, Role};
 use super::simulate::Simulation;
 use crate::wire::Wire;
@@ -109,6 +109,25 @@ impl Body {
             ports.iter().map(place).collect()
         };
         let (inputs, outputs) = (places(inputs), places(outputs));
+        Body { kernel: Arc::new(kernel), simulation, inputs, outputs, started: false }
+    }
+
+    /// The behaviour of a block whose kernel has ports of its own, with the blocks inside it.
+    pub(super) fn of(kernel: Kernel) -> Self {
+        let ports = kernel.ports.clone();
+        let simulated = match kernel.errors().is_empty() && !kernel.instances.is_empty() {
+            true => &Hierarchy::of_kernel(kernel.clone()).flat(&[]),
+            false => &kernel,
+        };
+        let simulation = simulated.errors().is_empty().then(|| Simulation::new(simulated));
+        let places = |is_output: bool| -> Vec<Place> {
+            let place = |port: &super::kernel::Port| {
+                let slot = simulation.as_ref().and_then(|simulation| simulation.slot_of(simulated, &port.name));
+                (slot.unwrap_or_default(), limbs(port.bits) as usize)
+            };
+            ports.iter().filter(|port| port.output == is_output).map(place).collect()
+        };
+        let (inputs, outputs) = (places(false), places(true));
         Body { kernel: Arc::new(kernel), simulation, inputs, outputs, started: false }
     }
 

@@ -1,13 +1,19 @@
 //! Construction of a kernel: ports, wires, registers, memories, conditions.
 
 use std::cell::{Cell, RefCell};
+use std::sync::Arc;
 
 use super::error::KernelError;
 use super::expression::Expr;
 use super::kernel::{
-    Contents, Domain, Item, Kernel, Memory, MemoryId, Node, NodeId, Register, Role, Signal, SignalId, Type, Write,
+    Contents, Domain, Instance, Item, Kernel, Memory, MemoryId, Node, NodeId, Port, Register, Role, Signal, SignalId,
+    Type, Write,
 };
 use super::keywords::is_keyword;
+use super::wiring::SEPARATOR;
+
+/// The port that resets a block.
+const RESET: &str = "rst";
 
 /// Builds a [`Kernel`]. Its expressions borrow it, so that Rust's operators, loops and functions compose them.
 #[derive(Debug, Default)]
@@ -65,6 +71,52 @@ impl Builder {
     /// An input port, unsigned, of `bits` bits.
     pub fn input(&self, name: &str, bits: usize) -> Expr<'_> {
         *self.declare(name, Type::unsigned(bits), Role::Input)
+    }
+
+    /// Declares a port.
+    pub(super) fn port(&self, port: Port) {
+        self.kernel.borrow_mut().ports.push(port);
+    }
+
+    /// A signal that an instance drives.
+    pub(super) fn from_instance(&self, name: &str, bits: usize) -> Expr<'_> {
+        *self.declare(name, Type::unsigned(bits), Role::Instance)
+    }
+
+    /// Adds the instance `name` of a block; its ports are signals of this kernel.
+    pub(super) fn place(&self, name: &str, kernel: Arc<Kernel>) {
+        if is_keyword(name) {
+            let (block, signal) = (self.block(), name.to_owned());
+            self.fail(KernelError::Name { block, signal, reason: "a keyword of Verilog" });
+        }
+        let name = format!("{}{name}", self.scope.borrow());
+        self.kernel.borrow_mut().instances.push(Instance { name, kernel });
+    }
+
+    /// Connects the reset of every instance whose reset is not assigned.
+    fn connect_resets(&self) {
+        let resets: Vec<(SignalId, NodeId)> = {
+            let kernel = self.kernel.borrow();
+            let input = |id: SignalId| kernel.signals[id].role == Role::Input;
+            let Some(rst) = kernel.signal_of(RESET).filter(|&id| input(id)) else { return };
+            let node = kernel.interned[&(Node::Signal(rst), kernel.signals[rst].ty)];
+            let names = kernel.instances.iter().map(|instance| format!("{}{SEPARATOR}{RESET}", instance.name));
+            let open = names.filter_map(|name| kernel.signal_of(&name));
+            open.filter(|&id| kernel.signals[id].value.is_none() && !input(id)).map(|id| (id, node)).collect()
+        };
+        let mut kernel = self.kernel.borrow_mut();
+        for (id, node) in resets {
+            kernel.signals[id].value = Some(node);
+            kernel.items.push(Item::Wire(id));
+        }
+    }
+
+    /// Runs `body` without the prefixes of the scopes around it.
+    pub(super) fn unscoped<R>(&self, body: impl FnOnce() -> R) -> R {
+        let outer = self.scope.take();
+        let result = body();
+        *self.scope.borrow_mut() = outer;
+        result
     }
 
     /// A combinational signal with a value. A driven port is a signal of the port's name.
@@ -245,7 +297,12 @@ impl Builder {
 
     /// The kernel; its [`Kernel::errors`] list what is wrong with it.
     pub fn finish(self) -> Kernel {
+        self.connect_resets();
         let mut kernel = self.kernel.into_inner();
+        for Port { name, bits, output, .. } in kernel.ports.clone() {
+            kernel.bind(&name, bits, output);
+        }
+        kernel.connects = !kernel.instances.is_empty();
         kernel.check();
         kernel
     }

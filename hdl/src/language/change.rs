@@ -77,7 +77,7 @@ impl Change {
     /// [`KernelError::Change`] if the block has no such signal to drive or its value no such expression; what is wrong
     /// with the new value.
     pub(super) fn apply(&self, kernel: &Kernel) -> Result<Kernel, KernelError> {
-        let driven = |&id: &SignalId| kernel.signals[id].role != Role::Input;
+        let driven = |&id: &SignalId| !kernel.signals[id].role.is_driven_outside();
         let id = kernel.signal_of(&self.signal).filter(driven).ok_or_else(|| self.refused("is not driven there"))?;
         let mut changed = match &self.kind {
             Kind::Undefined => {

@@ -1,7 +1,7 @@
 //! Checks of a finished kernel, and expressions as text for messages.
 
 use super::error::KernelError;
-use super::kernel::{Binary, Defect, Kernel, Node, NodeId, Role, Unary};
+use super::kernel::{Binary, Defect, Kernel, Node, NodeId, Unary};
 
 /// Nesting after which an expression in a message is abbreviated.
 const DEPTH: usize = 4;
@@ -12,7 +12,7 @@ impl Kernel {
         let defects: Vec<KernelError> =
             std::mem::take(&mut self.defects).into_iter().map(|(node, defect)| self.defective(node, defect)).collect();
         self.errors.splice(..0, defects);
-        let unassigned = |signal: &&super::kernel::Signal| signal.value.is_none() && signal.role != Role::Input;
+        let unassigned = |signal: &&super::kernel::Signal| signal.value.is_none() && !signal.role.is_driven_outside();
         let unassigned: Vec<String> =
             self.signals.iter().filter(unassigned).map(|signal| signal.name.clone()).collect();
         let block = self.block.clone();

@@ -57,13 +57,34 @@ impl Module {
         let (ports, locals, inner) = Default::default();
         Module { path, ports, locals, inner, children: Vec::new(), code, kernel: None }
     }
+
+    /// The block of this kernel, whose ports are those of its declaration.
+    fn of_kernel(path: Vec<String>, kernel: Arc<Kernel>) -> Self {
+        let mut module = Module::new(path, Verilog::Empty);
+        let pin = |name: &str, bits, driven| Pin { name: name.to_owned(), bits, driven, value: None };
+        module.ports.extend(kernel.clock.iter().map(|clock| pin(clock, 1, false)));
+        module.ports.extend(kernel.ports.iter().map(|port| pin(&port.name, port.bits, port.output)));
+        module.kernel = Some(kernel);
+        module
+    }
+
+    /// Adds the instances of its kernel to its children, and they and the blocks inside them to `modules`.
+    fn place_instances(&mut self, modules: &mut Vec<Module>) {
+        for instance in self.kernel.iter().flat_map(|kernel| &kernel.instances) {
+            let path = [&self.path[..], std::slice::from_ref(&instance.name)].concat();
+            let mut module = Module::of_kernel(path, instance.kernel.clone());
+            module.place_instances(modules);
+            self.children.push((instance.name.clone(), module.ports.iter().map(|pin| pin.name.clone()).collect()));
+            modules.push(module);
+        }
+    }
 }
 
 /// Path of a block, and one of its ports or signals.
-type Net = (String, String);
+pub(super) type Net = (String, String);
 
 /// A net as it is called in the whole design.
-fn called(path: &str, name: &str) -> String {
+pub(super) fn called(path: &str, name: &str) -> String {
     match path {
         "" => name.to_owned(),
         path => format!("{path}{SEPARATOR}{name}"),
@@ -77,6 +98,10 @@ pub struct Hierarchy {
     modules: BTreeMap<String, Module>,
 }
 
+fn by_path(modules: Vec<Module>) -> BTreeMap<String, Module> {
+    modules.into_iter().map(|module| (module.path.join(SEPARATOR), module)).collect()
+}
+
 /// Attributes of memories by the path of their block and their name in it.
 pub type Attributes = BTreeMap<(String, String), String>;
 
@@ -86,8 +111,29 @@ impl Hierarchy {
         VISITED.take();
         let mut collector = Collector::default();
         design.accept("", &mut collector);
-        let modules = collector.done.into_iter().map(|module| (module.path.join(SEPARATOR), module)).collect();
-        Hierarchy { modules }
+        Hierarchy { modules: by_path(collector.done) }
+    }
+
+    /// The blocks of a design whose top has this kernel.
+    pub fn of_kernel(kernel: Kernel) -> Self {
+        let mut modules = Vec::new();
+        let mut top = Module::of_kernel(Vec::new(), Arc::new(kernel));
+        top.place_instances(&mut modules);
+        modules.push(top);
+        Hierarchy { modules: by_path(modules) }
+    }
+
+    /// The kernel of the top.
+    pub(super) fn top(&self) -> Option<&Kernel> {
+        self.modules.get("").and_then(|module| module.kernel.as_deref())
+    }
+
+    /// The net of the signal `name` in the block at `path`.
+    pub(super) fn net(&self, path: &str, name: &str) -> Net {
+        match self.modules.get(path) {
+            Some(module) => module.net(path, name),
+            None => (path.to_owned(), name.to_owned()),
+        }
     }
 
     /// The kernel of every block by its path: the instances from the top, levels separated by [`SEPARATOR`].
@@ -214,12 +260,15 @@ impl Hierarchy {
         lines.extend(body.lines().map(str::to_owned));
         for (instance, ports) in &module.children {
             let child = [module.path.clone(), vec![instance.clone()]].concat().join(SEPARATOR);
-            let connect = |port: &String| format!("    .{port}({instance}{SEPARATOR}{port})");
+            let connect = |port: &String| match kernel.clock.as_ref() == Some(port) && !kernel.has_net(instance, port) {
+                true => format!("    .{port}({port})"),
+                false => format!("    .{port}({instance}{SEPARATOR}{port})"),
+            };
             lines.push(format!("{} {instance} (", name(&child)));
             lines.push(format!("{}\n);", ports.iter().map(connect).collect::<Vec<_>>().join(",\n")));
         }
         let ports = module.ports.iter().map(|pin| &*pin.name);
-        let mut text = kernel.header(&name(path), ports, &|port| comment(path, port));
+        let mut text = kernel.header(&name(path), ports, &|port| kernel.meaning(port).or_else(|| comment(path, port)));
         for line in lines.iter().flat_map(|line| line.lines()) {
             let _ = write!(text, "\n{}", format!("    {line}").trim_end());
         }
@@ -231,6 +280,17 @@ impl Hierarchy {
 pub type Comment<'a> = dyn Fn(&str, &str) -> Option<String> + 'a;
 
 impl Kernel {
+    /// Whether the port of an instance is a signal of its own here, as that of a block in rust-hdl is.
+    fn has_net(&self, instance: &str, port: &str) -> bool {
+        self.signal_of(&called(instance, port)).is_some()
+    }
+
+    /// What the declaration says of a port.
+    fn meaning(&self, port: &str) -> Option<String> {
+        let port = self.ports.iter().find(|own| own.name == port)?;
+        Some(port.doc.clone())
+    }
+
     /// The head of a module of this name with these ports, in this order.
     pub(super) fn header<'a>(
         &self,
@@ -243,7 +303,7 @@ impl Kernel {
                 return format!("    input wire {port}");
             };
             let kind = match &signal.role {
-                Role::Input => "input wire",
+                Role::Input | Role::Instance => "input wire",
                 Role::Wire { .. } => "output wire",
                 Role::Register(_) => "output reg",
             };
@@ -299,6 +359,7 @@ impl Probe for Collector {
             let pins: Vec<Pin> = module.ports.iter().chain(&module.inner).cloned().collect();
             module.kernel = Some(Arc::new(wiring(&module.path.join(SEPARATOR), &pins, &module.locals, code)));
         }
+        module.place_instances(&mut self.done);
         if let (Some(outer), Some(instance)) = (self.open.last_mut(), module.path.last()) {
             let called = |pin: &Pin| Pin {
                 name: format!("{instance}{SEPARATOR}{}", pin.name),

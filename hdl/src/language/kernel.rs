@@ -1,6 +1,7 @@
 //! The expression graph of a block: nodes in one arena, signals, memories.
 
 use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
 use super::error::KernelError;
 
@@ -120,10 +121,19 @@ impl Node {
 pub(crate) enum Role {
     /// Port driven from outside.
     Input,
+    /// Output of an instance.
+    Instance,
     /// Combinational; `declared` ahead of its assignment.
     Wire { declared: bool },
     /// Changes at the rising edge of the clock.
     Register(Register),
+}
+
+impl Role {
+    /// Whether another block drives the signal.
+    pub(crate) fn is_driven_outside(&self) -> bool {
+        matches!(self, Role::Input | Role::Instance)
+    }
 }
 
 /// Properties of a register.
@@ -217,6 +227,23 @@ impl Memory {
     }
 }
 
+/// A port of a block.
+#[derive(Clone, Debug)]
+pub(crate) struct Port {
+    pub(crate) name: String,
+    pub(crate) bits: usize,
+    pub(crate) output: bool,
+    /// What it means.
+    pub(crate) doc: String,
+}
+
+/// A block inside another one. Its port `p` is the signal `name__p` of the block around it.
+#[derive(Clone, Debug)]
+pub(crate) struct Instance {
+    pub(crate) name: String,
+    pub(crate) kernel: Arc<Kernel>,
+}
+
 /// What is wrong with an expression.
 #[derive(Clone, Debug)]
 pub(crate) enum Defect {
@@ -240,6 +267,9 @@ pub(crate) enum Item {
 pub struct Kernel {
     pub(crate) block: String,
     pub(crate) clock: Option<String>,
+    /// The ports besides the clock, in the order of their declaration.
+    pub(crate) ports: Vec<Port>,
+    pub(crate) instances: Vec<Instance>,
     pub(crate) domains: Vec<Domain>,
     pub(crate) nodes: Vec<(Node, Type)>,
     pub(crate) interned: HashMap<(Node, Type), NodeId>,
@@ -314,7 +344,7 @@ impl Kernel {
             }
             if let Node::Signal(id) = self.nodes[node].0 {
                 match &self.signals[id].role {
-                    Role::Input => found.push(self.signals[id].name.as_str()),
+                    Role::Input | Role::Instance => found.push(self.signals[id].name.as_str()),
                     Role::Wire { .. } => open.extend(self.signals[id].value),
                     Role::Register(_) => {}
                 }
@@ -365,7 +395,7 @@ impl Kernel {
         let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
         let read: BTreeSet<NodeId> = self.within(&[values, self.edge_roots()].concat()).collect();
         let is_read = |id: SignalId| read.iter().any(|&node| self.nodes[node].0 == Node::Signal(id));
-        let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role == Role::Input);
+        let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role.is_driven_outside());
         inputs.filter(|(id, _)| !is_read(*id)).map(|(_, signal)| signal.name.as_str()).collect()
     }
 

@@ -17,7 +17,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::kernel::{Binary, Kernel, Node, NodeId, Role, Unary};
+use super::kernel::{Binary, Kernel, Node, NodeId, Unary};
 
 /// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
 const CELL: [usize; 3] = [16, 4, 6];
@@ -98,7 +98,7 @@ impl Kernel {
 
     /// Whether the node is an input of the block, which registers of other blocks may share.
     fn is_input(&self, node: NodeId) -> bool {
-        matches!(self.nodes[node].0, Node::Signal(id) if matches!(self.signals[id].role, Role::Input))
+        matches!(self.nodes[node].0, Node::Signal(id) if self.signals[id].role.is_driven_outside())
     }
 
     fn is_constant(&self, node: NodeId) -> bool {

@@ -129,6 +129,23 @@ pub(crate) fn check_with_defects<'a, R: Reference>(
     }
 }
 
+/// A block of the language with the blocks inside it as a [`Subject`], with seeded defects; its ports in this order.
+///
+/// ```text
+/// subject_of!(Queue::new(8), &[], inputs [rst, write, word], outputs [room, m_axis_tvalid])
+/// ```
+macro_rules! subject_of {
+    ($block:expr, $changes:expr, inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?] $(,)?) => {
+        $crate::language::testbench::Subject::of(
+            $crate::language::kernel_of(&$block),
+            $changes,
+            &[$(stringify!($input)),*],
+            &[$(stringify!($output)),*],
+        )
+    };
+}
+pub(crate) use subject_of;
+
 /// A block with the blocks inside it as a [`Subject`], its Verilog with seeded defects; `clk` is its clock.
 ///
 /// ```text

@@ -124,7 +124,7 @@ impl Printer<'_> {
     }
 
     fn declare(&mut self, signal: &Signal) {
-        if let (Some(comment), false) = (&signal.comment, signal.role == Role::Input) {
+        if let (Some(comment), false) = (&signal.comment, signal.role.is_driven_outside()) {
             self.line(&format!("// {comment}"));
         }
         let Signal { name, ty, .. } = signal;
@@ -138,6 +138,7 @@ impl Printer<'_> {
                 }
             }
             Role::Wire { declared: true } if !signal.output => self.line(&format!("wire {}{name};", range(ty.bits))),
+            Role::Instance => self.line(&format!("wire {}{name};", range(ty.bits))),
             Role::Wire { .. } | Role::Input => {}
         }
     }
@@ -169,7 +170,7 @@ impl Printer<'_> {
         let own_node = |id: SignalId| kernel.interned[&(Node::Signal(id), kernel.signals[id].ty)];
         let signals = (0..kernel.signals.len()).filter(|&id| !kernel.signals[id].output && unread(own_node(id)));
         let (inputs, signals): (Vec<SignalId>, Vec<SignalId>) =
-            signals.partition(|&id| kernel.signals[id].role == Role::Input);
+            signals.partition(|&id| kernel.signals[id].role.is_driven_outside());
         let names = |ids: Vec<SignalId>| ids.into_iter().map(|id| kernel.signals[id].name.clone());
         let has_edge = kernel.registers().any(|(_, _, register)| register.domain.is_none())
             || kernel.memories.iter().any(|m| !m.writes.is_empty());

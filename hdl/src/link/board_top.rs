@@ -12,6 +12,7 @@ use super::board::{Board, BoardOutputs};
 use super::{FrameGate, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
+use crate::language::RustHdl;
 use crate::primitives::{Dff, RegisterSlice};
 use crate::scan::{ScanPins, WritableScanCore};
 use crate::wire::Wire;
@@ -78,7 +79,7 @@ macro_rules! board_top {
             $($unused: Signal<Local, Bit>,)?
             power_on: PowerOn,
             // Registered once more, because the engine is large and its reset has a long route.
-            engine_rst: Dff,
+            engine_rst: RustHdl<Dff>,
             line: $block,
             link: PacketLink,
             engine: $engine,

@@ -10,6 +10,7 @@ use super::pins::{Beat, ScanInputs, ScanOutputs, ScanPins, Scanner};
 use super::{ScanCapture, ScanCodes, ScanSequencer, ScanStatus, ScanTables, Shape};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
+use crate::language::RustHdl;
 use crate::primitives::Dff;
 use crate::wire::{Wire, Word};
 use crate::{engine, serial};
@@ -64,7 +65,7 @@ macro_rules! scan_core {
             /// The beat is the last of its frame; valid with `m_axis_tvalid`.
             pub m_axis_tlast: Signal<Out, Bit>,
             // Registered, because the engine is large and its reset has a long route.
-            restart: Dff,
+            restart: RustHdl<Dff>,
             sequencer: ScanSequencer,
             capture: ScanCapture,
             engine: $engine,

@@ -6,6 +6,7 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};
 use crate::wire::Wire;
 
@@ -50,11 +51,11 @@ pub struct Receive {
     pub framing: Signal<Out, Bit>,
     /// Clears `framing`.
     pub reported: Signal<In, Bit>,
-    taxels: Counter,
-    frame: Ram,
+    taxels: RustHdl<Counter>,
+    frame: RustHdl<Ram>,
     stats: FrameStats,
-    whole: Dff,
-    broken: Dff,
+    whole: RustHdl<Dff>,
+    broken: RustHdl<Dff>,
     taken: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
 }
@@ -80,8 +81,8 @@ impl Receive {
             negative: Default::default(),
             framing: Default::default(),
             reported: Default::default(),
-            taxels: Counter::new(taxels),
-            frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
+            taxels: RustHdl::new(Counter::new(taxels)),
+            frame: RustHdl::new(Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }])),
             stats: FrameStats::new(bits, Some(floor), 1),
             whole: Default::default(),
             broken: Default::default(),

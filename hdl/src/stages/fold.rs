@@ -4,152 +4,119 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
     count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, CaseEqual, Counter, Delay, Dff, Ram,
 };
-use crate::wire::Wire;
 
-/// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
-/// input memory.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Fold {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is computed.
-    pub which: Wire<In>,
-    /// A new frame: reading restarts at the frame's first quad.
-    pub begin_frame: Signal<In, Bit>,
-    /// Fold the next subarray.
-    pub start: Signal<In, Bit>,
-    /// The subarray is the frame's last.
-    pub last_part: Signal<In, Bit>,
-    /// Address of the quad to read from the frame buffer, over all subarrays; steps in every cycle after `start` until
-    /// the subarray is read.
-    pub quad_address: Wire<Out>,
-    /// The frame's last quad was read in the cycle before: the frame buffer is free.
-    pub free: Signal<Out, Bit>,
-    /// Four normalised codes, `input_bits` each, signed; four cycles after `quad_address`.
-    pub normalised: Wire<In>,
-    /// `normalised` holds a quad.
-    pub normalised_valid: Signal<Out, Bit>,
-    /// Four parities, two bits wider, signed; valid with `folded_valid`, one cycle after `normalised`.
-    pub folded: Wire<Out>,
-    /// `folded` holds a quad.
-    pub folded_valid: Signal<Out, Bit>,
-    /// The products may begin: what they read next is in the input memory; high for one cycle.
-    pub readable: Signal<Out, Bit>,
-    /// Address of the quad to read from the input memory; sampled in every cycle.
-    pub read_address: Wire<In>,
-    /// Four parities of that quad, signed; two cycles after `read_address`.
-    pub read_quad: Wire<Out>,
-    quads: CaseCounter,
-    lead: CaseEqual,
-    frame_quads: Counter,
-    running: Dff,
-    normalised_later: BitDelay,
-    folded_later: BitDelay,
-    begins: BitDelay,
-    frees: BitDelay,
-    address: Delay,
-    butterfly: Butterfly,
-    memory: Ram,
-    ending: Signal<Local, Bit>,
+block! {
+    /// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
+    /// input memory.
+    pub struct Fold {
+        /// Width of a code in bits.
+        bits: usize,
+        /// Quads of a subarray, by case.
+        quads: Vec<usize>,
+        /// Quads of the largest frame.
+        frame: usize,
+        /// Index of the quad with which the products may begin, by case.
+        leads: Vec<usize>,
+    }
+    ports FoldPorts {
+        clock;
+        reset;
+        /// Index of the case; constant while a frame is computed.
+        in which: count_bits(quads.len());
+        /// A new frame: reading restarts at the frame's first quad.
+        in begin_frame;
+        /// Fold the next subarray.
+        in start;
+        /// The subarray is the frame's last.
+        in last_part;
+        /// Address of the quad to read from the frame buffer, over all subarrays; steps in every cycle after `start` until
+        /// the subarray is read.
+        out quad_address: count_bits(*frame);
+        /// The frame's last quad was read in the cycle before: the frame buffer is free.
+        out free;
+        /// Four normalised codes, `input_bits` each, signed; four cycles after `quad_address`.
+        in normalised: 4 * bits;
+        /// `normalised` holds a quad.
+        out normalised_valid;
+        /// Four parities, two bits wider, signed; valid with `folded_valid`, one cycle after `normalised`.
+        out folded: 4 * (bits + 2);
+        /// `folded` holds a quad.
+        out folded_valid;
+        /// The products may begin: what they read next is in the input memory; high for one cycle.
+        out readable;
+        /// Address of the quad to read from the input memory; sampled in every cycle.
+        in read_address: count_bits(largest(quads));
+        /// Four parities of that quad, signed; two cycles after `read_address`.
+        out read_quad: 4 * (bits + 2);
+    }
 }
 
 impl Fold {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let bits = model.formats().input_bits as usize;
-        let limits: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
-        let frame_quads = frame_quads(model.cases());
-        let leads: Vec<usize> = model.cases().iter().map(|case| case.storage.lead).collect();
-        let quads = largest(&limits);
-        let address = count_bits(quads);
         Fold {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(limits.len())),
-            begin_frame: Default::default(),
-            start: Default::default(),
-            last_part: Default::default(),
-            quad_address: Wire::new(count_bits(frame_quads)),
-            free: Default::default(),
-            normalised: Wire::new(4 * bits),
-            normalised_valid: Default::default(),
-            folded: Wire::new(4 * (bits + 2)),
-            folded_valid: Default::default(),
-            readable: Default::default(),
-            read_address: Wire::new(address),
-            read_quad: Wire::new(4 * (bits + 2)),
-            quads: CaseCounter::new(&limits),
-            lead: CaseEqual::new(&leads, address),
-            frame_quads: Counter::new(frame_quads),
-            running: Default::default(),
-            normalised_later: BitDelay::new(4),
-            folded_later: BitDelay::new(1),
-            begins: BitDelay::new(6),
-            frees: BitDelay::new(1),
-            address: Delay::new(address, 5),
-            butterfly: Butterfly::new(bits),
-            memory: Ram::new(quads, 1, 4 * (bits + 2)).holding([Holds::Folded]).registered(),
-            ending: Default::default(),
+            bits: model.formats().input_bits as usize,
+            quads: model.cases().iter().map(|case| case.formats.quads).collect(),
+            frame: frame_quads(model.cases()),
+            leads: model.cases().iter().map(|case| case.storage.lead).collect(),
         }
     }
 }
 
-impl Logic for Fold {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.quads.clk.next = self.clk.val();
-        self.frame_quads.clk.next = self.clk.val();
-        self.running.clk.next = self.clk.val();
-        self.normalised_later.clk.next = self.clk.val();
-        self.folded_later.clk.next = self.clk.val();
-        self.begins.clk.next = self.clk.val();
-        self.frees.clk.next = self.clk.val();
-        self.address.clk.next = self.clk.val();
-        self.butterfly.clk.next = self.clk.val();
-        self.memory.clk.next = self.clk.val();
-        self.normalised_later.rst.next = self.rst.val();
-        self.folded_later.rst.next = self.rst.val();
-        self.begins.rst.next = self.rst.val();
-        self.frees.rst.next = self.rst.val();
+impl Block for Fold {
+    fn build<'k>(&self, k: &'k Builder, io: FoldPorts<Inside<'k>>) {
+        let depth = largest(&self.quads);
+        let address_bits = count_bits(depth);
+        let quads = k.instance("quads", CaseCounter::new(&self.quads));
+        let lead = k.instance("lead", CaseEqual::new(&self.leads, address_bits));
+        let frame_quads = k.instance("frame_quads", Counter::new(self.frame));
+        let running = k.instance("running", Dff {});
+        let normalised_later = k.instance("normalised_later", BitDelay::new(4));
+        let folded_later = k.instance("folded_later", BitDelay::new(1));
+        let begins = k.instance("begins", BitDelay::new(6));
+        let frees = k.instance("frees", BitDelay::new(1));
+        let address = k.instance("address", Delay::new(address_bits, 5));
+        let butterfly = k.instance("butterfly", Butterfly::new(self.bits));
+        let folded = Ram::new(depth, 1, 4 * (self.bits + 2)).holding([Holds::Folded]).registered();
+        let memory = k.instance("memory", folded);
 
-        self.quads.which.next = self.which.val();
-        self.lead.which.next = self.which.val();
-        self.lead.value.next = self.quads.value.val();
-        self.quads.clear.next = self.start.val();
-        self.quads.enable.next = self.running.q.val();
-        self.ending.next = self.running.q.val() & self.quads.last.val();
-        self.running.d.next = (self.start.val() | (self.running.q.val() & !self.quads.last.val())) & !self.rst.val();
-        self.frame_quads.clear.next = self.begin_frame.val();
-        self.frame_quads.enable.next = self.running.q.val();
-        self.quad_address.next = self.frame_quads.value.val();
-        comment!("Registered: the frame buffer is far away");
-        self.frees.d.next = self.ending.val() & self.last_part.val();
-        self.free.next = self.frees.q.val();
+        quads.which.set(io.which);
+        lead.which.set(io.which);
+        lead.value.set(quads.value);
+        quads.clear.set(io.start);
+        quads.enable.set(running.q);
+        let ending = k.wire("ending", running.q & quads.last);
+        running.d.set((io.start | (running.q & !quads.last)) & !io.rst);
+        frame_quads.clear.set(io.begin_frame);
+        frame_quads.enable.set(running.q);
+        io.quad_address.set(frame_quads.value);
+        k.comment("Registered: the frame buffer is far away.");
+        frees.d.set(ending & io.last_part);
+        io.free.set(frees.q);
 
-        self.normalised_later.d.next = self.running.q.val();
-        self.folded_later.d.next = self.normalised_later.q.val();
-        self.normalised_valid.next = self.normalised_later.q.val();
-        self.butterfly.quad.next = self.normalised.val();
-        self.folded.next = self.butterfly.sums.val();
-        self.folded_valid.next = self.folded_later.q.val();
+        normalised_later.d.set(running.q);
+        folded_later.d.set(normalised_later.q);
+        io.normalised_valid.set(normalised_later.q);
+        butterfly.quad.set(io.normalised);
+        io.folded.set(butterfly.sums);
+        io.folded_valid.set(folded_later.q);
 
-        self.address.d.next = self.quads.value.val();
-        self.memory.write.next = self.folded_later.q.val().into();
-        self.memory.write_address.next = self.address.q.val();
-        self.memory.write_data.next = self.butterfly.sums.val();
-        self.memory.read.next = true;
-        self.memory.read_address.next = self.read_address.val();
-        self.read_quad.next = self.memory.read_data.val();
-        comment!("Products read the input while it is written");
-        self.begins.d.next = self.running.q.val() & self.lead.equal.val();
-        self.readable.next = self.begins.q.val();
+        address.d.set(quads.value);
+        memory.write.set(folded_later.q);
+        memory.write_address.set(address.q);
+        memory.write_data.set(butterfly.sums);
+        memory.read.set(k.constant(1, 1));
+        memory.read_address.set(io.read_address);
+        io.read_quad.set(memory.read_data);
+        k.comment("Products read the input while it is written.");
+        begins.d.set(running.q & lead.equal);
+        io.readable.set(begins.q);
     }
 }
 
@@ -160,7 +127,7 @@ mod tests {
     use dermis_golden::fixed::stages::fold::fold;
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, random_word, MemoryReference, Reference};
+    use crate::language::testbench::{check_with_defects, random_word, subject_of, MemoryReference, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::wire::Word;
@@ -245,7 +212,7 @@ mod tests {
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Fold::new(&model),
                 changes,
                 inputs [rst, which, begin_frame, start, last_part, normalised, read_address],

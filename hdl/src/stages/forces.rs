@@ -4,6 +4,7 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{
     count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, CYCLE_BITS,
     SATURATION_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
@@ -86,9 +87,9 @@ pub struct Forces {
     /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or a status beat; valid
     /// with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    quads: Counter,
-    asked: Delay,
-    store: Ram,
+    quads: RustHdl<Counter>,
+    asked: RustHdl<Delay>,
+    store: RustHdl<Ram>,
     unit: ForceUnit,
     leaving: Queue,
 }
@@ -137,9 +138,9 @@ impl Forces {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
-            quads: Counter::new(words),
-            asked: Delay::new(address, 1),
-            store: Ram::new(words, 1, value).holding([Holds::Values]).registered(),
+            quads: RustHdl::new(Counter::new(words)),
+            asked: RustHdl::new(Delay::new(address, 1)),
+            store: RustHdl::new(Ram::new(words, 1, value).holding([Holds::Values]).registered()),
             leaving: Queue::new(unit.beat_data.width()),
             unit,
         }

@@ -9,6 +9,7 @@ use dermis_golden::fixed::plan::resources::{operand_words, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{
     count_bits, longest, position_bits, programs, BitDelay, Control, Counter, Delay, Dff, Lanes, OperandScale,
     OperandSelect, OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
@@ -62,22 +63,22 @@ pub struct Pass {
     pub issued: Signal<Out, Bit>,
     /// Index in its section of the instruction that issues; valid with `issued`.
     pub step: Wire<Out>,
-    column: Counter,
-    running: Dff,
+    column: RustHdl<Counter>,
+    running: RustHdl<Dff>,
     /// Schedule of the products.
     pub pass_program: PassProgram,
-    vectors: Ram,
+    vectors: RustHdl<Ram>,
     operand_writer: OperandWriter,
-    source: Delay,
-    factor: Delay,
-    control: Delay,
-    valid: BitDelay,
+    source: RustHdl<Delay>,
+    factor: RustHdl<Delay>,
+    control: RustHdl<Delay>,
+    valid: RustHdl<BitDelay>,
     select: OperandSelect,
     scale: OperandScale,
     /// The MAC lanes.
     pub lanes: Lanes,
     low_address: Slice,
-    coefficient_address: Delay,
+    coefficient_address: RustHdl<Delay>,
     issue: Signal<Local, Bit>,
     column_end: Signal<Local, Bit>,
 }
@@ -117,16 +118,18 @@ impl Pass {
             damaged: Wire::new(1),
             issued: Default::default(),
             step: Wire::new(pass_program.step.width()),
-            column: Counter::new(longest(model)),
+            column: RustHdl::new(Counter::new(longest(model))),
             running: Default::default(),
             low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
-            vectors: vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
+            vectors: RustHdl::new(
+                vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
+            ),
             operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
-            source: Delay::new(SOURCE_BITS, 2),
-            factor: Delay::new(FACTOR_BITS, 3),
-            control: Delay::new(Control::new(model).bits(), 3 + scaling),
-            valid: BitDelay::new(3 + scaling + pass_program.latency()),
-            coefficient_address: Delay::new(pass_program.coefficient_address.width(), scaling),
+            source: RustHdl::new(Delay::new(SOURCE_BITS, 2)),
+            factor: RustHdl::new(Delay::new(FACTOR_BITS, 3)),
+            control: RustHdl::new(Delay::new(Control::new(model).bits(), 3 + scaling)),
+            valid: RustHdl::new(BitDelay::new(3 + scaling + pass_program.latency())),
+            coefficient_address: RustHdl::new(Delay::new(pass_program.coefficient_address.width(), scaling)),
             select: OperandSelect::new(formats),
             scale: OperandScale::new(scales),
             pass_program,

@@ -9,6 +9,7 @@ use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::ports::{has_ports, ports};
 use crate::primitives::{
     count_bits, frame_quads, largest, BitDelay, Delay, Dff, FrameStats, InputMask, LaneBroadcast, Ram, Scan,
@@ -27,17 +28,17 @@ pub struct Receive {
     scan: Scan,
     input_mask: InputMask,
     broadcast: LaneBroadcast,
-    frame: Ram,
+    frame: RustHdl<Ram>,
     stats: FrameStats,
-    stats_enable: BitDelay,
-    stats_part: Delay,
-    stats_code: Delay,
-    stats_address: Delay,
-    stats_mask: Delay,
-    clears: Dff,
-    whole: Dff,
-    complete: Dff,
-    broken: Dff,
+    stats_enable: RustHdl<BitDelay>,
+    stats_part: RustHdl<Delay>,
+    stats_code: RustHdl<Delay>,
+    stats_address: RustHdl<Delay>,
+    stats_mask: RustHdl<Delay>,
+    clears: RustHdl<Dff>,
+    whole: RustHdl<Dff>,
+    complete: RustHdl<Dff>,
+    broken: RustHdl<Dff>,
     taken: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
 }
@@ -140,13 +141,15 @@ impl Receive {
             scan: Scan::new(std::slice::from_ref(own), Quads::LANES),
             input_mask: InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar),
             broadcast: LaneBroadcast::new(bits),
-            frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
+            frame: RustHdl::new(
+                Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
+            ),
             stats: FrameStats::new(bits, model.built_in_floor(), count),
-            stats_enable: BitDelay::new(1),
-            stats_part: Delay::new(count_bits(count), 1),
-            stats_code: Delay::new(bits, 1),
-            stats_address: Delay::new(count_bits(quads), 1),
-            stats_mask: Delay::new(4, 1),
+            stats_enable: RustHdl::new(BitDelay::new(1)),
+            stats_part: RustHdl::new(Delay::new(count_bits(count), 1)),
+            stats_code: RustHdl::new(Delay::new(bits, 1)),
+            stats_address: RustHdl::new(Delay::new(count_bits(quads), 1)),
+            stats_mask: RustHdl::new(Delay::new(4, 1)),
             clears: Default::default(),
             whole: Default::default(),
             complete: Default::default(),

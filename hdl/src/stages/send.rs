@@ -6,6 +6,7 @@ use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, PartsBegun, Scan, StatusCode};
 use crate::wire::Wire;
 
@@ -43,13 +44,13 @@ pub struct Send {
     /// The frame's last beat was accepted one cycle ago; high for one cycle.
     pub done: Signal<Out, Bit>,
     scan: Scan,
-    words: Counter,
-    parts: CaseCounter,
+    words: RustHdl<Counter>,
+    parts: RustHdl<CaseCounter>,
     code: StatusCode,
     released: PartsBegun,
-    sending: Dff,
-    status: Dff,
-    out: BitDelay,
+    sending: RustHdl<Dff>,
+    status: RustHdl<Dff>,
+    out: RustHdl<BitDelay>,
     step: Signal<Local, Bit>,
     at_end: Signal<Local, Bit>,
     finish: Signal<Local, Bit>,
@@ -79,13 +80,13 @@ impl Send {
             address: Wire::new(scan.address.width()),
             lane: Wire::new(2),
             done: Default::default(),
-            words: Counter::new(STATUS_BEATS),
-            parts: CaseCounter::new(&statuses),
+            words: RustHdl::new(Counter::new(STATUS_BEATS)),
+            parts: RustHdl::new(CaseCounter::new(&statuses)),
             code,
             released: PartsBegun::new(largest(&subarrays)),
             sending: Default::default(),
             status: Default::default(),
-            out: BitDelay::new(1),
+            out: RustHdl::new(BitDelay::new(1)),
             step: Default::default(),
             at_end: Default::default(),
             finish: Default::default(),

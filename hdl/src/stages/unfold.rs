@@ -4,6 +4,7 @@ use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, TransposedPlace, Unfolder};
 use crate::wire::Wire;
 
@@ -32,15 +33,15 @@ pub struct Unfold {
     pub address: Wire<Out>,
     /// All coefficients of the subarray have been output; high for one cycle.
     pub done: Signal<Out, Bit>,
-    quads: CaseCounter,
-    vectors: Counter,
+    quads: RustHdl<CaseCounter>,
+    vectors: RustHdl<Counter>,
     unfolder: Unfolder,
     transposed: TransposedPlace,
-    index_first: Delay,
-    index_later: Delay,
-    address_later: Delay,
-    valid_later: BitDelay,
-    finish: BitDelay,
+    index_first: RustHdl<Delay>,
+    index_later: RustHdl<Delay>,
+    address_later: RustHdl<Delay>,
+    valid_later: RustHdl<BitDelay>,
+    finish: RustHdl<BitDelay>,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -68,15 +69,15 @@ impl Unfold {
             index: Wire::new(index),
             address: Wire::new(address),
             done: Default::default(),
-            quads: CaseCounter::new(&quads),
-            vectors: Counter::new(count),
+            quads: RustHdl::new(CaseCounter::new(&quads)),
+            vectors: RustHdl::new(Counter::new(count)),
             unfolder: Unfolder::new(bits, &degrees),
             transposed: TransposedPlace::new(model.layout(), bits + 2, count, across),
-            index_first: Delay::new(index, 2),
-            index_later: Delay::new(index, 1),
-            address_later: Delay::new(address, 3),
-            valid_later: BitDelay::new(3),
-            finish: BitDelay::new(4),
+            index_first: RustHdl::new(Delay::new(index, 2)),
+            index_later: RustHdl::new(Delay::new(index, 1)),
+            address_later: RustHdl::new(Delay::new(address, 3)),
+            valid_later: RustHdl::new(BitDelay::new(3)),
+            finish: RustHdl::new(BitDelay::new(4)),
             quad_end: Default::default(),
         }
     }

@@ -47,19 +47,32 @@ impl Subject<'_> {
 /// A kernel in its own simulation; inputs and outputs in the order of its signals.
 impl<'a> From<&'a Kernel> for Subject<'a> {
     fn from(kernel: &'a Kernel) -> Self {
-        assert!(kernel.errors().is_empty(), "{:?}", kernel.errors());
-        let pins = |is_own: fn(&KernelSignal) -> bool| -> Vec<Pin> {
-            let own = kernel.signals.iter().filter(|signal| is_own(signal));
-            own.map(|signal| (signal.name.clone(), signal.ty.bits)).collect()
+        let names = |is_own: fn(&KernelSignal) -> bool| -> Vec<&str> {
+            kernel.signals.iter().filter(|signal| is_own(signal)).map(|signal| signal.name.as_str()).collect()
         };
-        let (inputs, outputs) = (pins(|signal| signal.role == Role::Input), pins(|signal| signal.output));
-        let names = kernel.clock.iter().chain(inputs.iter().chain(&outputs).map(|(name, _)| name));
-        let head = kernel.header("dut", names.map(String::as_str), &|_| None);
-        let mut simulation = Simulation::new(kernel);
-        let places = |pins: &[Pin]| -> Vec<(usize, usize)> {
-            pins.iter().map(|(name, bits)| (simulation.slot_of(kernel, name).unwrap(), *bits)).collect()
+        let (inputs, outputs) = (names(|signal| signal.role == Role::Input), names(|signal| signal.output));
+        Subject::of(kernel.clone(), &[], &inputs, &outputs)
+    }
+}
+
+impl Subject<'_> {
+    /// A kernel with the blocks inside it and with these `changes`; the ports in the order of their names.
+    pub(crate) fn of(kernel: Kernel, changes: &[Change], inputs: &[&str], outputs: &[&str]) -> Self {
+        let clock = kernel.clock.clone();
+        let hierarchy = Hierarchy::of_kernel(kernel);
+        hierarchy.check().unwrap();
+        let hierarchy = hierarchy.changed(changes).unwrap();
+        let flat = hierarchy.flat(&[]);
+        let mut simulation = Simulation::new(&flat);
+        let pin = |name: &&str| {
+            let signal = flat.signal_of(name).unwrap_or_else(|| panic!("no port {name}"));
+            ((*name).to_owned(), flat.signals[signal].ty.bits)
         };
-        let (read, driven) = (places(&inputs), places(&outputs));
+        let [inputs, outputs] = [inputs, outputs].map(|names| names.iter().map(pin).collect::<Vec<Pin>>());
+        let slots = |pins: &[Pin]| -> Vec<(usize, usize)> {
+            pins.iter().map(|(name, bits)| (simulation.slot_of(&flat, name).unwrap(), *bits)).collect()
+        };
+        let (read, driven) = (slots(&inputs), slots(&outputs));
         let cycle = move |words: &[Word]| {
             for (word, &(slot, bits)) in words.iter().zip(&read) {
                 simulation.set(slot, bits.div_ceil(64), word.limbs());
@@ -71,10 +84,10 @@ impl<'a> From<&'a Kernel> for Subject<'a> {
             outputs
         };
         Subject {
-            verilog: format!("{head}\n{}\nendmodule\n", kernel.verilog()),
-            files: kernel.memory_files(),
-            clock: kernel.clock.clone(),
+            verilog: hierarchy.verilog("dut", &Attributes::new(), &|_, _| None),
+            files: hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files()).collect(),
             run: Box::new(cycle),
+            clock,
             inputs,
             outputs,
         }

@@ -1,48 +1,42 @@
 //! A counter whose limit depends on the case, and expressions for values that depend on the case.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside};
+use crate::primitives::address::counter::{count, count_bits};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr};
-use crate::primitives::address::counter::{count_bits, kernel};
-use crate::wire::Wire;
-
-/// As [`Counter`](super::counter::Counter), with the limit of case `which`. When `which` changes, the count must be below the
-/// new limit, or be cleared before it is enabled again.
-#[derive(dermis_hdl_derive::Block)]
-pub struct CaseCounter {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Index of the case; where it changes, the count is below the new limit or is cleared before `enable`.
-    pub which: Wire<In>,
-    /// Sets the count to 0 at the clock edge, with priority over `enable`.
-    pub clear: Signal<In, Bit>,
-    /// Advances the count at the clock edge; from the last value to 0.
-    pub enable: Signal<In, Bit>,
-    /// The count, unsigned; valid from the first `clear` on.
-    pub value: Wire<Out>,
-    /// The count is at its last value, the limit of the case − 1; combinational.
-    pub last: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// As [`Counter`](super::counter::Counter), with the limit of case `which`. When `which` changes, the count must be below the
+    /// new limit, or be cleared before it is enabled again.
+    pub struct CaseCounter {
+        limits: Vec<usize>,
+    }
+    ports CaseCounterPorts {
+        clock;
+        /// Index of the case; where it changes, the count is below the new limit or is cleared before `enable`.
+        in which: count_bits(limits.len());
+        /// Sets the count to 0 at the clock edge, with priority over `enable`.
+        in clear;
+        /// Advances the count at the clock edge; from the last value to 0.
+        in enable;
+        /// The count, unsigned; valid from the first `clear` on.
+        out value: count_bits(largest(limits));
+        /// The count is at its last value, the limit of the case − 1; combinational.
+        out last;
+    }
 }
-
-kernel_block!(CaseCounter, clock clk, inputs [which, clear, enable], outputs [value, last]);
 
 impl CaseCounter {
     /// `limits[case]` is the number of counts of each case; 0 is taken as 1.
     pub fn new(limits: &[usize]) -> Self {
-        let (which, bits) = (count_bits(limits.len()), count_bits(largest(limits)));
-        let block = CaseCounter {
-            clk: Default::default(),
-            which: Wire::new(which),
-            clear: Default::default(),
-            enable: Default::default(),
-            value: Wire::new(bits),
-            last: Default::default(),
-            kernel: Body::default(),
-        };
-        let ends: Vec<usize> = limits.iter().map(|&limit| limit.max(1) - 1).collect();
-        block.bind(kernel(bits, |k, bits| value_by_case(k, k.input("which", which), &ends, bits)))
+        CaseCounter { limits: limits.to_vec() }
+    }
+}
+
+impl Block for CaseCounter {
+    fn build<'k>(&self, k: &'k Builder, io: CaseCounterPorts<Inside<'k>>) {
+        let ends: Vec<usize> = self.limits.iter().map(|&limit| limit.max(1) - 1).collect();
+        let end = value_by_case(k, io.which, &ends, io.value.bits());
+        count(k, [io.clear, io.enable], end, [io.value, io.last]);
     }
 }
 
@@ -68,10 +62,11 @@ pub fn expression_by_case<'k>(which: Expr<'k>, values: &[Expr<'k>]) -> Option<Ex
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::primitives::address::counter::tests::counts;
 
     #[test]
     fn values_wrap_at_the_limit_of_the_case() {
-        counts(CaseCounter::new(&[5, 11]).kernel.kernel(), &[5, 11]);
+        counts(&kernel_of(&CaseCounter::new(&[5, 11])), &[5, 11]);
     }
 }

@@ -1,64 +1,58 @@
 //! A counter from 0 to `limit − 1` that wraps.
 
 pub use dermis_golden::fixed::plan::resources::count_bits;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Output};
 
-/// ```text
-/// clear, enable --> value, last
-/// ```
-/// `enable` steps at the clock edge, from `limit − 1` back to 0; `clear` has priority. `last` is high while the value
-/// is `limit − 1`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Counter {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Sets the count to 0 at the clock edge, with priority over `enable`.
-    pub clear: Signal<In, Bit>,
-    /// Advances the count at the clock edge.
-    pub enable: Signal<In, Bit>,
-    /// The count, 0..`limit`, unsigned; valid from the first `clear` on.
-    pub value: Wire<Out>,
-    /// The count is `limit − 1`; combinational.
-    pub last: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// clear, enable --> value, last
+    /// ```
+    /// `enable` steps at the clock edge, from `limit − 1` back to 0; `clear` has priority. `last` is high while the value
+    /// is `limit − 1`.
+    pub struct Counter {
+        limit: usize,
+    }
+    ports CounterPorts {
+        clock;
+        /// Sets the count to 0 at the clock edge, with priority over `enable`.
+        in clear;
+        /// Advances the count at the clock edge.
+        in enable;
+        /// The count, 0..`limit`, unsigned; valid from the first `clear` on.
+        out value: count_bits(*limit);
+        /// The count is `limit − 1`; combinational.
+        out last;
+    }
 }
-
-kernel_block!(Counter, clock clk, inputs [clear, enable], outputs [value, last]);
 
 impl Counter {
     /// Counts 0..`limit`; a `limit` of 0 is taken as 1.
     pub fn new(limit: usize) -> Self {
-        let block = Counter {
-            clk: Default::default(),
-            clear: Default::default(),
-            enable: Default::default(),
-            value: Wire::new(count_bits(limit)),
-            last: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(count_bits(limit), |k, bits| k.constant(bits, limit.max(1) as u64 - 1)))
+        Counter { limit }
     }
 }
 
-/// A counter of `bits` bits that wraps after the value `end`.
-pub(super) fn kernel(bits: usize, end: impl for<'k> Fn(&'k Builder, usize) -> Expr<'k>) -> Kernel {
-    let k = Builder::new("counter");
-    let end = end(&k, bits);
-    let (clear, enable) = (k.input("clear", 1), k.input("enable", 1));
-    let value = k.state("value", Type::unsigned(bits), clear, 0);
-    let last = k.wire("last", value.equals(end));
-    k.when(enable, || value.set(last.mux(k.constant(bits, 0), value.plus(1))));
-    k.finish()
+impl Block for Counter {
+    fn build<'k>(&self, k: &'k Builder, io: CounterPorts<Inside<'k>>) {
+        let end = k.constant(io.value.bits(), self.limit.max(1) as u64 - 1);
+        count(k, [io.clear, io.enable], end, [io.value, io.last]);
+    }
+}
+
+/// A count from 0 to `end` and back, from the inputs clear and enable; the outputs value and last.
+pub(super) fn count<'k>(k: &'k Builder, [clear, enable]: [Expr<'k>; 2], end: Expr<'k>, [value, last]: [Output<'k>; 2]) {
+    let value = value.state(clear, 0);
+    let last = last.set(value.equals(end));
+    k.when(enable, || value.set(last.mux(k.constant(value.bits(), 0), value.plus(1))));
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use crate::language::testbench::{check, random_words, Reference};
+    use crate::language::{kernel_of, Kernel};
     use crate::wire::Word;
 
     /// The count; undefined before the first `clear`. Inputs: the case where there are several limits, clear, enable.
@@ -110,7 +104,7 @@ pub(super) mod tests {
     #[test]
     fn values_wrap_at_the_limit() {
         for limit in [1, 8, 13] {
-            counts(Counter::new(limit).kernel.kernel(), &[limit as u64]);
+            counts(&kernel_of(&Counter::new(limit)), &[limit as u64]);
         }
     }
 }

@@ -3,6 +3,7 @@
 use dermis_golden::fixed::CasePlan;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::{CaseCounter, QuadAddress};
 use crate::wire::Wire;
@@ -32,10 +33,10 @@ pub struct Scan {
     pub lane: Wire<Out>,
     /// Lanes the current taxel is written to, one bit each; valid with `address`.
     pub mask: Wire<Out>,
-    col: CaseCounter,
-    part_col: CaseCounter,
-    row: CaseCounter,
-    part_row: CaseCounter,
+    col: RustHdl<CaseCounter>,
+    part_col: RustHdl<CaseCounter>,
+    row: RustHdl<CaseCounter>,
+    part_row: RustHdl<CaseCounter>,
     quad_address: QuadAddress,
     line_end: Signal<Local, Bit>,
 }
@@ -56,10 +57,10 @@ impl Scan {
             part: Wire::new(quad_address.part.width()),
             lane: Wire::new(2),
             mask: Wire::new(4),
-            col: each(&|case| case.layout().cols),
-            part_col: each(&|case| case.grid().cols),
-            row: each(&|case| case.layout().rows),
-            part_row: each(&|case| case.grid().rows),
+            col: RustHdl::new(each(&|case| case.layout().cols)),
+            part_col: RustHdl::new(each(&|case| case.grid().cols)),
+            row: RustHdl::new(each(&|case| case.layout().rows)),
+            part_row: RustHdl::new(each(&|case| case.grid().rows)),
             quad_address,
             line_end: Default::default(),
         }

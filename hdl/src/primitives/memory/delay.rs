@@ -1,120 +1,98 @@
 //! Shift registers: a word or a control bit, delayed by a fixed number of cycles.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// A word delayed by `depth` cycles, with 0 on wires. Data, therefore without reset.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Delay {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// The word that `q` shows `depth` cycles later; taken in every cycle.
-    pub d: Wire<In>,
-    /// The word that was on `d`; `depth` cycles later.
-    pub q: Wire<Out>,
-    kernel: Body,
+block! {
+    /// A word delayed by `depth` cycles, with 0 on wires. Data, therefore without reset.
+    pub struct Delay {
+        bits: usize,
+        depth: usize,
+    }
+    ports DelayPorts {
+        clock;
+        /// The word that `q` shows `depth` cycles later; taken in every cycle.
+        in d: bits;
+        /// The word that was on `d`; `depth` cycles later.
+        out q: bits;
+    }
 }
-
-kernel_block!(Delay, clock clk, inputs [d], outputs [q]);
 
 impl Delay {
     /// Delays words of `bits` bits by `depth` cycles.
     pub fn new(bits: usize, depth: usize) -> Self {
-        let (d, q) = (Wire::new(bits), Wire::new(bits));
-        let block = Delay { clk: Default::default(), d, q, kernel: Body::default() };
-        block.bind(kernel(bits, depth))
+        Delay { bits, depth }
     }
 }
 
-fn kernel(bits: usize, depth: usize) -> Kernel {
-    let k = Builder::new("delay");
-    let first = k.input("d", bits);
-    if depth == 0 {
-        k.wire("q", first);
-        return k.finish();
-    }
-    let last = (1..depth).fold(first, |value, number| k.delay(&format!("pipe{number}"), value));
-    k.delay("q", last);
-    k.finish()
-}
-
-/// A control bit delayed by `depth` cycles; reset clears the whole shift register.
-#[derive(dermis_hdl_derive::Block)]
-pub struct BitDelay {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The bit that `q` shows `depth` cycles later.
-    pub d: Signal<In, Bit>,
-    /// The bit that was on `d` `depth` cycles earlier.
-    pub q: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(BitDelay, clock clk, inputs [rst, d], outputs [q]);
-
-impl BitDelay {
-    /// Delays by `depth` ≥ 1 cycles.
-    pub fn new(depth: usize) -> Self {
-        BitDelay::of(bit_kernel(depth))
-    }
-
-    /// Delays pulses of one cycle, more than `depth` ≥ 1 cycles apart, by `depth` cycles: a counter where a shift register
-    /// would be longer.
-    pub fn of_pulse(depth: usize) -> Self {
-        match depth <= LONGEST_SHIFT {
-            true => BitDelay::new(depth),
-            false => BitDelay::of(pulse_kernel(depth)),
+impl Block for Delay {
+    fn build<'k>(&self, k: &'k Builder, io: DelayPorts<Inside<'k>>) {
+        if self.depth == 0 {
+            io.q.set(io.d);
+            return;
         }
+        io.q.delay((1..self.depth).fold(io.d, |value, number| k.delay(&format!("pipe{number}"), value)));
     }
+}
 
-    fn of(kernel: Kernel) -> Self {
-        let block = BitDelay {
-            clk: Default::default(),
-            rst: Default::default(),
-            d: Default::default(),
-            q: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel)
+block! {
+    /// A control bit delayed by `depth` cycles; reset clears the whole shift register.
+    pub struct BitDelay {
+        depth: usize,
+        /// A counter stands in the place of the shift register.
+        counts: bool,
+    }
+    ports BitDelayPorts {
+        clock;
+        reset;
+        /// The bit that `q` shows `depth` cycles later.
+        in d;
+        /// The bit that was on `d` `depth` cycles earlier.
+        out q;
     }
 }
 
 /// Longest delay of a pulse for which a shift register is used.
 const LONGEST_SHIFT: usize = 8;
 
-fn bit_kernel(depth: usize) -> Kernel {
-    let k = Builder::new("bit_delay");
-    let (rst, mut value) = (k.input("rst", 1), k.input("d", 1));
-    let inner = (1..depth).map(|number| format!("pipe{number}"));
-    for name in inner.chain(["q".to_owned()]) {
-        let register = k.state(&name, Type::unsigned(1), rst, 0);
-        register.set(value);
-        value = *register;
+impl BitDelay {
+    /// Delays by `depth` ≥ 1 cycles.
+    pub fn new(depth: usize) -> Self {
+        BitDelay { depth, counts: false }
     }
-    k.finish()
+
+    /// Delays pulses of one cycle, more than `depth` ≥ 1 cycles apart, by `depth` cycles: a counter where a shift register
+    /// would be longer.
+    pub fn of_pulse(depth: usize) -> Self {
+        BitDelay { depth, counts: depth > LONGEST_SHIFT }
+    }
+
+    /// A pulse starts a counter, whose end is the delayed pulse.
+    fn count<'k>(&self, k: &'k Builder, io: BitDelayPorts<Inside<'k>>) {
+        let count = Type::unsigned(count_bits(self.depth));
+        let (left, runs, q) =
+            (k.register("left", count), k.state("runs", Type::unsigned(1), io.rst, 0), io.q.state(io.rst, 0));
+        let ends = k.wire("ends", *runs & left.is(1));
+        let start = k.constant(count.bits, self.depth as u64 - 1);
+        left.set(io.d.mux(start, (*left - k.constant(count.bits, 1)).low(count.bits)));
+        runs.set(io.d | (*runs & !ends));
+        q.set(ends);
+    }
 }
 
-/// A pulse starts a counter, whose end is the delayed pulse.
-fn pulse_kernel(depth: usize) -> Kernel {
-    let k = Builder::new("pulse_delay");
-    let (rst, d) = (k.input("rst", 1), k.input("d", 1));
-    let count = Type::unsigned(count_bits(depth));
-    let (left, runs, q) = (
-        k.register("left", count),
-        k.state("runs", Type::unsigned(1), rst, 0),
-        k.state("q", Type::unsigned(1), rst, 0),
-    );
-    let ends = k.wire("ends", *runs & left.is(1));
-    left.set(d.mux(k.constant(count.bits, depth as u64 - 1), (*left - k.constant(count.bits, 1)).low(count.bits)));
-    runs.set(d | (*runs & !ends));
-    q.set(ends);
-    k.finish()
+impl Block for BitDelay {
+    fn build<'k>(&self, k: &'k Builder, io: BitDelayPorts<Inside<'k>>) {
+        if self.counts {
+            return self.count(k, io);
+        }
+        let later = |value, number| {
+            let register = k.state(&format!("pipe{number}"), Type::unsigned(1), io.rst, 0);
+            register.set(value);
+            *register
+        };
+        io.q.state(io.rst, 0).set((1..self.depth).fold(io.d, later));
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +100,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline, Reference};
     use crate::wire::Word;
 
@@ -146,14 +125,14 @@ mod tests {
         for depth in [1, 2, 5] {
             let delay = Delay::new(70, depth);
             check(
-                delay.kernel.kernel(),
+                &kernel_of(&delay),
                 &random_words(1000, &[70]),
                 &mut Pipeline::new(depth, 1, |inputs: &[Word]| vec![Some(inputs[0])]),
             );
             let mut stimulus = random_words(1000, &[1, 1]);
             stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 17 == 0).into());
             let block = BitDelay::new(depth);
-            check(block.kernel.kernel(), &stimulus, &mut Bits(vec![None; depth].into()));
+            check(&kernel_of(&block), &stimulus, &mut Bits(vec![None; depth].into()));
         }
     }
 
@@ -170,7 +149,7 @@ mod tests {
             };
             let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
             let block = BitDelay::of_pulse(depth);
-            check(block.kernel.kernel(), &stimulus, &mut Bits(vec![None; depth].into()));
+            check(&kernel_of(&block), &stimulus, &mut Bits(vec![None; depth].into()));
         }
     }
 }

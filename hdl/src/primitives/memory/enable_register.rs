@@ -1,65 +1,52 @@
 //! A register with enable.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
-
-/// `kept` is the value of `word` at the last clock edge at which `keep` was high.
-#[derive(dermis_hdl_derive::Block)]
-pub struct EnableRegister {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Enable: store `word` at the clock edge.
-    pub keep: Signal<In, Bit>,
-    /// The word to store; valid with `keep`.
-    pub word: Wire<In>,
-    /// Stored word, from the cycle after `keep`; undefined before the first.
-    pub kept: Wire<Out>,
-    kernel: Body,
+block! {
+    /// `kept` is the value of `word` at the last clock edge at which `keep` was high.
+    pub struct EnableRegister {
+        bits: usize,
+        constant: bool,
+    }
+    ports EnableRegisterPorts {
+        clock;
+        /// Enable: store `word` at the clock edge.
+        in keep;
+        /// The word to store; valid with `keep`.
+        in word: bits;
+        /// Stored word, from the cycle after `keep`; undefined before the first.
+        out kept: bits;
+    }
 }
-
-kernel_block!(EnableRegister, clock clk, inputs [keep, word], outputs [kept]);
 
 impl EnableRegister {
     /// A register of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        EnableRegister::with(bits, false)
+        EnableRegister { bits, constant: false }
     }
 
     /// With `constant`, wires in place of the register, for a word that never changes.
     pub fn constant(self, constant: bool) -> Self {
-        EnableRegister::with(self.word.width(), constant)
-    }
-
-    fn with(bits: usize, constant: bool) -> Self {
-        let block = EnableRegister {
-            clk: Default::default(),
-            keep: Default::default(),
-            word: Wire::new(bits),
-            kept: Wire::new(bits),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits, constant))
+        EnableRegister { constant, ..self }
     }
 }
 
-fn kernel(bits: usize, constant: bool) -> Kernel {
-    let k = Builder::new("enable_register");
-    let (keep, word) = (k.input("keep", 1), k.input("word", bits));
-    if constant {
-        k.wire("kept", word);
-    } else {
-        let kept = k.register("kept", Type::unsigned(bits));
-        k.when(keep, || kept.set(word));
+impl Block for EnableRegister {
+    fn build<'k>(&self, k: &'k Builder, io: EnableRegisterPorts<Inside<'k>>) {
+        if self.constant {
+            io.kept.set(io.word);
+        } else {
+            let kept = io.kept.register();
+            k.when(io.keep, || kept.set(io.word));
+        }
     }
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
 
@@ -78,6 +65,6 @@ mod tests {
     #[test]
     fn a_word_stays_until_the_next() {
         let block = EnableRegister::new(70);
-        check(block.kernel.kernel(), &random_words(1000, &[1, 70]), &mut Kept(None));
+        check(&kernel_of(&block), &random_words(1000, &[1, 70]), &mut Kept(None));
     }
 }

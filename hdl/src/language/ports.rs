@@ -1,0 +1,343 @@
+//! The ports of a block, declared once: what is inside, what connects to it and what tests see follow from it.
+//!
+//! [`block!`](crate::block) declares the parameters of a block and its ports. The struct of ports has one field for each port,
+//! whose type depends on the side from which it is seen, its [`View`]:
+//!
+//! | view | an input is | an output is |
+//! |---|---|---|
+//! | [`Inside`], in [`Block::build`] | an expression | an [`Output`], to be driven once |
+//! | [`Outside`], from [`Builder::instance`] | a [`Net`], to be assigned | an expression |
+//! | [`Signals`](super::Signals), in rust-hdl | a signal | a signal |
+
+use std::marker::PhantomData;
+use std::sync::Arc;
+
+use super::build::{Builder, Net};
+use super::expression::Expr;
+use super::kernel::{Kernel, Port, Type};
+use super::rust_hdl::{SignalPort, Signals};
+use super::wiring::SEPARATOR;
+
+/// A hardware block: its parameters are the fields of a struct, from which its ports and its behaviour follow.
+pub trait Block: Interface {
+    /// Describes the behaviour between the ports `io`.
+    fn build<'k>(&self, k: &'k Builder, io: Self::Ports<Inside<'k>>);
+}
+
+/// The ports of a block; [`block!`](crate::block) implements it.
+pub trait Interface {
+    /// The ports, as seen from one side.
+    type Ports<V: View>;
+
+    /// Name of the block in messages.
+    const NAME: &'static str;
+
+    /// Whether it has a clock port, `clk`.
+    const CLOCKED: bool;
+
+    /// The ports, made by `make` in the order of their declaration.
+    fn ports<V: View>(&self, make: &mut dyn Make<V>) -> Self::Ports<V>;
+
+    /// Shows `visit` the ports of a block in rust-hdl, in the order of their declaration: name, whether it is an output.
+    fn visit(ports: &Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &dyn SignalPort));
+
+    /// As [`Interface::visit`], to change them.
+    fn visit_mut(ports: &mut Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &mut dyn SignalPort));
+}
+
+/// The side from which ports are seen.
+pub trait View {
+    /// An input of one bit.
+    type InBit;
+    /// An output of one bit.
+    type OutBit;
+    /// An input of a width that the parameters decide.
+    type In;
+    /// An output of such a width.
+    type Out;
+}
+
+/// Makes the ports of a view from their declaration: name, width in bits, meaning.
+pub trait Make<V: View> {
+    /// An input of one bit.
+    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> V::InBit;
+    /// An output of one bit.
+    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> V::OutBit;
+    /// An input of `bits` bits.
+    fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::In;
+    /// An output of `bits` bits.
+    fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::Out;
+}
+
+/// Ports as their block sees them.
+#[derive(Debug)]
+pub struct Inside<'k>(PhantomData<&'k ()>);
+
+impl<'k> View for Inside<'k> {
+    type InBit = Expr<'k>;
+    type OutBit = Output<'k>;
+    type In = Expr<'k>;
+    type Out = Output<'k>;
+}
+
+/// Ports as a block sees them that has an instance.
+#[derive(Debug)]
+pub struct Outside<'k>(PhantomData<&'k ()>);
+
+impl<'k> View for Outside<'k> {
+    type InBit = Net<'k>;
+    type OutBit = Expr<'k>;
+    type In = Net<'k>;
+    type Out = Expr<'k>;
+}
+
+/// An output as its block sees it: it is driven once, by a wire or a register of its name.
+#[derive(Clone, Copy, Debug)]
+pub struct Output<'k> {
+    builder: &'k Builder,
+    name: &'static str,
+    bits: usize,
+}
+
+impl<'k> Output<'k> {
+    /// Drives the output by a wire with this value. A narrower value is extended.
+    pub fn set(self, value: Expr<'k>) -> Expr<'k> {
+        let value = if value.bits() < self.bits { value.extend(self.bits) } else { value };
+        self.builder.unscoped(|| self.builder.wire(self.name, value))
+    }
+
+    /// Drives the output by a wire that is assigned later.
+    pub fn net(self) -> Net<'k> {
+        self.builder.unscoped(|| self.builder.net(self.name, Type::unsigned(self.bits)))
+    }
+
+    /// Drives the output by a register without reset.
+    pub fn register(self) -> Net<'k> {
+        self.builder.unscoped(|| self.builder.register(self.name, Type::unsigned(self.bits)))
+    }
+
+    /// Drives the output by a register that `reset` sets to `value`.
+    pub fn state(self, reset: Expr<'k>, value: u64) -> Net<'k> {
+        self.builder.unscoped(|| self.builder.state(self.name, Type::unsigned(self.bits), reset, value))
+    }
+
+    /// Drives the output by `value` one cycle later.
+    pub fn delay(self, value: Expr<'k>) -> Expr<'k> {
+        let register = self.register();
+        register.set(value);
+        *register
+    }
+
+    /// Width in bits.
+    pub fn bits(self) -> usize {
+        self.bits
+    }
+}
+
+/// Width of a port in bits, from an expression of a block's parameters or one of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Width(pub usize);
+
+impl From<usize> for Width {
+    fn from(bits: usize) -> Self {
+        Width(bits)
+    }
+}
+
+impl From<&usize> for Width {
+    fn from(bits: &usize) -> Self {
+        Width(*bits)
+    }
+}
+
+/// The text of a doc comment: its lines, of which each begins with a space.
+fn text(doc: &[&str]) -> String {
+    doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
+}
+
+struct MakeInside<'k>(&'k Builder);
+
+impl<'k> Make<Inside<'k>> for MakeInside<'k> {
+    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Expr<'k> {
+        self.input(name, 1, doc)
+    }
+
+    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Output<'k> {
+        self.output(name, 1, doc)
+    }
+
+    fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Expr<'k> {
+        self.0.port(Port { name: name.to_owned(), bits, output: false, doc: text(doc) });
+        self.0.input(name, bits)
+    }
+
+    fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Output<'k> {
+        self.0.port(Port { name: name.to_owned(), bits, output: true, doc: text(doc) });
+        Output { builder: self.0, name, bits }
+    }
+}
+
+struct MakeOutside<'k, 'a> {
+    builder: &'k Builder,
+    instance: &'a str,
+}
+
+impl MakeOutside<'_, '_> {
+    fn name(&self, port: &str) -> String {
+        format!("{}{SEPARATOR}{port}", self.instance)
+    }
+}
+
+impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
+    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Net<'k> {
+        self.input(name, 1, doc)
+    }
+
+    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Expr<'k> {
+        self.output(name, 1, doc)
+    }
+
+    fn input(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Net<'k> {
+        self.builder.net(&self.name(name), Type::unsigned(bits))
+    }
+
+    fn output(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Expr<'k> {
+        self.builder.from_instance(&self.name(name), bits)
+    }
+}
+
+/// The kernel of a block.
+pub fn kernel_of<B: Block>(block: &B) -> Kernel {
+    let k = match B::CLOCKED {
+        true => Builder::new(B::NAME),
+        false => Builder::combinational(B::NAME),
+    };
+    let io = block.ports(&mut MakeInside(&k));
+    block.build(&k, io);
+    k.finish()
+}
+
+impl Builder {
+    /// An instance of `block`: its ports, of which the inputs are to be assigned. The clock is that of the block around it,
+    /// and so is the reset, an input `rst`, unless it is assigned.
+    pub fn instance<B: Block>(&self, name: &str, block: B) -> B::Ports<Outside<'_>> {
+        let kernel = Arc::new(kernel_of(&block));
+        let ports = block.ports(&mut MakeOutside { builder: self, instance: name });
+        self.place(name, kernel);
+        ports
+    }
+}
+
+/// Declares a block: a struct of its parameters, and a struct of its ports, each once.
+///
+/// ```text
+/// block! {
+///     /// Output queue.
+///     pub struct Queue {
+///         /// Width of a beat in bits.
+///         bits: usize,
+///     }
+///     ports QueuePorts {
+///         clock;
+///         reset;
+///         /// Writes a beat in this cycle.
+///         in write;
+///         /// Data of the beat; valid with `write`.
+///         in word: bits;
+///         /// A beat can be written in this cycle.
+///         out room;
+///     }
+/// }
+///
+/// impl Block for Queue {
+///     fn build<'k>(&self, k: &'k Builder, io: QueuePorts<Inside<'k>>) { … }
+/// }
+/// ```
+/// A port without a width is one bit wide; a width is an expression of the parameters, which are in scope by their names.
+/// `clock` is the port `clk`, `reset` the port `rst`. A block without `clock` is combinational.
+#[macro_export]
+macro_rules! block {
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
+        ports $ports:ident { clock; reset; $($port:tt)* }
+    ) => {
+        $crate::block! {
+            @ true, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*]
+            { #[doc = " Synchronous reset, active high."] in rst; $($port)* }
+        }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
+        ports $ports:ident { clock; $($port:tt)* }
+    ) => {
+        $crate::block! {
+            @ true, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
+        }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
+        ports $ports:ident { $($port:tt)* }
+    ) => {
+        $crate::block! {
+            @ false, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
+        }
+    };
+    (
+        @ $clocked:literal, [$($meta:tt)*] $vis:vis $block:ident, $ports:ident,
+        [$($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty,)*]
+        { $($(#[doc = $doc:literal])+ $direction:ident $port:ident $(: $width:expr)?;)* }
+    ) => {
+        $($meta)*
+        $vis struct $block { $($(#[$field_meta])* $field_vis $field: $field_type,)* }
+
+        #[doc = concat!("Ports of [`", stringify!($block), "`].")]
+        $vis struct $ports<V: $crate::language::View> {
+            $($(#[doc = $doc])+ pub $port: $crate::block!(@type $direction V $($width)?),)*
+        }
+
+        impl $crate::language::Interface for $block {
+            type Ports<V: $crate::language::View> = $ports<V>;
+
+            const NAME: &'static str = stringify!($block);
+
+            const CLOCKED: bool = $clocked;
+
+            #[allow(unused_variables)]
+            fn ports<V: $crate::language::View>(&self, make: &mut dyn $crate::language::Make<V>) -> $ports<V> {
+                let $block { $($field,)* } = self;
+                $ports { $($port: $crate::block!(@make $direction make, stringify!($port), [$($doc),+] $(, $width)?),)* }
+            }
+
+            fn visit(
+                ports: &$ports<$crate::language::Signals>,
+                visit: &mut dyn FnMut(&'static str, bool, &dyn $crate::language::SignalPort),
+            ) {
+                $(visit(stringify!($port), $crate::block!(@is_output $direction), &ports.$port);)*
+            }
+
+            fn visit_mut(
+                ports: &mut $ports<$crate::language::Signals>,
+                visit: &mut dyn FnMut(&'static str, bool, &mut dyn $crate::language::SignalPort),
+            ) {
+                $(visit(stringify!($port), $crate::block!(@is_output $direction), &mut ports.$port);)*
+            }
+        }
+    };
+    (@type in $view:ident) => { <$view as $crate::language::View>::InBit };
+    (@type out $view:ident) => { <$view as $crate::language::View>::OutBit };
+    (@type in $view:ident $width:expr) => { <$view as $crate::language::View>::In };
+    (@type out $view:ident $width:expr) => { <$view as $crate::language::View>::Out };
+    (@make in $make:ident, $name:expr, $doc:tt) => { $make.in_bit($name, &$doc) };
+    (@make out $make:ident, $name:expr, $doc:tt) => { $make.out_bit($name, &$doc) };
+    (@make in $make:ident, $name:expr, $doc:tt, $width:expr) => {
+        $make.input($name, $crate::language::Width::from($width).0, &$doc)
+    };
+    (@make out $make:ident, $name:expr, $doc:tt, $width:expr) => {
+        $make.output($name, $crate::language::Width::from($width).0, &$doc)
+    };
+    (@is_output in) => { false };
+    (@is_output out) => { true };
+}
