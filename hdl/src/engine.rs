@@ -114,22 +114,22 @@ engine! {
         stages {
             prepare: Prepare => "stages/prepare.rs",
             receive: ReceiveStage => "stages/receive.rs",
-            normalise: Normalise => "stages/normalise.rs",
+            normalise: RustHdl<Normalise> => "stages/normalise.rs",
             fold: RustHdl<Fold> => "stages/fold.rs",
             pass: Pass => "stages/pass.rs",
-            segment: Segment => "stages/segment.rs",
-            contacts: Contacts => "stages/contacts.rs",
-            window: Window => "stages/window.rs",
-            estimate: Estimate => "stages/estimate.rs",
-            shear: Shear => "stages/shear.rs",
+            segment: RustHdl<Segment> => "stages/segment.rs",
+            contacts: RustHdl<Contacts> => "stages/contacts.rs",
+            window: RustHdl<Window> => "stages/window.rs",
+            estimate: RustHdl<Estimate> => "stages/estimate.rs",
+            shear: RustHdl<Shear> => "stages/shear.rs",
             rescale: Rescale => "stages/rescale.rs",
-            relax: Relax => "stages/relax.rs",
+            relax: RustHdl<Relax> => "stages/relax.rs",
             unfold: Unfold => "stages/unfold.rs",
             search: SearchStage => "stages/search.rs",
             forces: Forces => "stages/forces.rs",
             send: Send => "stages/send.rs",
-            label_beats: LabelBeats => "stages/label_beats.rs",
-            resultants: Resultants => "stages/resultants.rs",
+            label_beats: RustHdl<LabelBeats> => "stages/label_beats.rs",
+            resultants: RustHdl<Resultants> => "stages/resultants.rs",
         }
         control {
             operand_source: OperandSource,
@@ -177,6 +177,8 @@ engine! {
             behind: Signal<Local, Bit>,
             hand_over: Signal<Local, Bit>,
             begin_send: Signal<Local, Bit>,
+            _network: bool,
+            _contacts: bool,
         }
     }
 }
@@ -188,8 +190,8 @@ impl Engine {
         let bits = formats.input_bits as usize;
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let which = count_bits(counts.len());
-        let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
-        let (forces, resultants) = (Forces::new(model), Resultants::new(model));
+        let (prepare, normalise, rescale) = (Prepare::new(model), RustHdl::new(Normalise::new(bits)), Rescale::new(model));
+        let (forces, resultants) = (Forces::new(model), RustHdl::new(Resultants::new(model)));
         let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.scene.input.has_memory());
         let mut engine = Engine {
             clk: Default::default(),
@@ -205,15 +207,15 @@ impl Engine {
             receive: ReceiveStage::new(model),
             fold: RustHdl::new(Fold::new(model)),
             pass: Pass::new(model),
-            estimate: Estimate::new(model),
-            segment: Segment::of_model(model),
-            contacts: Contacts::new(model),
-            window: Window::new(model),
-            label_beats: LabelBeats::new(model, forces.m_axis_tdata.width()),
-            shear: Shear::new(model),
+            estimate: RustHdl::new(Estimate::new(model)),
+            segment: RustHdl::new(Segment::of_model(model)),
+            contacts: RustHdl::new(Contacts::new(model)),
+            window: RustHdl::new(Window::new(model)),
+            label_beats: RustHdl::new(LabelBeats::new(model, forces.m_axis_tdata.width())),
+            shear: RustHdl::new(Shear::new(model)),
             operand_source: OperandSource::new(model),
             status_source: StatusSource::new(model),
-            relax: Relax::new(formats),
+            relax: RustHdl::new(Relax::new(formats)),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
             forces,
@@ -265,9 +267,21 @@ impl Engine {
             behind: Default::default(),
             hand_over: Default::default(),
             begin_send: Default::default(),
+            _network: formats.has_network(),
+            _contacts: model.contacts() > 0,
         };
         engine.connect_all();
         engine
+    }
+
+    /// Whether a network gives μ.
+    pub(crate) fn has_network(&self) -> bool {
+        self._network
+    }
+
+    /// Whether each contact has a μ of its own.
+    pub(crate) fn has_contacts(&self) -> bool {
+        self._contacts
     }
 }
 

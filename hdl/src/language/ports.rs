@@ -21,7 +21,7 @@ use super::wiring::SEPARATOR;
 /// A hardware block: its parameters are the fields of a struct, from which its ports and its behaviour follow.
 pub trait Block: Interface {
     /// Describes the behaviour between the ports `io`.
-    fn build<'k>(&self, k: &'k Builder, io: Self::Ports<Inside<'k>>);
+    fn build<'k>(&'k self, k: &'k Builder, io: Self::Ports<Inside<'k>>);
 }
 
 /// The ports of a block; [`block!`](crate::block) implements it.

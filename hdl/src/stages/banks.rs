@@ -10,6 +10,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::{Choose, Receive, ReceivePorts};
+use crate::language::RustHdl;
 use crate::language::{Body, Builder, Expr, Kernel, Port, SEPARATOR};
 use crate::ports::has_ports;
 use crate::primitives::expression_by_case;
@@ -23,7 +24,7 @@ use crate::primitives::expression_by_case;
 pub struct Banks {
     ports: ReceivePorts,
     banks: Vec<Receive>,
-    choose: Choose,
+    choose: RustHdl<Choose>,
     kernel: Body,
 }
 
@@ -69,7 +70,7 @@ impl Banks {
         let mut block = Banks {
             ports: ReceivePorts::new(cases, model.floor_bits()),
             banks: (0..cases.len()).map(|case| Receive::new(model, case)).collect(),
-            choose: Choose::new(model),
+            choose: RustHdl::new(Choose::new(model)),
             kernel: Body::default(),
         };
         let (_, reads, drives) = block.pins();

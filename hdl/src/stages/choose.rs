@@ -7,86 +7,62 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Grid;
 use dermis_golden::spec::scene::Condition;
 use dermis_golden::spec::sensor::Sensor;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
-/// `free`, and keeps its value until the next choice.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Choose {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A code, `input_bits` wide, two's complement; valid with `accept`.
-    pub code: Wire<In>,
-    /// A code is accepted in this cycle.
-    pub accept: Signal<In, Bit>,
-    /// The code has `tlast`, which before the end of the frame drops the frame; valid with `accept`.
-    pub tlast: Signal<In, Bit>,
-    /// The frame has been read: clears `settled`.
-    pub free: Signal<In, Bit>,
-    /// Index of the chosen case; valid with `settled`.
-    pub which: Wire<Out>,
-    /// The choice for the frame in the buffer is complete.
-    pub settled: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(Choose, clock clk, inputs [rst, code, accept, tlast, free], outputs [which, settled]);
-
-/// What a choice depends on.
-struct Rule<'a> {
-    sensor: &'a Sensor,
-    /// Subarrays of each case.
-    grids: Vec<Grid>,
-    condition: Condition,
-    /// Noise floor in codes.
-    floor: i32,
-    /// Width of a code.
-    bits: usize,
+block! {
+    /// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
+    /// `free`, and keeps its value until the next choice.
+    pub struct Choose {
+        sensor: Sensor,
+        /// Subarrays of each case.
+        grids: Vec<Grid>,
+        condition: Condition,
+        /// Noise floor in codes.
+        floor: i32,
+        /// Width of a code.
+        bits: usize,
+    }
+    ports ChoosePorts {
+        clock;
+        reset;
+        /// A code, `input_bits` wide, two's complement; valid with `accept`.
+        in code: bits;
+        /// A code is accepted in this cycle.
+        in accept;
+        /// The code has `tlast`, which before the end of the frame drops the frame; valid with `accept`.
+        in tlast;
+        /// The frame has been read: clears `settled`.
+        in free;
+        /// Index of the chosen case; valid with `settled`.
+        out which: count_bits(grids.len());
+        /// The choice for the frame in the buffer is complete.
+        out settled;
+    }
 }
 
 impl Choose {
     /// For the cases of `model`.
     pub fn new(model: &Model) -> Self {
         let bits = model.formats().input_bits as usize;
-        Choose::with(&Rule {
-            sensor: &model.scene.sensor,
+        Choose {
+            sensor: model.scene.sensor.clone(),
             grids: model.grids(),
             condition: model.scene.partition.condition,
             // A floor beyond the code's range is clamped to its end, which no code exceeds either.
             floor: model.noise_floor.min((1 << (bits - 1)) - 1),
             bits,
-        })
-    }
-
-    fn with(rule: &Rule) -> Self {
-        let block = Choose {
-            clk: Default::default(),
-            rst: Default::default(),
-            code: Wire::new(rule.bits),
-            accept: Default::default(),
-            tlast: Default::default(),
-            free: Default::default(),
-            which: Wire::new(count_bits(rule.grids.len())),
-            settled: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(rule))
+        }
     }
 }
 
-fn kernel(rule: &Rule) -> Kernel {
-    let k = Builder::new("choose");
-    let (rst, accept, tlast, free) = (k.input("rst", 1), k.input("accept", 1), k.input("tlast", 1), k.input("free", 1));
-    let code = k.input("code", rule.bits);
+impl Block for Choose {
+    fn build<'k>(&self, k: &'k Builder, io: ChoosePorts<Inside<'k>>) {
+    let ChoosePorts { rst, code, accept, tlast, free, .. } = io;
     let bit = Type::unsigned(1);
-    let (rows, cols, magnitude_bits) = (rule.sensor.rows, rule.sensor.cols, rule.bits - 1);
+    let (rows, cols, magnitude_bits) = (self.sensor.rows, self.sensor.cols, self.bits - 1);
     let magnitude = Type::unsigned(magnitude_bits);
 
     let [line_end, frame_end, restart, last3] = ["line_end", "frame_end", "restart", "last3"].map(|name| match name {
@@ -110,8 +86,8 @@ fn kernel(rule: &Rule) -> Kernel {
     let last2 = k.delay("last2", last1 & !rst);
     last3.set(last2 & !rst);
     let magnitude1 = k.delay("magnitude1", code.low(magnitude_bits) ^ code.top().repeat(magnitude_bits));
-    let rows1 = k.delay("rows1", beside(&k, *row, rows));
-    let cols1 = k.delay("cols1", beside(&k, *col, cols));
+    let rows1 = k.delay("rows1", beside(k, *row, rows));
+    let cols1 = k.delay("cols1", beside(k, *col, cols));
 
     k.comment("Maxima");
     let [peak, middle_rows, middle_cols] =
@@ -121,16 +97,16 @@ fn kernel(rule: &Rule) -> Kernel {
         let takes = counts.map_or(larger, |counts| counts & larger);
         k.when(valid1 & takes, || most.set(magnitude1));
     }
-    let signs = (rule.condition != Condition::Loaded).then(|| signs(&k, rule, [*row, *col, code, valid1, forget]));
+    let signs = (self.condition != Condition::Loaded).then(|| signs(k, self, [*row, *col, code, valid1, forget]));
 
     k.comment("Limit for a contact, choice");
     let share = peak.shift_right(CUT_SHIFT as usize).extend(magnitude_bits);
-    let floor = k.constant(magnitude_bits, rule.floor.max(0) as u64);
-    let limit = k.delay("limit", if rule.floor > 0 { floor.less(share).mux(share, floor) } else { share });
+    let floor = k.constant(magnitude_bits, self.floor.max(0) as u64);
+    let limit = k.delay("limit", if self.floor > 0 { floor.less(share).mux(share, floor) } else { share });
     let cut_rows = k.wire("cut_rows", limit.less(*middle_rows));
     let cut_cols = k.wire("cut_cols", limit.less(*middle_cols));
-    let which_bits = count_bits(rule.grids.len());
-    let choice = rule.grids.iter().enumerate().skip(1).rev().fold(k.constant(which_bits, 0), |other, (case, grid)| {
+    let which_bits = count_bits(self.grids.len());
+    let choice = self.grids.iter().enumerate().skip(1).rev().fold(k.constant(which_bits, 0), |other, (case, grid)| {
         let cut = match (grid.rows > 1, grid.cols > 1) {
             (true, true) => cut_rows | cut_cols,
             (true, false) => cut_rows,
@@ -139,11 +115,11 @@ fn kernel(rule: &Rule) -> Kernel {
         let refused = signs.map_or(cut, |signs| cut | differ(signs, *grid));
         (!refused).mux(k.constant(which_bits, case as u64), other)
     });
-    let which = k.register("which", Type::unsigned(which_bits));
+    let which = io.which.register();
     k.when(*last3, || which.set(choice));
-    let settled = k.register("settled", bit);
+    let settled = io.settled.register();
     settled.set((*settled | *last3) & !free & !rst);
-    k.finish()
+    }
 }
 
 /// Whether `line` of `lines` is beside the boundary in the middle; 1 bit.
@@ -158,7 +134,7 @@ fn beside<'k>(k: &'k Builder, line: Expr<'k>, lines: usize) -> Expr<'k> {
 }
 
 /// For each quarter of the array a bit: a code was above the noise floor, a code was below its negative.
-fn signs<'k>(k: &'k Builder, rule: &Rule, [row, col, code, valid1, forget]: [Expr<'k>; 5]) -> [Expr<'k>; 2] {
+fn signs<'k>(k: &'k Builder, rule: &Choose, [row, col, code, valid1, forget]: [Expr<'k>; 5]) -> [Expr<'k>; 2] {
     let half = |line: Expr<'k>, lines: usize| !line.less(k.constant(line.bits(), lines.div_ceil(2) as u64));
     let quarter1 = k.delay("quarter1", half(row, rule.sensor.rows).concat(half(col, rule.sensor.cols)));
     let quarter = k.constant(4, 1).shift_left_by(quarter1);
@@ -189,6 +165,7 @@ mod tests {
     use dermis_golden::spec::scene::Scene;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -196,7 +173,7 @@ mod tests {
 
     /// The choice of the bit-true model, with the cycles that it takes.
     struct Expected<'a> {
-        rule: &'a Rule<'a>,
+        rule: &'a Choose,
         index: usize,
         seen: FrameStats,
         /// Edges until the choice, while a frame is complete.
@@ -206,7 +183,7 @@ mod tests {
     }
 
     impl<'a> Expected<'a> {
-        fn new(rule: &'a Rule<'a>) -> Self {
+        fn new(rule: &'a Choose) -> Self {
             Expected { rule, index: 0, seen: FrameStats::default(), left: None, which: None, settled: None }
         }
 
@@ -237,7 +214,7 @@ mod tests {
             self.left = self.left.map(|left| left - 1).filter(|left| *left > 0);
             if accept {
                 let code = inputs[4].signed(0, BITS) as i32;
-                self.seen.add(rule.sensor, self.index, code, rule.floor);
+                self.seen.add(&rule.sensor, self.index, code, rule.floor);
                 self.index += 1;
                 if self.index == rule.sensor.taxels() {
                     (self.index, self.left) = (0, Some(3));
@@ -249,7 +226,7 @@ mod tests {
     }
 
     /// Codes of sparse contacts with gaps; early `tlast`, resets, a buffer that stays full for a while.
-    fn stimulus(rule: &Rule, cycles: usize) -> Vec<Vec<Word>> {
+    fn stimulus(rule: &Choose, cycles: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(6);
         let mut state = Expected::new(rule);
         let mut all = Vec::new();
@@ -284,9 +261,8 @@ mod tests {
             (Condition::BothSigns, 9, all),
             (Condition::BothSigns, 0, vec![grid(1, 1), grid(2, 1)]),
         ] {
-            let rule = Rule { sensor: &sensor, grids, condition, floor, bits: BITS };
-            let block = Choose::with(&rule);
-            check(block.kernel.kernel(), &stimulus(&rule, 30_000), &mut Expected::new(&rule));
+            let rule = Choose { sensor: sensor.clone(), grids, condition, floor, bits: BITS };
+            check(&kernel_of(&rule), &stimulus(&rule, 30_000), &mut Expected::new(&rule));
         }
     }
 }

@@ -16,151 +16,130 @@
 
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::{count_bits, frame_quads, position_bits};
-use crate::wire::Wire;
 
-/// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other. The
-/// ports of the frame buffer and of the labels are those of the stage that runs.
-///
-/// Without contacts pulses pass on wires, and what only contacts need is constant 0.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Contacts {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A subarray starts.
-    pub start: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is computed.
-    pub which: Wire<In>,
-    /// The products of v_00 may begin.
-    pub readable: Signal<In, Bit>,
-    /// `fold` has read the frame.
-    pub folded: Signal<In, Bit>,
-    /// `unfold` gives a quad of taxels.
-    pub taxels_valid: Signal<In, Bit>,
-    /// The contacts are known; high for one cycle.
-    pub segmented: Signal<In, Bit>,
-    /// Number of contacts; valid with `segmented`.
-    pub count: Wire<In>,
-    /// The μ of the contact is known; high for one cycle.
-    pub known: Signal<In, Bit>,
-    /// The subarray meets the scene's condition.
-    pub condition: Signal<In, Bit>,
-    /// A code of the contact is above the noise floor; valid with `known`.
-    pub positive: Signal<In, Bit>,
-    /// A code of the contact is below minus the noise floor; valid with `known`.
-    pub negative: Signal<In, Bit>,
-    /// Position of its μ1 in mu_max/384, signed; valid with `known`.
-    pub position_x: Wire<In>,
-    /// Position of its μ2 in mu_max/384, signed; valid with `known`.
-    pub position_y: Wire<In>,
-    /// Word of both ln σ; valid with `known`.
-    pub ln_sigma: Wire<In>,
-    /// The values of a subarray begin; high for one cycle.
-    pub values_begin: Signal<In, Bit>,
-    /// The search of a subarray has ended; high for one cycle.
-    pub searched: Signal<In, Bit>,
-    /// Address of the quad that `fold` reads from the frame buffer; in every cycle but those of a window.
-    pub fold_address: Wire<In>,
-    /// Address of the quad that `window` reads there, and of its labels; from `window_start` to `known`.
-    pub window_address: Wire<In>,
-    /// Address of the quad whose labels `shear` reads; in a step.
-    pub shear_address: Wire<In>,
-    /// Address of the step whose labels `forces` reads; after the last step.
-    pub forces_address: Wire<In>,
-    /// Address of the quad whose labels `label_beats` reads; with `sends_labels`.
-    pub sent_address: Wire<In>,
-    /// `label_beats` reads labels.
-    pub sends_labels: Signal<In, Bit>,
-    /// Section of the passes: of contacts 0 for v_00, 1 for the layers, 2 for a step; else the case.
-    pub section: Wire<Out>,
-    /// The section begins.
-    pub pass_start: Signal<Out, Bit>,
-    /// The frame buffer may be overwritten.
-    pub free: Signal<Out, Bit>,
-    /// Address of the quad to read from the frame buffer; combinational.
-    pub quad_address: Wire<Out>,
-    /// Address of the quad whose labels are needed; combinational.
-    pub label_address: Wire<Out>,
-    /// The taxels of `unfold` are those of v_00.
-    pub fills: Signal<Out, Bit>,
-    /// v_00 is filled in: find the contacts.
-    pub segment_start: Signal<Out, Bit>,
-    /// Index of the contact; from the cycle after `segmented`, or after `known` of the contact before.
-    pub contact: Wire<Out>,
-    /// Label of its taxels, one more; as `contact`.
-    pub label: Wire<Out>,
-    /// Read the window around it; its layers begin.
-    pub window_start: Signal<Out, Bit>,
-    /// The rows of the first layer come next.
-    pub estimate_start: Signal<Out, Bit>,
-    /// μ is wanted, otherwise it is 0.
-    pub enabled: Signal<Out, Bit>,
-    /// Make the operands of a step.
-    pub shear_start: Signal<Out, Bit>,
-    /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits; from `known` of the contact on.
-    pub positions_x: Wire<Out>,
-    /// The same of μ2; as `positions_x`.
-    pub positions_y: Wire<Out>,
-    /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
-    pub told: Signal<Out, Bit>,
-    /// The label; valid with `told`.
-    pub told_label: Wire<Out>,
-    /// Position of its μ1, 0 where there is no such contact; valid with `told`.
-    pub told_x: Wire<Out>,
-    /// Position of its μ2; as `told_x`.
-    pub told_y: Wire<Out>,
-    /// Its word of both ln σ, 0 where it does not meet the condition; valid with `told`.
-    pub told_ln_sigma: Wire<Out>,
-    /// Whether it meets the condition; valid with `told`.
-    pub told_condition: Signal<Out, Bit>,
-    /// Beats of a subarray may be requested; of contacts once the last status has been told; high for one cycle.
-    pub begins: Signal<Out, Bit>,
-    /// The subarray is out of the passes and the search; high for one cycle.
-    pub ended: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other. The
+    /// ports of the frame buffer and of the labels are those of the stage that runs.
+    ///
+    /// Without contacts pulses pass on wires, and what only contacts need is constant 0.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Contacts {
+        quads: usize,
+        /// Steps of `relax`.
+        steps: usize,
+        /// Largest number of contacts; 0 without contacts.
+        contacts: usize,
+        /// Width of the word of both ln σ.
+        score_bits: usize,
+        /// A contact needs codes of both signs for a μ.
+        both_signs: bool,
+        cases: usize,
+        /// Quads of a frame, over all subarrays, and steps in which they are sent.
+        frame_quads: usize,
+        frame_steps: usize,
+    }
+    ports ContactsPorts {
+        clock;
+        reset;
+        /// A subarray starts.
+        in start;
+        /// Index of the case; constant while a frame is computed.
+        in which: count_bits(*cases);
+        /// The products of v_00 may begin.
+        in readable;
+        /// `fold` has read the frame.
+        in folded;
+        /// `unfold` gives a quad of taxels.
+        in taxels_valid;
+        /// The contacts are known; high for one cycle.
+        in segmented;
+        /// Number of contacts; valid with `segmented`.
+        in count: label_bits(*contacts);
+        /// The μ of the contact is known; high for one cycle.
+        in known;
+        /// The subarray meets the scene's condition.
+        in condition;
+        /// A code of the contact is above the noise floor; valid with `known`.
+        in positive;
+        /// A code of the contact is below minus the noise floor; valid with `known`.
+        in negative;
+        /// Position of its μ1 in mu_max/384, signed; valid with `known`.
+        in position_x: position_bits();
+        /// Position of its μ2 in mu_max/384, signed; valid with `known`.
+        in position_y: position_bits();
+        /// Word of both ln σ; valid with `known`.
+        in ln_sigma: score_bits;
+        /// The values of a subarray begin; high for one cycle.
+        in values_begin;
+        /// The search of a subarray has ended; high for one cycle.
+        in searched;
+        /// Address of the quad that `fold` reads from the frame buffer; in every cycle but those of a window.
+        in fold_address: count_bits(*frame_quads);
+        /// Address of the quad that `window` reads there, and of its labels; from `window_start` to `known`.
+        in window_address: count_bits(*quads);
+        /// Address of the quad whose labels `shear` reads; in a step.
+        in shear_address: count_bits(*quads);
+        /// Address of the step whose labels `forces` reads; after the last step.
+        in forces_address: count_bits(*frame_steps);
+        /// Address of the quad whose labels `label_beats` reads; with `sends_labels`.
+        in sent_address: count_bits(*quads);
+        /// `label_beats` reads labels.
+        in sends_labels;
+        /// Section of the passes: of contacts 0 for v_00, 1 for the layers, 2 for a step; else the case.
+        out section: section_bits(*contacts, *cases);
+        /// The section begins.
+        out pass_start;
+        /// The frame buffer may be overwritten.
+        out free;
+        /// Address of the quad to read from the frame buffer; combinational.
+        out quad_address: count_bits(*frame_quads);
+        /// Address of the quad whose labels are needed; combinational.
+        out label_address: count_bits(*quads);
+        /// The taxels of `unfold` are those of v_00.
+        out fills;
+        /// v_00 is filled in: find the contacts.
+        out segment_start;
+        /// Index of the contact; from the cycle after `segmented`, or after `known` of the contact before.
+        out contact: count_bits(*contacts.max(&1));
+        /// Label of its taxels, one more; as `contact`.
+        out label: label_bits(*contacts);
+        /// Read the window around it; its layers begin.
+        out window_start;
+        /// The rows of the first layer come next.
+        out estimate_start;
+        /// μ is wanted, otherwise it is 0.
+        out enabled;
+        /// Make the operands of a step.
+        out shear_start;
+        /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits; from `known` of the contact on.
+        out positions_x: contacts.max(&1) * position_bits();
+        /// The same of μ2; as `positions_x`.
+        out positions_y: contacts.max(&1) * position_bits();
+        /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
+        out told;
+        /// The label; valid with `told`.
+        out told_label: label_bits(*contacts);
+        /// Position of its μ1, 0 where there is no such contact; valid with `told`.
+        out told_x: position_bits();
+        /// Position of its μ2; as `told_x`.
+        out told_y: position_bits();
+        /// Its word of both ln σ, 0 where it does not meet the condition; valid with `told`.
+        out told_ln_sigma: score_bits;
+        /// Whether it meets the condition; valid with `told`.
+        out told_condition;
+        /// Beats of a subarray may be requested; of contacts once the last status has been told; high for one cycle.
+        out begins;
+        /// The subarray is out of the passes and the search; high for one cycle.
+        out ended;
+    }
 }
-
-kernel_block!(
-    Contacts,
-    clock clk,
-    inputs [
-        rst, start, which, readable, folded, taxels_valid, segmented, count, known, condition, positive, negative,
-        position_x, position_y, ln_sigma, values_begin, searched, fold_address, window_address, shear_address,
-        forces_address, sent_address, sends_labels
-    ],
-    outputs [
-        section, pass_start, free, quad_address, label_address, fills, segment_start, contact, label, window_start,
-        estimate_start, enabled, shear_start, positions_x, positions_y, told, told_label, told_x, told_y, told_ln_sigma,
-        told_condition, begins, ended
-    ]
-);
 
 /// Width of the number of a section.
 const SECTION_BITS: usize = 2;
-
-/// What decides the circuit.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    quads: usize,
-    /// Steps of `relax`.
-    steps: usize,
-    /// Largest number of contacts; 0 without contacts.
-    contacts: usize,
-    /// Width of the word of both ln σ.
-    score_bits: usize,
-    /// A contact needs codes of both signs for a μ.
-    both_signs: bool,
-    cases: usize,
-    /// Quads of a frame, over all subarrays, and steps in which they are sent.
-    frame_quads: usize,
-    frame_steps: usize,
-}
 
 #[derive(Clone, Copy)]
 enum State {
@@ -179,7 +158,7 @@ impl Contacts {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let frame_quads = frame_quads(model.cases());
-        Contacts::of(Shape {
+        Contacts {
             quads: formats.quads,
             steps: formats.degree,
             contacts: model.contacts(),
@@ -188,201 +167,77 @@ impl Contacts {
             cases: model.cases().len(),
             frame_quads,
             frame_steps: formats.sweep_steps(frame_quads),
-        })
+        }
     }
 
-    /// Whether each contact has a μ of its own.
-    pub(crate) fn are_wanted(&self) -> bool {
-        !self.kernel.kernel().memories().is_empty()
-    }
-
-    fn of(shape: Shape) -> Self {
-        let label = shape.label_bits();
-        let positions = shape.contacts.max(1) * position_bits();
-        let block = Contacts {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            which: Wire::new(count_bits(shape.cases)),
-            folded: Default::default(),
-            readable: Default::default(),
-            taxels_valid: Default::default(),
-            segmented: Default::default(),
-            count: Wire::new(label),
-            known: Default::default(),
-            condition: Default::default(),
-            positive: Default::default(),
-            negative: Default::default(),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            ln_sigma: Wire::new(shape.score_bits),
-            values_begin: Default::default(),
-            searched: Default::default(),
-            fold_address: Wire::new(count_bits(shape.frame_quads)),
-            window_address: Wire::new(count_bits(shape.quads)),
-            shear_address: Wire::new(count_bits(shape.quads)),
-            forces_address: Wire::new(count_bits(shape.frame_steps)),
-            sent_address: Wire::new(count_bits(shape.quads)),
-            sends_labels: Default::default(),
-            section: Wire::new(shape.section_bits()),
-            free: Default::default(),
-            quad_address: Wire::new(count_bits(shape.frame_quads)),
-            label_address: Wire::new(count_bits(shape.quads)),
-            fills: Default::default(),
-            estimate_start: Default::default(),
-            enabled: Default::default(),
-            pass_start: Default::default(),
-            segment_start: Default::default(),
-            contact: Wire::new(shape.contact_bits()),
-            label: Wire::new(label),
-            window_start: Default::default(),
-            shear_start: Default::default(),
-            positions_x: Wire::new(positions),
-            positions_y: Wire::new(positions),
-            told: Default::default(),
-            told_label: Wire::new(label),
-            told_x: Wire::new(position_bits()),
-            told_y: Wire::new(position_bits()),
-            told_ln_sigma: Wire::new(shape.score_bits),
-            told_condition: Default::default(),
-            begins: Default::default(),
-            ended: Default::default(),
-            kernel: Body::default(),
-        };
-        let kernel = match shape.contacts {
-            0 => block.nothing(shape),
-            _ => shape.kernel(),
-        };
-        block.bind(kernel)
-    }
-
-    /// The kernel of a scene without contacts.
-    fn nothing(&self, shape: Shape) -> Kernel {
-        let k = Builder::new("contacts");
-        let own = shape.inputs(&k);
+    /// Without contacts.
+    fn nothing<'k>(k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
         k.comment("There are no contacts.");
-        for (name, value) in [
-            ("section", own.which),
-            ("pass_start", own.readable),
-            ("free", own.folded),
-            ("quad_address", own.fold_address),
-            ("estimate_start", own.start),
-            ("enabled", own.condition),
-            ("begins", own.values_begin),
-            ("ended", own.searched),
-        ] {
-            k.wire(name, value);
-        }
+        io.section.set(io.which);
+        io.pass_start.set(io.readable);
+        io.free.set(io.folded);
+        io.quad_address.set(io.fold_address);
+        io.estimate_start.set(io.start);
+        io.enabled.set(io.condition);
+        io.begins.set(io.values_begin);
+        io.ended.set(io.searched);
         let words = [
-            ("label_address", self.label_address.width()),
-            ("contact", self.contact.width()),
-            ("label", self.label.width()),
-            ("positions_x", self.positions_x.width()),
-            ("positions_y", self.positions_y.width()),
-            ("told_label", self.told_label.width()),
-            ("told_x", self.told_x.width()),
-            ("told_y", self.told_y.width()),
-            ("told_ln_sigma", self.told_ln_sigma.width()),
+            io.label_address,
+            io.contact,
+            io.label,
+            io.positions_x,
+            io.positions_y,
+            io.told_label,
+            io.told_x,
+            io.told_y,
+            io.told_ln_sigma,
         ];
-        let bits = ["fills", "segment_start", "window_start", "shear_start", "told", "told_condition"];
-        for (name, width) in words.into_iter().chain(bits.map(|name| (name, 1))) {
-            k.wire(name, k.constant(width, 0));
+        let bits = [io.fills, io.segment_start, io.window_start, io.shear_start, io.told, io.told_condition];
+        for output in words.into_iter().chain(bits) {
+            output.set(k.constant(output.bits(), 0));
         }
-        k.finish()
+    }
+
+    /// What `of` gives for the contact of a label, 0 for label 0.
+    fn of_label<'k>(self, k: &'k Builder, label: Expr<'k>, of: impl Fn(usize) -> Expr<'k>) -> Expr<'k> {
+        let arms: Vec<(u64, Expr<'k>)> = (0..self.contacts).map(|at| (at as u64 + 1, of(at))).collect();
+        label.case(&arms, k.constant(of(0).bits(), 0))
     }
 }
 
-/// Inputs of the kernel.
-struct Inputs<'k> {
-    rst: Expr<'k>,
-    start: Expr<'k>,
-    which: Expr<'k>,
-    readable: Expr<'k>,
-    folded: Expr<'k>,
-    taxels_valid: Expr<'k>,
-    segmented: Expr<'k>,
-    count: Expr<'k>,
-    known: Expr<'k>,
-    condition: Expr<'k>,
-    positive: Expr<'k>,
-    negative: Expr<'k>,
-    position: [Expr<'k>; 2],
-    ln_sigma: Expr<'k>,
-    values_begin: Expr<'k>,
-    searched: Expr<'k>,
-    fold_address: Expr<'k>,
-    window_address: Expr<'k>,
-    shear_address: Expr<'k>,
-    forces_address: Expr<'k>,
-    sent_address: Expr<'k>,
-    sends_labels: Expr<'k>,
+/// Width of a label, and of a number of contacts.
+fn label_bits(contacts: usize) -> usize {
+    count_bits(contacts + 1)
 }
 
-impl Shape {
-    /// Width of a label, and of a number of contacts.
-    fn label_bits(self) -> usize {
-        count_bits(self.contacts + 1)
+/// Width of the section.
+fn section_bits(contacts: usize, cases: usize) -> usize {
+    if contacts > 0 {
+        SECTION_BITS
+    } else {
+        count_bits(cases)
     }
+}
 
-    /// Width of the section.
-    fn section_bits(self) -> usize {
-        if self.contacts > 0 {
-            SECTION_BITS
-        } else {
-            count_bits(self.cases)
+impl Block for Contacts {
+    fn build<'k>(&self, k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
+        if self.contacts == 0 {
+            return Contacts::nothing(k, io);
         }
-    }
-
-    /// Width of the index of a contact.
-    fn contact_bits(self) -> usize {
-        count_bits(self.contacts.max(1))
-    }
-
-    fn inputs(self, k: &Builder) -> Inputs<'_> {
-        let bit = |name: &str| k.input(name, 1);
-        Inputs {
-            rst: bit("rst"),
-            start: bit("start"),
-            which: k.input("which", count_bits(self.cases)),
-            readable: bit("readable"),
-            folded: bit("folded"),
-            taxels_valid: bit("taxels_valid"),
-            segmented: bit("segmented"),
-            count: k.input("count", self.label_bits()),
-            known: bit("known"),
-            condition: bit("condition"),
-            positive: bit("positive"),
-            negative: bit("negative"),
-            position: ["position_x", "position_y"].map(|name| k.input(name, position_bits())),
-            ln_sigma: k.input("ln_sigma", self.score_bits),
-            values_begin: bit("values_begin"),
-            searched: bit("searched"),
-            fold_address: k.input("fold_address", count_bits(self.frame_quads)),
-            window_address: k.input("window_address", count_bits(self.quads)),
-            shear_address: k.input("shear_address", count_bits(self.quads)),
-            forces_address: k.input("forces_address", count_bits(self.frame_steps)),
-            sent_address: k.input("sent_address", count_bits(self.quads)),
-            sends_labels: bit("sends_labels"),
-        }
-    }
-
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("contacts");
-        let own = self.inputs(&k);
-        let (rst, label_bits, bit) = (own.rst, self.label_bits(), Type::unsigned(1));
+        let (rst, label_bits, bit) = (io.rst, label_bits(self.contacts), Type::unsigned(1));
         let state = k.state("state", Type::unsigned(3), rst, State::Idle as u64);
         let is = |wanted: State| state.is(wanted as u64);
         let goes = |next: State| state.set(k.constant(3, next as u64));
 
-        let contact = k.register("contact", Type::unsigned(self.contact_bits()));
-        let label = k.wire("label", contact.extend(label_bits).plus(1));
+        let contact = io.contact.register();
+        let label = io.label.set(contact.extend(label_bits).plus(1));
         let found = k.register("found", Type::unsigned(label_bits));
-        let section = k.register("section", Type::unsigned(SECTION_BITS));
+        let section = io.section.register();
         let step = k.register("step", Type::unsigned(count_bits(self.steps)));
         let quad = k.register("quad", Type::unsigned(count_bits(self.quads)));
         let last_quad = quad.is(self.quads as u64 - 1);
-        let complete = k.wire("complete", own.taxels_valid & last_quad);
-        k.when(own.taxels_valid, || quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1))));
+        let complete = k.wire("complete", io.taxels_valid & last_quad);
+        k.when(io.taxels_valid, || quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1))));
         let pulse = |name: &str, value: Expr<'_>| {
             let own = k.state(name, bit, rst, 0);
             own.set(value);
@@ -390,20 +245,20 @@ impl Shape {
 
         k.comment("A state ends with the pulse of the stage it waits for.");
         let segments = k.wire("segments", is(State::First) & complete);
-        let segmented = k.wire("has_segments", is(State::Segment) & own.segmented);
-        let known = k.wire("has_mu", is(State::Contact) & own.known);
+        let segmented = k.wire("has_segments", is(State::Segment) & io.segmented);
+        let known = k.wire("has_mu", is(State::Contact) & io.known);
         let last_contact = label.equals(*found);
-        let next_contact = k.wire("next_contact", (segmented & own.count.any()) | (known & !last_contact));
+        let next_contact = k.wire("next_contact", (segmented & io.count.any()) | (known & !last_contact));
         let stepped = k.wire("stepped", is(State::Step) & complete);
         let last_step = step.is(self.steps as u64 - 1);
-        let steps = k.wire("steps", (segmented & !own.count.any()) | (known & last_contact) | (stepped & !last_step));
-        let tells = k.wire("tells", is(State::Result) & own.values_begin);
+        let steps = k.wire("steps", (segmented & !io.count.any()) | (known & last_contact) | (stepped & !last_step));
+        let tells = k.wire("tells", is(State::Result) & io.values_begin);
         let tells_of = k.register("tells_of", Type::unsigned(label_bits));
         let ends = k.wire("ends", is(State::Tell) & tells_of.is(self.contacts as u64));
 
         k.when(segments, || goes(State::Segment));
         k.when(segmented, || {
-            found.set(own.count);
+            found.set(io.count);
             contact.set(k.constant(contact.bits(), 0));
             step.set(k.constant(step.bits(), 0));
         });
@@ -425,7 +280,7 @@ impl Shape {
         });
         k.when(is(State::Tell), || tells_of.set(tells_of.plus(1)));
         k.when(ends, || goes(State::Idle));
-        k.when(own.start, || {
+        k.when(io.start, || {
             goes(State::First);
             section.set(k.constant(SECTION_BITS, 0));
             quad.set(k.constant(quad.bits(), 0));
@@ -434,64 +289,59 @@ impl Shape {
         pulse("window_start", is(State::Place));
         pulse("shear_start", steps);
         pulse("ended", ends);
-        k.wire("begins", k.named("ended"));
+        io.begins.set(k.named("ended"));
         k.comment("All windows have been read when the first step begins.");
         pulse("free", steps & !is(State::Step));
-        k.wire("fills", own.taxels_valid & is(State::First));
-        k.wire("estimate_start", k.named("window_start"));
-        let enabled = if self.both_signs { own.positive & own.negative } else { own.positive | own.negative };
-        let enabled = k.wire("enabled", enabled);
+        io.fills.set(io.taxels_valid & is(State::First));
+        io.estimate_start.set(k.named("window_start"));
+        let enabled = if self.both_signs { io.positive & io.negative } else { io.positive | io.negative };
+        let enabled = io.enabled.set(enabled);
         let reads = is(State::Contact);
-        k.wire("quad_address", reads.mux(own.window_address.resize(own.fold_address.bits()), own.fold_address));
-        let sent = own.sends_labels.mux(own.sent_address, own.forces_address.resize(own.sent_address.bits()));
-        let label_address = reads.mux(own.window_address, is(State::Step).mux(own.shear_address, sent));
-        k.wire("label_address", label_address);
-        k.wire("pass_start", own.readable | k.named("window_start") | k.named("shear_start"));
+        io.quad_address.set(reads.mux(io.window_address.resize(io.fold_address.bits()), io.fold_address));
+        let sent = io.sends_labels.mux(io.sent_address, io.forces_address.resize(io.sent_address.bits()));
+        let label_address = reads.mux(io.window_address, is(State::Step).mux(io.shear_address, sent));
+        io.label_address.set(label_address);
+        io.pass_start.set(io.readable | k.named("window_start") | k.named("shear_start"));
 
         k.comment("What is known of each contact.");
         let conditions = k.register("conditions", Type::unsigned(self.contacts));
         let index = |contact: usize| contact * position_bits();
         let positions = ["positions_x", "positions_y"]
             .map(|name| k.register(name, Type::unsigned(self.contacts * position_bits())));
+        let position = [io.position_x, io.position_y];
         for axis in [0, 1] {
             let kept = |at: usize| positions[axis].slice(index(at), position_bits());
-            let own_now = |at: usize| (known & contact.is(at as u64)).mux(own.position[axis], kept(at));
+            let own_now = |at: usize| (known & contact.is(at as u64)).mux(position[axis], kept(at));
             let all: Vec<Expr<'_>> = (0..self.contacts).rev().map(own_now).collect();
             positions[axis].set(concat(&all));
         }
-        let own_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !own.start;
+        let own_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !io.start;
         conditions.set(concat(&(0..self.contacts).rev().map(own_condition).collect::<Vec<_>>()));
         let ln_sigma = k.memory("ln_sigma_of", self.contacts, self.score_bits, Contents::Undefined);
-        ln_sigma.write(known, *contact, own.ln_sigma);
+        ln_sigma.write(known, *contact, io.ln_sigma);
 
         k.comment("Contacts that there are not have no condition, and what has no condition has no μ.");
         pulse("told", is(State::Tell));
-        k.delay("told_label", *tells_of);
-        let condition = k.wire("condition_of", self.of_label(&k, *tells_of, |at| conditions.at(at)));
-        k.delay("told_condition", condition);
+        io.told_label.delay(*tells_of);
+        let condition = k.wire("condition_of", self.of_label(k, *tells_of, |at| conditions.at(at)));
+        io.told_condition.delay(condition);
         for (axis, name) in ["told_x", "told_y"].into_iter().enumerate() {
-            let position = self.of_label(&k, *tells_of, |at| positions[axis].slice(index(at), position_bits()));
+            let position = self.of_label(k, *tells_of, |at| positions[axis].slice(index(at), position_bits()));
             k.delay(name, position & condition.repeat(position_bits()));
         }
-        let word = ln_sigma.read(tells_of.minus(1).low(self.contact_bits()));
-        k.delay("told_ln_sigma", word & condition.repeat(self.score_bits));
-        k.finish()
-    }
-
-    /// What `of` gives for the contact of a label, 0 for label 0.
-    fn of_label<'k>(self, k: &'k Builder, label: Expr<'k>, of: impl Fn(usize) -> Expr<'k>) -> Expr<'k> {
-        let arms: Vec<(u64, Expr<'k>)> = (0..self.contacts).map(|at| (at as u64 + 1, of(at))).collect();
-        label.case(&arms, k.constant(of(0).bits(), 0))
+        let word = ln_sigma.read(tells_of.minus(1).low(contact.bits()));
+        io.told_ln_sigma.delay(word & condition.repeat(self.score_bits));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape {
+    const SHAPE: Contacts = Contacts {
         quads: 5,
         steps: 3,
         contacts: 6,
@@ -714,6 +564,6 @@ mod tests {
 
     #[test]
     fn stages_start_one_after_the_other_and_every_contact_is_told() {
-        check(Contacts::of(SHAPE).kernel.kernel(), &stimulus(), &mut Sequence::new());
+        check(&kernel_of(&SHAPE), &stimulus(), &mut Sequence::new());
     }
 }

@@ -12,67 +12,53 @@ use dermis_golden::fixed::stages::send::LN_SIGMA_BITS;
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, saturated, SATURATION_BITS};
-use crate::wire::Wire;
 
-/// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
-/// layer. One more quad, of both positions and two zeros, says that μ is known; no product reads it.
-///
-/// Without a network all outputs are constant 0.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Estimate {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The rows of the first layer come next.
-    pub start: Signal<In, Bit>,
-    /// A subarray starts: its saturations are counted from 0.
-    pub clear: Signal<In, Bit>,
-    /// Otherwise μ is 0; constant from `start` until the next.
-    pub enabled: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `valid`.
-    pub quad: Wire<In>,
-    /// `quad` holds a row of a layer.
-    pub valid: Signal<In, Bit>,
-    /// Images of four neurons in parities, or the positions of μ, `data_bits` each, signed; valid with `operands_valid`.
-    pub operands: Wire<Out>,
-    /// `operands` holds a quad, or μ is known.
-    pub operands_valid: Signal<Out, Bit>,
-    /// Position of μ1 in mu_max/384, signed; valid from the last `operands_valid` until the next `start`.
-    pub position_x: Wire<Out>,
-    /// Position of μ2 in mu_max/384, signed; valid as `position_x`.
-    pub position_y: Wire<Out>,
-    /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; valid as
-    /// `position_x`.
-    pub ln_sigma: Wire<Out>,
-    /// μ is known; high for one cycle.
-    pub known: Signal<Out, Bit>,
-    /// Number of saturated images and outputs of this subarray, 16 bits, stays at the largest count; final with μ.
-    pub saturations: Wire<Out>,
-    kernel: Body,
-}
-
-kernel_block!(
-    Estimate,
-    clock clk,
-    inputs [rst, start, clear, enabled, quad, valid],
-    outputs [operands, operands_valid, position_x, position_y, ln_sigma, known, saturations]
-);
-
-/// What decides the circuit.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    lane_bits: usize,
-    data_bits: usize,
-    /// Width of the word of both ln σ, which stands in the place of the score.
-    score_bits: usize,
-    /// The network; none in a scene with a search.
-    network: Option<Layers>,
+block! {
+    /// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
+    /// layer. One more quad, of both positions and two zeros, says that μ is known; no product reads it.
+    ///
+    /// Without a network all outputs are constant 0.
+    pub struct Estimate {
+        lane_bits: usize,
+        data_bits: usize,
+        /// Width of the word of both ln σ, which stands in the place of the score.
+        score_bits: usize,
+        /// The network; none in a scene with a search.
+        network: Option<Layers>,
+    }
+    ports EstimatePorts {
+        clock;
+        reset;
+        /// The rows of the first layer come next.
+        in start;
+        /// A subarray starts: its saturations are counted from 0.
+        in clear;
+        /// Otherwise μ is 0; constant from `start` until the next.
+        in enabled;
+        /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `valid`.
+        in quad: 4 * lane_bits;
+        /// `quad` holds a row of a layer.
+        in valid;
+        /// Images of four neurons in parities, or the positions of μ, `data_bits` each, signed; valid with `operands_valid`.
+        out operands: 4 * data_bits;
+        /// `operands` holds a quad, or μ is known.
+        out operands_valid;
+        /// Position of μ1 in mu_max/384, signed; valid from the last `operands_valid` until the next `start`.
+        out position_x: position_bits();
+        /// Position of μ2 in mu_max/384, signed; valid as `position_x`.
+        out position_y: position_bits();
+        /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; valid as
+        /// `position_x`.
+        out ln_sigma: score_bits;
+        /// μ is known; high for one cycle.
+        out known;
+        /// Number of saturated images and outputs of this subarray, 16 bits, stays at the largest count; final with μ.
+        out saturations: SATURATION_BITS;
+    }
 }
 
 /// Sizes of a network.
@@ -89,35 +75,15 @@ impl Estimate {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let network = model.quantised().network.as_ref();
-        Estimate::of(Shape {
+        Estimate {
             lane_bits: formats.lane_bits as usize,
             data_bits: formats.data_bits as usize,
             score_bits: formats.score_bits as usize,
             network: network
                 .map(|network| Layers { hidden: formats.hidden_rows().sum(), shift: network.shift as usize }),
-        })
+        }
     }
 
-    fn of(shape: Shape) -> Self {
-        let block = Estimate {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            clear: Default::default(),
-            enabled: Default::default(),
-            quad: Wire::new(4 * shape.lane_bits),
-            valid: Default::default(),
-            operands: Wire::new(4 * shape.data_bits),
-            operands_valid: Default::default(),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            ln_sigma: Wire::new(shape.score_bits),
-            known: Default::default(),
-            saturations: Wire::new(SATURATION_BITS),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
-    }
 }
 
 /// A signed number within `range`.
@@ -127,22 +93,20 @@ fn clamped<'k>(k: &'k Builder, value: Expr<'k>, [least, most]: [i64; 2]) -> Expr
     value.less(least).mux(least, most.less(value).mux(most, value))
 }
 
-impl Shape {
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("estimate");
-        let [rst, start, clear, enabled] = ["rst", "start", "clear", "enabled"].map(|name| k.input(name, 1));
-        let (quad, valid) = (k.input("quad", 4 * self.lane_bits), k.input("valid", 1));
+impl Block for Estimate {
+    fn build<'k>(&self, k: &'k Builder, io: EstimatePorts<Inside<'k>>) {
+        let EstimatePorts { rst, start, clear, enabled, quad, valid, .. } = io;
         let Some(Layers { hidden, shift }) = self.network else {
             k.comment("There is no network.");
-            k.wire("operands", k.constant(4 * self.data_bits, 0));
-            k.wire("operands_valid", k.constant(1, 0));
-            for name in ["position_x", "position_y"] {
-                k.wire(name, k.constant(position_bits(), 0));
+            io.operands.set(k.constant(4 * self.data_bits, 0));
+            io.operands_valid.set(k.constant(1, 0));
+            for position in [io.position_x, io.position_y] {
+                position.set(k.constant(position_bits(), 0));
             }
-            k.wire("ln_sigma", k.constant(self.score_bits, 0));
-            k.wire("known", k.constant(1, 0));
-            k.wire("saturations", k.constant(SATURATION_BITS, 0));
-            return k.finish();
+            io.ln_sigma.set(k.constant(self.score_bits, 0));
+            io.known.set(k.constant(1, 0));
+            io.saturations.set(k.constant(SATURATION_BITS, 0));
+            return;
         };
         let bit = Type::unsigned(1);
         let later = |name: &str, value: Expr| {
@@ -184,7 +148,7 @@ impl Shape {
             let (parity, row) = OUTPUTS[place];
             let name = format!("output_{place}");
             let value = k.delay(&name, accumulator(parity).round_shift(shift + LAST_SHIFT as usize));
-            let (value, clips) = saturated(&k, value, bits as usize);
+            let (value, clips) = saturated(k, value, bits as usize);
             (value, [first, second][row] & clips)
         };
         let outputs = [POSITION_BITS, POSITION_BITS, OUTPUT_BITS, OUTPUT_BITS];
@@ -196,29 +160,30 @@ impl Shape {
                 let register = k.register(&format!("ln_{place}"), Type::signed(OUTPUT_BITS as usize));
                 // It is needed with μ, much later.
                 let value = k.delay(&format!("saturated_{place}"), outputs[place].0);
-                k.when(ln_told[row], || register.set(clamped(&k, value, ln_sigma_range())));
+                k.when(ln_told[row], || register.set(clamped(k, value, ln_sigma_range())));
                 register.get().extend(LN_SIGMA_BITS as usize).unsigned()
             })
             .into();
-        k.wire("ln_sigma", ln_sigma[1].concat(ln_sigma[0]));
-        let known = self.position(&k, [first, second], later, [outputs[0].0, outputs[1].0], [rst | start, enabled]);
+        io.ln_sigma.set(ln_sigma[1].concat(ln_sigma[0]));
+        let known = self.position(k, [first, second], later, [outputs[0].0, outputs[1].0], [rst | start, enabled]);
         let told = ["position_y", "position_x"].map(|name| k.named(name).signed().extend(self.data_bits).unsigned());
         let told = k.constant(2 * self.data_bits, 0).concat(concat(&told));
-        k.wire("operands", known.mux(told, images_out));
-        k.wire("operands_valid", images_valid | known);
+        io.operands.set(known.mux(told, images_out));
+        io.operands_valid.set(images_valid | known);
 
         let image_clips = k.delay(
             "image_clips",
             valid2.mux(concat(&[0, 1, 2, 3].map(|lane: usize| images[lane].1)), k.constant(4, 0)),
         );
         let output_clips = k.delay("output_clips", concat(&[0, 1, 2, 3].map(|place: usize| outputs[place].1)));
-        count_saturations(&k, "saturations", clear, image_clips | output_clips);
-        k.finish()
+        count_saturations(k, "saturations", clear, image_clips | output_clips);
     }
+}
 
+impl Estimate {
     /// The position of μ, taken with `first` and reduced from `second` on; high for one cycle when it is known.
     fn position<'k>(
-        self,
+        &self,
         k: &'k Builder,
         [first, second]: [Expr<'k>; 2],
         later: impl Fn(&str, Expr<'k>) -> Expr<'k>,
@@ -256,6 +221,7 @@ mod tests {
     use dermis_golden::fixed::stages::send::ln_sigma_word;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::scenes::learned;
     use crate::wire::Word;
@@ -381,6 +347,6 @@ mod tests {
             }
         }
         let block = Estimate::new(&model);
-        check(block.kernel.kernel(), &stimulus, &mut Rows::new(&model, hidden));
+        check(&kernel_of(&block), &stimulus, &mut Rows::new(&model, hidden));
     }
 }

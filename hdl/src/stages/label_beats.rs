@@ -6,66 +6,52 @@
 use dermis_golden::fixed::stages::send::{LABELS_PER_BEAT, LABEL_BITS};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, lane_of, quad_address_of, TaxelPlace};
-use crate::wire::Wire;
 
-/// ```text
-/// s_axis --------------------> m_axis
-/// labels --> lane --> beat -----^
-/// ```
-/// Without contacts, and where a record of each takes the place of the forces, the stream passes on wires.
-#[derive(dermis_hdl_derive::Block)]
-pub struct LabelBeats {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A beat, 96 bits; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// The beat, or one of labels; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// LabelBeats are being read.
-    pub reads: Signal<Out, Bit>,
-    /// Address of the quad whose labels are needed; with `reads`.
-    pub label_address: Wire<Out>,
-    /// LabelBeats of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
-    pub labels: Wire<In>,
-    kernel: Body,
-}
-
-kernel_block!(
-    LabelBeats,
-    clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, labels],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, reads, label_address]
-);
-
-/// What decides the circuit.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    layout: Quads,
-    /// Width of a beat.
-    bits: usize,
-    /// Largest number of contacts; 0 without contacts.
-    contacts: usize,
-    /// Beats of labels in a frame; 0 where the output has none.
-    beats: usize,
+block! {
+    /// ```text
+    /// s_axis --------------------> m_axis
+    /// labels --> lane --> beat -----^
+    /// ```
+    /// Without contacts, and where a record of each takes the place of the forces, the stream passes on wires.
+    pub struct LabelBeats {
+        layout: Quads,
+        /// Width of a beat.
+        bits: usize,
+        /// Largest number of contacts; 0 without contacts.
+        contacts: usize,
+        /// Beats of labels in a frame; 0 where the output has none.
+        beats: usize,
+    }
+    ports LabelBeatsPorts {
+        clock;
+        reset;
+        /// A beat, 96 bits; valid with `s_axis_tvalid`.
+        in s_axis_tdata: bits;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// The beat, or one of labels; valid with `m_axis_tvalid`.
+        out m_axis_tdata: bits;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// LabelBeats are being read.
+        out reads;
+        /// Address of the quad whose labels are needed; with `reads`.
+        out label_address: count_bits(layout.len());
+        /// LabelBeats of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
+        in labels: Quads::LANES * label_bits(*contacts);
+    }
 }
 
 /// Cycles from the scan of a taxel until its label is in the beat.
@@ -75,56 +61,32 @@ impl LabelBeats {
     /// For beats of `bits` bits of `model`.
     pub fn new(model: &Model, bits: usize) -> Self {
         let (contacts, beats) = (model.contacts(), model.label_beats());
-        LabelBeats::of(Shape { layout: model.layout(), bits, contacts, beats })
-    }
-
-    fn of(shape: Shape) -> Self {
-        let block = LabelBeats {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(shape.bits),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(shape.bits),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            reads: Default::default(),
-            label_address: Wire::new(count_bits(shape.layout.len())),
-            labels: Wire::new(Quads::LANES * shape.label_bits()),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+        LabelBeats { layout: model.layout(), bits, contacts, beats }
     }
 }
 
-impl Shape {
-    /// Width of a label.
-    fn label_bits(self) -> usize {
-        count_bits(self.contacts + 1)
-    }
+/// Width of the label of one of so many contacts.
+fn label_bits(contacts: usize) -> usize {
+    count_bits(contacts + 1)
+}
 
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("label_beats");
-        let rst = k.input("rst", 1);
-        let (data, given) = (k.input("s_axis_tdata", self.bits), k.input("s_axis_tvalid", 1));
-        let (last, taken) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-        let labels = k.input("labels", Quads::LANES * self.label_bits());
+impl Block for LabelBeats {
+    fn build<'k>(&self, k: &'k Builder, io: LabelBeatsPorts<Inside<'k>>) {
+        let LabelBeatsPorts { rst, s_axis_tdata: data, s_axis_tvalid: given, s_axis_tlast: last, labels, .. } = io;
+        let taken = io.m_axis_tready;
         if self.beats == 0 {
             k.comment("There are no contacts, or a record of each in place of the labels.");
-            for (name, value) in
-                [("m_axis_tdata", data), ("m_axis_tvalid", given), ("m_axis_tlast", last), ("s_axis_tready", taken)]
-            {
-                k.wire(name, value);
-            }
-            k.wire("reads", k.constant(1, 0));
-            k.wire("label_address", k.constant(count_bits(self.layout.len()), 0));
-            return k.finish();
+            io.m_axis_tdata.set(data);
+            io.m_axis_tvalid.set(given);
+            io.m_axis_tlast.set(last);
+            io.s_axis_tready.set(taken);
+            io.reads.set(k.constant(1, 0));
+            io.label_address.set(k.constant(count_bits(self.layout.len()), 0));
+            return;
         }
         let (taxels, beats) = (self.layout.rows * self.layout.cols, self.beats);
         let counter = |name: &str, count: usize| k.state(name, Type::unsigned(count_bits(count)), rst, 0);
-        let reads = k.state("reads", Type::unsigned(1), rst, 0);
+        let reads = io.reads.state(rst, 0);
         let passed = counter("passed", taxels + 1);
         let passes = k.wire("passes", given & taken & !*reads);
         let all_passed = passes & passed.is(taxels as u64 - 1);
@@ -139,17 +101,17 @@ impl Shape {
         let (row_ends, col_ends) = (row.is(self.layout.rows as u64 - 1), col.is(self.layout.cols as u64 - 1));
         k.when(scans, || place.set(place.plus(1)));
         k.when(scans & !*beyond, || {
-            col.set(after(&k, *col, col_ends));
-            k.when(col_ends, || row.set(after(&k, *row, row_ends)));
+            col.set(after(k, *col, col_ends));
+            k.when(col_ends, || row.set(after(k, *row, row_ends)));
             k.when(col_ends & row_ends, || beyond.set(k.constant(1, 1)));
         });
-        let own = TaxelPlace::of(&k, self.layout, [*row, *col]);
+        let own = TaxelPlace::of(k, self.layout, [*row, *col]);
         let near = [0, 1].map(|axis| k.delay(["near_row", "near_col"][axis], own.near[axis]));
         let first = k.constant(count_bits(self.layout.len()), 0);
-        k.delay("label_address", quad_address_of(&k, self.layout, near, first));
-        let from = later(&k, rst, "from", own.lower.concat(own.right));
-        let (arrives, empty) = (later(&k, rst, "arrives", scans), later(&k, rst, "empty", *beyond));
-        let label = lane_of(labels, Quads::LANES, from) & (!empty).repeat(self.label_bits());
+        io.label_address.delay(quad_address_of(k, self.layout, near, first));
+        let from = later(k, rst, "from", own.lower.concat(own.right));
+        let (arrives, empty) = (later(k, rst, "arrives", scans), later(k, rst, "empty", *beyond));
+        let label = lane_of(labels, Quads::LANES, from) & (!empty).repeat(label_bits(self.contacts));
         let label = label.extend(LABEL_BITS as usize);
         let word = k.register("word", Type::unsigned(self.bits));
         k.when(arrives, || word.set(label.concat(word.slice(LABEL_BITS as usize, self.bits - LABEL_BITS as usize))));
@@ -161,7 +123,7 @@ impl Shape {
         k.when(leaves, || {
             arrived.set(k.constant(arrived.bits(), 0));
             place.set(k.constant(place.bits(), 0));
-            beat.set(after(&k, *beat, last_beat));
+            beat.set(after(k, *beat, last_beat));
         });
         k.when(leaves & last_beat, || {
             reads.set(k.constant(1, 0));
@@ -171,11 +133,10 @@ impl Shape {
         });
         k.when(all_passed, || reads.set(k.constant(1, 1)));
 
-        k.wire("m_axis_tdata", reads.mux(*word, data));
-        k.wire("m_axis_tvalid", reads.mux(full, given));
-        k.wire("m_axis_tlast", last & !*reads);
-        k.wire("s_axis_tready", taken & !*reads);
-        k.finish()
+        io.m_axis_tdata.set(reads.mux(*word, data));
+        io.m_axis_tvalid.set(reads.mux(full, given));
+        io.m_axis_tlast.set(last & !*reads);
+        io.s_axis_tready.set(taken & !*reads);
     }
 }
 
@@ -200,10 +161,11 @@ mod tests {
     use dermis_golden::fixed::stages::send::{label_beats, labels_to_beats};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8, beats: 2 };
+    const SHAPE: LabelBeats = LabelBeats { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8, beats: 2 };
     const BITS: usize = 4;
     /// Cycles from the beat before to one of labels, at full speed.
     const CYCLES: usize = LABELS_PER_BEAT + READ - 1;
@@ -328,6 +290,6 @@ mod tests {
     fn labels_follow_the_forces() {
         let mut random = fastrand::Rng::with_seed(4);
         let labels: Vec<usize> = (0..35).map(|_| random.usize(..=SHAPE.contacts)).collect();
-        check(LabelBeats::of(SHAPE).kernel.kernel(), &stimulus(&labels), &mut Sent::new(&labels));
+        check(&kernel_of(&SHAPE), &stimulus(&labels), &mut Sent::new(&labels));
     }
 }

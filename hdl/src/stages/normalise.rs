@@ -1,46 +1,49 @@
 //! Stage `normalise`: block exponent of the input, one left shift for all codes of a subarray.
 
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::{by_leading_one, count_bits};
-use crate::wire::Wire;
 
-/// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
-/// then registered and shifted, one per cycle: the frame buffer may lie far from the shifter.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Normalise {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Compute the shift for a new subarray.
-    pub start: Signal<In, Bit>,
-    /// OR of the subarray's magnitudes; valid with `start`.
-    pub magnitude: Wire<In>,
-    /// Four codes, `bits` each, signed; one quad per cycle.
-    pub quad: Wire<In>,
-    /// Four shifted codes, `bits` each, signed; two cycles after `quad`.
-    pub shifted: Wire<Out>,
-    /// The left shift; from two cycles after `start` until the next one.
-    pub shift: Wire<Out>,
-    kernel: Body,
+block! {
+    /// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
+    /// then registered and shifted, one per cycle: the frame buffer may lie far from the shifter.
+    pub struct Normalise {
+        /// Width of a code.
+        bits: usize,
+    }
+    ports NormalisePorts {
+        clock;
+        /// Compute the shift for a new subarray.
+        in start;
+        /// OR of the subarray's magnitudes; valid with `start`.
+        in magnitude: bits - 1;
+        /// Four codes, `bits` each, signed; one quad per cycle.
+        in quad: 4 * bits;
+        /// Four shifted codes, `bits` each, signed; two cycles after `quad`.
+        out shifted: 4 * bits;
+        /// The left shift; from two cycles after `start` until the next one.
+        out shift: count_bits(*bits);
+    }
 }
 
-kernel_block!(Normalise, clock clk, inputs [start, magnitude, quad], outputs [shifted, shift]);
 
 impl Normalise {
     /// For codes of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        let block = Normalise {
-            clk: Default::default(),
-            start: Default::default(),
-            magnitude: Wire::new(bits - 1),
-            quad: Wire::new(4 * bits),
-            shifted: Wire::new(4 * bits),
-            shift: Wire::new(count_bits(bits)),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits))
+        Normalise { bits }
+    }
+}
+
+impl Block for Normalise {
+    fn build<'k>(&self, k: &'k Builder, io: NormalisePorts<Inside<'k>>) {
+        let shift = io.shift.register();
+        let left = k.delay("left", left_shift(k, io.magnitude));
+        let started = k.delay("started", io.start);
+        k.when(started, || shift.set(left));
+        let near = k.delay("near", io.quad);
+        let lane = |lane: usize| near.slice(lane * self.bits, self.bits).shift_left_by(*shift);
+        io.shifted.delay(concat(&[3, 2, 1, 0].map(lane)));
     }
 }
 
@@ -53,25 +56,12 @@ pub(super) fn left_shift<'k>(k: &'k Builder, magnitude: Expr<'k>) -> Expr<'k> {
     none | by_leading_one(k, magnitude, 0..bits - 1, width, |bit| bits - 2 - bit)
 }
 
-fn kernel(bits: usize) -> Kernel {
-    let k = Builder::new("normalise");
-    let (start, magnitude) = (k.input("start", 1), k.input("magnitude", bits - 1));
-    let quad = k.input("quad", 4 * bits);
-    let shift = k.register("shift", Type::unsigned(count_bits(bits)));
-    let left = k.delay("left", left_shift(&k, magnitude));
-    let started = k.delay("started", start);
-    k.when(started, || shift.set(left));
-    let near = k.delay("near", quad);
-    let lanes: Vec<Expr> = (0..4).rev().map(|lane| near.slice(lane * bits, bits).shift_left_by(*shift)).collect();
-    k.delay("shifted", concat(&lanes));
-    k.finish()
-}
-
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::stages::normalise;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
 
@@ -108,6 +98,6 @@ mod tests {
             inputs[1] = Word::from(inputs[1].number() >> (cycle % BITS));
         }
         let block = Normalise::new(BITS);
-        check(block.kernel.kernel(), &stimulus, &mut Shifts::default());
+        check(&kernel_of(&block), &stimulus, &mut Shifts::default());
     }
 }

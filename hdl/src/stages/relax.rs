@@ -4,127 +4,77 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::{count_bits, count_saturations, operand_of, saturated, saturating_sum, SATURATION_BITS};
-use crate::wire::Wire;
 
-/// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Relax {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A subarray starts: v_00 comes next, and saturations are counted from 0.
-    pub start: Signal<In, Bit>,
-    /// Four parities, `vector_bits` each, signed; valid with `words_valid`.
-    pub words: Wire<In>,
-    /// `words` holds a quad.
-    pub words_valid: Signal<In, Bit>,
-    /// The same, `data_bits` each, which passes on without a network; valid with `short_valid`.
-    pub short: Wire<In>,
-    /// `short` holds a quad.
-    pub short_valid: Signal<In, Bit>,
-    /// Saturations of `rescale` in this subarray; taken in every cycle.
-    pub rescaled: Wire<In>,
-    /// Saturations of `estimate` in this subarray; taken in every cycle.
-    pub estimated: Wire<In>,
-    /// Saturations of `shear` in this subarray; taken in every cycle.
-    pub sheared: Wire<In>,
-    /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
-    pub sums: Wire<Out>,
-    /// `sums` holds a quad.
-    pub sums_valid: Signal<Out, Bit>,
-    /// The same as operands, `data_bits` each; valid with `operands_valid`.
-    pub operands: Wire<Out>,
-    /// `operands` holds a quad.
-    pub operands_valid: Signal<Out, Bit>,
-    /// All saturations of this subarray, 16 bits, stays at the largest count; final four cycles after the last sum.
-    pub saturations: Wire<Out>,
-    kernel: Body,
-}
-
-kernel_block!(
-    Relax,
-    clock clk,
-    inputs [rst, start, words, words_valid, short, short_valid, rescaled, estimated, sheared],
-    outputs [sums, sums_valid, operands, operands_valid, saturations]
-);
-
-/// Widths and number of quads.
-#[derive(Clone, Copy)]
-struct Shape {
-    word: usize,
-    data: usize,
-    quads: usize,
-    network: bool,
-    /// Each contact has a μ of its own.
-    contacts: bool,
+block! {
+    /// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four.
+    pub struct Relax {
+        word: usize,
+        data: usize,
+        quads: usize,
+        network: bool,
+        /// Each contact has a μ of its own.
+        contacts: bool,
+    }
+    ports RelaxPorts {
+        clock;
+        reset;
+        /// A subarray starts: v_00 comes next, and saturations are counted from 0.
+        in start;
+        /// Four parities, `vector_bits` each, signed; valid with `words_valid`.
+        in words: 4 * word;
+        /// `words` holds a quad.
+        in words_valid;
+        /// The same, `data_bits` each, which passes on without a network; valid with `short_valid`.
+        in short: 4 * data;
+        /// `short` holds a quad.
+        in short_valid;
+        /// Saturations of `rescale` in this subarray; taken in every cycle.
+        in rescaled: SATURATION_BITS;
+        /// Saturations of `estimate` in this subarray; taken in every cycle.
+        in estimated: SATURATION_BITS;
+        /// Saturations of `shear` in this subarray; taken in every cycle.
+        in sheared: SATURATION_BITS;
+        /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
+        out sums: 4 * word;
+        /// `sums` holds a quad.
+        out sums_valid;
+        /// The same as operands, `data_bits` each; valid with `operands_valid`.
+        out operands: 4 * data;
+        /// `operands` holds a quad.
+        out operands_valid;
+        /// All saturations of this subarray, 16 bits, stays at the largest count; final four cycles after the last sum.
+        out saturations: SATURATION_BITS;
+    }
 }
 
 impl Relax {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        Relax::of(Shape {
+        Relax {
             word: formats.vector_bits as usize,
             data: formats.data_bits as usize,
             quads: formats.quads,
             network: formats.has_network(),
             contacts: formats.by_contact(),
-        })
-    }
-
-    /// Whether a network gives μ.
-    pub(crate) fn is_wanted(&self) -> bool {
-        !self.kernel.kernel().memories().is_empty()
-    }
-
-    fn of(shape: Shape) -> Self {
-        let block = Relax {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            words: Wire::new(4 * shape.word),
-            words_valid: Default::default(),
-            short: Wire::new(4 * shape.data),
-            short_valid: Default::default(),
-            rescaled: Wire::new(SATURATION_BITS),
-            estimated: Wire::new(SATURATION_BITS),
-            sheared: Wire::new(SATURATION_BITS),
-            sums: Wire::new(4 * shape.word),
-            sums_valid: Default::default(),
-            operands: Wire::new(4 * shape.data),
-            operands_valid: Default::default(),
-            saturations: Wire::new(SATURATION_BITS),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+        }
     }
 }
 
-impl Shape {
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("relax");
-        let [rst, start] = ["rst", "start"].map(|name| k.input(name, 1));
-        let (words, valid) = (k.input("words", 4 * self.word), k.input("words_valid", 1));
-        let (short, short_valid) = (k.input("short", 4 * self.data), k.input("short_valid", 1));
-        let [rescaled, estimated, sheared] =
-            ["rescaled", "estimated", "sheared"].map(|name| k.input(name, SATURATION_BITS));
+impl Block for Relax {
+    fn build<'k>(&self, k: &'k Builder, io: RelaxPorts<Inside<'k>>) {
+        let RelaxPorts { rst, start, words, words_valid: valid, rescaled, estimated, sheared, .. } = io;
         if !self.network {
             k.comment("Without a network all passes on.");
-            for (name, value) in [
-                ("sums", words),
-                ("sums_valid", valid),
-                ("operands", short),
-                ("operands_valid", short_valid),
-                ("saturations", rescaled),
-            ] {
-                k.wire(name, value);
-            }
-            return k.finish();
+            io.sums.set(words);
+            io.sums_valid.set(valid);
+            io.operands.set(io.short);
+            io.operands_valid.set(io.short_valid);
+            io.saturations.set(rescaled);
+            return;
         }
         let bit = Type::unsigned(1);
         let quad = k.state("quad", Type::unsigned(count_bits(self.quads)), rst | start, 0);
@@ -151,25 +101,24 @@ impl Shape {
                 let at = parity * self.word;
                 let own = words2.slice(at, self.word).signed();
                 let sum = own + (first.slice(at, self.word) & adds2.repeat(self.word)).signed();
-                let (word, clips) = saturated(&k, sum, self.word);
+                let (word, clips) = saturated(k, sum, self.word);
                 let word = k.delay("sum", word);
-                [word, operand_of(&k, word, self.data), clips]
+                [word, operand_of(k, word, self.data), clips]
             })
         };
         let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
         let [sums, own, clipped] = [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
-        k.wire("sums", sums);
-        k.wire("operands", own);
+        io.sums.set(sums);
+        io.operands.set(own);
 
         let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
-        let relaxed = count_saturations(&k, "relaxed", start, clipped3);
-        let mut others = saturating_sum(&k, "of_layers", rescaled, estimated);
+        let relaxed = count_saturations(k, "relaxed", start, clipped3);
+        let mut others = saturating_sum(k, "of_layers", rescaled, estimated);
         if self.contacts {
-            others = saturating_sum(&k, "of_contacts", others, sheared);
+            others = saturating_sum(k, "of_contacts", others, sheared);
         }
         let others = k.delay("others", others);
-        k.delay("saturations", saturating_sum(&k, "total", others, relaxed));
-        k.finish()
+        io.saturations.delay(saturating_sum(k, "total", others, relaxed));
     }
 }
 
@@ -180,10 +129,11 @@ mod tests {
     use dermis_golden::fixed::words::arith::saturate;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { word: 22, data: 18, quads: 5, network: true, contacts: true };
+    const SHAPE: Relax = Relax { word: 22, data: 18, quads: 5, network: true, contacts: true };
 
     /// A sum, and how many of its words were saturated.
     type Sum = ([i64; 4], u32);
@@ -296,7 +246,7 @@ mod tests {
 
     #[test]
     fn the_products_of_each_step_are_added_to_v_00() {
-        check(Relax::of(SHAPE).kernel.kernel(), &stimulus(), &mut Sums::default());
+        check(&kernel_of(&SHAPE), &stimulus(), &mut Sums::default());
     }
 
     /// Words, their operands and their count, on wires.
@@ -312,7 +262,7 @@ mod tests {
 
     #[test]
     fn without_a_network_all_passes_on() {
-        let block = Relax::of(Shape { network: false, ..SHAPE });
-        check(block.kernel.kernel(), &stimulus(), &mut Wires);
+        let block = Relax { network: false, ..SHAPE };
+        check(&kernel_of(&block), &stimulus(), &mut Wires);
     }
 }

@@ -5,44 +5,44 @@ use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Grid;
 use dermis_golden::spec::sensor::Sensor;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Net, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// ```text
-/// s_axis (forces, row-major; status) --> moments --> sums of each subarray or label --> m_axis (sums; status)
-/// ```
-/// One force is accepted per cycle. The sums start to leave four cycles after the last force, then the status beats
-/// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
-///
-/// Where each contact has a μ of its own, a force comes with the label of its taxel, and the taxels of a label are counted.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Resultants {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// `{fz, fy, fx}` of a taxel, 32 bits signed each, with contacts above them its label, or a status beat; valid with
-    /// `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A beat of sums, or a status beat, 96 bits; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// s_axis (forces, row-major; status) --> moments --> sums of each subarray or label --> m_axis (sums; status)
+    /// ```
+    /// One force is accepted per cycle. The sums start to leave four cycles after the last force, then the status beats
+    /// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
+    ///
+    /// Where each contact has a μ of its own, a force comes with the label of its taxel, and the taxels of a label are counted.
+    pub struct Resultants {
+        parts: Option<Parts>,
+        sensor: Sensor,
+    }
+    ports ResultantsPorts {
+        clock;
+        reset;
+        /// `{fz, fy, fx}` of a taxel, 32 bits signed each, with contacts above them its label, or a status beat; valid with
+        /// `s_axis_tvalid`.
+        in s_axis_tdata: parts.map_or(3 * WORD, Parts::force_bits);
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A beat of sums, or a status beat, 96 bits; valid with `m_axis_tvalid`.
+        out m_axis_tdata: 3 * WORD;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+    }
 }
 
 /// Width of a component of a force, in bits.
@@ -51,13 +51,6 @@ const WORD: usize = FORCE_BITS as usize;
 const PLACE: usize = POSITION_BITS as usize + 1;
 /// Width of a sum on the stream, in bits.
 const WIDE: usize = 64;
-
-kernel_block!(
-    Resultants,
-    clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
-);
 
 /// What tells to which sums a force is added.
 #[derive(Clone, Copy, Debug)]
@@ -108,39 +101,23 @@ impl Resultants {
             Summed::Subarray => Parts::Subarrays(model.grid()),
             Summed::Label => Parts::Labels(model.records()),
         });
-        Resultants::of(parts, &model.scene.sensor)
-    }
-
-    fn of(parts: Option<Parts>, sensor: &Sensor) -> Self {
-        let block = Resultants {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(parts.map_or(3 * WORD, Parts::force_bits)),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(3 * WORD),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(parts.map_or_else(pass_through, |parts| sums(sensor, parts)))
+        Resultants { parts, sensor: model.scene.sensor.clone() }
     }
 }
 
-/// The stream on wires.
-fn pass_through() -> Kernel {
-    let k = Builder::new("resultants");
-    k.input("rst", 1);
-    let (data, valid) = (k.input("s_axis_tdata", 3 * WORD), k.input("s_axis_tvalid", 1));
-    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-    k.comment("A force per taxel: the stream passes through.");
-    k.wire("s_axis_tready", ready);
-    k.wire("m_axis_tdata", data);
-    k.wire("m_axis_tvalid", valid);
-    k.wire("m_axis_tlast", last);
-    k.finish()
+impl Block for Resultants {
+    fn build<'k>(&self, k: &'k Builder, io: ResultantsPorts<Inside<'k>>) {
+        match self.parts {
+            Some(parts) => sums(k, io, &self.sensor, parts),
+            None => {
+                k.comment("A force per taxel: the stream passes through.");
+                io.s_axis_tready.set(io.m_axis_tready);
+                io.m_axis_tdata.set(io.s_axis_tdata);
+                io.m_axis_tvalid.set(io.s_axis_tvalid);
+                io.m_axis_tlast.set(io.s_axis_tlast);
+            }
+        }
+    }
 }
 
 /// A counter from 0 to `last` that starts again at 0.
@@ -167,13 +144,11 @@ fn pick<'k>(index: Expr<'k>, values: &[Expr<'k>]) -> Expr<'k> {
     index.case(&arms, values[0])
 }
 
-fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
+fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, parts: Parts) {
     let (count, grid, summed) = (parts.count(), parts.grid(), parts.summed());
     let (rows, cols) = (sensor.rows / grid.rows, sensor.cols / grid.cols);
-    let k = Builder::new("resultants");
-    let rst = k.input("rst", 1);
-    let (data, valid) = (k.input("s_axis_tdata", parts.force_bits()), k.input("s_axis_tvalid", 1));
-    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    let ResultantsPorts { rst, s_axis_tdata: data, s_axis_tvalid: valid, s_axis_tlast: last, .. } = io;
+    let ready = io.m_axis_tready;
     let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
     let restart = k.net("restart", bit);
     let counting = k.state("counting", bit, *restart, 1);
@@ -185,10 +160,10 @@ fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
     };
 
     k.comment("The taxel of the next force: row and column in its subarray, and of its subarray.");
-    let col = Lines::new(&k, "col", cols, *restart);
-    let part_col = Lines::new(&k, "part_col", grid.cols, *restart);
-    let row = Lines::new(&k, "row", rows, *restart);
-    let part_row = Lines::new(&k, "part_row", grid.rows, *restart);
+    let col = Lines::new(k, "col", cols, *restart);
+    let part_col = Lines::new(k, "part_col", grid.cols, *restart);
+    let row = Lines::new(k, "row", rows, *restart);
+    let part_row = Lines::new(k, "part_row", grid.rows, *restart);
     let line_last = k.wire("line_last", col.is_last & part_col.is_last);
     let last_force = k.wire("last_force", line_last & row.is_last & part_row.is_last);
     let take = k.wire("take", *counting & valid);
@@ -200,13 +175,13 @@ fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
     let (x, y) = (axis("x", sensor.cols), axis("y", sensor.rows));
     let pitch = k.signed_constant(PLACE, 2);
     k.when(take, || {
-        col.step(&k);
+        col.step(k);
         x.set(line_last.mux(k.signed_constant(PLACE, start_of(sensor.cols)), (*x + pitch).resize(PLACE)));
-        k.when(col.is_last, || part_col.step(&k));
+        k.when(col.is_last, || part_col.step(k));
         k.when(line_last, || {
             y.set((*y + pitch).resize(PLACE));
-            row.step(&k);
-            k.when(row.is_last, || part_row.step(&k));
+            row.step(k);
+            k.when(row.is_last, || part_row.step(k));
         });
         k.when(last_force, || counting.set(zero));
     });
@@ -275,12 +250,12 @@ fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
     all.reverse();
     let all = k.wire("all", concat(&all));
 
-    let beat = Lines::new(&k, "beat", summed.beats(), *restart);
+    let beat = Lines::new(k, "beat", summed.beats(), *restart);
     let now: Vec<Expr> = (0..summed.beats()).map(|n| all.slice(n * 3 * WORD, 3 * WORD)).collect();
     let sent = k.wire("sent", *sending & ready);
     k.when(settled, || sending.set(one));
     k.when(sent, || {
-        beat.step(&k);
+        beat.step(k);
         k.when(beat.is_last, || {
             part_out.set(part_out.plus(1));
             k.when(part_out.is(count as u64 - 1), || sending.set(zero));
@@ -289,11 +264,10 @@ fn sums(sensor: &Sensor, parts: Parts) -> Kernel {
     let passing = k.wire("passing", !(*counting | settling[0] | settling[1] | settled | *sending));
     let finish = k.wire("finish", passing & valid & ready & last);
     restart.set(rst | finish);
-    k.wire("s_axis_tready", *counting | (passing & ready));
-    k.wire("m_axis_tvalid", *sending | (passing & valid));
-    k.wire("m_axis_tlast", passing & last);
-    k.wire("m_axis_tdata", sending.mux(pick(*beat.count, &now), data.low(3 * WORD)));
-    k.finish()
+    io.s_axis_tready.set(*counting | (passing & ready));
+    io.m_axis_tvalid.set(*sending | (passing & valid));
+    io.m_axis_tlast.set(passing & last);
+    io.m_axis_tdata.set(sending.mux(pick(*beat.count, &now), data.low(3 * WORD)));
 }
 
 #[cfg(test)]
@@ -302,6 +276,7 @@ mod tests {
     use dermis_golden::spec::scene::Scene;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -405,7 +380,7 @@ mod tests {
             "name = \"sums\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"
         );
         let sensor = Scene::parse(&text, "sums.toml").unwrap().sensor;
-        let block = Resultants::of(Some(parts), &sensor);
+        let block = Resultants { parts: Some(parts), sensor: sensor.clone() };
         let mut random = fastrand::Rng::with_seed(12);
         let inputs = |cycle: usize| {
             let mut fields = [(); 3].map(|()| random.i64(..) >> random.u8(32..64)).to_vec();
@@ -425,7 +400,7 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..6000).map(inputs).collect();
         let records = vec![Record::default(); parts.count()];
         let mut reference = Sums { sensor, parts, reset: false, taxel: 0, settling: 0, beat: 0, records };
-        check(block.kernel.kernel(), &stimulus, &mut reference);
+        check(&kernel_of(&block), &stimulus, &mut reference);
     }
 
     #[test]

@@ -30,12 +30,10 @@ use dermis_golden::fixed::stages::segment::cycles::Segmentation;
 use dermis_golden::fixed::stages::segment::word_shift;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel};
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 use control::{Circuit, Shape};
 
 mod basins;
@@ -43,50 +41,53 @@ mod control;
 mod labels;
 mod walk;
 
-/// Segments the quads that were filled in; ports below, steps in the module docs.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Segment {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; stops the sequence.
-    pub rst: Signal<In, Bit>,
-    /// Four taxels of v_00, signed; valid with `fill`.
-    pub fill_quad: Wire<In>,
-    /// `fill_quad` holds a quad; not from `start` to `done`.
-    pub fill: Signal<In, Bit>,
-    /// Address of the quad; valid with `fill`.
-    pub fill_address: Wire<In>,
-    /// All quads have been filled in: start. Ignored from then to `done`.
-    pub start: Signal<In, Bit>,
-    /// Address of the quad whose labels are asked; taken in every cycle.
-    pub label_address: Wire<In>,
-    /// Index of the contact whose middle is asked; taken in every cycle.
-    pub contact: Wire<In>,
-    /// Outputs are valid from now to the next `start`; high for one cycle.
-    pub done: Signal<Out, Bit>,
-    /// Number of contacts; valid from `done` to the next `start`.
-    pub count: Wire<Out>,
-    /// There were more contacts or basins than there may be.
-    pub overflow: Signal<Out, Bit>,
-    /// The contacts of a quad are written; high for one cycle per quad, in their order.
-    pub labelled: Signal<Out, Bit>,
-    /// Those contacts, signed, a bit wider than a label; valid with `labelled`.
-    pub labelled_quad: Wire<Out>,
-    /// Contacts of the four taxels of a quad, 0 for none, else 1 + index; two cycles after `label_address`.
-    pub labels: Wire<Out>,
-    /// Row of the taxel in the middle of a contact; one cycle after `contact`.
-    pub middle_row: Wire<Out>,
-    /// Its column; as `middle_row`.
-    pub middle_col: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Segments the quads that were filled in; ports below, steps in the module docs.
+    pub struct Segment {
+        layout: Quads,
+        /// Width of a lane of a quad that comes in.
+        lane: usize,
+        /// Width of the index of a contact.
+        contact_bits: usize,
+        /// Width of a label.
+        label_bits: usize,
+        /// The circuit; none without contacts.
+        shape: Option<Shape>,
+    }
+    ports SegmentPorts {
+        clock;
+        /// Synchronous reset, active high; stops the sequence.
+        in rst;
+        /// Four taxels of v_00, signed; valid with `fill`.
+        in fill_quad: 4 * lane;
+        /// `fill_quad` holds a quad; not from `start` to `done`.
+        in fill;
+        /// Address of the quad; valid with `fill`.
+        in fill_address: count_bits(layout.len());
+        /// All quads have been filled in: start. Ignored from then to `done`.
+        in start;
+        /// Address of the quad whose labels are asked; taken in every cycle.
+        in label_address: count_bits(layout.len());
+        /// Index of the contact whose middle is asked; taken in every cycle.
+        in contact: contact_bits;
+        /// Outputs are valid from now to the next `start`; high for one cycle.
+        out done;
+        /// Number of contacts; valid from `done` to the next `start`.
+        out count: label_bits;
+        /// There were more contacts or basins than there may be.
+        out overflow;
+        /// The contacts of a quad are written; high for one cycle per quad, in their order.
+        out labelled;
+        /// Those contacts, signed, a bit wider than a label; valid with `labelled`.
+        out labelled_quad: 4 * (label_bits + 1);
+        /// Contacts of the four taxels of a quad, 0 for none, else 1 + index; two cycles after `label_address`.
+        out labels: 4 * label_bits;
+        /// Row of the taxel in the middle of a contact; one cycle after `contact`.
+        out middle_row: count_bits(layout.rows);
+        /// Its column; as `middle_row`.
+        out middle_col: count_bits(layout.cols);
+    }
 }
-
-kernel_block!(
-    Segment,
-    clock clk,
-    inputs [rst, fill_quad, fill, fill_address, start, label_address, contact],
-    outputs [done, count, overflow, labelled, labelled_quad, labels, middle_row, middle_col]
-);
 
 impl Segment {
     /// For the contacts of `model`; without contacts all outputs are constant 0.
@@ -95,82 +96,34 @@ impl Segment {
         let lane = formats.vector_bits as usize + 2;
         match &model.by_contact {
             Some(contacts) => Segment::new(&contacts.segmentation(&model.scene), lane, word_shift(formats) as usize),
-            None => Segment::nothing(model.layout(), lane),
+            None => Segment { layout: model.layout(), lane, contact_bits: 1, label_bits: 1, shape: None },
         }
-    }
-
-    /// Constant 0 in the place of a segmentation, for quads with lanes of `lane` bits.
-    fn nothing(layout: Quads, lane: usize) -> Self {
-        let (quad, bits) = (count_bits(layout.len()), count_bits(1));
-        let k = Builder::new("segment");
-        k.comment("There are no contacts.");
-        for (name, width) in [
-            ("rst", 1),
-            ("fill_quad", 4 * lane),
-            ("fill", 1),
-            ("fill_address", quad),
-            ("start", 1),
-            ("label_address", quad),
-            ("contact", bits),
-        ] {
-            k.input(name, width);
-        }
-        for (name, width) in [
-            ("done", 1),
-            ("count", bits),
-            ("overflow", 1),
-            ("labelled", 1),
-            ("labelled_quad", 4 * (bits + 1)),
-            ("labels", 4 * bits),
-            ("middle_row", count_bits(layout.rows)),
-            ("middle_col", count_bits(layout.cols)),
-        ] {
-            k.wire(name, k.constant(width, 0));
-        }
-        Segment::with(layout, lane, bits, bits).bind(k.finish())
     }
 
     /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
     pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
         let shape = Shape::new(segmentation, lane, low);
-        Segment::with(segmentation.quads(), lane, count_bits(shape.most), shape.label()).bind(kernel(&shape))
-    }
-
-    /// The ports for quads of `layout` with lanes of `lane` bits, indices of contacts of `contact` bits and labels of `label`.
-    fn with(layout: Quads, lane: usize, contact: usize, label: usize) -> Self {
-        let quad = count_bits(layout.len());
-        Segment {
-            clk: Default::default(),
-            rst: Default::default(),
-            fill_quad: Wire::new(4 * lane),
-            fill: Default::default(),
-            fill_address: Wire::new(quad),
-            start: Default::default(),
-            label_address: Wire::new(quad),
-            contact: Wire::new(contact),
-            done: Default::default(),
-            count: Wire::new(label),
-            overflow: Default::default(),
-            labelled: Default::default(),
-            labelled_quad: Wire::new(4 * (label + 1)),
-            labels: Wire::new(4 * label),
-            middle_row: Wire::new(count_bits(layout.rows)),
-            middle_col: Wire::new(count_bits(layout.cols)),
-            kernel: Body::default(),
-        }
+        let (contact_bits, label_bits) = (count_bits(shape.most), shape.label());
+        Segment { layout: segmentation.quads(), lane, contact_bits, label_bits, shape: Some(shape) }
     }
 }
 
-fn kernel(shape: &Shape) -> Kernel {
-    let k = Builder::new("segment");
-    {
-        let circuit = Circuit::new(&k, shape);
+impl Block for Segment {
+    fn build<'k>(&'k self, k: &'k Builder, io: SegmentPorts<Inside<'k>>) {
+        let Some(shape) = &self.shape else {
+            k.comment("There are no contacts.");
+            let words = [io.count, io.labelled_quad, io.labels, io.middle_row, io.middle_col];
+            for output in [io.done, io.overflow, io.labelled].into_iter().chain(words) {
+                output.set(k.constant(output.bits(), 0));
+            }
+            return;
+        };
+        let circuit = Circuit::new(k, shape, io);
         let order = circuit.order();
         let list = circuit.tables(&order);
         circuit.labels(&order);
         circuit.begin_pairs(&list);
     }
-    k.finish()
 }
 
 #[cfg(test)]

@@ -10,120 +10,95 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
 use dermis_golden::fixed::stages::shear::{LATENCY, MEAN};
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, saturated, SATURATION_BITS};
-use crate::wire::Wire;
 
-/// Operands of p in, in the order of the quads; after `start`, operands of the products with Ax, then with Ay, the first
-/// [`LATENCY`] cycles later. Without contacts all outputs are constant 0.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Shear {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A frame starts: v_00 comes next, and saturations are counted from 0.
-    pub clear: Signal<In, Bit>,
-    /// Four parities of p as an operand, `data_bits` each, signed; valid with `operands_valid`.
-    pub operands: Wire<In>,
-    /// `operands` holds a quad.
-    pub operands_valid: Signal<In, Bit>,
-    /// All quads of p are there: their operands leave.
-    pub start: Signal<In, Bit>,
-    /// Address of the quad whose labels are needed; from the cycle after `start`, one per cycle.
-    pub label_address: Wire<Out>,
-    /// Contact of each lane of that quad, 0 for none, else 1 …; two cycles after `label_address`.
-    pub labels: Wire<In>,
-    /// Position of μ1 of each contact in mu_max/384, signed, contact 1 in the low bits; constant while operands leave.
-    pub positions_x: Wire<In>,
-    /// The same of μ2; as `positions_x`.
-    pub positions_y: Wire<In>,
-    /// Four parities, `data_bits` each, signed; valid with `sheared_valid`.
-    pub sheared: Wire<Out>,
-    /// `sheared` holds a quad.
-    pub sheared_valid: Signal<Out, Bit>,
-    /// Number of saturated words of this frame, 16 bits, stays at the largest count; final two cycles after the last quad.
-    pub saturations: Wire<Out>,
-    kernel: Body,
-}
-
-kernel_block!(
-    Shear,
-    clock clk,
-    inputs [rst, clear, operands, operands_valid, start, labels, positions_x, positions_y],
-    outputs [label_address, sheared, sheared_valid, saturations]
-);
-
-/// What decides the circuit.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    data: usize,
-    quads: usize,
-    /// Largest number of contacts; 0 without contacts.
-    contacts: usize,
+block! {
+    /// Operands of p in, in the order of the quads; after `start`, operands of the products with Ax, then with Ay, the first
+    /// [`LATENCY`] cycles later. Without contacts all outputs are constant 0.
+    pub struct Shear {
+        data: usize,
+        quads: usize,
+        /// Largest number of contacts; 0 without contacts.
+        contacts: usize,
+    }
+    ports ShearPorts {
+        clock;
+        reset;
+        /// A frame starts: v_00 comes next, and saturations are counted from 0.
+        in clear;
+        /// Four parities of p as an operand, `data_bits` each, signed; valid with `operands_valid`.
+        in operands: 4 * data;
+        /// `operands` holds a quad.
+        in operands_valid;
+        /// All quads of p are there: their operands leave.
+        in start;
+        /// Address of the quad whose labels are needed; from the cycle after `start`, one per cycle.
+        out label_address: count_bits(*quads);
+        /// Contact of each lane of that quad, 0 for none, else 1 …; two cycles after `label_address`.
+        in labels: 4 * label_bits(*contacts);
+        /// Position of μ1 of each contact in mu_max/384, signed, contact 1 in the low bits; constant while operands leave.
+        in positions_x: positions_bits(*contacts);
+        /// The same of μ2; as `positions_x`.
+        in positions_y: positions_bits(*contacts);
+        /// Four parities, `data_bits` each, signed; valid with `sheared_valid`.
+        out sheared: 4 * data;
+        /// `sheared` holds a quad.
+        out sheared_valid;
+        /// Number of saturated words of this frame, 16 bits, stays at the largest count; final two cycles after the last quad.
+        out saturations: SATURATION_BITS;
+    }
 }
 
 impl Shear {
     /// For the contacts of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts: model.contacts() })
+        Shear { data: formats.data_bits as usize, quads: formats.quads, contacts: model.contacts() }
     }
 
-    fn of(shape: Shape) -> Self {
-        let quad = 4 * shape.data;
-        let block = Shear {
-            clk: Default::default(),
-            rst: Default::default(),
-            clear: Default::default(),
-            operands: Wire::new(quad),
-            operands_valid: Default::default(),
-            start: Default::default(),
-            label_address: Wire::new(count_bits(shape.quads)),
-            labels: Wire::new(4 * shape.label_bits()),
-            positions_x: Wire::new(shape.positions_bits()),
-            positions_y: Wire::new(shape.positions_bits()),
-            sheared: Wire::new(quad),
-            sheared_valid: Default::default(),
-            saturations: Wire::new(SATURATION_BITS),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+    /// The address of the next quad.
+    fn after<'k>(&self, k: &'k Builder, quad: Expr<'k>) -> Expr<'k> {
+        quad.is(self.quads as u64 - 1).mux(k.constant(quad.bits(), 0), quad.plus(1))
+    }
+
+    /// The position of a contact, 0 for none.
+    fn position_of<'k>(&self, k: &'k Builder, label: Expr<'k>, all: Expr<'k>) -> Expr<'k> {
+        let none = k.constant(position_bits(), 0);
+        let own = |contact: usize| all.slice((contact - 1) * position_bits(), position_bits());
+        let arms: Vec<(u64, Expr<'k>)> =
+            (NONE + 1..=self.contacts).map(|contact| (contact as u64, own(contact))).collect();
+        label.case(&arms, none)
     }
 }
 
-impl Shape {
-    /// Width of the positions of all contacts.
-    fn positions_bits(self) -> usize {
-        self.contacts.max(1) * position_bits()
-    }
+/// Width of the positions of so many contacts.
+fn positions_bits(contacts: usize) -> usize {
+    contacts.max(1) * position_bits()
+}
 
-    /// Width of the number of a contact.
-    fn label_bits(self) -> usize {
-        count_bits(self.contacts + 1)
-    }
+/// Width of the number of one of so many contacts.
+fn label_bits(contacts: usize) -> usize {
+    count_bits(contacts + 1)
+}
 
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("shear");
-        let [rst, clear] = ["rst", "clear"].map(|name| k.input(name, 1));
-        let (operands, valid) = (k.input("operands", 4 * self.data), k.input("operands_valid", 1));
-        let start = k.input("start", 1);
-        let labels = k.input("labels", 4 * self.label_bits());
-        let positions = ["positions_x", "positions_y"].map(|name| k.input(name, self.positions_bits()));
+impl Block for Shear {
+    fn build<'k>(&self, k: &'k Builder, io: ShearPorts<Inside<'k>>) {
+        let ShearPorts { rst, clear, operands, operands_valid: valid, start, labels, .. } = io;
+        let positions = [io.positions_x, io.positions_y];
         if self.contacts == 0 {
             k.comment("There are no contacts.");
-            k.wire("label_address", k.constant(count_bits(self.quads), 0));
-            k.wire("sheared", k.constant(4 * self.data, 0));
-            k.wire("sheared_valid", k.constant(1, 0));
-            k.wire("saturations", k.constant(SATURATION_BITS, 0));
-            return k.finish();
+            io.label_address.set(k.constant(count_bits(self.quads), 0));
+            io.sheared.set(k.constant(4 * self.data, 0));
+            io.sheared_valid.set(k.constant(1, 0));
+            io.saturations.set(k.constant(SATURATION_BITS, 0));
+            return;
         }
         let (bit, count) = (Type::unsigned(1), Type::unsigned(count_bits(self.quads)));
         let place = k.state("place", count, rst | clear, 0);
-        k.when(valid, || place.set(self.after(&k, *place)));
+        k.when(valid, || place.set(self.after(k, *place)));
         let memory = k.memory("operands_of_p", self.quads, 4 * self.data, Contents::Undefined).holds(Holds::Sheared);
         memory.write(valid, *place, operands);
 
@@ -133,12 +108,12 @@ impl Shape {
         let quad = k.state("quad", count, rst | clear, 0);
         let last = k.wire("last", quad.is(self.quads as u64 - 1));
         k.when(*running, || {
-            quad.set(self.after(&k, *quad));
+            quad.set(self.after(k, *quad));
             second.set(*second ^ last);
             running.set(!(last & *second));
         });
         k.when(start, || running.set(k.constant(1, 1)));
-        k.wire("label_address", *quad);
+        io.label_address.set(*quad);
         let read = k.delay("read_1", k.delay("read", memory.read(*quad)));
         k.comment("Labels and the positions of an axis are registered: from memory to multiplier is too long a way.");
         let labels = k.delay("labels_held", labels);
@@ -149,8 +124,9 @@ impl Shape {
             k.scope(&format!("taxel_{lane}"), || {
                 let taxel = hadamard(read)[lane].round_shift(MEAN as usize).low(self.data);
                 let taxel = k.delay("taxel", k.delay("mean", taxel.unsigned())).signed();
-                let label = labels.slice(lane * self.label_bits(), self.label_bits());
-                let position = k.delay("position", self.position_of(&k, label, positions)).signed();
+                let label_bits = label_bits(self.contacts);
+                let label = labels.slice(lane * label_bits, label_bits);
+                let position = k.delay("position", self.position_of(k, label, positions)).signed();
                 let product = k.delay("product", taxel * position);
                 // Below 3/4 of a taxel.
                 k.delay("sheared", product.round_shift(POSITION_SHIFT as usize).low(self.data).unsigned())
@@ -159,10 +135,10 @@ impl Shape {
         let taxels = k.wire("taxels", concat(&[3, 2, 1, 0].map(lane)));
         let parity = |parity: usize| {
             let sum = k.delay(&format!("sum_{parity}"), hadamard(taxels)[parity].unsigned());
-            saturated(&k, sum.signed(), self.data)
+            saturated(k, sum.signed(), self.data)
         };
         let parities = [3, 2, 1, 0].map(parity);
-        k.delay("sheared", concat(&parities.map(|(word, _)| word)));
+        io.sheared.delay(concat(&parities.map(|(word, _)| word)));
         let later = |name: &str, value: Expr<'_>| {
             let state = k.state(name, bit, rst | clear, 0);
             state.set(value);
@@ -171,22 +147,7 @@ impl Shape {
         let leaves = (1..LATENCY as usize - 1).fold(*running, |valid, cycle| later(&format!("valid_{cycle}"), valid));
         later("sheared_valid", leaves);
         let clipped = leaves.mux(concat(&parities.map(|(_, clips)| clips)), k.constant(4, 0));
-        count_saturations(&k, "saturations", rst | clear, clipped);
-        k.finish()
-    }
-
-    /// The address of the next quad.
-    fn after<'k>(self, k: &'k Builder, quad: Expr<'k>) -> Expr<'k> {
-        quad.is(self.quads as u64 - 1).mux(k.constant(quad.bits(), 0), quad.plus(1))
-    }
-
-    /// The position of a contact, 0 for none.
-    fn position_of<'k>(self, k: &'k Builder, label: Expr<'k>, all: Expr<'k>) -> Expr<'k> {
-        let none = k.constant(position_bits(), 0);
-        let own = |contact: usize| all.slice((contact - 1) * position_bits(), position_bits());
-        let arms: Vec<(u64, Expr<'k>)> =
-            (NONE + 1..=self.contacts).map(|contact| (contact as u64, own(contact))).collect();
-        label.case(&arms, none)
+        count_saturations(k, "saturations", rst | clear, clipped);
     }
 }
 
@@ -199,6 +160,7 @@ mod tests {
     use dermis_golden::spec::scene::Scene;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
@@ -332,8 +294,8 @@ mod tests {
     fn each_taxel_is_multiplied_by_the_mu_of_its_contact() {
         let formats = formats();
         let stimulus = stimulus(&formats);
-        let block = Shear::of(Shape { data: formats.data_bits as usize, quads: formats.quads, contacts: CONTACTS });
+        let block = Shear { data: formats.data_bits as usize, quads: formats.quads, contacts: CONTACTS };
         let (p, leaving, asked) = (None, VecDeque::new(), VecDeque::new());
-        check(block.kernel.kernel(), &stimulus, &mut Shearing { formats, p, leaving, asked, total: 0, quiet: 0 });
+        check(&kernel_of(&block), &stimulus, &mut Shearing { formats, p, leaving, asked, total: 0, quiet: 0 });
     }
 }

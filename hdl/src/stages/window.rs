@@ -13,63 +13,70 @@ use dermis_golden::fixed::Model;
 use dermis_golden::physics::symmetry::parity::hadamard;
 use dermis_golden::spec::quads::Quads;
 use dermis_golden::spec::window;
-use rust_hdl::prelude::*;
 
 use super::normalise::left_shift;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::{
     beyond, count_bits, lane_of, magnitude_of, quad_address_of, subtracted, TaxelPlace, MASK_BITS,
 };
-use crate::wire::{Wire, Word};
+use crate::wire::Word;
 
-/// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
-/// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked. The array is one
-/// subarray.
-///
-/// Without contacts all outputs are constant 0.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Window {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high: ends a window.
-    pub rst: Signal<In, Bit>,
-    /// Reads the window around a contact, from now on; ends another.
-    pub start: Signal<In, Bit>,
-    /// Row of the taxel in the middle of the contact; valid with `start`.
-    pub middle_row: Wire<In>,
-    /// Column of this taxel; valid with `start`.
-    pub middle_col: Wire<In>,
-    /// Label of the contact's taxels, from 1 on; valid with `start`.
-    pub label: Wire<In>,
-    /// Address of a quad of the frame buffer, and of its labels; 0 for a taxel beyond the array.
-    pub quad_address: Wire<Out>,
-    /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
-    pub quad: Wire<In>,
-    /// Labels of the quad's four taxels; two cycles after `quad_address`.
-    pub labels: Wire<In>,
-    /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
-    pub floor: Wire<In>,
-    /// A quad is written to the window memory.
-    pub write: Signal<Out, Bit>,
-    /// High limbs of the four parities of the quad, signed; valid with `write`.
-    pub write_quad: Wire<Out>,
-    /// Folded mask of the quad in units of [`MASKED`](dermis_golden::fixed::words::network::MASKED), four signed fields of
-    /// 4 bits; valid with `write`.
-    pub mask_quad: Wire<Out>,
-    /// A code of the contact's taxels in the window is above the noise floor; valid from `done` until the next `start`.
-    pub positive: Signal<Out, Bit>,
-    /// A code of these taxels is below minus the noise floor; valid as `positive`.
-    pub negative: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
+    /// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked. The array is one
+    /// subarray.
+    ///
+    /// Without contacts all outputs are constant 0.
+    pub struct Window {
+        layout: Quads,
+        /// Width of a code.
+        bits: usize,
+        /// Width of the low limb of a parity, and of the high one.
+        low_bits: usize,
+        high_bits: usize,
+        label_bits: usize,
+        /// Noise floor in codes, where it is not written.
+        floor: Option<i32>,
+        floor_bits: usize,
+        /// Dead taxels, in ascending order.
+        dead: Vec<usize>,
+        /// The window; none without contacts.
+        window: Option<window::Window>,
+    }
+    ports WindowPorts {
+        clock;
+        /// Synchronous reset, active high: ends a window.
+        in rst;
+        /// Reads the window around a contact, from now on; ends another.
+        in start;
+        /// Row of the taxel in the middle of the contact; valid with `start`.
+        in middle_row: count_bits(layout.rows);
+        /// Column of this taxel; valid with `start`.
+        in middle_col: count_bits(layout.cols);
+        /// Label of the contact's taxels, from 1 on; valid with `start`.
+        in label: label_bits;
+        /// Address of a quad of the frame buffer, and of its labels; 0 for a taxel beyond the array.
+        out quad_address: count_bits(layout.len());
+        /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
+        in quad: 4 * bits;
+        /// Labels of the quad's four taxels; two cycles after `quad_address`.
+        in labels: 4 * label_bits;
+        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+        in floor: floor_bits;
+        /// A quad is written to the window memory.
+        out write;
+        /// High limbs of the four parities of the quad, signed; valid with `write`.
+        out write_quad: 4 * high_bits;
+        /// Folded mask of the quad in units of [`MASKED`](dermis_golden::fixed::words::network::MASKED), four signed fields of
+        /// 4 bits; valid with `write`.
+        out mask_quad: 4 * MASK_BITS;
+        /// A code of the contact's taxels in the window is above the noise floor; valid from `done` until the next `start`.
+        out positive;
+        /// A code of these taxels is below minus the noise floor; valid as `positive`.
+        out negative;
+    }
 }
-
-kernel_block!(
-    Window,
-    clock clk,
-    inputs [rst, start, middle_row, middle_col, label, quad, labels, floor],
-    outputs [quad_address, write, write_quad, mask_quad, positive, negative]
-);
 
 /// Cycles from the scan of a taxel until its code has been chosen from the quad that was read.
 const CODE: usize = 7;
@@ -79,72 +86,41 @@ const SUM: usize = 9;
 impl Window {
     /// For the windows of `model`.
     pub fn new(model: &Model) -> Self {
-        let (formats, layout) = (model.formats(), model.layout());
-        let (bits, label_bits) = (formats.input_bits as usize, count_bits(model.contacts() + 1));
-        let address = count_bits(layout.len());
-        let block = Window {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            middle_row: Wire::new(count_bits(layout.rows)),
-            middle_col: Wire::new(count_bits(layout.cols)),
-            label: Wire::new(label_bits),
-            quad_address: Wire::new(address),
-            quad: Wire::new(4 * bits),
-            labels: Wire::new(4 * label_bits),
-            floor: Wire::new(model.floor_bits() as usize),
-            write: Default::default(),
-            write_quad: Wire::new(4 * (formats.fold_bits - formats.input_low_bits) as usize),
-            mask_quad: Wire::new(4 * MASK_BITS),
-            positive: Default::default(),
-            negative: Default::default(),
-            kernel: Body::default(),
-        };
-        let kernel = block.kernel_of(model);
-        block.bind(kernel)
-    }
-
-    fn kernel_of(&self, model: &Model) -> Kernel {
-        let k = Builder::new("window");
-        let own = Ports {
-            k: &k,
-            rst: k.input("rst", 1),
-            start: k.input("start", 1),
-            middle: [k.input("middle_row", self.middle_row.width()), k.input("middle_col", self.middle_col.width())],
-            label: k.input("label", self.label.width()),
-            quad: k.input("quad", self.quad.width()),
-            labels: k.input("labels", self.labels.width()),
-            floor: k.input("floor", self.floor.width()),
-        };
-        match &model.by_contact {
-            Some(contacts) => own.window(model, &contacts.window),
-            None => {
-                k.comment("There are no contacts.");
-                let words = [
-                    ("quad_address", self.quad_address.width()),
-                    ("write_quad", self.write_quad.width()),
-                    ("mask_quad", self.mask_quad.width()),
-                ];
-                let bits = ["write", "positive", "negative"].map(|name| (name, 1));
-                for (name, width) in words.into_iter().chain(bits) {
-                    k.wire(name, k.constant(width, 0));
-                }
-            }
+        let formats = model.formats();
+        Window {
+            layout: model.layout(),
+            bits: formats.input_bits as usize,
+            low_bits: formats.input_low_bits as usize,
+            high_bits: (formats.fold_bits - formats.input_low_bits) as usize,
+            label_bits: count_bits(model.contacts() + 1),
+            floor: model.built_in_floor(),
+            floor_bits: model.floor_bits() as usize,
+            dead: model.dead.clone(),
+            window: model.by_contact.as_ref().map(|contacts| contacts.window),
         }
-        k.finish()
     }
 }
 
-/// The inputs, in the kernel under construction.
-struct Ports<'k> {
+impl Block for Window {
+    fn build<'k>(&self, k: &'k Builder, io: WindowPorts<Inside<'k>>) {
+        match &self.window {
+            Some(window) => Circuit { k, io, block: self }.window(window),
+            None => {
+                k.comment("There are no contacts.");
+                let words = [io.quad_address, io.write_quad, io.mask_quad];
+                for output in words.into_iter().chain([io.write, io.positive, io.negative]) {
+                    output.set(k.constant(output.bits(), 0));
+                }
+            }
+        }
+    }
+}
+
+/// The circuit under construction.
+struct Circuit<'k, 'a> {
     k: &'k Builder,
-    rst: Expr<'k>,
-    start: Expr<'k>,
-    middle: [Expr<'k>; 2],
-    label: Expr<'k>,
-    quad: Expr<'k>,
-    labels: Expr<'k>,
-    floor: Expr<'k>,
+    io: WindowPorts<Inside<'k>>,
+    block: &'a Window,
 }
 
 /// The taxel of a cycle of the scan.
@@ -161,7 +137,7 @@ struct Scanned<'k> {
     outside: Expr<'k>,
 }
 
-impl<'k> Ports<'k> {
+impl<'k> Circuit<'k, '_> {
     /// A bit that is 0 after a reset or a start.
     fn bit(&self, name: &str, value: Expr<'k>) -> Expr<'k> {
         let state = self.k.state(name, Type::unsigned(1), self.restarts(), 0);
@@ -170,7 +146,7 @@ impl<'k> Ports<'k> {
     }
 
     fn restarts(&self) -> Expr<'k> {
-        self.rst | self.start
+        self.io.rst | self.io.start
     }
 
     /// A bit so many cycles later, 0 after a reset or a start.
@@ -183,10 +159,10 @@ impl<'k> Ports<'k> {
         (0..cycles).fold(value, |value, number| self.k.delay(&format!("{name}_{number}"), value))
     }
 
-    fn window(&self, model: &Model, window: &window::Window) {
+    fn window(&self, window: &window::Window) {
         let k = self.k;
-        let scanned = self.scan(window, model.layout());
-        let [code, own, masked] = self.code(model, &scanned);
+        let scanned = self.scan(window, self.block.layout);
+        let [code, own, masked] = self.code(&scanned);
 
         k.comment("First sweep: magnitude and signs. The second sweep finds the same ones.");
         let valid = self.bit_later("valid", scanned.valid, CODE);
@@ -197,7 +173,7 @@ impl<'k> Ports<'k> {
         };
         let magnitude = magnitude_of(code);
         let magnitude = gathered("magnitude", magnitude & valid.repeat(magnitude.bits()));
-        let [above, below] = beyond(k, code, model.built_in_floor(), self.floor);
+        let [above, below] = beyond(k, code, self.block.floor, self.io.floor);
         let counts = self.bit("counts", own & valid);
         gathered("positive", k.delay("above", above) & counts);
         gathered("negative", k.delay("below", below) & counts);
@@ -206,11 +182,11 @@ impl<'k> Ports<'k> {
         let shift = k.delay("shift", left_shift(k, magnitude));
         let shifted = k.delay("shifted", k.delay("code_later", code).shift_left_by(shift));
         let sums = self.sums(shifted, self.later("lane", scanned.lane, SUM));
-        let low = model.formats().input_low_bits as usize;
-        k.wire("write_quad", concat(&sums.map(|sum| sum.slice(low, sum.bits() - low))));
+        let low = self.block.low_bits;
+        self.io.write_quad.set(concat(&sums.map(|sum| sum.slice(low, sum.bits() - low))));
         let mask = k.register("mask", Type::unsigned(Quads::LANES));
         mask.set(self.later("masked_code", masked, SUM - CODE).concat(mask.slice(1, Quads::LANES - 1)));
-        k.wire("mask_quad", mask.table(4 * MASK_BITS, &folded_masks()));
+        self.io.mask_quad.set(mask.table(4 * MASK_BITS, &folded_masks()));
 
         let ended = self.bit_later("ends_quad", scanned.ends_quad, SUM);
         self.bit("write", ended);
@@ -219,7 +195,7 @@ impl<'k> Ports<'k> {
     /// Scans the window twice: quad by quad, in each the four lanes.
     fn scan(&self, window: &window::Window, array: Quads) -> Scanned<'k> {
         let (k, quads) = (self.k, window.quads());
-        let scanning = k.state("scanning", Type::unsigned(1), self.rst, 0);
+        let scanning = k.state("scanning", Type::unsigned(1), self.io.rst, 0);
         let counter = |name: &str, limit: usize| k.state(name, Type::unsigned(count_bits(limit)), self.restarts(), 0);
         let lane = counter("lane", Quads::LANES);
         let (across, down) = (counter("across", quads.quad_cols()), counter("down", quads.quad_rows()));
@@ -233,14 +209,15 @@ impl<'k> Ports<'k> {
         k.when(row_ends, || down.set(down.plus(1)));
         k.when(sweep_ends, || down.set(k.constant(down.bits(), 0)));
         k.when(sweep_ends, || again.set(k.constant(1, 1)));
-        scanning.set(self.start | (*scanning & !(sweep_ends & *again)));
+        scanning.set(self.io.start | (*scanning & !(sweep_ends & *again)));
 
         k.comment("Row and column, modulo a power of two beyond the last line of any window.");
+        let middle = [self.io.middle_row, self.io.middle_col];
         let line = |axis: usize, near: Expr<'k>, far: Expr<'k>, own: usize, lines: usize| {
             let name = ["row", "col"][axis];
             let bits = count_bits(lines + own);
             let first = k.register(&format!("first_{name}"), Type::unsigned(bits));
-            k.when(self.start, || first.set(self.middle[axis].extend(bits).minus(own as u64 / 2)));
+            k.when(self.io.start, || first.set(middle[axis].extend(bits).minus(own as u64 / 2)));
             let mirrored = (k.constant(count_bits(own), own as u64 - 1) - near).low(count_bits(own));
             let at = k.delay(&format!("{name}_at"), (*first + far.mux(mirrored, near)).low(bits));
             (at.low(count_bits(lines)), at.less(k.constant(bits, lines as u64)))
@@ -259,17 +236,17 @@ impl<'k> Ports<'k> {
     }
 
     /// The code of the scanned taxel, whether it is one of the contact, and whether it is masked; [`CODE`] cycles later.
-    fn code(&self, model: &Model, scanned: &Scanned<'k>) -> [Expr<'k>; 3] {
-        let (k, layout) = (self.k, model.layout());
+    fn code(&self, scanned: &Scanned<'k>) -> [Expr<'k>; 3] {
+        let (k, layout, dead) = (self.k, self.block.layout, &self.block.dead);
         let [row, col] = scanned.place;
         let place = TaxelPlace::of(k, layout, scanned.place);
         let near = [0, 1].map(|axis| k.delay(["near_row", "near_col"][axis], place.near[axis]));
         let first = k.constant(count_bits(layout.len()), 0);
-        k.delay("quad_address", quad_address_of(k, layout, near, first));
-        let is_dead = (!model.dead.is_empty()).then(|| {
+        self.io.quad_address.delay(quad_address_of(k, layout, near, first));
+        let is_dead = (!dead.is_empty()).then(|| {
             let table = (0..1usize << (row.bits() + col.bits())).map(|at| {
                 let (row, col) = (at >> col.bits(), at % (1 << col.bits()));
-                u64::from(col < layout.cols && model.dead.binary_search(&(row * layout.cols + col)).is_ok())
+                u64::from(col < layout.cols && dead.binary_search(&(row * layout.cols + col)).is_ok())
             });
             row.concat(col).table(1, &table.collect::<Vec<u64>>())
         });
@@ -278,11 +255,11 @@ impl<'k> Ports<'k> {
         let masked = self.later("masked", masked, 4);
         let from = self.later("from", place.lower.concat(place.right), 4);
         let chosen = |quad: Expr<'k>| lane_of(quad, Quads::LANES, from);
-        let bits = self.quad.bits() / Quads::LANES;
-        let code = k.delay("code", chosen(self.quad) & (!masked).repeat(bits));
-        let label = k.register("contact", Type::unsigned(self.label.bits()));
-        k.when(self.start, || label.set(self.label));
-        let own = k.delay("own", chosen(self.labels).equals(*label));
+        let bits = self.block.bits;
+        let code = k.delay("code", chosen(self.io.quad) & (!masked).repeat(bits));
+        let label = k.register("contact", Type::unsigned(self.block.label_bits));
+        k.when(self.io.start, || label.set(self.io.label));
+        let own = k.delay("own", chosen(self.io.labels).equals(*label));
         [code, own, k.delay("masked_code", masked)]
     }
 

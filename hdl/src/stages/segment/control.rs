@@ -6,7 +6,8 @@ use dermis_golden::estimate::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
 
-use crate::language::{concat, Builder, Contents, Expr, MemoryPort, Net, Type};
+use super::SegmentPorts;
+use crate::language::{concat, Builder, Contents, Expr, Inside, MemoryPort, Net, Type};
 use crate::primitives::count_bits;
 
 /// Width of the number of a basin.
@@ -137,8 +138,7 @@ impl Shape {
 pub(super) struct Circuit<'k> {
     pub(super) k: &'k Builder,
     pub(super) shape: &'k Shape,
-    pub(super) rst: Expr<'k>,
-    start: Expr<'k>,
+    pub(super) io: SegmentPorts<Inside<'k>>,
     state: [Net<'k>; STATES.len()],
     /// When a state ends.
     leaves: RefCell<Vec<Expr<'k>>>,
@@ -207,10 +207,10 @@ pub(super) struct Circuit<'k> {
 }
 
 impl<'k> Circuit<'k> {
-    pub(super) fn new(k: &'k Builder, shape: &'k Shape) -> Self {
+    pub(super) fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
         let (taxel, quad) = (count_bits(shape.taxels()), count_bits(shape.quad_count()));
         let (row, col) = (count_bits(shape.rows), count_bits(shape.cols));
-        let (rst, start) = (k.input("rst", 1), k.input("start", 1));
+        let rst = io.rst;
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let state =
             STATES.map(|name| k.state(&format!("in_{name}"), Type::unsigned(1), rst, u64::from(name == STATES[IDLE])));
@@ -222,16 +222,14 @@ impl<'k> Circuit<'k> {
         let later = |name: &str, value| k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value));
 
         k.comment("Quads of words, each with its sign; the word of a lane");
-        let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", quad));
-        let fill_quad = k.input("fill_quad", 4 * shape.lane);
         let narrow = |lane: usize| {
-            let value = fill_quad.slice(lane * shape.lane, shape.lane).signed();
+            let value = io.fill_quad.slice(lane * shape.lane, shape.lane).signed();
             let value = value.resize(value.bits().max(shape.low + WORD + 1)).unsigned();
             value.top().concat(value.slice(shape.low, WORD))
         };
         let quads = k.memory("quads", shape.quad_count(), 4 * (WORD + 1), Contents::Undefined).unchecked();
         let quads = quads.holds(Holds::SegmentQuads);
-        quads.write(fill, fill_address, concat(&[3, 2, 1, 0].map(narrow)));
+        quads.write(io.fill, io.fill_address, concat(&[3, 2, 1, 0].map(narrow)));
         let quad = register("quad", quad);
         let quads_out = later("quads", quads.read(*quad));
         let lanes: Vec<(u64, Expr)> =
@@ -301,8 +299,6 @@ impl<'k> Circuit<'k> {
         Circuit {
             k,
             shape,
-            rst,
-            start,
             state,
             leaves: RefCell::default(),
             tick,
@@ -335,9 +331,9 @@ impl<'k> Circuit<'k> {
             smoothed,
             line_ends,
             count: register("basins", BASIN),
-            kept: register("count", shape.label()),
-            overflow: register("overflow", 1),
-            done: k.state("done", Type::unsigned(1), rst, 0),
+            kept: io.count.register(),
+            overflow: io.overflow.register(),
+            done: io.done.state(rst, 0),
             label: register("label", count_bits(shape.most)),
             adds: register("adds", 1),
             own: register("own", BASIN),
@@ -348,6 +344,7 @@ impl<'k> Circuit<'k> {
             chain_out,
             loads: table("loads", shape.sum, Holds::Loads),
             bars: table("bars", shape.smoothed, Holds::Bars),
+            io,
         }
     }
 }
@@ -404,7 +401,7 @@ impl<'k> Circuit<'k> {
         k.when(counted | self.is(BORDERS) & *self.moves | smooths & !tick.at(3), || {
             tick.set(ends.mux(self.zero(4), tick.plus(1)));
         });
-        k.wire("starts", self.is(IDLE) & self.start)
+        k.wire("starts", self.is(IDLE) & self.io.start)
     }
 }
 

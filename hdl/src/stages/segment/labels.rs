@@ -32,11 +32,10 @@ impl<'k> Circuit<'k> {
         let memory = memory.holds(Holds::Labels);
         let whole = k.delay("label_quad_ends", self.is(LABEL) & order.quads_end);
         memory.write(whole, k.delay("label_quad_address", *self.quad), quad);
-        k.wire("labelled", whole);
+        self.io.labelled.set(whole);
         let signed = |lane: usize| self.zero(1).concat(quad.slice(lane * bits, bits));
-        k.wire("labelled_quad", concat(&[3, 2, 1, 0].map(signed)));
-        let address = k.input("label_address", self.quad.bits());
-        k.delay("labels", k.delay("labels_read", memory.read(address)));
+        self.io.labelled_quad.set(concat(&[3, 2, 1, 0].map(signed)));
+        self.io.labels.delay(k.delay("labels_read", memory.read(self.io.label_address)));
         k.when(self.is(LABEL) & order.last_quad, || self.ending.set(k.constant(1, 1)));
         self.enter(self.at(LABEL, 3) & *self.ending, [LABEL, MIDDLE], || ());
     }
@@ -61,13 +60,13 @@ impl<'k> Circuit<'k> {
         let done = k.wire("ends", self.at(MIDDLE, 0) & self.higher.equals(self.kept.resize(BASIN)));
         self.enter(done, [MIDDLE, IDLE], || ());
         self.done.set(done);
-        let contact = k.input("contact", bits);
-        for (axis, (name, lines)) in [("middle_row", self.row), ("middle_col", self.col)].into_iter().enumerate() {
-            let memory = k.memory(&format!("{name}s"), self.shape.most, lines.bits(), Contents::Undefined).unchecked();
+        let outputs = [(self.io.middle_row, "middle_rows", self.row), (self.io.middle_col, "middle_cols", self.col)];
+        for (axis, (output, name, lines)) in outputs.into_iter().enumerate() {
+            let memory = k.memory(name, self.shape.most, lines.bits(), Contents::Undefined).unchecked();
             let memory = memory.holds(Holds::Middles(axis));
             let writes = [row, column][axis] & ends;
             memory.write(writes, self.higher.low(bits), self.line.low(lines.bits()));
-            k.delay(name, memory.read(contact));
+            output.delay(memory.read(self.io.contact));
         }
     }
 }

@@ -11,8 +11,8 @@ use dermis_golden::spec::quads::Quads;
 use dermis_golden::spec::sensor::Sensor;
 
 use super::*;
-use crate::language::testbench::{block_subject, check, check_with_defects, random_word, Reference};
-use crate::language::Change;
+use crate::language::testbench::{check, check_with_defects, random_word, subject_of, Reference, Subject};
+use crate::language::{kernel_of, Change};
 use crate::wire::Word;
 
 /// Width of a lane and lowest bit of a word in it.
@@ -96,7 +96,16 @@ fn words(p: &[i64]) -> Vec<i64> {
     p.iter().map(|p| (*p).max(0) >> LOW).collect()
 }
 
-/// Inputs in the order of the kernel.
+fn subject(array: &Array, changes: &[Change]) -> Subject<'static> {
+    subject_of!(
+        Segment::new(&array.segmentation(), LANE, LOW),
+        changes,
+        inputs [rst, start, fill, fill_address, fill_quad, contact, label_address],
+        outputs [count, overflow, done, middle_row, middle_col, labelled, labelled_quad, labels],
+    )
+}
+
+/// Inputs in the order of the subject.
 const RST: usize = 0;
 const START: usize = 1;
 const FILL: usize = 2;
@@ -228,8 +237,7 @@ fn contacts_are_those_of_the_model() {
         (Array::new(20, 20, MOST), &all[..KINDS]),
     ];
     for (array, kinds) in arrays {
-        let block = Segment::new(&array.segmentation(), LANE, LOW);
-        check(block.kernel.kernel(), &stimulus(&array, kinds, 5), &mut Segmenting::new(&array));
+        check(subject(&array, &[]), &stimulus(&array, kinds, 5), &mut Segmenting::new(&array));
     }
 }
 
@@ -237,14 +245,6 @@ fn contacts_are_those_of_the_model() {
 #[test]
 fn defects_are_found() {
     let array = Array::new(6, 7, 3);
-    let subject = |changes: &[Change]| {
-        block_subject!(
-            Segment::new(&array.segmentation(), LANE, LOW),
-            changes,
-            inputs [rst, start, fill, fill_address, fill_quad, contact, label_address],
-            outputs [count, overflow, done, middle_row, middle_col, labelled, labelled_quad, labels],
-        )
-    };
     let defects = [
         Change::value("", "larger", |k| k.constant(1, 1)),
         Change::value("", "turned", |k| k.constant(1, 0)),
@@ -253,7 +253,7 @@ fn defects_are_found() {
         Change::value("", "line_found", |k| k.constant(1, 1)),
     ];
     let kinds: Vec<usize> = (0..2 * KINDS).map(|index| index % KINDS).collect();
-    check_with_defects(subject, &stimulus(&array, &kinds, 7), || Segmenting::new(&array), &defects);
+    check_with_defects(|changes| subject(&array, changes), &stimulus(&array, &kinds, 7), || Segmenting::new(&array), &defects);
 }
 
 /// The plan lists every memory of the block.
@@ -261,8 +261,8 @@ fn defects_are_found() {
 fn memories_are_those_of_the_plan() {
     let board = Board::load("ulx3s-85f").unwrap();
     for array in [Array::new(20, 20, MOST), Array::new(7, 12, 3)] {
-        let block = Segment::new(&array.segmentation(), LANE, LOW);
-        let memories = block.kernel.kernel().memories();
+        let kernel = kernel_of(&Segment::new(&array.segmentation(), LANE, LOW));
+        let memories = kernel.memories();
         let mut own: Vec<_> = memories.iter().map(|m| (m.label.clone().unwrap(), m.words, m.bits)).collect();
         let planned = segment_memories(&array.segmentation(), &board, board.distributed_words[0]);
         let mut planned: Vec<_> = planned.iter().map(|m| (m.holds.to_string(), m.words, m.bits)).collect();

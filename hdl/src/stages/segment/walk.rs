@@ -60,7 +60,7 @@ impl<'k> Circuit<'k> {
         let quads_end = k.wire("quads_end", self.at(UNPACK, 6) | self.at(LABEL, 4) & self.lane.all());
         let known = self.steps_out.at(BASIN);
         // An entry is there in WALK, a tap in the smoothing.
-        let walks = k.state("walks", Type::unsigned(1), self.rst, 0);
+        let walks = k.state("walks", Type::unsigned(1), self.io.rst, 0);
         walks.set(self.at(WALK, 1));
         let walks = *walks;
         let tap_there = k.register("runs", Type::unsigned(1));

@@ -10,9 +10,9 @@ use dermis_golden::spec::window::Place;
 
 use super::*;
 use crate::language::testbench::{
-    block_subject, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+    subject_of, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
 };
-use crate::language::Change;
+use crate::language::{kernel_of, Change};
 use crate::scenes::model;
 use crate::wire::Word;
 
@@ -193,7 +193,7 @@ impl Reference for Windows<'_> {
 }
 
 fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
-    block_subject!(
+    subject_of!(
         Window::new(model),
         changes,
         inputs [rst, start, middle_row, middle_col, label, quad, labels, floor],
@@ -241,5 +241,5 @@ fn without_contacts_there_is_no_window() {
     let block = Window::new(&model(4, 5, ""));
     let widths = [1, 1, 2, 3, 4, 80, 16, 1];
     let outputs = |_: &[Word]| vec![Some(Word::default()); 6];
-    check(block.kernel.kernel(), &random_words(100, &widths), &mut Pipeline::new(0, 6, outputs));
+    check(&kernel_of(&block), &random_words(100, &widths), &mut Pipeline::new(0, 6, outputs));
 }
