@@ -132,7 +132,7 @@ engine! {
             resultants: Resultants => "stages/resultants.rs",
         }
         control {
-            operand_source: OperandSource,
+            operand_source: RustHdl<OperandSource>,
             status_source: StatusSource,
             begins: RustHdl<BitDelay>,
             arrival: Arrival,
@@ -211,7 +211,7 @@ impl Engine {
             window: Window::new(model),
             label_beats: LabelBeats::new(model, forces.m_axis_tdata.width()),
             shear: Shear::new(model),
-            operand_source: OperandSource::new(model),
+            operand_source: RustHdl::new(OperandSource::new(model)),
             status_source: StatusSource::new(model),
             relax: Relax::new(formats),
             unfold: Unfold::new(model),

@@ -70,7 +70,7 @@ macro_rules! design {
 }
 
 design!(engine::Engine, |engine: &engine::Engine| {
-    let columns = engine.pass.pass_program.column_file().map(|text| (COLUMN_FILE, text));
+    let columns = engine.pass.pass_program.kernel().memory_files().pop().map(|(_, text)| (COLUMN_FILE, text));
     let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
     engine.pass.lanes.memory_files().into_iter().chain(columns).chain(table).collect()
 });
