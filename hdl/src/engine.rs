@@ -132,7 +132,7 @@ engine! {
             resultants: RustHdl<Resultants> => "stages/resultants.rs",
         }
         control {
-            operand_source: OperandSource,
+            operand_source: RustHdl<OperandSource>,
             status_source: StatusSource,
             begins: RustHdl<BitDelay>,
             arrival: RustHdl<Arrival>,

@@ -66,15 +66,15 @@ pub struct Pass {
     column: RustHdl<Counter>,
     running: RustHdl<Dff>,
     /// Schedule of the products.
-    pub pass_program: PassProgram,
+    pub pass_program: RustHdl<PassProgram>,
     vectors: RustHdl<Ram>,
-    operand_writer: OperandWriter,
+    operand_writer: RustHdl<OperandWriter>,
     source: RustHdl<Delay>,
     factor: RustHdl<Delay>,
     control: RustHdl<Delay>,
     valid: RustHdl<BitDelay>,
-    select: OperandSelect,
-    scale: OperandScale,
+    select: RustHdl<OperandSelect>,
+    scale: RustHdl<OperandScale>,
     /// The MAC lanes.
     pub lanes: Lanes,
     low_address: RustHdl<Slice>,
@@ -88,7 +88,9 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let quads = formats.quads;
-        let pass_program = PassProgram::new(model);
+        let program = PassProgram::new(model);
+        let program_latency = program.latency();
+        let pass_program = RustHdl::new(program);
         let lanes = Lanes::new(model);
         let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
@@ -124,14 +126,14 @@ impl Pass {
             vectors: RustHdl::new(
                 vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
             ),
-            operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
+            operand_writer: RustHdl::new(OperandWriter::new(&lengths, model.first().storage.streamed)),
             source: RustHdl::new(Delay::new(SOURCE_BITS, 2)),
             factor: RustHdl::new(Delay::new(FACTOR_BITS, 3)),
             control: RustHdl::new(Delay::new(Control::new(model).bits(), 3 + scaling)),
-            valid: RustHdl::new(BitDelay::new(3 + scaling + pass_program.latency())),
+            valid: RustHdl::new(BitDelay::new(3 + scaling + program_latency)),
             coefficient_address: RustHdl::new(Delay::new(pass_program.coefficient_address.width(), scaling)),
-            select: OperandSelect::new(formats),
-            scale: OperandScale::new(scales),
+            select: RustHdl::new(OperandSelect::new(formats)),
+            scale: RustHdl::new(OperandScale::new(scales)),
             pass_program,
             lanes,
             issue: Default::default(),

@@ -1,107 +1,79 @@
 //! Rows of v_00 from the accumulations of its low and its high limbs.
 
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside};
 
-/// Adds the rows of the high limbs, shifted left by `limb_align`, to those of the low limbs, which have been written to
-/// a memory. Until `clear` is followed by the `last` row of the low limbs, rows pass unchanged.
-///
-/// Where neither factor of v_00 has a low limb, all rows pass unchanged and all are `complete`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct LimbSum {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// A new subarray: the next row is the first of the low limbs; with priority over `last`.
-    pub clear: Signal<In, Bit>,
-    /// `quad` is the last row of an accumulation.
-    pub last: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed; taken in every cycle.
-    pub quad: Wire<In>,
-    /// The row as written before, of the low limbs, `acc_bits` each, signed; valid with a row of the high limbs.
-    pub low: Wire<In>,
-    /// The row to write, `acc_bits` each, signed; one cycle after `quad`.
-    pub sum: Wire<Out>,
-    /// The sum of `quad` has all products of v_00, not those of its low limbs only.
-    pub complete: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(LimbSum, clock clk, inputs [clear, last, quad, low], outputs [sum, complete]);
-
-/// Widths of the words.
-#[derive(Clone, Copy)]
-struct Shape {
-    lane: usize,
-    acc: usize,
-    /// Left shift of the high limbs, 0 without low limbs.
-    align: usize,
+block! {
+    /// Adds the rows of the high limbs, shifted left by `limb_align`, to those of the low limbs, which have been written to
+    /// a memory. Until `clear` is followed by the `last` row of the low limbs, rows pass unchanged.
+    ///
+    /// Where neither factor of v_00 has a low limb, all rows pass unchanged and all are `complete`.
+    #[derive(Clone, Copy)]
+    pub struct LimbSum {
+        lane: usize,
+        acc: usize,
+        /// Left shift of the high limbs, 0 without low limbs.
+        align: usize,
+    }
+    ports LimbSumPorts {
+        clock;
+        /// A new subarray: the next row is the first of the low limbs; with priority over `last`.
+        in clear;
+        /// `quad` is the last row of an accumulation.
+        in last;
+        /// Accumulators of one row for the four parities, `lane_bits` each, signed; taken in every cycle.
+        in quad: 4 * lane;
+        /// The row as written before, of the low limbs, `acc_bits` each, signed; valid with a row of the high limbs.
+        in low: 4 * acc;
+        /// The row to write, `acc_bits` each, signed; one cycle after `quad`.
+        out sum: 4 * acc;
+        /// The sum of `quad` has all products of v_00, not those of its low limbs only.
+        out complete;
+    }
 }
 
 impl LimbSum {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        LimbSum::of(Shape {
-            lane: formats.lane_bits as usize,
-            acc: formats.acc_bits as usize,
-            align: formats.limb_align as usize,
-        })
-    }
-
-    fn of(shape: Shape) -> Self {
-        let block = LimbSum {
-            clk: Default::default(),
-            clear: Default::default(),
-            last: Default::default(),
-            quad: Wire::new(4 * shape.lane),
-            low: Wire::new(4 * shape.acc),
-            sum: Wire::new(4 * shape.acc),
-            complete: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+        LimbSum { lane: formats.lane_bits as usize, acc: formats.acc_bits as usize, align: formats.limb_align as usize }
     }
 }
 
-impl Shape {
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("limb_sum");
-        let [clear, last] = ["clear", "last"].map(|name| k.input(name, 1));
-        let (quad, low) = (k.input("quad", 4 * self.lane), k.input("low", 4 * self.acc));
-        let plain = |parity: usize| quad.slice(parity * self.lane, self.lane).signed().extend(self.acc);
+impl Block for LimbSum {
+    fn build<'k>(&self, k: &'k Builder, io: LimbSumPorts<Inside<'k>>) {
+        let plain = |parity: usize| io.quad.slice(parity * self.lane, self.lane).signed().extend(self.acc);
         if self.align == 0 {
-            k.wire("complete", k.constant(1, 1));
-            k.delay("sum", concat(&[3, 2, 1, 0].map(plain)));
-            return k.finish();
+            io.complete.set(k.constant(1, 1));
+            io.sum.delay(concat(&[3, 2, 1, 0].map(plain)));
+            return;
         }
-        let complete = k.state("complete", Type::unsigned(1), clear, 0);
-        k.when(last, || complete.set(k.constant(1, 1)));
+        let complete = io.complete.state(io.clear, 0);
+        k.when(io.last, || complete.set(k.constant(1, 1)));
         let of = |parity: usize| {
-            let (high, low) = (plain(parity), low.slice(parity * self.acc, self.acc));
+            let (high, low) = (plain(parity), io.low.slice(parity * self.acc, self.acc));
             // The lowest bits of a shifted word are zero and need no adder.
             let upper = (high.low(self.acc - self.align) + low.slice(self.align, self.acc - self.align))
                 .low(self.acc - self.align);
             complete.mux(upper.concat(low.low(self.align)), high.unsigned())
         };
-        k.delay("sum", concat(&[3, 2, 1, 0].map(of)));
-        k.finish()
+        io.sum.delay(concat(&[3, 2, 1, 0].map(of)));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { lane: 33, acc: 40, align: 5 };
+    const SHAPE: LimbSum = LimbSum { lane: 33, acc: 40, align: 5 };
 
     /// Whether the row of the low limbs has been the last; undefined before the first `clear`.
     struct Rows {
-        shape: Shape,
+        shape: LimbSum,
         complete: Option<bool>,
         sum: Option<Word>,
     }
@@ -112,7 +84,7 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let Shape { lane, acc, align } = self.shape;
+            let LimbSum { lane, acc, align } = self.shape;
             let [quad, low] = [(2, lane), (3, acc)].map(|(k, bits)| [0, 1, 2, 3].map(|n| inputs[k].signed(n, bits)));
             let sums = [0, 1, 2, 3].map(|n| match self.complete {
                 Some(true) if align > 0 => (low[n] + (quad[n] << align)) << (64 - acc) >> (64 - acc),
@@ -140,9 +112,9 @@ mod tests {
                 vec![(cycle == 0 || random.u8(..9) == 0).into(), (random.u8(..4) == 0).into(), quad, low]
             };
             let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
-            let shape = Shape { align, ..SHAPE };
+            let shape = LimbSum { align, ..SHAPE };
             let complete = (align == 0).then_some(true);
-            check(LimbSum::of(shape).kernel.kernel(), &stimulus, &mut Rows { shape, complete, sum: None });
+            check(&kernel_of(&shape), &stimulus, &mut Rows { shape, complete, sum: None });
         }
     }
 }

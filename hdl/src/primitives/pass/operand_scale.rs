@@ -2,34 +2,34 @@
 
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
 use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel};
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside};
 use crate::primitives::pass::pass_program::FACTOR_BITS;
 use crate::primitives::search::sweep::position_bits;
-use crate::wire::Wire;
 
-/// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
-/// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the operands pass on wires.
-#[derive(dermis_hdl_derive::Block)]
-pub struct OperandScale {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Operand of each lane group, four times 18 bits, signed; taken in every cycle.
-    pub operands: Wire<In>,
-    /// 0 = unchanged, 1 = times μ1, 2 = times μ2; valid with `operands`.
-    pub factor: Wire<In>,
-    /// Position of μ1 in mu_max/384, signed; valid with a `factor` of 1.
-    pub position_x: Wire<In>,
-    /// Position of μ2 in mu_max/384, signed; valid with a `factor` of 2.
-    pub position_y: Wire<In>,
-    /// The operands, four times 18 bits, signed.
-    pub scaled: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
+    /// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the operands pass on
+    /// wires.
+    pub struct OperandScale {
+        /// A network gives one μ.
+        wanted: bool,
+    }
+    ports OperandScalePorts {
+        clock;
+        /// Operand of each lane group, four times 18 bits, signed; taken in every cycle.
+        in operands: 4 * M;
+        /// 0 = unchanged, 1 = times μ1, 2 = times μ2; valid with `operands`.
+        in factor: FACTOR_BITS;
+        /// Position of μ1 in mu_max/384, signed; valid with a `factor` of 1.
+        in position_x: position_bits();
+        /// Position of μ2 in mu_max/384, signed; valid with a `factor` of 2.
+        in position_y: position_bits();
+        /// The operands, four times 18 bits, signed.
+        out scaled: 4 * M;
+    }
 }
-
-kernel_block!(OperandScale, clock clk, inputs [operands, factor, position_x, position_y], outputs [scaled]);
 
 const M: usize = MULTIPLIER_BITS as usize;
 /// Cycles from `operands` to `scaled` where there is a network.
@@ -38,16 +38,7 @@ const LATENCY: usize = 3;
 impl OperandScale {
     /// `wanted`: a network gives one μ.
     pub fn new(wanted: bool) -> Self {
-        let block = OperandScale {
-            clk: Default::default(),
-            operands: Wire::new(4 * M),
-            factor: Wire::new(FACTOR_BITS),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            scaled: Wire::new(4 * M),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(wanted))
+        OperandScale { wanted }
     }
 
     /// Cycles from `operands` to `scaled`.
@@ -60,28 +51,26 @@ impl OperandScale {
     }
 }
 
-fn kernel(wanted: bool) -> Kernel {
-    let k = Builder::new("operand_scale");
-    let (operands, factor) = (k.input("operands", 4 * M), k.input("factor", FACTOR_BITS));
-    let [x, y] = ["position_x", "position_y"].map(|name| k.input(name, position_bits()).signed());
-    if !wanted {
-        k.comment("Nothing is multiplied by μ.");
-        k.wire("scaled", operands);
-        return k.finish();
+impl Block for OperandScale {
+    fn build<'k>(&self, k: &'k Builder, io: OperandScalePorts<Inside<'k>>) {
+        if !self.wanted {
+            k.comment("Nothing is multiplied by μ.");
+            io.scaled.set(io.operands);
+            return;
+        }
+        k.comment("Operands and μ are registered in front of the multipliers: both come from far away.");
+        let taken = k.delay("taken", io.operands);
+        let position = k.delay("position", io.factor.at(1).mux(io.position_y.signed(), io.position_x.signed()));
+        let scales = k.delay("scales", k.delay("multiplies", io.factor.any()));
+        let kept = k.delay("kept", taken);
+        let scaled = |parity: usize| {
+            let operand = taken.slice(parity * M, M).signed();
+            let product = k.delay(&format!("product_{parity}"), operand * position);
+            let rounded = product.round_shift(POSITION_SHIFT as usize).low(M);
+            scales.mux(rounded.unsigned(), kept.slice(parity * M, M))
+        };
+        io.scaled.delay(concat(&[3, 2, 1, 0].map(scaled)));
     }
-    k.comment("Operands and μ are registered in front of the multipliers: both come from far away.");
-    let taken = k.delay("taken", operands);
-    let position = k.delay("position", factor.at(1).mux(y, x));
-    let scales = k.delay("scales", k.delay("multiplies", factor.any()));
-    let kept = k.delay("kept", taken);
-    let scaled = |parity: usize| {
-        let operand = taken.slice(parity * M, M).signed();
-        let product = k.delay(&format!("product_{parity}"), operand * position);
-        let rounded = product.round_shift(POSITION_SHIFT as usize).low(M);
-        scales.mux(rounded.unsigned(), kept.slice(parity * M, M))
-    };
-    k.delay("scaled", concat(&[3, 2, 1, 0].map(scaled)));
-    k.finish()
 }
 
 #[cfg(test)]
@@ -89,6 +78,7 @@ mod tests {
     use dermis_golden::fixed::stages::pass::scaled;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Pipeline};
     use crate::wire::Word;
 
@@ -114,7 +104,7 @@ mod tests {
                 vec![Some(Word::of_fields(&all, M))]
             };
             let block = OperandScale::new(wanted);
-            check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(OperandScale::latency(wanted), 1, of));
+            check(&kernel_of(&block), &stimulus, &mut Pipeline::new(OperandScale::latency(wanted), 1, of));
         }
     }
 }

@@ -2,73 +2,60 @@
 
 use dermis_golden::fixed::words::network::MASKED;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// One stage at a time gives quads, which pass on in the same cycle.
-///
-/// | scene | operands |
-/// |---|---|
-/// | with a search | `own`: v_ij |
-/// | one μ by a network | `own`: v_00 and p; `images`: of the layers, and when μ is known |
-/// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
-///
-/// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
-#[derive(dermis_hdl_derive::Block)]
-pub struct OperandSource {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Operands of `relax`, `data_bits` each, signed; valid with `own_valid`.
-    pub own: Wire<In>,
-    /// `own` holds a quad; with a μ for each contact it goes to `shear` instead.
-    pub own_valid: Signal<In, Bit>,
-    /// Operands of `estimate`, `data_bits` each, signed; valid with `images_valid`.
-    pub images: Wire<In>,
-    /// `images` holds a quad.
-    pub images_valid: Signal<In, Bit>,
-    /// High limbs of a contact's window, signed; valid with `window_valid`.
-    pub window_quad: Wire<In>,
-    /// Folded mask of the same quad, in units of the word of a masked taxel, signed; valid with `window_valid`.
-    pub mask: Wire<In>,
-    /// `window_quad` and `mask` hold a quad.
-    pub window_valid: Signal<In, Bit>,
-    /// Operands of `shear`, `data_bits` each, signed; valid with `sheared_valid`.
-    pub sheared: Wire<In>,
-    /// `sheared` holds a quad.
-    pub sheared_valid: Signal<In, Bit>,
-    /// A quad of operands, `operand_bits` each, signed; valid with `valid`.
-    pub quad: Wire<Out>,
-    /// `quad` holds a quad.
-    pub valid: Signal<Out, Bit>,
-    /// It is one of a window or its mask.
-    pub of_window: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(
-    OperandSource,
-    clock clk,
-    inputs [rst, own, own_valid, images, images_valid, window_quad, mask, window_valid, sheared, sheared_valid],
-    outputs [quad, valid, of_window]
-);
-
-/// What decides the circuit.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    data: usize,
-    /// Width of an operand.
-    operand: usize,
-    /// Width of a word of the window.
-    limb: usize,
-    network: bool,
-    /// Quads of a window, where each contact has a μ of its own.
-    window: Option<usize>,
+block! {
+    /// One stage at a time gives quads, which pass on in the same cycle.
+    ///
+    /// | scene | operands |
+    /// |---|---|
+    /// | with a search | `own`: v_ij |
+    /// | one μ by a network | `own`: v_00 and p; `images`: of the layers, and when μ is known |
+    /// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
+    ///
+    /// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
+    #[derive(Clone, Copy, Debug)]
+    pub struct OperandSource {
+        data: usize,
+        /// Width of an operand.
+        operand: usize,
+        /// Width of a word of the window.
+        limb: usize,
+        network: bool,
+        /// Quads of a window, where each contact has a μ of its own.
+        window: Option<usize>,
+    }
+    ports OperandSourcePorts {
+        clock;
+        reset;
+        /// Operands of `relax`, `data_bits` each, signed; valid with `own_valid`.
+        in own: 4 * data;
+        /// `own` holds a quad; with a μ for each contact it goes to `shear` instead.
+        in own_valid;
+        /// Operands of `estimate`, `data_bits` each, signed; valid with `images_valid`.
+        in images: 4 * data;
+        /// `images` holds a quad.
+        in images_valid;
+        /// High limbs of a contact's window, signed; valid with `window_valid`.
+        in window_quad: 4 * limb;
+        /// Folded mask of the same quad, in units of the word of a masked taxel, signed; valid with `window_valid`.
+        in mask: 4 * MASK_BITS;
+        /// `window_quad` and `mask` hold a quad.
+        in window_valid;
+        /// Operands of `shear`, `data_bits` each, signed; valid with `sheared_valid`.
+        in sheared: 4 * data;
+        /// `sheared` holds a quad.
+        in sheared_valid;
+        /// A quad of operands, `operand_bits` each, signed; valid with `valid`.
+        out quad: 4 * operand;
+        /// `quad` holds a quad.
+        out valid;
+        /// It is one of a window or its mask.
+        out of_window;
+    }
 }
 
 /// Width of a field of the mask: one word of 0 or 1, signed, and the growth of the sum.
@@ -78,96 +65,66 @@ impl OperandSource {
     /// For the operands of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        OperandSource::of(Shape {
+        OperandSource {
             data: formats.data_bits as usize,
             operand: formats.operand_bits() as usize,
             limb: (formats.fold_bits - formats.input_low_bits) as usize,
             network: formats.has_network(),
             window: formats.window_quads,
-        })
+        }
     }
 
-    fn of(shape: Shape) -> Self {
-        let quad = || Wire::new(4 * shape.data);
-        let block = OperandSource {
-            clk: Default::default(),
-            rst: Default::default(),
-            own: quad(),
-            own_valid: Default::default(),
-            images: Wire::new(4 * shape.data),
-            images_valid: Default::default(),
-            window_quad: Wire::new(4 * shape.limb),
-            mask: Wire::new(4 * MASK_BITS),
-            window_valid: Default::default(),
-            sheared: Wire::new(4 * shape.data),
-            sheared_valid: Default::default(),
-            quad: Wire::new(4 * shape.operand),
-            valid: Default::default(),
-            of_window: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
-    }
-}
-
-impl Shape {
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("operand_source");
-        let rst = k.input("rst", 1);
-        let (own, own_valid) = (k.input("own", 4 * self.data), k.input("own_valid", 1));
-        let (images, images_valid) = (k.input("images", 4 * self.data), k.input("images_valid", 1));
-        let (window, mask) = (k.input("window_quad", 4 * self.limb), k.input("mask", 4 * MASK_BITS));
-        let window_valid = k.input("window_valid", 1);
-        let (sheared, sheared_valid) = (k.input("sheared", 4 * self.data), k.input("sheared_valid", 1));
-        let Some(quads) = self.window else {
-            let (quad, valid) = match self.network {
-                true => (images_valid.mux(images, own), images_valid | own_valid),
-                false => (own, own_valid),
-            };
-            k.wire("quad", quad);
-            k.wire("valid", valid);
-            k.wire("of_window", k.constant(1, 0));
-            return k.finish();
-        };
-        let place = k.state("place", Type::unsigned(count_bits(quads)), rst, 0);
-        let masks = k.state("masks", Type::unsigned(1), rst, 0);
-        let last = k.wire("last", place.is(quads as u64 - 1));
-        k.when(window_valid | *masks, || place.set(last.mux(k.constant(place.bits(), 0), place.plus(1))));
-        k.when((window_valid | *masks) & last, || masks.set(window_valid));
-        let memory = k.memory("mask_of", quads, 4 * MASK_BITS, Contents::Undefined);
-        memory.write(window_valid, *place, mask);
-        let kept = memory.read(*place);
-        let masked = MASKED.trailing_zeros() as usize;
-        let mask = self.operands(kept, MASK_BITS, masked);
-        let window = self.operands(window, self.limb, 0);
-        let made = self.operands(images_valid.mux(images, sheared), self.data, 0);
-        k.wire("quad", window_valid.mux(window, masks.mux(mask, made)));
-        let of_window = k.wire("of_window", window_valid | *masks);
-        k.wire("valid", of_window | images_valid | sheared_valid);
-        k.finish()
-    }
-}
-
-impl Shape {
     /// Four signed fields of `bits` bits as operands, times 2^`shift`.
-    fn operands<'k>(self, quad: Expr<'k>, bits: usize, shift: usize) -> Expr<'k> {
+    fn operands<'k>(&self, quad: Expr<'k>, bits: usize, shift: usize) -> Expr<'k> {
         let field =
             |lane: usize| quad.slice(lane * bits, bits).signed().shift_left(shift).resize(self.operand).unsigned();
         concat(&[3, 2, 1, 0].map(field))
     }
 }
 
+impl Block for OperandSource {
+    fn build<'k>(&self, k: &'k Builder, io: OperandSourcePorts<Inside<'k>>) {
+        let (images_valid, window_valid) = (io.images_valid, io.window_valid);
+        let Some(quads) = self.window else {
+            let (quad, valid) = match self.network {
+                true => (images_valid.mux(io.images, io.own), images_valid | io.own_valid),
+                false => (io.own, io.own_valid),
+            };
+            io.quad.set(quad);
+            io.valid.set(valid);
+            io.of_window.set(k.constant(1, 0));
+            return;
+        };
+        let place = k.state("place", Type::unsigned(count_bits(quads)), io.rst, 0);
+        let masks = k.state("masks", Type::unsigned(1), io.rst, 0);
+        let last = k.wire("last", place.is(quads as u64 - 1));
+        k.when(window_valid | *masks, || place.set(last.mux(k.constant(place.bits(), 0), place.plus(1))));
+        k.when((window_valid | *masks) & last, || masks.set(window_valid));
+        let memory = k.memory("mask_of", quads, 4 * MASK_BITS, Contents::Undefined);
+        memory.write(window_valid, *place, io.mask);
+        let kept = memory.read(*place);
+        let masked = MASKED.trailing_zeros() as usize;
+        let mask = self.operands(kept, MASK_BITS, masked);
+        let window = self.operands(io.window_quad, self.limb, 0);
+        let made = self.operands(images_valid.mux(io.images, io.sheared), self.data, 0);
+        io.quad.set(window_valid.mux(window, masks.mux(mask, made)));
+        let of_window = io.of_window.set(window_valid | *masks);
+        io.valid.set(of_window | images_valid | io.sheared_valid);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { data: 14, operand: 18, limb: 17, network: true, window: Some(5) };
+    const SHAPE: OperandSource = OperandSource { data: 14, operand: 18, limb: 17, network: true, window: Some(5) };
 
     /// Inputs in the order of the block.
     struct Sources {
-        shape: Shape,
+        shape: OperandSource,
         /// Masks of the window so far; `None` before the first reset.
         masks: Option<Vec<Word>>,
         /// Index of the mask that passes on, once the window is complete.
@@ -177,7 +134,7 @@ mod tests {
     impl Reference for Sources {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let [own, images, window, sheared] = [2, 4, 7, 9].map(|input| inputs[input].number() == 1);
-            let Shape { data, operand, limb, network, window: quads } = self.shape;
+            let OperandSource { data, operand, limb, network, window: quads } = self.shape;
             if quads.is_none() {
                 let quad = if images && network { Some(inputs[3]) } else { own.then_some(inputs[1]) };
                 return vec![quad, Some((own || images && network).into()), Some(Word::default())];
@@ -213,7 +170,7 @@ mod tests {
     }
 
     /// Windows with gaps, after each a pause in which its mask leaves, then quads of the others, one at a time.
-    fn stimulus(shape: Shape) -> Vec<Vec<Word>> {
+    fn stimulus(shape: OperandSource) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(9);
         let mut all = Vec::new();
         let mut put = |random: &mut fastrand::Rng, rst: bool, given: Option<usize>| {
@@ -253,11 +210,11 @@ mod tests {
     fn quads_of_one_stage_at_a_time_pass_on() {
         for shape in [
             SHAPE,
-            Shape { window: None, operand: SHAPE.data, ..SHAPE },
-            Shape { window: None, operand: SHAPE.data, network: false, ..SHAPE },
+            OperandSource { window: None, operand: SHAPE.data, ..SHAPE },
+            OperandSource { window: None, operand: SHAPE.data, network: false, ..SHAPE },
         ] {
             let mut sources = Sources { shape, masks: None, next: None };
-            check(OperandSource::of(shape).kernel.kernel(), &stimulus(shape), &mut sources);
+            check(&kernel_of(&shape), &stimulus(shape), &mut sources);
         }
     }
 }

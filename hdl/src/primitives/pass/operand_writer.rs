@@ -1,53 +1,40 @@
 //! Write address of finished vectors in the operand memory.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::address::case_counter::{expression_by_case, value_by_case};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
-/// later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`, begun.
-#[derive(dermis_hdl_derive::Block)]
-pub struct OperandWriter {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Index of the case; constant from the cycle after `clear` until the next.
-    pub which: Wire<In>,
-    /// Restarts the counts for the next subarray, with priority over `valid`.
-    pub clear: Signal<In, Bit>,
-    /// A quad of a v_ij arrives in this cycle.
-    pub valid: Signal<In, Bit>,
-    /// Write address of the quad; valid with `keep`.
-    pub address: Wire<Out>,
-    /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
-    pub keep: Signal<Out, Bit>,
-    /// Number of operand vectors of this subarray that can be read; includes a vector from the cycle after the `valid`
-    /// that makes it readable.
-    pub finished: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
+    /// later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`, begun.
+    pub struct OperandWriter {
+        lengths: Vec<Vec<usize>>,
+        streamed: bool,
+    }
+    ports OperandWriterPorts {
+        clock;
+        /// Index of the case; constant from the cycle after `clear` until the next.
+        in which: count_bits(lengths.len());
+        /// Restarts the counts for the next subarray, with priority over `valid`.
+        in clear;
+        /// A quad of a v_ij arrives in this cycle.
+        in valid;
+        /// Write address of the quad; valid with `keep`.
+        out address: count_bits(words(lengths));
+        /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
+        out keep;
+        /// Number of operand vectors of this subarray that can be read; includes a vector from the cycle after the `valid`
+        /// that makes it readable.
+        out finished: count_bits(most_vectors(lengths) + 1);
+    }
 }
-
-kernel_block!(OperandWriter, clock clk, inputs [which, clear, valid], outputs [address, keep, finished]);
 
 impl OperandWriter {
     /// `lengths[case]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is read from its
     /// first quad on, one quad per cycle, while one quad per cycle is written.
     pub fn new(lengths: &[Vec<usize>], streamed: bool) -> Self {
-        let vectors = most_vectors(lengths);
-        let block = OperandWriter {
-            clk: Default::default(),
-            which: Wire::new(count_bits(lengths.len())),
-            clear: Default::default(),
-            valid: Default::default(),
-            address: Wire::new(count_bits(words(lengths))),
-            keep: Default::default(),
-            finished: Wire::new(count_bits(vectors + 1)),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(lengths, streamed))
+        OperandWriter { lengths: lengths.to_vec(), streamed }
     }
 }
 
@@ -61,54 +48,52 @@ fn most_vectors(lengths: &[Vec<usize>]) -> usize {
     lengths.iter().map(Vec::len).max().unwrap_or(0)
 }
 
-fn kernel(lengths: &[Vec<usize>], streamed: bool) -> Kernel {
-    let k = Builder::new("operand_writer");
-    let which = k.input("which", count_bits(lengths.len()));
-    let (clear, valid) = (k.input("clear", 1), k.input("valid", 1));
-    let (vectors, most) = (most_vectors(lengths), words(lengths));
-    let (address_bits, finished_bits) = (count_bits(most), count_bits(vectors + 1));
-    if vectors == 0 {
-        k.comment("No v_ij is an operand of a later pass.");
-        for (port, bits) in [("address", address_bits), ("keep", 1), ("finished", finished_bits)] {
-            k.wire(port, k.constant(bits, 0));
+impl Block for OperandWriter {
+    fn build<'k>(&self, k: &'k Builder, io: OperandWriterPorts<Inside<'k>>) {
+        let OperandWriter { lengths, streamed } = self;
+        let (vectors, most) = (most_vectors(lengths), words(lengths));
+        if vectors == 0 {
+            k.comment("No v_ij is an operand of a later pass.");
+            for port in [io.address, io.keep, io.finished] {
+                port.set(k.constant(port.bits(), 0));
+            }
+            return;
         }
-        return k.finish();
-    }
-    let longest = lengths.iter().flatten().copied().max().unwrap_or(1);
-    let quad = k.state("quad", Type::unsigned(count_bits(longest)), clear, 0);
-    let address = k.state("address", Type::unsigned(address_bits), clear, 0);
-    let finished = k.state("finished", Type::unsigned(finished_bits), clear, 0);
-    let is_uniform = |own: &Vec<usize>| own.iter().all(|length| *length == own[0]);
-    let last = if lengths.iter().all(|own| own.len() == vectors && is_uniform(own)) {
-        let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
-        value_by_case(&k, which, &ends, quad.bits())
-    } else {
-        let own = |own: &Vec<usize>| {
-            let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
-            finished.table(quad.bits(), &padded(lasts, finished_bits))
+        let longest = lengths.iter().flatten().copied().max().unwrap_or(1);
+        let quad = k.state("quad", Type::unsigned(count_bits(longest)), io.clear, 0);
+        let address = io.address.state(io.clear, 0);
+        let finished = io.finished.state(io.clear, 0);
+        let is_uniform = |own: &Vec<usize>| own.iter().all(|length| *length == own[0]);
+        let last = if lengths.iter().all(|own| own.len() == vectors && is_uniform(own)) {
+            let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
+            value_by_case(k, io.which, &ends, quad.bits())
+        } else {
+            let own = |own: &Vec<usize>| {
+                let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
+                finished.table(quad.bits(), &padded(lasts, finished.bits()))
+            };
+            let of_cases: Vec<Expr> = lengths.iter().map(own).collect();
+            expression_by_case(io.which, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
         };
-        let of_cases: Vec<Expr> = lengths.iter().map(own).collect();
-        expression_by_case(which, &of_cases).unwrap_or(k.constant(quad.bits(), 0))
-    };
-    let last_quad = k.wire("last_quad", quad.equals(last));
-    let counts: Vec<usize> = lengths.iter().map(Vec::len).collect();
-    let all = finished.equals(value_by_case(&k, which, &counts, finished_bits));
-    let full = match streamed {
-        true => {
-            let full = k.state("full", Type::unsigned(1), clear, 0);
-            k.when(valid & last_quad & all, || full.set(k.constant(1, 1)));
-            *full
-        }
-        false => all,
-    };
-    let keep = k.wire("keep", valid & !full);
-    k.when(keep, || {
-        quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1)));
-        k.when(!address.is(most as u64 - 1), || address.set(address.plus(1)));
-        let readable = if streamed { quad.is(0) } else { last_quad };
-        k.when(readable, || finished.set(finished.plus(1)));
-    });
-    k.finish()
+        let last_quad = k.wire("last_quad", quad.equals(last));
+        let counts: Vec<usize> = lengths.iter().map(Vec::len).collect();
+        let all = finished.equals(value_by_case(k, io.which, &counts, finished.bits()));
+        let full = match streamed {
+            true => {
+                let full = k.state("full", Type::unsigned(1), io.clear, 0);
+                k.when(io.valid & last_quad & all, || full.set(k.constant(1, 1)));
+                *full
+            }
+            false => all,
+        };
+        let keep = io.keep.set(io.valid & !full);
+        k.when(keep, || {
+            quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1)));
+            k.when(!address.is(most as u64 - 1), || address.set(address.plus(1)));
+            let readable = if *streamed { quad.is(0) } else { last_quad };
+            k.when(readable, || finished.set(finished.plus(1)));
+        });
+    }
 }
 
 /// A table with zeros up to all that an index of `bits` bits reaches.
@@ -120,6 +105,7 @@ fn padded(mut table: Vec<u64>, bits: usize) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -183,7 +169,7 @@ mod tests {
             let stimulus: Vec<_> = stimulus.collect();
             for &streamed in streamed {
                 let block = OperandWriter::new(lengths, streamed);
-                check(block.kernel.kernel(), &stimulus, &mut Count { lengths, quads: None, streamed });
+                check(&kernel_of(&block), &stimulus, &mut Count { lengths, quads: None, streamed });
             }
         }
     }

@@ -4,12 +4,10 @@ use dermis_golden::fixed::plan::program::{instructions, Instruction};
 use dermis_golden::fixed::plan::resources::{operand_words, Holds};
 use dermis_golden::fixed::words::schedule::{sections, Axis, Operand, Section, Target};
 use dermis_golden::fixed::{CasePlan, Model};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Net, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
 /// One product over the columns of one group of rows: an instruction of the schedule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,50 +78,68 @@ pub fn longest(model: &Model) -> usize {
     steps.unwrap_or(1).max(model.formats().quads)
 }
 
-/// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
-///
-/// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge. `ready` (the
-/// step's operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
-/// of the section, after which the first follows) are combinational.
-///
-/// The current instruction is in a register. The table is always read at the next instruction, because `advance`
-/// settles late in the cycle.
-#[derive(dermis_hdl_derive::Block)]
-pub struct PassProgram {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Index of the section; valid with `start`, constant until its last step.
-    pub which: Wire<In>,
-    /// Load the first step at the clock edge.
-    pub start: Signal<In, Bit>,
-    /// Load the next step at the clock edge.
-    pub advance: Signal<In, Bit>,
-    /// Position in the step's columns; taken in every cycle.
-    pub column: Wire<In>,
-    /// Number of operand vectors of this subarray that can be read; taken in every cycle.
-    pub finished: Wire<In>,
-    /// The step's operand can be read, and the pause after an accumulation is over.
-    pub ready: Signal<Out, Bit>,
-    /// `column` is the step's last.
-    pub last: Signal<Out, Bit>,
-    /// The step is the last of its section.
-    pub ends: Signal<Out, Bit>,
-    /// Address in the coefficient memory; [`latency`](PassProgram::latency) cycles after `column`.
-    pub coefficient_address: Wire<Out>,
-    /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency) cycles after
-    /// `column`.
-    pub operand_address: Wire<Out>,
-    /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with the
-    /// addresses.
-    pub source: Wire<Out>,
-    /// Factor of the operand as in [`OperandScale`](super::operand_scale::OperandScale); with the addresses. Constant 0 without
-    /// a network.
-    pub factor: Wire<Out>,
-    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes), see [`Control`]; with the addresses.
-    pub control: Wire<Out>,
-    /// Index of the step in its section; from `start` on.
-    pub step: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
+    ///
+    /// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge. `ready` (the
+    /// step's operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
+    /// of the section, after which the first follows) are combinational.
+    ///
+    /// The current instruction is in a register. The table is always read at the next instruction, because `advance`
+    /// settles late in the cycle.
+    pub struct PassProgram {
+        /// The steps of each section.
+        steps: Vec<Vec<Step>>,
+        /// Address of each coefficient word's column, and its transposed address; empty without a column list.
+        list: Vec<[usize; 2]>,
+        /// Some step reads its operand transposed.
+        across: bool,
+        /// Cycles without a product after each accumulation, 1 to 3.
+        pause: usize,
+        /// Words of the coefficient memory.
+        words: usize,
+        /// Columns of the longest step.
+        columns: usize,
+        /// Words of the operand memory.
+        operands: usize,
+        /// Vectors of the operand memory.
+        vectors: usize,
+        control: Control,
+    }
+    ports PassProgramPorts {
+        clock;
+        /// Index of the section; valid with `start`, constant until its last step.
+        in which: count_bits(steps.len());
+        /// Load the first step at the clock edge.
+        in start;
+        /// Load the next step at the clock edge.
+        in advance;
+        /// Position in the step's columns; taken in every cycle.
+        in column: count_bits(*columns);
+        /// Number of operand vectors of this subarray that can be read; taken in every cycle.
+        in finished: count_bits(vectors + 1);
+        /// The step's operand can be read, and the pause after an accumulation is over.
+        out ready;
+        /// `column` is the step's last.
+        out last;
+        /// The step is the last of its section.
+        out ends;
+        /// Address in the coefficient memory; [`latency`](PassProgram::latency) cycles after `column`.
+        out coefficient_address: count_bits(*words);
+        /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency) cycles after
+        /// `column`.
+        out operand_address: count_bits(*operands);
+        /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with
+        /// the addresses.
+        out source: SOURCE_BITS;
+        /// Factor of the operand as in [`OperandScale`](super::operand_scale::OperandScale); with the addresses. Constant 0 without
+        /// a network.
+        out factor: FACTOR_BITS;
+        /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes), see [`Control`]; with the addresses.
+        out control: control.bits();
+        /// Index of the step in its section; from `start` on.
+        out step: count_bits(largest_of(steps));
+    }
 }
 
 /// The control word of the lanes: bit 0 is the last product of an accumulation; the others are there where they are needed.
@@ -160,35 +176,10 @@ impl Control {
 /// Width of `factor`, in bits.
 pub const FACTOR_BITS: usize = 2;
 
-kernel_block!(
-    PassProgram,
-    clock clk,
-    inputs [which, start, advance, column, finished],
-    outputs [ready, last, ends, coefficient_address, operand_address, source, factor, control, step]
-);
-
 /// File of the column list, one line per word of the coefficient memory.
 pub const COLUMN_FILE: &str = "columns.hex";
 /// Width of `source`, in bits.
 pub const SOURCE_BITS: usize = 5;
-
-/// What decides the circuit.
-struct Shape {
-    /// The steps of each section.
-    steps: Vec<Vec<Step>>,
-    /// Address of each coefficient word's column, and its transposed address; empty without a column list.
-    list: Vec<[usize; 2]>,
-    /// Some step reads its operand transposed.
-    across: bool,
-    /// Cycles without a product after each accumulation, 1 to 3.
-    pause: usize,
-    /// Words of the coefficient memory, columns of the longest step, words and vectors of the operand memory.
-    words: usize,
-    columns: usize,
-    operands: usize,
-    vectors: usize,
-    control: Control,
-}
 
 impl PassProgram {
     /// The schedule of `model`.
@@ -197,7 +188,7 @@ impl PassProgram {
         let programs = programs(model);
         let pair = |case: &CasePlan, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
         let pairs = |case: &CasePlan| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
-        PassProgram::of(&Shape {
+        PassProgram {
             steps: programs.iter().map(unroll).collect(),
             list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),
             across: formats.shared_a,
@@ -207,46 +198,18 @@ impl PassProgram {
             operands: operand_words(formats).max(formats.quads),
             vectors: programs.iter().map(|(_, section)| section.operands.len()).max().unwrap_or(0),
             control: Control::new(model),
-        })
-    }
-
-    fn of(shape: &Shape) -> Self {
-        let block = PassProgram {
-            clk: Default::default(),
-            which: Wire::new(count_bits(shape.steps.len())),
-            start: Default::default(),
-            advance: Default::default(),
-            column: Wire::new(count_bits(shape.columns)),
-            finished: Wire::new(count_bits(shape.vectors + 1)),
-            ready: Default::default(),
-            last: Default::default(),
-            ends: Default::default(),
-            coefficient_address: Wire::new(count_bits(shape.words)),
-            operand_address: Wire::new(count_bits(shape.operands)),
-            source: Wire::new(SOURCE_BITS),
-            factor: Wire::new(FACTOR_BITS),
-            control: Wire::new(shape.control.bits()),
-            step: Wire::new(count_bits(largest_of(&shape.steps))),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+        }
     }
 
     /// Cycles from `column` to the addresses: 1, or 3 with a column list.
     pub fn latency(&self) -> usize {
-        match self.kernel.kernel().memories() {
-            [] => 1,
-            _ => 3,
+        if self.list.is_empty() {
+            1
+        } else {
+            3
         }
     }
 
-    /// Content of [`COLUMN_FILE`] for `$readmemh`, the transposed address above the plain one; `None` without a list.
-    pub fn column_file(&self) -> Option<String> {
-        self.kernel.kernel().memory_files().into_iter().next().map(|(_, text)| text)
-    }
-}
-
-impl Shape {
     /// Widths of the fields of an instruction, from bit 0: last, kind and flip and transposed as in
     /// `source`, ends, final column, needs, operand, coefficients; with a network also factor and layer.
     fn fields(&self) -> Vec<usize> {
@@ -284,66 +247,20 @@ impl Shape {
         k.wire("instruction", index.table(bits, &words))
     }
 
-    fn kernel(&self) -> Kernel {
-        let k = Builder::new("pass_program");
-        let which = k.input("which", count_bits(self.steps.len()));
-        let (start, advance) = (k.input("start", 1), k.input("advance", 1));
-        let (column, finished) = (k.input("column", count_bits(self.columns)), k.input("finished", self.fields()[4]));
-        let step = k.register("step", Type::unsigned(count_bits(largest_of(&self.steps))));
-        let names =
-            ["last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base", "multiplies", "of_layer"];
-        let registers: Vec<Net> =
-            names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
-        let &[last_product, selects, ends, final_column, needs, o_base, c_base, ref of_network @ ..] = &registers[..]
-        else {
-            unreachable!("one register per field")
-        };
-        let asked = k.wire("asked", (start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
-        let instruction = self.table(&k, which, asked);
-        k.when(start | advance, || {
-            step.set(asked);
-            let mut at = 0;
-            for register in &registers {
-                register.set(instruction.slice(at, register.bits()));
-                at += register.bits();
-            }
-        });
-        let ended = advance & *last_product;
-        let pauses = (1..=self.pause).scan(ended, |ended, number| {
-            *ended = k.delay(&format!("pause_{number}"), *ended);
-            Some(*ended)
-        });
-        let pauses = pauses.reduce(|one, other| one | other).unwrap_or(k.constant(1, 0));
-        k.wire("ready", !(pauses | finished.less(*needs)));
-        let last = k.wire("last", column.equals(*final_column));
-        let opens = self.control.opens.then(|| step.is(0) & column.is(0));
-        let layer = of_network.get(1).map(Net::get);
-        let flags: Vec<Expr> = opens.into_iter().chain(layer).chain([*last_product & last]).collect();
-        let flags = k.wire("flags", concat(&flags));
-        let factor = of_network.first().map(Net::get);
-        self.addresses(&k, column, [*c_base, *o_base], [Some(*selects), factor, Some(flags)]);
-        k.finish()
-    }
-
-    /// The registers from column to addresses, and of source, factor and control, which go with them; constant 0 for what there
-    /// is not.
+    /// The addresses for `column`, and with them source, factor and control, all to be registered once more: at once, or behind the
+    /// column list.
     fn addresses<'k>(
         &self,
         k: &'k Builder,
         column: Expr<'k>,
         [c_base, o_base]: [Expr<'k>; 2],
         with: [Option<Expr<'k>>; 3],
-    ) {
+    ) -> ([Expr<'k>; 2], [Option<Expr<'k>>; 3]) {
         const NAMES: [&str; 3] = ["source", "factor", "control"];
         let coefficients = (c_base + column).low(c_base.bits());
         let operand = |base: Expr<'k>, column: Expr<'k>| (base + column).low(o_base.bits());
         if self.list.is_empty() {
-            k.delay("coefficient_address", coefficients);
-            k.delay("operand_address", operand(o_base, column));
-            for (name, value) in NAMES.into_iter().zip(with) {
-                value.map_or_else(|| k.wire(name, k.constant(FACTOR_BITS, 0)), |value| k.delay(name, value));
-            }
-            return;
+            return ([coefficients, operand(o_base, column)], with);
         }
         let bits = column.bits();
         let word = |&[straight, transposed]: &[usize; 2]| match self.across {
@@ -360,17 +277,60 @@ impl Shape {
         };
         let [c_address1, c_address2] = twice("c_address", coefficients);
         let [_, o_base2] = twice("o_base", o_base);
-        let with2 = [0, 1, 2].map(|k| with[k].map(|value| twice(NAMES[k], value)[1]));
+        let with2 = [0, 1, 2].map(|at| with[at].map(|value| twice(NAMES[at], value)[1]));
         let pair = k.delay("pair", columns.read(c_address1));
         let kept = match (self.across, with2[0]) {
             (true, Some(source2)) => source2.at(4).mux(pair.slice(bits, bits), pair.low(bits)),
             _ => pair,
         };
         let kept = k.wire("kept", kept);
-        k.delay("coefficient_address", c_address2);
-        k.delay("operand_address", operand(o_base2, kept));
-        for (name, value) in NAMES.into_iter().zip(with2) {
-            value.map_or_else(|| k.wire(name, k.constant(FACTOR_BITS, 0)), |value| k.delay(name, value));
+        ([c_address2, operand(o_base2, kept)], with2)
+    }
+}
+
+impl Block for PassProgram {
+    fn build<'k>(&self, k: &'k Builder, io: PassProgramPorts<Inside<'k>>) {
+        let step = io.step.register();
+        let names =
+            ["last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base", "multiplies", "of_layer"];
+        let registers: Vec<Net> =
+            names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
+        let &[last_product, selects, ends, final_column, needs, o_base, c_base, ref of_network @ ..] = &registers[..]
+        else {
+            unreachable!("one register per field")
+        };
+        let asked = k.wire("asked", (io.start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
+        let instruction = self.table(k, io.which, asked);
+        k.when(io.start | io.advance, || {
+            step.set(asked);
+            let mut at = 0;
+            for register in &registers {
+                register.set(instruction.slice(at, register.bits()));
+                at += register.bits();
+            }
+        });
+        let ended = io.advance & *last_product;
+        let pauses = (1..=self.pause).scan(ended, |ended, number| {
+            *ended = k.delay(&format!("pause_{number}"), *ended);
+            Some(*ended)
+        });
+        let pauses = pauses.reduce(|one, other| one | other).unwrap_or(k.constant(1, 0));
+        io.ready.set(!(pauses | io.finished.less(*needs)));
+        let last = io.last.set(io.column.equals(*final_column));
+        let opens = self.control.opens.then(|| step.is(0) & io.column.is(0));
+        let layer = of_network.get(1).map(Net::get);
+        let flags: Vec<Expr> = opens.into_iter().chain(layer).chain([*last_product & last]).collect();
+        let flags = k.wire("flags", concat(&flags));
+        let factor = of_network.first().map(Net::get);
+        let with = [Some(*selects), factor, Some(flags)];
+        let ([coefficients, operands], with) = self.addresses(k, io.column, [*c_base, *o_base], with);
+        io.coefficient_address.delay(coefficients);
+        io.operand_address.delay(operands);
+        for (output, value) in [io.source, io.factor, io.control].into_iter().zip(with) {
+            match value {
+                Some(value) => output.delay(value),
+                None => output.set(k.constant(output.bits(), 0)),
+            };
         }
     }
 }
@@ -385,6 +345,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -392,7 +353,7 @@ mod tests {
     const VECTORS: usize = 2;
 
     /// Two sections of steps with random fields, with or without a column list.
-    fn shape(listed: bool, control: Control) -> Shape {
+    fn shape(listed: bool, control: Control) -> PassProgram {
         let mut random = fastrand::Rng::with_seed(6);
         let mut step = |index: usize, count: usize| Step {
             coefficients: random.usize(..40),
@@ -410,7 +371,7 @@ mod tests {
         let steps = [5, 3].map(|count| (0..count).map(|index| step(index, count)).collect()).into();
         let list = (0..47).map(|_| [random.usize(..QUADS), random.usize(..QUADS)]).collect();
         let list = if listed { list } else { Vec::new() };
-        Shape {
+        PassProgram {
             steps,
             list,
             across: listed,
@@ -425,7 +386,7 @@ mod tests {
 
     /// The step in execution, its index, the outputs on their way.
     struct Program {
-        shape: Shape,
+        shape: PassProgram,
         now: Option<(Step, usize)>,
         /// Whether each of the cycles of the pause before ended an accumulation.
         ended: VecDeque<Option<bool>>,
@@ -493,13 +454,9 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
         for (listed, layers, opens) in [(false, false, false), (true, false, true), (false, true, true)] {
             let shape = shape(listed, Control { layers, opens });
-            let block = PassProgram::of(&shape);
-            let pipe = vec![[None; 5]; block.latency()].into();
-            check(
-                block.kernel.kernel(),
-                &stimulus,
-                &mut Program { ended: vec![None; shape.pause].into(), shape, now: None, pipe },
-            );
+            let pipe = vec![[None; 5]; shape.latency()].into();
+            let ended = vec![None; shape.pause].into();
+            check(&kernel_of(&shape), &stimulus, &mut Program { ended, shape, now: None, pipe });
         }
     }
 }

@@ -1,31 +1,32 @@
 //! Block exponent of v_00: the right shift that brings its largest accumulator to a full word.
 
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::leading_one::by_leading_one;
-use crate::wire::Wire;
 
-/// ORs the magnitudes of the raw quads; `shift` is valid three cycles after the last of them.
-#[derive(dermis_hdl_derive::Block)]
-pub struct RawLength {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Clears the OR for a new subarray, and the quad of the cycle before with it.
-    pub clear: Signal<In, Bit>,
-    /// `quad` is valid and taken in.
-    pub accept: Signal<In, Bit>,
-    /// Four accumulators, `acc_bits` each, signed; valid with `accept`.
-    pub quad: Wire<In>,
-    /// Right shift for `rescale`, of the quads so far; three cycles later.
-    pub shift: Wire<Out>,
-    kernel: Body,
+block! {
+    /// ORs the magnitudes of the raw quads; `shift` is valid three cycles after the last of them.
+    pub struct RawLength {
+        /// Width of an accumulator in bits.
+        acc: usize,
+        /// Length to which a word is brought, in bits without the sign.
+        full: usize,
+    }
+    ports RawLengthPorts {
+        clock;
+        /// Clears the OR for a new subarray, and the quad of the cycle before with it.
+        in clear;
+        /// `quad` is valid and taken in.
+        in accept;
+        /// Four accumulators, `acc_bits` each, signed; valid with `accept`.
+        in quad: 4 * acc;
+        /// Right shift for `rescale`, of the quads so far; three cycles later.
+        out shift: count_bits(*acc);
+    }
 }
-
-kernel_block!(RawLength, clock clk, inputs [clear, accept, quad], outputs [shift]);
 
 /// Width of the right shift of `rescale`, in bits.
 pub fn shift_bits(formats: &Formats) -> usize {
@@ -35,37 +36,24 @@ pub fn shift_bits(formats: &Formats) -> usize {
 impl RawLength {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        RawLength::of(formats.acc_bits as usize, formats.full_length() as usize)
-    }
-
-    /// For accumulators of `acc` bits that are brought to a length of `full` bits, without a sign.
-    fn of(acc: usize, full: usize) -> Self {
-        let block = RawLength {
-            clk: Default::default(),
-            clear: Default::default(),
-            accept: Default::default(),
-            quad: Wire::new(4 * acc),
-            shift: Wire::new(count_bits(acc)),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(acc, full))
+        RawLength { acc: formats.acc_bits as usize, full: formats.full_length() as usize }
     }
 }
 
-fn kernel(acc: usize, full: usize) -> Kernel {
-    let k = Builder::new("raw_length");
-    let [clear, accept] = ["clear", "accept"].map(|name| k.input(name, 1));
-    // The quad comes from an adder.
-    let quad = k.delay("taken", k.input("quad", 4 * acc));
-    let seen = k.state("seen", Type::unsigned(acc - 1), clear, 0);
-    let magnitude = |lane: usize| {
-        let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
-        k.wire(&format!("m{lane}"), low ^ sign.repeat(acc - 1))
-    };
-    let all = (0..4).map(magnitude).fold(*seen, |all, magnitude| all | magnitude);
-    k.when(k.delay("accepted", accept), || seen.set(all));
-    k.delay("shift", by_leading_one(&k, *seen, full..acc - 1, count_bits(acc), |bit| bit + 1 - full));
-    k.finish()
+impl Block for RawLength {
+    fn build<'k>(&self, k: &'k Builder, io: RawLengthPorts<Inside<'k>>) {
+        let RawLength { acc, full } = *self;
+        // The quad comes from an adder.
+        let quad = k.delay("taken", io.quad);
+        let seen = k.state("seen", Type::unsigned(acc - 1), io.clear, 0);
+        let magnitude = |lane: usize| {
+            let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
+            k.wire(&format!("m{lane}"), low ^ sign.repeat(acc - 1))
+        };
+        let all = (0..4).map(magnitude).fold(*seen, |all, magnitude| all | magnitude);
+        k.when(k.delay("accepted", io.accept), || seen.set(all));
+        io.shift.delay(by_leading_one(k, *seen, full..acc - 1, io.shift.bits(), |bit| bit + 1 - full));
+    }
 }
 
 #[cfg(test)]
@@ -73,6 +61,7 @@ mod tests {
     use dermis_golden::fixed::words::arith::{bit_length, magnitude_bits};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -112,7 +101,7 @@ mod tests {
             vec![clear.into(), random.bool().into(), Word::of_fields(&quad, ACC)]
         };
         let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
-        let block = RawLength::of(ACC, FULL);
-        check(block.kernel.kernel(), &stimulus, &mut Seen::default());
+        let block = RawLength { acc: ACC, full: FULL };
+        check(&kernel_of(&block), &stimulus, &mut Seen::default());
     }
 }

@@ -1,102 +1,70 @@
 //! After a sweep: compares its nine candidates with each other and with the best so far.
 
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::search::score_bias::weight_bits;
 use crate::primitives::search::sweep::{position_bits, sweep_bits, Fields};
-use crate::wire::Wire;
 
-/// Score = total − weight for all nine at once, then a tree of comparisons. Ties: in the coarse grid the first
-/// candidate in row-major order wins; in a halving the centre, then row-major order. The last three candidates are
-/// compared with the best so far in parallel with each other.
-///
-/// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, `LATENCY` cycles later.
-/// `begin_frame` clears the result for a new search, `halve` doubles the position for the next level.
-#[derive(dermis_hdl_derive::Block)]
-pub struct BestCandidate {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears the control pipeline only.
-    pub rst: Signal<In, Bit>,
-    /// A new search: position 0, score 0, nothing taken.
-    pub begin_frame: Signal<In, Bit>,
-    /// A new level: the position doubles and `taken` is cleared.
-    pub halve: Signal<In, Bit>,
-    /// The nine candidates are valid; starts their comparison.
-    pub start: Signal<In, Bit>,
-    /// Nine totals Σ log2(…), `score_bits` each, signed; valid with `start`.
-    pub totals: Wire<In>,
-    /// Nine n·log2 Σp, unsigned; valid with `start`.
-    pub weights: Wire<In>,
-    /// Nine bits, candidate k may be taken; valid with `start`.
-    pub eligible: Wire<In>,
-    /// Word of the sweep (`Fields`); valid with `start`.
-    pub sweep: Wire<In>,
-    /// The comparison is complete; high for one cycle.
-    pub done: Signal<Out, Bit>,
-    /// The best candidate changed; valid with `done`.
-    pub improved: Signal<Out, Bit>,
-    /// The next sweep was waiting for this result; valid with `done`.
-    pub closes: Signal<Out, Bit>,
-    /// Word of the sweep just compared; valid with `done`.
-    pub compared: Wire<Out>,
-    /// Best position, x, in grid steps of the level, signed; valid with `done` and from then on until the next `done`,
-    /// `halve` or `begin_frame` takes effect.
-    pub best_x: Wire<Out>,
-    /// Best position, y, in grid steps of the level, signed; as `best_x`.
-    pub best_y: Wire<Out>,
-    /// Score of the best candidate, signed, 2^−6; as `best_x`.
-    pub score: Wire<Out>,
-    /// A candidate was taken at this level.
-    pub taken: Signal<Out, Bit>,
-    /// A candidate was taken in the coarse grid.
-    pub found: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Score = total − weight for all nine at once, then a tree of comparisons. Ties: in the coarse grid the first
+    /// candidate in row-major order wins; in a halving the centre, then row-major order. The last three candidates are
+    /// compared with the best so far in parallel with each other.
+    ///
+    /// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, `LATENCY` cycles later.
+    /// `begin_frame` clears the result for a new search, `halve` doubles the position for the next level.
+    pub struct BestCandidate {
+        score_bits: usize,
+        weight_bits: usize,
+    }
+    ports BestCandidatePorts {
+        clock;
+        /// Synchronous reset, active high; clears the control pipeline only.
+        in rst;
+        /// A new search: position 0, score 0, nothing taken.
+        in begin_frame;
+        /// A new level: the position doubles and `taken` is cleared.
+        in halve;
+        /// The nine candidates are valid; starts their comparison.
+        in start;
+        /// Nine totals Σ log2(…), `score_bits` each, signed; valid with `start`.
+        in totals: 9 * score_bits;
+        /// Nine n·log2 Σp, unsigned; valid with `start`.
+        in weights: 9 * weight_bits;
+        /// Nine bits, candidate k may be taken; valid with `start`.
+        in eligible: 9;
+        /// Word of the sweep (`Fields`); valid with `start`.
+        in sweep: sweep_bits();
+        /// The comparison is complete; high for one cycle.
+        out done;
+        /// The best candidate changed; valid with `done`.
+        out improved;
+        /// The next sweep was waiting for this result; valid with `done`.
+        out closes;
+        /// Word of the sweep just compared; valid with `done`.
+        out compared: sweep_bits();
+        /// Best position, x, in grid steps of the level, signed; valid with `done` and from then on until the next `done`,
+        /// `halve` or `begin_frame` takes effect.
+        out best_x: position_bits();
+        /// Best position, y, in grid steps of the level, signed; as `best_x`.
+        out best_y: position_bits();
+        /// Score of the best candidate, signed, 2^−6; as `best_x`.
+        out score: score_bits;
+        /// A candidate was taken at this level.
+        out taken;
+        /// A candidate was taken in the coarse grid.
+        out found;
+    }
 }
 
 /// Cycles from `start` to `done`.
 pub const LATENCY: usize = 6;
 
-kernel_block!(
-    BestCandidate,
-    clock clk,
-    inputs [rst, begin_frame, halve, start, totals, weights, eligible, sweep],
-    outputs [done, improved, closes, compared, best_x, best_y, score, taken, found]
-);
-
 impl BestCandidate {
     /// With the widths of `formats`, for subarrays of at most `taxels` taxels.
     pub fn new(formats: &Formats, taxels: usize) -> Self {
-        BestCandidate::with_widths(formats.score_bits as usize, weight_bits(taxels))
-    }
-
-    /// With scores of `score_bits` and weights of `weight_bits`.
-    fn with_widths(score_bits: usize, weight_bits: usize) -> Self {
-        let block = BestCandidate {
-            clk: Default::default(),
-            rst: Default::default(),
-            begin_frame: Default::default(),
-            halve: Default::default(),
-            start: Default::default(),
-            totals: Wire::new(9 * score_bits),
-            weights: Wire::new(9 * weight_bits),
-            eligible: Wire::new(9),
-            sweep: Wire::new(sweep_bits()),
-            done: Default::default(),
-            improved: Default::default(),
-            closes: Default::default(),
-            compared: Wire::new(sweep_bits()),
-            best_x: Wire::new(position_bits()),
-            best_y: Wire::new(position_bits()),
-            score: Wire::new(score_bits),
-            taken: Default::default(),
-            found: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(score_bits, weight_bits))
+        BestCandidate { score_bits: formats.score_bits as usize, weight_bits: weight_bits(taxels) }
     }
 }
 
@@ -198,109 +166,108 @@ impl<'k> Compared<'k> {
     }
 }
 
-fn kernel(t: usize, w: usize) -> Kernel {
-    let p = position_bits();
-    let k = Builder::new("best_candidate");
-    let (rst, begin_frame) = (k.input("rst", 1), k.input("begin_frame", 1));
-    let (halve, start) = (k.input("halve", 1), k.input("start", 1));
-    let (totals, weights) = (k.input("totals", 9 * t), k.input("weights", 9 * w));
-    let (eligible, sweep) = (k.input("eligible", 9), k.input("sweep", sweep_bits()));
-    let bit = Type::unsigned(1);
-    let done = k.state("done", bit, rst, 0);
-    let (improved, closes) = (k.register("improved", bit), k.register("closes", bit));
-    let compared = k.register("compared", Type::unsigned(sweep_bits()));
-    let (best_x, best_y) = (k.register("best_x", Type::signed(p)), k.register("best_y", Type::signed(p)));
-    let score = k.register("score", Type::signed(t));
-    let (taken, found) = (k.register("taken", bit), k.register("found", bit));
-    let valid = k.state("valid", Type::unsigned(LATENCY - 1), rst, 0);
+impl Block for BestCandidate {
+    fn build<'k>(&self, k: &'k Builder, io: BestCandidatePorts<Inside<'k>>) {
+        let (p, t, w) = (position_bits(), self.score_bits, self.weight_bits);
+        let done = io.done.state(io.rst, 0);
+        let (improved, closes) = (io.improved.register(), io.closes.register());
+        let compared = io.compared.register();
+        let (best_x, best_y) = (k.register("best_x", Type::signed(p)), k.register("best_y", Type::signed(p)));
+        let score = k.register("score", Type::signed(t));
+        let (taken, found) = (io.taken.register(), io.found.register());
+        let valid = k.state("valid", Type::unsigned(LATENCY - 1), io.rst, 0);
 
-    // Score = total − weight, for all nine at once.
-    let difference = |n: usize| {
-        let weight = weights.slice(n * w, w);
-        (totals.slice(n * t, t) - weight.low(w.min(t))).low(t)
-    };
-    let scores = k.delay("scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
-    let (fits, own_sweep) =
-        (k.register("fits", Type::unsigned(9)), k.register("own_sweep", Type::unsigned(sweep_bits())));
-    k.when(start, || {
-        fits.set(eligible);
-        own_sweep.set(sweep);
-    });
-    let fields = Fields::of(*own_sweep);
-    let centre = [("own_centre_x", fields.centre[0]), ("own_centre_y", fields.centre[1])];
-    let centre = centre.map(|(name, value)| k.wire(name, value));
-    let coarse = k.wire("own_coarse", fields.coarse);
+        // Score = total − weight, for all nine at once.
+        let difference = |n: usize| {
+            let weight = io.weights.slice(n * w, w);
+            (io.totals.slice(n * t, t) - weight.low(w.min(t))).low(t)
+        };
+        let scores = k.delay("scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
+        let (fits, own_sweep) =
+            (k.register("fits", Type::unsigned(9)), k.register("own_sweep", Type::unsigned(sweep_bits())));
+        k.when(io.start, || {
+            fits.set(io.eligible);
+            own_sweep.set(io.sweep);
+        });
+        let fields = Fields::of(*own_sweep);
+        let centre = [("own_centre_x", fields.centre[0]), ("own_centre_y", fields.centre[1])];
+        let centre = centre.map(|(name, value)| k.wire(name, value));
+        let coarse = k.wire("own_coarse", fields.coarse);
 
-    k.comment("The eight around the centre keep their order: four pairs, then the four before and the four after it.");
-    let leaf = |n: usize| {
-        let (ok, score) = (fits.at(n), scores.slice(n * t, t).signed());
-        Candidate { ok, score, index: k.constant(4, n as u64) }
-    };
-    let [a, b, c, d] = [(0, "a"), (2, "b"), (5, "c"), (7, "d")].map(|(n, name)| leaf(n).better(&k, leaf(n + 1), name));
-    let middle = leaf(4).delayed(&k, "middle");
-    let (before, after) = (a.better(&k, b, "before"), c.better(&k, d, "after"));
-    let central = middle.delayed(&k, "centre");
+        k.comment(
+            "The eight around the centre keep their order: four pairs, then the four before and the four after it.",
+        );
+        let leaf = |n: usize| {
+            let (ok, score) = (fits.at(n), scores.slice(n * t, t).signed());
+            Candidate { ok, score, index: k.constant(4, n as u64) }
+        };
+        let [a, b, c, d] =
+            [(0, "a"), (2, "b"), (5, "c"), (7, "d")].map(|(n, name)| leaf(n).better(k, leaf(n + 1), name));
+        let middle = leaf(4).delayed(k, "middle");
+        let (before, after) = (a.better(k, b, "before"), c.better(k, d, "after"));
+        let central = middle.delayed(k, "centre");
 
-    k.comment("The earlier one wins ties; in a halving that is the centre.");
-    let level = !coarse & central.score.equals(before.score);
-    let centre_wins = k.wire("centre_wins", central.ok & (central.beats(before) | level));
-    let after_wins = k.wire("after_wins", after.ok & after.beats(before) & after.beats(central));
-    let takes_centre = k.delay("takes_centre", centre_wins);
-    let takes_after = k.delay("takes_after", after_wins);
-    let some = k.delay("some", before.ok | central.ok | after.ok);
+        k.comment("The earlier one wins ties; in a halving that is the centre.");
+        let level = !coarse & central.score.equals(before.score);
+        let centre_wins = k.wire("centre_wins", central.ok & (central.beats(before) | level));
+        let after_wins = k.wire("after_wins", after.ok & after.beats(before) & after.beats(central));
+        let takes_centre = k.delay("takes_centre", centre_wins);
+        let takes_after = k.delay("takes_after", after_wins);
+        let some = k.delay("some", before.ok | central.ok | after.ok);
 
-    k.comment(
-        "All three are compared with the best so far in parallel with the choice among them. The best's distance",
-    );
-    k.comment("from the centre was registered a cycle earlier.");
-    let ahead = [k.delay("ahead_x", *best_x - centre[0]), k.delay("ahead_y", *best_y - centre[1])];
-    let best = Best { score: *score, ahead, centre };
-    let against_best = |candidate, name| Compared::new(&k, candidate, best, name);
-    let last = [against_best(before, "before"), against_best(central, "centre"), against_best(after, "after")];
-    let choose = |what: usize| {
-        let [before, centre, after] = last.map(|one| [one.lower, one.tie, one.score, one.x, one.y][what]);
-        takes_after.mux(after, takes_centre.mux(centre, before))
-    };
-    let fit = k.delay("fit", some & (coarse | *found));
-    let lower = k.delay("lower", !*taken | choose(0));
-    let tie = k.delay("tie", coarse & choose(1));
-    let [s, x, y] = [("s", 2), ("x", 3), ("y", 4)].map(|(name, what)| k.delay(name, choose(what)));
-    let ends = valid.top();
-    let take = k.wire("take", ends & fit & (lower | tie));
+        k.comment(
+            "All three are compared with the best so far in parallel with the choice among them. The best's distance",
+        );
+        k.comment("from the centre was registered a cycle earlier.");
+        let ahead = [k.delay("ahead_x", *best_x - centre[0]), k.delay("ahead_y", *best_y - centre[1])];
+        let best = Best { score: *score, ahead, centre };
+        let against_best = |candidate, name| Compared::new(k, candidate, best, name);
+        let last = [against_best(before, "before"), against_best(central, "centre"), against_best(after, "after")];
+        let choose = |what: usize| {
+            let [before, centre, after] = last.map(|one| [one.lower, one.tie, one.score, one.x, one.y][what]);
+            takes_after.mux(after, takes_centre.mux(centre, before))
+        };
+        let fit = k.delay("fit", some & (coarse | *found));
+        let lower = k.delay("lower", !*taken | choose(0));
+        let tie = k.delay("tie", coarse & choose(1));
+        let [s, x, y] = [("s", 2), ("x", 3), ("y", 4)].map(|(name, what)| k.delay(name, choose(what)));
+        let ends = valid.top();
+        let take = k.wire("take", ends & fit & (lower | tie));
 
-    valid.set(valid.low(LATENCY - 2).concat(start));
-    done.set(ends);
-    improved.set(take);
-    k.when(ends, || {
-        closes.set(fields.closes);
-        compared.set(*own_sweep);
-    });
-    // A new search has priority over a new level, and that over a result.
-    k.when(take & !halve, || {
-        best_x.set(x);
-        best_y.set(y);
-        score.set(s);
-        taken.set(k.constant(1, 1));
-        k.when(coarse, || found.set(k.constant(1, 1)));
-    });
-    k.when(halve, || {
-        best_x.set(best_x.low(p - 1).concat(k.constant(1, 0)).signed());
-        best_y.set(best_y.low(p - 1).concat(k.constant(1, 0)).signed());
-        taken.set(k.constant(1, 0));
-    });
-    k.when(begin_frame, || {
-        best_x.set(k.signed_constant(p, 0));
-        best_y.set(k.signed_constant(p, 0));
-        score.set(k.signed_constant(t, 0));
-        taken.set(k.constant(1, 0));
-        found.set(k.constant(1, 0));
-    });
-    k.finish()
+        valid.set(valid.low(LATENCY - 2).concat(io.start));
+        done.set(ends);
+        improved.set(take);
+        k.when(ends, || {
+            closes.set(fields.closes);
+            compared.set(*own_sweep);
+        });
+        // A new search has priority over a new level, and that over a result.
+        k.when(take & !io.halve, || {
+            best_x.set(x);
+            best_y.set(y);
+            score.set(s);
+            taken.set(k.constant(1, 1));
+            k.when(coarse, || found.set(k.constant(1, 1)));
+        });
+        k.when(io.halve, || {
+            best_x.set(best_x.low(p - 1).concat(k.constant(1, 0)).signed());
+            best_y.set(best_y.low(p - 1).concat(k.constant(1, 0)).signed());
+            taken.set(k.constant(1, 0));
+        });
+        k.when(io.begin_frame, || {
+            best_x.set(k.signed_constant(p, 0));
+            best_y.set(k.signed_constant(p, 0));
+            score.set(k.signed_constant(t, 0));
+            taken.set(k.constant(1, 0));
+            found.set(k.constant(1, 0));
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::primitives::search::sweep::Sweep;
     use crate::wire::Word;
@@ -433,7 +400,7 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_comparing_one_by_one_finds() {
-        let block = BestCandidate::with_widths(SCORE_BITS, WEIGHT_BITS);
-        check(block.kernel.kernel(), &stimulus(8000), &mut OneByOne::default());
+        let block = BestCandidate { score_bits: SCORE_BITS, weight_bits: WEIGHT_BITS };
+        check(&kernel_of(&block), &stimulus(8000), &mut OneByOne::default());
     }
 }

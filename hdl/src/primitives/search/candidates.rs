@@ -1,52 +1,43 @@
 //! Values of p at the nine candidates of the 3×3 grid about the centre.
 
 use dermis_golden::fixed::words::schedule::EXPONENTS;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::search::polynomial_word::PolynomialWord;
-use crate::wire::Wire;
 
-/// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k, as
-/// wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle: their
-/// combination over y. 21 adders per lane at degree 3.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Candidates {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// One polynomial per lane, in the layout given; a new word may come each cycle.
-    pub word: Wire<In>,
-    /// Nine signed values per lane; [`LATENCY`] cycles after `word`.
-    pub values: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k, as
+    /// wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle: their
+    /// combination over y. 21 adders per lane at degree 3.
+    pub struct Candidates {
+        layout: PolynomialWord,
+    }
+    ports CandidatesPorts {
+        clock;
+        /// One polynomial per lane, in the layout given; a new word may come each cycle.
+        in word: layout.bits();
+        /// Nine signed values per lane; [`LATENCY`] cycles after `word`.
+        out values: 9 * layout.lanes * layout.widths[0];
+    }
 }
 
 /// Cycles from `word` to `values`.
 pub const LATENCY: usize = 2;
 
-kernel_block!(Candidates, clock clk, inputs [word], outputs [values]);
-
 impl Candidates {
     /// For polynomials in `layout`.
     pub fn new(layout: &PolynomialWord) -> Self {
-        let block = Candidates {
-            clk: Default::default(),
-            word: Wire::new(layout.bits()),
-            values: Wire::new(9 * layout.lanes * layout.widths[0]),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(layout))
+        Candidates { layout: layout.clone() }
     }
 }
 
-fn kernel(layout: &PolynomialWord) -> Kernel {
-    let k = Builder::new("candidates");
-    let word = k.input("word", layout.bits());
-    let lane = |lane| k.scope(&format!("lane_{lane}"), || values_of_lane(&k, layout, word, lane));
-    let values: Vec<Expr> = (0..layout.lanes).flat_map(lane).collect();
-    k.wire("values", concat(&values.into_iter().rev().collect::<Vec<_>>()));
-    k.finish()
+impl Block for Candidates {
+    fn build<'k>(&self, k: &'k Builder, io: CandidatesPorts<Inside<'k>>) {
+        let lane = |lane| k.scope(&format!("lane_{lane}"), || values_of_lane(k, &self.layout, io.word, lane));
+        let values: Vec<Expr> = (0..self.layout.lanes).flat_map(lane).collect();
+        io.values.set(concat(&values.into_iter().rev().collect::<Vec<_>>()));
+    }
 }
 
 /// An even and an odd part, of which each may be absent: the values of their polynomial at −1, 0 and 1, where the even
@@ -90,6 +81,7 @@ mod tests {
     use dermis_golden::fixed::stages::search::candidates;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline};
     use crate::wire::Word;
 
@@ -101,7 +93,7 @@ mod tests {
             let values: Vec<i64> = (0..lanes).flat_map(|lane| candidates(&layout.get(&inputs[0], lane))).collect();
             vec![Some(Word::of_fields(&values, bits))]
         };
-        check(block.kernel.kernel(), &random_words(500, &[layout.bits()]), &mut Pipeline::new(LATENCY, 1, expected));
+        check(&kernel_of(&block), &random_words(500, &[layout.bits()]), &mut Pipeline::new(LATENCY, 1, expected));
     }
 
     /// Degrees 3, 2 and 1; words of all widths, so that sums wrap.

@@ -63,8 +63,9 @@ impl PolynomialWord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block;
     use crate::language::testbench::{check, random_words, Pipeline};
-    use crate::language::{Body, Builder};
+    use crate::language::{kernel_of, Block, Builder, Inside};
 
     #[test]
     fn coefficients_of_all_lanes_lie_side_by_side() {
@@ -79,14 +80,30 @@ mod tests {
         assert_eq!(word.field(3 * 20 + 2 * 7, 7), 64);
     }
 
+    block! {
+        /// Two polynomials change places.
+        struct Exchange {
+            layout: PolynomialWord,
+        }
+        ports ExchangePorts {
+            /// Two polynomials.
+            in word: layout.bits();
+            /// The polynomial of lane 1 in lane 0 and that of lane 0 in lane 1; combinational.
+            out exchanged: layout.bits();
+        }
+    }
+
+    impl Block for Exchange {
+        fn build<'k>(&self, _: &'k Builder, io: ExchangePorts<Inside<'k>>) {
+            let coefficient = |n, lane| self.layout.coefficient(io.word, n, lane).unsigned();
+            let lane = |lane: usize| (0..3).map(|n| coefficient(n, lane)).collect();
+            io.exchanged.set(self.layout.join(&[lane(1), lane(0)]));
+        }
+    }
+
     #[test]
     fn a_kernel_takes_polynomials_apart_and_joins_them() {
         let layout = PolynomialWord::new(2, &[20, 7, 33]);
-        let k = Builder::combinational("exchange");
-        let word = k.input("word", layout.bits());
-        let lane = |lane: usize| (0..3).map(|n| layout.coefficient(word, n, lane).unsigned()).collect();
-        k.wire("exchanged", layout.join(&[lane(1), lane(0)]));
-        let body = Body::new(k.finish(), &[("word", layout.bits())], &[("exchanged", layout.bits())]);
         let of = |inputs: &[Word]| {
             let mut exchanged = Word::default();
             // Offset and width of the coefficients of lane 0.
@@ -96,6 +113,7 @@ mod tests {
             }
             vec![Some(exchanged)]
         };
-        check(body.kernel(), &random_words(300, &[layout.bits()]), &mut Pipeline::new(0, 1, of));
+        let stimulus = random_words(300, &[layout.bits()]);
+        check(&kernel_of(&Exchange { layout }), &stimulus, &mut Pipeline::new(0, 1, of));
     }
 }

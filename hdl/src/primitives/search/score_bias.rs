@@ -1,52 +1,48 @@
 //! Bias of each candidate's score, n·log2 Σp, and whether the candidate is eligible.
 
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::address::case_counter::{expression_by_case, largest};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::logarithm::{locate, logarithm, LOG_BITS};
 use crate::primitives::search::sweep::{square_bits, sweep_bits, Fields};
-use crate::wire::Wire;
 
-/// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, the logarithm in three steps, the
-/// last with its table, times n.
-///
-/// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
-/// nine cycles after `start`, until those of the next sweep.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScoreBias {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears the control pipeline only.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is searched.
-    pub which: Wire<In>,
-    /// Start with the nine candidates of `sweep`.
-    pub start: Signal<In, Bit>,
-    /// Word of the sweep (`Fields`); valid with `start`.
-    pub sweep: Wire<In>,
-    /// Squared radius of the search disc; valid with `start`.
-    pub radius: Wire<In>,
-    /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
-    pub sums: Wire<In>,
-    /// Nine n·log2 Σp, unsigned, 2^−6; valid nine cycles after `start`, until those of the next sweep.
-    pub weights: Wire<Out>,
-    /// Nine bits, each Σp > 0 and inside the disc; valid with `weights`.
-    pub eligible: Wire<Out>,
-    /// Word of the sweep the results belong to; valid with `weights`.
-    pub weighted_sweep: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, the logarithm in three steps, the
+    /// last with its table, times n.
+    ///
+    /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
+    /// nine cycles after `start`, until those of the next sweep.
+    pub struct ScoreBias {
+        /// Width of a Σp in bits.
+        sum_bits: usize,
+        /// Taxels of a subarray, by case.
+        taxels: Vec<usize>,
+    }
+    ports ScoreBiasPorts {
+        clock;
+        /// Synchronous reset, active high; clears the control pipeline only.
+        in rst;
+        /// Index of the case; constant while a frame is searched.
+        in which: count_bits(taxels.len());
+        /// Start with the nine candidates of `sweep`.
+        in start;
+        /// Word of the sweep (`Fields`); valid with `start`.
+        in sweep: sweep_bits();
+        /// Squared radius of the search disc; valid with `start`.
+        in radius: square_bits();
+        /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
+        in sums: 9 * sum_bits;
+        /// Nine n·log2 Σp, unsigned, 2^−6; valid nine cycles after `start`, until those of the next sweep.
+        out weights: 9 * weight_bits(largest(taxels));
+        /// Nine bits, each Σp > 0 and inside the disc; valid with `weights`.
+        out eligible: 9;
+        /// Word of the sweep the results belong to; valid with `weights`.
+        out weighted_sweep: sweep_bits();
+    }
 }
-
-kernel_block!(
-    ScoreBias,
-    clock clk,
-    inputs [rst, which, start, sweep, radius, sums],
-    outputs [weights, eligible, weighted_sweep]
-);
 
 /// Width of n·log2 Σp for subarrays of `taxels` taxels, in bits.
 pub fn weight_bits(taxels: usize) -> usize {
@@ -60,25 +56,7 @@ fn count(taxels: i64) -> usize {
 impl ScoreBias {
     /// With the widths of `formats`, for subarrays of `taxels[case]` taxels.
     pub fn new(formats: &Formats, taxels: &[usize]) -> Self {
-        ScoreBias::with_sums_of(formats.sum_bits[0] as usize, taxels)
-    }
-
-    /// With Σp of `sum_bits`.
-    fn with_sums_of(sum_bits: usize, taxels: &[usize]) -> Self {
-        let block = ScoreBias {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(taxels.len())),
-            start: Default::default(),
-            sweep: Wire::new(sweep_bits()),
-            radius: Wire::new(square_bits()),
-            sums: Wire::new(9 * sum_bits),
-            weights: Wire::new(9 * weight_bits(largest(taxels))),
-            eligible: Wire::new(9),
-            weighted_sweep: Wire::new(sweep_bits()),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(sum_bits, taxels))
+        ScoreBias { sum_bits: formats.sum_bits[0] as usize, taxels: taxels.to_vec() }
     }
 }
 
@@ -94,83 +72,82 @@ fn halves<'k>(k: &'k Builder, taxels: usize, log: Expr<'k>, bits: usize) -> [Exp
     [sum(first), sum(rest)]
 }
 
-fn kernel(s: usize, taxels: &[usize]) -> Kernel {
-    let (w, q) = (weight_bits(largest(taxels)), square_bits());
-    let k = Builder::new("score_bias");
-    let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(taxels.len())));
-    let (start, sweep) = (k.input("start", 1), k.input("sweep", sweep_bits()));
-    let (radius, sums) = (k.input("radius", q), k.input("sums", 9 * s));
-    let (bit, zero) = (Type::unsigned(1), k.constant(1, 0));
-    let running = k.state("running", bit, rst, 0);
-    let valid = k.state("valid", Type::unsigned(5), rst, 0);
-    let (own_sweep, own_radius) = (k.register("own_sweep", sweep.ty()), k.register("own_radius", radius.ty()));
-    k.when(start, || {
-        own_sweep.set(sweep);
-        own_radius.set(radius);
-    });
-    let row = k.register("row", Type::unsigned(2));
-    row.set(start.mux(k.constant(2, 0), row.plus(1)));
-    let rows = ["row2", "row3", "row4", "row5", "row6"].iter().scan(*row, |row, name| {
-        *row = k.delay(name, *row);
-        Some(*row)
-    });
-    let row6 = rows.last().unwrap_or(*row);
-    k.when(row.is(2), || running.set(zero));
-    k.when(start, || running.set(k.constant(1, 1)));
-    valid.set(valid.low(4).concat(*running));
-    let writes = valid.top();
-
-    k.comment(
-        "|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry chain per",
-    );
-    k.comment("cycle, the comparison in a third cycle. Rows in order uy = −1, 0, 1.");
-    let fields = Fields::of(*own_sweep);
-    let twice = [("twice_x", fields.centre[0]), ("twice_y", fields.centre[1])];
-    let [twice_x, twice_y] = twice.map(|(name, value)| k.wire(name, value.shift_left(1).resize(q).unsigned()));
-    let below = (fields.square - twice_y).low(q).plus(1);
-    let above = (fields.square + twice_y).low(q).plus(1);
-    let in_row = k.delay("in_row", row.is(0).mux(below, row.is(2).mux(above, fields.square)));
-    let distances = [
-        k.delay("distance_0", (in_row - twice_x).low(q).plus(1)),
-        k.delay("distance_1", in_row),
-        k.delay("distance_2", (in_row + twice_x).low(q).plus(1)),
-    ];
-
-    let mut results = Vec::new();
-    for (column, distance) in distances.into_iter().enumerate() {
-        k.scope(&format!("column_{column}"), || {
-            let sum_of = |row: usize| sums.slice((3 * row + column) * s, s);
-            let sum = k.delay("sum", row.is(0).mux(sum_of(0), row.is(1).mux(sum_of(1), sum_of(2))));
-            let presses = k.delay("presses", !sum.top() & sum.any());
-            let fits = k.delay("fits", presses & !own_radius.less(distance));
-            let fits = k.delay("fits_2", k.delay("fits_1", fits));
-            let located = k.delay("located", locate(&k, "locate", sum));
-            let log = k.delay("log", logarithm(&k, "log", located));
-            let all: Vec<[Expr; 2]> = taxels.iter().map(|&taxels| halves(&k, taxels, log, w)).collect();
-            let half = |n: usize| {
-                let of: Vec<Expr> = all.iter().map(|halves| halves[n]).collect();
-                expression_by_case(which, &of).unwrap_or(k.constant(w, 0))
-            };
-            let weight = (k.delay("first", half(0)) + k.delay("rest", half(1))).low(w);
-            for row in 0..3 {
-                let own = (
-                    k.register(&format!("weight_{row}"), Type::unsigned(w)),
-                    k.register(&format!("eligible_{row}"), bit),
-                );
-                k.when(writes & row6.is(row), || {
-                    own.0.set(weight);
-                    own.1.set(fits);
-                });
-                results.push((3 * row as usize + column, own));
-            }
+impl Block for ScoreBias {
+    fn build<'k>(&self, k: &'k Builder, io: ScoreBiasPorts<Inside<'k>>) {
+        let ScoreBias { sum_bits: s, ref taxels } = *self;
+        let (w, q) = (weight_bits(largest(taxels)), square_bits());
+        let (bit, zero) = (Type::unsigned(1), k.constant(1, 0));
+        let running = k.state("running", bit, io.rst, 0);
+        let valid = k.state("valid", Type::unsigned(5), io.rst, 0);
+        let (own_sweep, own_radius) =
+            (k.register("own_sweep", io.sweep.ty()), k.register("own_radius", io.radius.ty()));
+        k.when(io.start, || {
+            own_sweep.set(io.sweep);
+            own_radius.set(io.radius);
         });
+        let row = k.register("row", Type::unsigned(2));
+        row.set(io.start.mux(k.constant(2, 0), row.plus(1)));
+        let rows = ["row2", "row3", "row4", "row5", "row6"].iter().scan(*row, |row, name| {
+            *row = k.delay(name, *row);
+            Some(*row)
+        });
+        let row6 = rows.last().unwrap_or(*row);
+        k.when(row.is(2), || running.set(zero));
+        k.when(io.start, || running.set(k.constant(1, 1)));
+        valid.set(valid.low(4).concat(*running));
+        let writes = valid.top();
+
+        k.comment(
+            "|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry chain per",
+        );
+        k.comment("cycle, the comparison in a third cycle. Rows in order uy = −1, 0, 1.");
+        let fields = Fields::of(*own_sweep);
+        let twice = [("twice_x", fields.centre[0]), ("twice_y", fields.centre[1])];
+        let [twice_x, twice_y] = twice.map(|(name, value)| k.wire(name, value.shift_left(1).resize(q).unsigned()));
+        let below = (fields.square - twice_y).low(q).plus(1);
+        let above = (fields.square + twice_y).low(q).plus(1);
+        let in_row = k.delay("in_row", row.is(0).mux(below, row.is(2).mux(above, fields.square)));
+        let distances = [
+            k.delay("distance_0", (in_row - twice_x).low(q).plus(1)),
+            k.delay("distance_1", in_row),
+            k.delay("distance_2", (in_row + twice_x).low(q).plus(1)),
+        ];
+
+        let mut results = Vec::new();
+        for (column, distance) in distances.into_iter().enumerate() {
+            k.scope(&format!("column_{column}"), || {
+                let sum_of = |row: usize| io.sums.slice((3 * row + column) * s, s);
+                let sum = k.delay("sum", row.is(0).mux(sum_of(0), row.is(1).mux(sum_of(1), sum_of(2))));
+                let presses = k.delay("presses", !sum.top() & sum.any());
+                let fits = k.delay("fits", presses & !own_radius.less(distance));
+                let fits = k.delay("fits_2", k.delay("fits_1", fits));
+                let located = k.delay("located", locate(k, "locate", sum));
+                let log = k.delay("log", logarithm(k, "log", located));
+                let all: Vec<[Expr; 2]> = taxels.iter().map(|&taxels| halves(k, taxels, log, w)).collect();
+                let half = |n: usize| {
+                    let of: Vec<Expr> = all.iter().map(|halves| halves[n]).collect();
+                    expression_by_case(io.which, &of).unwrap_or(k.constant(w, 0))
+                };
+                let weight = (k.delay("first", half(0)) + k.delay("rest", half(1))).low(w);
+                for row in 0..3 {
+                    let own = (
+                        k.register(&format!("weight_{row}"), Type::unsigned(w)),
+                        k.register(&format!("eligible_{row}"), bit),
+                    );
+                    k.when(writes & row6.is(row), || {
+                        own.0.set(weight);
+                        own.1.set(fits);
+                    });
+                    results.push((3 * row as usize + column, own));
+                }
+            });
+        }
+        results.sort_by_key(|&(n, _)| std::cmp::Reverse(n));
+        io.weights.set(concat(&results.iter().map(|(_, (weight, _))| weight.get()).collect::<Vec<_>>()));
+        io.eligible.set(concat(&results.iter().map(|(_, (_, eligible))| eligible.get()).collect::<Vec<_>>()));
+        let weighted_sweep = io.weighted_sweep.register();
+        k.when(writes & row6.is(2), || weighted_sweep.set(*own_sweep));
     }
-    results.sort_by_key(|&(n, _)| std::cmp::Reverse(n));
-    k.wire("weights", concat(&results.iter().map(|(_, (weight, _))| weight.get()).collect::<Vec<_>>()));
-    k.wire("eligible", concat(&results.iter().map(|(_, (_, eligible))| eligible.get()).collect::<Vec<_>>()));
-    let weighted_sweep = k.register("weighted_sweep", sweep.ty());
-    k.when(writes & row6.is(2), || weighted_sweep.set(*own_sweep));
-    k.finish()
 }
 
 #[cfg(test)]
@@ -178,6 +155,7 @@ mod tests {
     use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::primitives::search::sweep::Sweep;
     use crate::wire::Word;
@@ -266,7 +244,7 @@ mod tests {
 
     #[test]
     fn nine_weights_and_the_disc_are_those_of_the_model() {
-        let block = ScoreBias::with_sums_of(SUM_BITS, &TAXELS);
-        check(block.kernel.kernel(), &stimulus(6000), &mut AtOnce::default());
+        let block = ScoreBias { sum_bits: SUM_BITS, taxels: TAXELS.to_vec() };
+        check(&kernel_of(&block), &stimulus(6000), &mut AtOnce::default());
     }
 }

@@ -2,78 +2,72 @@
 
 use dermis_golden::fixed::stages::search::COARSE_CENTRES;
 use dermis_golden::fixed::words::formats::HALVINGS;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::search::store::{base, base_bits};
 use crate::primitives::search::sweep::{position_bits, square_bits, sweep_bits, Fields, BUFFER_BITS, START};
-use crate::wire::Wire;
 
-/// Sweeps over the coarse tiles, then the halvings, then a last sweep that only moves to the best position.
-///
-/// `set_up` starts a sweep. Its `step`, `sweep` and `source` are valid from the next cycle until the following
-/// `set_up`; `target`, also a field of `sweep`, one cycle later. In the coarse grid `set_up` may coincide with
-/// `compared`; otherwise it comes three cycles after `compared` or `begin_frame`.
-///
-/// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads the
-/// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
-/// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `compared` with
-/// `improved` makes the buffer of a coarse sweep the best.
-#[derive(dermis_hdl_derive::Block)]
-pub struct SearchSequencer {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears `chains` only.
-    pub rst: Signal<In, Bit>,
-    /// A new search starts.
-    pub begin_frame: Signal<In, Bit>,
-    /// Search; otherwise only the last sweep follows. Valid with `begin_frame`.
-    pub enabled: Signal<In, Bit>,
-    /// Set up the next sweep.
-    pub set_up: Signal<In, Bit>,
-    /// The candidates of a sweep have been compared.
-    pub compared: Signal<In, Bit>,
-    /// The best candidate changed; valid with `compared`.
-    pub improved: Signal<In, Bit>,
-    /// Word of that sweep; valid with `compared`.
-    pub compared_sweep: Wire<In>,
-    /// Best position, x, in grid steps, signed; constant in the two cycles before a halving or the last sweep is set
-    /// up.
-    pub best_x: Wire<In>,
-    /// Best position, y, in grid steps, signed; as `best_x`.
-    pub best_y: Wire<In>,
-    /// Move of the sweep, as in [`Taylor`](super::taylor::Taylor), x in bits 1:0, y in bits 3:2, halving in bit 4;
-    /// valid from the cycle after `set_up` until the next.
-    pub step: Wire<Out>,
-    /// The sweep is the last: it only moves to the best position.
-    pub last: Signal<Out, Bit>,
-    /// The next sweep is a halving.
-    pub next_halves: Signal<Out, Bit>,
-    /// The next sweep is the last.
-    pub next_last: Signal<Out, Bit>,
-    /// The next sweep may be set up without waiting for the comparison of this one.
-    pub chains: Signal<Out, Bit>,
-    /// Buffer to read; valid from the cycle after `set_up` until the next.
-    pub source: Wire<Out>,
-    /// First address of the buffer that the next sweep reads; one cycle after that buffer is known.
-    pub next_base: Wire<Out>,
-    /// Buffer to write; valid from two cycles after `set_up` to one cycle after the next.
-    pub target: Wire<Out>,
-    /// Word of the sweep (`Fields`); valid from two cycles after `set_up` until the next.
-    pub sweep: Wire<Out>,
-    /// Squared radius of the search disc in grid steps of the level; valid from the cycle after `set_up` until the
-    /// next.
-    pub radius: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Sweeps over the coarse tiles, then the halvings, then a last sweep that only moves to the best position.
+    ///
+    /// `set_up` starts a sweep. Its `step`, `sweep` and `source` are valid from the next cycle until the following
+    /// `set_up`; `target`, also a field of `sweep`, one cycle later. In the coarse grid `set_up` may coincide with
+    /// `compared`; otherwise it comes three cycles after `compared` or `begin_frame`.
+    ///
+    /// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads the
+    /// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
+    /// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `compared` with
+    /// `improved` makes the buffer of a coarse sweep the best.
+    pub struct SearchSequencer {
+        /// Quads of a buffer.
+        quads: usize,
+    }
+    ports SearchSequencerPorts {
+        clock;
+        /// Synchronous reset, active high; clears `chains` only.
+        in rst;
+        /// A new search starts.
+        in begin_frame;
+        /// Search; otherwise only the last sweep follows. Valid with `begin_frame`.
+        in enabled;
+        /// Set up the next sweep.
+        in set_up;
+        /// The candidates of a sweep have been compared.
+        in compared;
+        /// The best candidate changed; valid with `compared`.
+        in improved;
+        /// Word of that sweep; valid with `compared`.
+        in compared_sweep: sweep_bits();
+        /// Best position, x, in grid steps, signed; constant in the two cycles before a halving or the last sweep is set
+        /// up.
+        in best_x: position_bits();
+        /// Best position, y, in grid steps, signed; as `best_x`.
+        in best_y: position_bits();
+        /// Move of the sweep, as in [`Taylor`](super::taylor::Taylor), x in bits 1:0, y in bits 3:2, halving in bit 4;
+        /// valid from the cycle after `set_up` until the next.
+        out step: 5;
+        /// The sweep is the last: it only moves to the best position.
+        out last;
+        /// The next sweep is a halving.
+        out next_halves;
+        /// The next sweep is the last.
+        out next_last;
+        /// The next sweep may be set up without waiting for the comparison of this one.
+        out chains;
+        /// Buffer to read; valid from the cycle after `set_up` until the next.
+        out source: BUFFER_BITS;
+        /// First address of the buffer that the next sweep reads; one cycle after that buffer is known.
+        out next_base: base_bits(*quads);
+        /// Buffer to write; valid from two cycles after `set_up` to one cycle after the next.
+        out target: BUFFER_BITS;
+        /// Word of the sweep (`Fields`); valid from two cycles after `set_up` until the next.
+        out sweep: sweep_bits();
+        /// Squared radius of the search disc in grid steps of the level; valid from the cycle after `set_up` until the
+        /// next.
+        out radius: square_bits();
+    }
 }
-
-kernel_block!(
-    SearchSequencer,
-    clock clk,
-    inputs [rst, begin_frame, enabled, set_up, compared, improved, compared_sweep, best_x, best_y],
-    outputs [step, last, next_halves, next_last, chains, source, next_base, target, sweep, radius]
-);
 
 /// Number of sweeps whose candidates are compared.
 const COMPARED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
@@ -85,31 +79,7 @@ const COARSE_RADIUS: u64 = 9;
 impl SearchSequencer {
     /// For a search memory with buffers of `quads` quads.
     pub fn new(quads: usize) -> Self {
-        let p = position_bits();
-        let block = SearchSequencer {
-            clk: Default::default(),
-            rst: Default::default(),
-            begin_frame: Default::default(),
-            enabled: Default::default(),
-            set_up: Default::default(),
-            compared: Default::default(),
-            improved: Default::default(),
-            compared_sweep: Wire::new(sweep_bits()),
-            best_x: Wire::new(p),
-            best_y: Wire::new(p),
-            step: Wire::new(5),
-            last: Default::default(),
-            next_halves: Default::default(),
-            next_last: Default::default(),
-            chains: Default::default(),
-            source: Wire::new(BUFFER_BITS),
-            next_base: Wire::new(base_bits(quads)),
-            target: Wire::new(BUFFER_BITS),
-            sweep: Wire::new(sweep_bits()),
-            radius: Wire::new(square_bits()),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(quads))
+        SearchSequencer { quads }
     }
 }
 
@@ -148,116 +118,115 @@ fn shifted(value: Expr<'_>, by: usize) -> Expr<'_> {
     value.shift_left(by).low(value.bits())
 }
 
-fn kernel(quads: usize) -> Kernel {
-    let (p, q) = (position_bits(), square_bits());
-    let (final_coarse, final_halving) = (COARSE_CENTRES.len() as u64 - 1, COMPARED as u64 - 1);
-    let k = Builder::new("search_sequencer");
-    let (rst, begin_frame, enabled) = (k.input("rst", 1), k.input("begin_frame", 1), k.input("enabled", 1));
-    let (set_up, compared, improved) = (k.input("set_up", 1), k.input("compared", 1), k.input("improved", 1));
-    let compared_sweep = k.input("compared_sweep", sweep_bits());
-    let best = [k.input("best_x", p), k.input("best_y", p)];
-    let (bit, buffer) = (Type::unsigned(1), Type::unsigned(BUFFER_BITS));
-    let zero = k.constant(1, 0);
-    let number = |buffer: usize| k.constant(BUFFER_BITS, buffer as u64);
-    let count = k.register("count", Type::unsigned(COUNT_BITS));
-    let (is_coarse, is_halving) = (k.register("is_coarse", bit), k.register("is_halving", bit));
-    let (step, last) = (k.register("step", Type::unsigned(5)), k.register("last", bit));
-    let chains = k.state("chains", bit, rst, 0);
-    let (source, target) = (k.register("source", buffer), k.register("target", buffer));
-    let radius = k.register("radius", Type::unsigned(q));
-    let kept = k.register("kept", Type::unsigned(sweep_bits()));
-    let (closes, coarse) = (k.register("taken_closes", bit), k.register("taken_coarse", bit));
-    let place = k.register("place", Type::unsigned(q + 2 * p));
+impl Block for SearchSequencer {
+    fn build<'k>(&self, k: &'k Builder, io: SearchSequencerPorts<Inside<'k>>) {
+        let (p, q) = (position_bits(), square_bits());
+        let (final_coarse, final_halving) = (COARSE_CENTRES.len() as u64 - 1, COMPARED as u64 - 1);
+        let best = [io.best_x, io.best_y];
+        let bit = Type::unsigned(1);
+        let zero = k.constant(1, 0);
+        let number = |buffer: usize| k.constant(BUFFER_BITS, buffer as u64);
+        let count = k.register("count", Type::unsigned(COUNT_BITS));
+        let (is_coarse, is_halving) = (k.register("is_coarse", bit), k.register("is_halving", bit));
+        let (step, last) = (io.step.register(), io.last.register());
+        let chains = io.chains.state(io.rst, 0);
+        let (source, target) = (io.source.register(), io.target.register());
+        let radius = io.radius.register();
+        let kept = k.register("kept", Type::unsigned(sweep_bits()));
+        let (closes, coarse) = (k.register("taken_closes", bit), k.register("taken_coarse", bit));
+        let place = k.register("place", Type::unsigned(q + 2 * p));
 
-    let at_last_coarse = k.wire("at_last_coarse", count.is(final_coarse));
-    let closing = k.wire("closing", !*is_coarse | at_last_coarse);
-    k.wire("next_halves", *is_halving);
-    let next_last = k.wire("next_last", !*is_coarse & !*is_halving);
-    k.comment(
+        let at_last_coarse = k.wire("at_last_coarse", count.is(final_coarse));
+        let closing = k.wire("closing", !*is_coarse | at_last_coarse);
+        io.next_halves.set(*is_halving);
+        let next_last = io.next_last.set(!*is_coarse & !*is_halving);
+        k.comment(
         "A coarse sweep set up in the cycle of `compared` already uses its result for the choice of buffers; a halving",
     );
-    k.comment("is set up later.");
-    let keeps = k.wire("keeps", compared & improved & Fields::of(compared_sweep).coarse);
-    let kept_buffer = k.wire("kept_buffer", Fields::of(*kept).buffer);
-    let sweep = k.wire("sweep", concat(&[*closes, *coarse, *target, *place]));
-    let from = Fields::of(k.wire("from", is_coarse.mux(sweep, *kept)));
+        k.comment("is set up later.");
+        let keeps = k.wire("keeps", io.compared & io.improved & Fields::of(io.compared_sweep).coarse);
+        let kept_buffer = k.wire("kept_buffer", Fields::of(*kept).buffer);
+        let sweep = io.sweep.set(concat(&[*closes, *coarse, *target, *place]));
+        let from = Fields::of(k.wire("from", is_coarse.mux(sweep, *kept)));
 
-    k.comment(
+        k.comment(
         "The best position is at most one step from the centre of its polynomials, so two bits of the difference are",
     );
-    k.comment("the move. Move, starting point and destination are registered before the sweep is set up.");
-    let moves = coarse_moves();
-    let axis = |axis: usize, name: &str| {
-        let table: Vec<u64> = (0..1 << COUNT_BITS).map(|n| moves.get(n).map_or(0, |by| by[axis] as u64 & 3)).collect();
-        let to_best = (best[axis].low(2) - from.centre[axis].low(2)).low(2);
-        let go = k.delay(&format!("go_{name}"), is_coarse.mux(count.table(2, &table), to_best));
-        let down = k.delay(&format!("down_{name}"), grows_down(&k, from.centre[axis]));
-        (go, k.delay(&format!("base_{name}"), from.centre[axis]), down)
-    };
-    let [(go_x, base_x, down_x), (go_y, base_y, down_y)] = [axis(0, "x"), axis(1, "y")];
-    let base_square = k.delay("base_square", from.square);
-    let base_buffer = k.delay("base_buffer", from.buffer);
-    let bases: Vec<u64> = (0..1 << BUFFER_BITS).map(|b| base(b, quads) as u64).collect();
-    k.delay("next_base", from.buffer.table(base_bits(quads), &bases));
-    let to_square = base_square + grows(&k, base_x, go_x, down_x) + grows(&k, base_y, go_y, down_y);
-    let at_square = k.delay("at_square", to_square.low(q));
-    let at_x = k.delay("at_x", moved(base_x, go_x));
-    let at_y = k.delay("at_y", moved(base_y, go_y));
-    let next = [(at_square, 2), (at_y, 1), (at_x, 1)];
-    let next = next.map(|(value, by)| is_halving.mux(shifted(value, by), value.unsigned()));
-    let next = k.wire("next", concat(&next));
+        k.comment("the move. Move, starting point and destination are registered before the sweep is set up.");
+        let moves = coarse_moves();
+        let axis = |axis: usize, name: &str| {
+            let table: Vec<u64> =
+                (0..1 << COUNT_BITS).map(|n| moves.get(n).map_or(0, |by| by[axis] as u64 & 3)).collect();
+            let to_best = (best[axis].low(2) - from.centre[axis].low(2)).low(2);
+            let go = k.delay(&format!("go_{name}"), is_coarse.mux(count.table(2, &table), to_best));
+            let down = k.delay(&format!("down_{name}"), grows_down(k, from.centre[axis]));
+            (go, k.delay(&format!("base_{name}"), from.centre[axis]), down)
+        };
+        let [(go_x, base_x, down_x), (go_y, base_y, down_y)] = [axis(0, "x"), axis(1, "y")];
+        let base_square = k.delay("base_square", from.square);
+        let base_buffer = k.delay("base_buffer", from.buffer);
+        let bases: Vec<u64> = (0..1 << BUFFER_BITS).map(|b| base(b, self.quads) as u64).collect();
+        io.next_base.delay(from.buffer.table(base_bits(self.quads), &bases));
+        let to_square = base_square + grows(k, base_x, go_x, down_x) + grows(k, base_y, go_y, down_y);
+        let at_square = k.delay("at_square", to_square.low(q));
+        let at_x = k.delay("at_x", moved(base_x, go_x));
+        let at_y = k.delay("at_y", moved(base_y, go_y));
+        let next = [(at_square, 2), (at_y, 1), (at_x, 1)];
+        let next = next.map(|(value, by)| is_halving.mux(shifted(value, by), value.unsigned()));
+        let next = k.wire("next", concat(&next));
 
-    k.comment("The first sweep of a search, halvings and the last one; registered before the sweep is set up.");
-    let in_place = k.delay("in_place", !*is_coarse | count.is(0));
+        k.comment("The first sweep of a search, halvings and the last one; registered before the sweep is set up.");
+        let in_place = k.delay("in_place", !*is_coarse | count.is(0));
 
-    k.comment(
+        k.comment(
         "A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after",
     );
-    k.comment(
-        "the set-up, when a `compared` in the cycle of the set-up has taken effect. The first, which reads START,",
-    );
-    k.comment("writes 1. Other sweeps work in place.");
-    let unused = |b: u64| !source.is(b) & !kept_buffer.is(b);
-    let other = unused(2).mux(number(2), number(0));
-    let free = k.wire("free", (source.is(START as u64) | unused(1)).mux(number(1), other));
-    let (set_up_1, coarse_1) = (k.delay("set_up_1", set_up), k.delay("coarse_1", *is_coarse));
-    k.when(set_up_1, || target.set(coarse_1.mux(free, *source)));
-    k.when(set_up, || {
-        count.set(count.plus(1));
-        k.when(at_last_coarse, || is_coarse.set(zero));
-        is_halving.set((*is_halving | at_last_coarse) & !count.is(final_halving));
-        closes.set(closing);
-        coarse.set(*is_coarse);
-        place.set(next);
-        k.when(*is_halving, || radius.set(shifted(*radius, 2)));
-        chains.set(!closing);
-    });
-    k.when(set_up & !begin_frame, || {
-        step.set(concat(&[*is_halving, go_y, go_x]));
-        last.set(next_last);
-        source.set(base_buffer);
-    });
-    k.when(keeps, || kept.set(compared_sweep));
-    k.when(set_up & in_place, || {
-        kept.set(concat(&[closing, *is_coarse, is_coarse.mux(number(1), kept_buffer), next]));
-    });
-    k.when(begin_frame, || {
-        count.set(enabled.mux(k.constant(COUNT_BITS, 0), k.constant(COUNT_BITS, COMPARED as u64)));
-        is_coarse.set(enabled);
-        is_halving.set(zero);
-        closes.set(zero);
-        coarse.set(zero);
-        place.set(zero.repeat(place.bits()));
-        target.set(number(START));
-        kept.set(concat(&[zero, zero, number(START), zero.repeat(place.bits())]));
-        radius.set(k.constant(q, COARSE_RADIUS));
-    });
-    k.finish()
+        k.comment(
+            "the set-up, when a `compared` in the cycle of the set-up has taken effect. The first, which reads START,",
+        );
+        k.comment("writes 1. Other sweeps work in place.");
+        let unused = |b: u64| !source.is(b) & !kept_buffer.is(b);
+        let other = unused(2).mux(number(2), number(0));
+        let free = k.wire("free", (source.is(START as u64) | unused(1)).mux(number(1), other));
+        let (set_up_1, coarse_1) = (k.delay("set_up_1", io.set_up), k.delay("coarse_1", *is_coarse));
+        k.when(set_up_1, || target.set(coarse_1.mux(free, *source)));
+        k.when(io.set_up, || {
+            count.set(count.plus(1));
+            k.when(at_last_coarse, || is_coarse.set(zero));
+            is_halving.set((*is_halving | at_last_coarse) & !count.is(final_halving));
+            closes.set(closing);
+            coarse.set(*is_coarse);
+            place.set(next);
+            k.when(*is_halving, || radius.set(shifted(*radius, 2)));
+            chains.set(!closing);
+        });
+        k.when(io.set_up & !io.begin_frame, || {
+            step.set(concat(&[*is_halving, go_y, go_x]));
+            last.set(next_last);
+            source.set(base_buffer);
+        });
+        k.when(keeps, || kept.set(io.compared_sweep));
+        k.when(io.set_up & in_place, || {
+            kept.set(concat(&[closing, *is_coarse, is_coarse.mux(number(1), kept_buffer), next]));
+        });
+        k.when(io.begin_frame, || {
+            count.set(io.enabled.mux(k.constant(COUNT_BITS, 0), k.constant(COUNT_BITS, COMPARED as u64)));
+            is_coarse.set(io.enabled);
+            is_halving.set(zero);
+            closes.set(zero);
+            coarse.set(zero);
+            place.set(zero.repeat(place.bits()));
+            target.set(number(START));
+            kept.set(concat(&[zero, zero, number(START), zero.repeat(place.bits())]));
+            radius.set(k.constant(q, COARSE_RADIUS));
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::primitives::search::sweep::{Sweep, BUFFERS};
     use crate::wire::Word;
@@ -408,6 +377,6 @@ mod tests {
     #[test]
     fn sweeps_are_those_of_the_search_in_integers() {
         let block = SearchSequencer::new(QUADS);
-        check(block.kernel.kernel(), &stimulus(10_000), &mut Search::default());
+        check(&kernel_of(&block), &stimulus(10_000), &mut Search::default());
     }
 }

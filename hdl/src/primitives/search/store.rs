@@ -4,74 +4,70 @@ use dermis_golden::fixed::plan::cycles::split_latency;
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::Formats;
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::search::polynomial_word::PolynomialWord;
 use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
-use crate::wire::Wire;
 
-/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes whole
-/// polynomials into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
-/// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
-///
-/// A step is the part of a quad that the search computes in a cycle: all of it, a half or a quarter. Addresses of steps are
-/// `{quad, step}`. Where a quad takes several steps, `read_data` has one more cycle of latency, and the memory is written
-/// with a quad's last step.
-///
-/// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
-/// name of buffer 0, and `fill` and `write` never coincide.
-///
-/// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
-/// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
-/// old content, so that using it would show as an error.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Store {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Write coefficient `fill_index` of quad `fill_address` of buffer `START`.
-    pub fill: Signal<In, Bit>,
-    /// Index of the coefficient; valid with `fill`.
-    pub fill_index: Wire<In>,
-    /// Address of the quad; valid with `fill`.
-    pub fill_address: Wire<In>,
-    /// The coefficient of four taxels, signed; valid with `fill`.
-    pub fill_quad: Wire<In>,
-    /// Write `write_data` to step `write_address`; the steps of a quad follow one another.
-    pub write: Signal<In, Bit>,
-    /// Buffer to write; valid one cycle before `write`.
-    pub write_buffer: Wire<In>,
-    /// Address of the step; valid with `write`.
-    pub write_address: Wire<In>,
-    /// The polynomials of a step; valid with `write`.
-    pub write_data: Wire<In>,
-    /// Buffer to read; valid with `read_address`.
-    pub read_buffer: Wire<In>,
-    /// Address of the step to read, 0 in the cycle after `begins`, then one more after each cycle with `counts`; taken
-    /// in every cycle.
-    pub read_address: Wire<In>,
-    /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
-    pub begins: Signal<In, Bit>,
-    /// The read addresses advance to the next step.
-    pub counts: Signal<In, Bit>,
-    /// First address of that buffer in the memory (`base`); valid with `begins`.
-    pub next_base: Wire<In>,
-    /// The polynomials of a step; [`latency`] cycles after `read_address`.
-    pub read_data: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes whole
+    /// polynomials into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
+    /// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
+    ///
+    /// A step is the part of a quad that the search computes in a cycle: all of it, a half or a quarter. Addresses of steps are
+    /// `{quad, step}`. Where a quad takes several steps, `read_data` has one more cycle of latency, and the memory is written
+    /// with a quad's last step.
+    ///
+    /// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
+    /// name of buffer 0, and `fill` and `write` never coincide.
+    ///
+    /// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
+    /// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
+    /// old content, so that using it would show as an error.
+    pub struct Store {
+        /// Layout of the polynomials of a step.
+        step: PolynomialWord,
+        quads: usize,
+        /// Width of a coefficient of a taxel in bits.
+        fill_bits: usize,
+        /// One subarray or frame is filled while another is searched.
+        apart: bool,
+    }
+    ports StorePorts {
+        clock;
+        /// Write coefficient `fill_index` of quad `fill_address` of buffer `START`.
+        in fill;
+        /// Index of the coefficient; valid with `fill`.
+        in fill_index: count_bits(step.widths.len());
+        /// Address of the quad; valid with `fill`.
+        in fill_address: count_bits(*quads);
+        /// The coefficient of four taxels, signed; valid with `fill`.
+        in fill_quad: 4 * fill_bits;
+        /// Write `write_data` to step `write_address`; the steps of a quad follow one another.
+        in write;
+        /// Buffer to write; valid one cycle before `write`.
+        in write_buffer: BUFFER_BITS;
+        /// Address of the step; valid with `write`.
+        in write_address: count_bits(quads * steps(step));
+        /// The polynomials of a step; valid with `write`.
+        in write_data: step.bits();
+        /// Buffer to read; valid with `read_address`.
+        in read_buffer: BUFFER_BITS;
+        /// Address of the step to read, 0 in the cycle after `begins`, then one more after each cycle with `counts`; taken
+        /// in every cycle.
+        in read_address: count_bits(quads * steps(step));
+        /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
+        in begins;
+        /// The read addresses advance to the next step.
+        in counts;
+        /// First address of that buffer in the memory (`base`); valid with `begins`.
+        in next_base: base_bits(*quads);
+        /// The polynomials of a step; [`latency`] cycles after `read_address`.
+        out read_data: step.bits();
+    }
 }
-
-kernel_block!(
-    Store,
-    clock clk,
-    inputs [
-        fill, fill_index, fill_address, fill_quad, write, write_buffer, write_address, write_data, read_buffer,
-        read_address, begins, counts, next_base
-    ],
-    outputs [read_data]
-);
 
 /// Cycles from `read_address` to `read_data`, where a step is a quad.
 const LATENCY: usize = 3;
@@ -95,26 +91,7 @@ impl Store {
     /// `quads` quads of polynomials, filled with coefficients of `fill_bits` bits; `step` is the layout of the polynomials
     /// of a step, `apart` says whether one subarray or frame is filled while another is searched.
     pub fn new(step: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
-        let (address, steps) = (count_bits(quads), count_bits(quads * steps(&step)));
-        let block = Store {
-            clk: Default::default(),
-            fill: Default::default(),
-            fill_index: Wire::new(count_bits(step.widths.len())),
-            fill_address: Wire::new(address),
-            fill_quad: Wire::new(4 * fill_bits),
-            write: Default::default(),
-            write_buffer: Wire::new(BUFFER_BITS),
-            write_address: Wire::new(steps),
-            write_data: Wire::new(step.bits()),
-            read_buffer: Wire::new(BUFFER_BITS),
-            read_address: Wire::new(steps),
-            begins: Default::default(),
-            counts: Default::default(),
-            next_base: Wire::new(base_bits(quads)),
-            read_data: Wire::new(step.bits()),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(&step, quads, fill_bits, apart))
+        Store { step, quads, fill_bits, apart }
     }
 }
 
@@ -131,85 +108,81 @@ fn split<'k>(address: Expr<'k>, steps: usize) -> (Expr<'k>, Option<Expr<'k>>) {
     }
 }
 
-fn kernel(step: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
-    let k = Builder::new("store");
-    let layout = &PolynomialWord { lanes: Quads::LANES, widths: step.widths.clone() };
-    let (quad_bits, bits, step_bits) = (count_bits(quads), base_bits(quads), count_bits(quads * steps(step)));
-    let (fill, fill_index) = (k.input("fill", 1), k.input("fill_index", count_bits(layout.widths.len())));
-    let (fill_address, fill_quad) = (k.input("fill_address", quad_bits), k.input("fill_quad", 4 * fill_bits));
-    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
-    let (write_address, write_data) = (k.input("write_address", step_bits), k.input("write_data", step.bits()));
-    let (read_buffer, read_address) = (k.input("read_buffer", BUFFER_BITS), k.input("read_address", step_bits));
-    let (begins, counts) = (k.input("begins", 1), k.input("counts", 1));
-    let next_base = k.input("next_base", bits);
-    let (write_address, written) = split(write_address, steps(step));
-    let (read_address, shows) = split(read_address, steps(step));
-    let (counts, whole) = match (shows, written) {
-        (Some(shows), Some(written)) => (counts & shows.all(), write & written.all()),
-        _ => (counts, write),
-    };
-    let shows = shows.map(|shows| (0..LATENCY).fold(shows, |shows, n| k.delay(&format!("shows_{n}"), shows)));
+impl Block for Store {
+    fn build<'k>(&self, k: &'k Builder, io: StorePorts<Inside<'k>>) {
+        let Store { ref step, quads, fill_bits, apart } = *self;
+        let layout = &PolynomialWord { lanes: Quads::LANES, widths: step.widths.clone() };
+        let bits = base_bits(quads);
+        let (write_address, written) = split(io.write_address, steps(step));
+        let (read_address, shows) = split(io.read_address, steps(step));
+        let (counts, whole) = match (shows, written) {
+            (Some(shows), Some(written)) => (io.counts & shows.all(), io.write & written.all()),
+            _ => (io.counts, io.write),
+        };
+        let shows = shows.map(|shows| (0..LATENCY).fold(shows, |shows, n| k.delay(&format!("shows_{n}"), shows)));
 
-    let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
-    let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
-    let to_buffer = k.wire("to_buffer", (write_base + write_address).low(bits));
-    let write_to = if apart { to_buffer } else { fill.mux(fill_address, to_buffer) };
-    let write_to = k.wire("write_to", write_to);
-    let from_start = apart.then(|| k.delay("from_start", k.delay("from_start_1", read_buffer.is(START as u64))));
-    k.comment(
+        let bases: Vec<(u64, Expr)> =
+            (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
+        let write_base = k.delay("write_base", io.write_buffer.case(&bases, k.constant(bits, 0)));
+        let to_buffer = k.wire("to_buffer", (write_base + write_address).low(bits));
+        let write_to = if apart { to_buffer } else { io.fill.mux(io.fill_address, to_buffer) };
+        let write_to = k.wire("write_to", write_to);
+        let from_start = apart.then(|| k.delay("from_start", k.delay("from_start_1", io.read_buffer.is(START as u64))));
+        k.comment(
         "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
     );
-    k.comment("attribute keeps synthesis from merging them.");
-    let coefficient = |index: usize| {
-        let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
-        let memory = format!("memory{index}");
-        let place = k.memory(&memory, BUFFERS * quads, all, Contents::Undefined).unchecked();
-        let place = place.holds(Holds::Polynomials(index));
-        let from = k.register(&format!("from{index}"), Type::unsigned(bits)).keep();
-        k.when(counts, || from.set(from.plus(1)));
-        k.when(begins, || from.set(next_base));
-        let filled = |lane: usize| fill_quad.slice(lane * fill_bits, fill_bits).signed().resize(width).unsigned();
-        let filled = concat(&[3, 2, 1, 0].map(filled));
-        let fills = fill_index.is(index as u64);
-        let last = write_data.slice(step.offset(index), step.lanes * width);
-        let before = |at: usize| {
-            let part = k.register(&format!("part{index}_{at}"), last.ty());
-            if let Some(written) = written {
-                k.when(write & written.is(at as u64), || part.set(last));
+        k.comment("attribute keeps synthesis from merging them.");
+        let coefficient = |index: usize| {
+            let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
+            let memory = format!("memory{index}");
+            let place = k.memory(&memory, BUFFERS * quads, all, Contents::Undefined).unchecked();
+            let place = place.holds(Holds::Polynomials(index));
+            let from = k.register(&format!("from{index}"), Type::unsigned(bits)).keep();
+            k.when(counts, || from.set(from.plus(1)));
+            k.when(io.begins, || from.set(io.next_base));
+            let filled =
+                |lane: usize| io.fill_quad.slice(lane * fill_bits, fill_bits).signed().resize(width).unsigned();
+            let filled = concat(&[3, 2, 1, 0].map(filled));
+            let fills = io.fill_index.is(index as u64);
+            let last = io.write_data.slice(step.offset(index), step.lanes * width);
+            let before = |at: usize| {
+                let part = k.register(&format!("part{index}_{at}"), last.ty());
+                if let Some(written) = written {
+                    k.when(io.write & written.is(at as u64), || part.set(last));
+                }
+                *part
+            };
+            let mut quad: Vec<Expr> = (0..steps(step) - 1).map(before).collect();
+            quad.push(last);
+            let quad = concat(&quad.into_iter().rev().collect::<Vec<_>>());
+            let read = registered(k, &format!("read{index}"), place.read(*from));
+            let shown = match from_start {
+                Some(from_start) => {
+                    let start = format!("start{index}");
+                    let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
+                    let own = own.holds(Holds::Start(index));
+                    write_port(k, (&start, own), [io.fill & fills, io.fill_address, filled]);
+                    write_port(k, (&memory, place), [whole, write_to, quad]);
+                    from_start.mux(registered(k, &format!("read_start{index}"), own.read(read_address)), read)
+                }
+                None => {
+                    write_port(k, (&memory, place), [io.fill.mux(fills, whole), write_to, io.fill.mux(filled, quad)]);
+                    read
+                }
+            };
+            let shown = k.delay(&format!("shown{index}"), shown);
+            match shows {
+                None => shown,
+                Some(shows) => {
+                    let part = |at: usize| shown.slice(at * step.lanes * width, step.lanes * width);
+                    let later: Vec<(u64, Expr)> = (1..steps(step)).map(|at| (at as u64, part(at))).collect();
+                    k.delay(&format!("step{index}"), shows.case(&later, part(0)))
+                }
             }
-            *part
         };
-        let mut quad: Vec<Expr> = (0..steps(step) - 1).map(before).collect();
-        quad.push(last);
-        let quad = concat(&quad.into_iter().rev().collect::<Vec<_>>());
-        let read = registered(&k, &format!("read{index}"), place.read(*from));
-        let shown = match from_start {
-            Some(from_start) => {
-                let start = format!("start{index}");
-                let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
-                let own = own.holds(Holds::Start(index));
-                write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
-                write_port(&k, (&memory, place), [whole, write_to, quad]);
-                from_start.mux(registered(&k, &format!("read_start{index}"), own.read(read_address)), read)
-            }
-            None => {
-                write_port(&k, (&memory, place), [fill.mux(fills, whole), write_to, fill.mux(filled, quad)]);
-                read
-            }
-        };
-        let shown = k.delay(&format!("shown{index}"), shown);
-        match shows {
-            None => shown,
-            Some(shows) => {
-                let part = |at: usize| shown.slice(at * step.lanes * width, step.lanes * width);
-                let later: Vec<(u64, Expr)> = (1..steps(step)).map(|at| (at as u64, part(at))).collect();
-                k.delay(&format!("step{index}"), shows.case(&later, part(0)))
-            }
-        }
-    };
-    let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
-    k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
-    k.finish()
+        let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+        io.read_data.set(concat(&shown.into_iter().rev().collect::<Vec<_>>()));
+    }
 }
 
 /// Read register of a memory and its output register.
@@ -231,42 +204,27 @@ fn write_port<'k>(k: &'k Builder, (name, memory): (&str, MemoryPort<'k>), [asks,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{check, random_words, Reference};
-    use crate::simulate::settles;
+    use crate::language::kernel_of;
+    use crate::language::testbench::{check, random_words, Reference, Subject};
     use crate::wire::Word;
 
     const BITS: usize = 5;
 
-    fn store() -> Store {
-        let mut store = Store::new(PolynomialWord { lanes: 4, widths: vec![BITS] }, 3, BITS, false);
-        store.connect_all();
-        store
-    }
-
-    fn clock(store: &mut Store) {
-        for level in [false, true] {
-            store.clk.next = level.into();
-            assert!(settles(store));
-        }
-    }
-
     /// Writes `data` to quad 1 of buffer 0 and reads quad `at`, `late` cycles after `write`.
-    fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
-        store.write_data.next = data.into();
-        store.write_address.next = 1.into();
-        store.begins.next = true;
-        for cycle in 0..=late + LATENCY {
-            store.write.next = cycle == 1;
+    fn read(store: &mut Subject, data: u64, at: u64, late: usize) -> u64 {
+        let cycle = |cycle: usize| {
             // Reads another quad in all cycles but the tested one.
-            store.next_base.next = if cycle == late { at.into() } else { 2.into() };
-            clock(store);
-        }
-        store.read_data.val().word().field(0, 4 * BITS)
+            let next_base = if cycle == late { at } else { 2 };
+            store.cycle(&[0, 0, 0, 0, u64::from(cycle == 1), 0, 1, data, 0, 0, 1, 0, next_base].map(Word::from))
+        };
+        (0..=late + LATENCY + 1).map(cycle).last().unwrap()[0].number()
     }
 
     #[test]
     fn what_is_read_where_and_when_it_is_written_is_the_complement() {
-        let mut store = store();
+        let layout = PolynomialWord { lanes: 4, widths: vec![BITS] };
+        let kernel = kernel_of(&Store::new(layout, 3, BITS, false));
+        let mut store = Subject::from(&kernel);
         assert_eq!(read(&mut store, 0x12345, 1, 2), 0x12345);
         // The write takes effect one cycle after `write`.
         assert_eq!(read(&mut store, 0xabcde, 1, 1), !0x12345 & 0xfffff);
@@ -390,7 +348,7 @@ mod tests {
                 shows: Default::default(),
                 step: Default::default(),
             };
-            check(store.kernel.kernel(), &stimulus, &mut buffers);
+            check(&kernel_of(&store), &stimulus, &mut buffers);
         }
     }
 }

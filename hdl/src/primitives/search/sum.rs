@@ -1,75 +1,55 @@
 //! Sum of all taxels' polynomials of a subarray, one per search buffer.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::search::polynomial_word::PolynomialWord;
 use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
-use crate::wire::Wire;
 
-/// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
-/// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
-/// `write` replaces a buffer's sum by the `write_data` of the next cycle.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Sum {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Add `fill_quad` to coefficient `fill_index`.
-    pub fill: Signal<In, Bit>,
-    /// Address of the quad; 0 restarts the coefficient. Valid with `fill`.
-    pub fill_address: Wire<In>,
-    /// Index of the coefficient; valid with `fill`.
-    pub fill_index: Wire<In>,
-    /// Counted lanes, one bit each; valid with `fill`.
-    pub fill_mask: Wire<In>,
-    /// The coefficient of four taxels, signed; valid with `fill`.
-    pub fill_quad: Wire<In>,
-    /// Put the sum of `read_buffer` on `word`.
-    pub read: Signal<In, Bit>,
-    /// Buffer to read; valid with `read`.
-    pub read_buffer: Wire<In>,
-    /// The sum read last, in the layout of the sums; three cycles after `read`.
-    pub word: Wire<Out>,
-    /// Replace the sum of `write_buffer`.
-    pub write: Signal<In, Bit>,
-    /// Buffer to write; valid with `write`.
-    pub write_buffer: Wire<In>,
-    /// The new sum; valid one cycle after `write`.
-    pub write_data: Wire<In>,
-    kernel: Body,
+block! {
+    /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
+    /// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
+    /// `write` replaces a buffer's sum by the `write_data` of the next cycle.
+    pub struct Sum {
+        layout: PolynomialWord,
+        quads: usize,
+        /// Width of a coefficient of a taxel in bits.
+        fill_bits: usize,
+    }
+    ports SumPorts {
+        clock;
+        /// Add `fill_quad` to coefficient `fill_index`.
+        in fill;
+        /// Address of the quad; 0 restarts the coefficient. Valid with `fill`.
+        in fill_address: count_bits(*quads);
+        /// Index of the coefficient; valid with `fill`.
+        in fill_index: count_bits(layout.widths.len());
+        /// Counted lanes, one bit each; valid with `fill`.
+        in fill_mask: LANES;
+        /// The coefficient of four taxels, signed; valid with `fill`.
+        in fill_quad: LANES * fill_bits;
+        /// Put the sum of `read_buffer` on `word`.
+        in read;
+        /// Buffer to read; valid with `read`.
+        in read_buffer: BUFFER_BITS;
+        /// The sum read last, in the layout of the sums; three cycles after `read`.
+        out word: layout.bits();
+        /// Replace the sum of `write_buffer`.
+        in write;
+        /// Buffer to write; valid with `write`.
+        in write_buffer: BUFFER_BITS;
+        /// The new sum; valid one cycle after `write`.
+        in write_data: layout.bits();
+    }
 }
 
 /// Taxels of a quad.
 const LANES: usize = 4;
 
-kernel_block!(
-    Sum,
-    clock clk,
-    inputs [fill, fill_address, fill_index, fill_mask, fill_quad, read, read_buffer, write, write_buffer, write_data],
-    outputs [word]
-);
-
 impl Sum {
     /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits.
     pub fn new(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Self {
-        let block = Sum {
-            clk: Default::default(),
-            fill: Default::default(),
-            fill_address: Wire::new(count_bits(quads)),
-            fill_index: Wire::new(count_bits(layout.widths.len())),
-            fill_mask: Wire::new(LANES),
-            fill_quad: Wire::new(LANES * fill_bits),
-            read: Default::default(),
-            read_buffer: Wire::new(BUFFER_BITS),
-            word: Wire::new(layout.bits()),
-            write: Default::default(),
-            write_buffer: Wire::new(BUFFER_BITS),
-            write_data: Wire::new(layout.bits()),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(layout, quads, fill_bits))
+        Sum { layout: layout.clone(), quads, fill_bits }
     }
 }
 
@@ -82,54 +62,49 @@ struct Addition<'k> {
     added: Expr<'k>,
 }
 
-fn kernel(layout: &PolynomialWord, quads: usize, bits: usize) -> Kernel {
-    let k = Builder::new("sum");
-    let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", count_bits(quads)));
-    let fill_index = k.input("fill_index", count_bits(layout.widths.len()));
-    let (fill_mask, fill_quad) = (k.input("fill_mask", LANES), k.input("fill_quad", LANES * bits));
-    let (read, read_buffer) = (k.input("read", 1), k.input("read_buffer", BUFFER_BITS));
-    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
-    let write_data = k.input("write_data", layout.bits());
-    let (read, read_buffer) = (k.delay("read_1", read), k.delay("read_buffer_1", read_buffer));
-    let term = |lane: usize| {
-        let counted = fill_mask.at(lane).mux(fill_quad.slice(lane * bits, bits), k.constant(bits, 0));
-        k.delay(&format!("term_{lane}"), counted.signed())
-    };
-    let terms = [0, 1, 2, 3].map(term);
-    let twice = |name: &str, value| k.delay(name, k.delay(&format!("{name}_1"), value));
-    let addition = Addition {
-        adds: twice("adds", fill),
-        index: twice("index", fill_index),
-        first: twice("first", fill_address.is(0)),
-        added: k.delay("added", terms[0] + terms[1] + (terms[2] + terms[3])),
-    };
-    let written: Vec<Expr> = (0..BUFFERS).map(|b| write & write_buffer.is(b as u64)).collect();
-    let coefficient = |n: usize| {
-        k.scope(&format!("coefficient_{n}"), || {
-            // Own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
-            let own = |name: &str, value: Expr<'_>| {
-                let register = k.register(name, value.ty()).keep();
-                register.set(value);
-                register
-            };
-            let (reads, from) = (own("reads", read), own("from", read_buffer));
-            let writes: Vec<Net> = (0..BUFFERS).map(|b| own(&format!("writes_{b}"), written[b])).collect();
-            let data = layout.coefficient(write_data, n, 0);
-            let buffer = |b: usize| k.register(&format!("buffer_{b}"), Type::signed(layout.widths[n]));
-            let buffers: Vec<Net> = (0..=BUFFERS).map(buffer).collect();
-            let others: Vec<(u64, Expr)> = (1..).zip(buffers[1..].iter().map(Net::get)).collect();
-            let word = k.register("word", Type::signed(layout.widths[n]));
-            k.when(*reads, || word.set(from.case(&others, *buffers[0])));
-            for (writes, buffer) in writes.iter().zip(&buffers) {
-                k.when(writes.get(), || buffer.set(data));
-            }
-            add(&k, addition, n, buffers[START]);
-            word.get()
-        })
-    };
-    let sums: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
-    k.wire("word", concat(&sums.into_iter().rev().collect::<Vec<_>>()));
-    k.finish()
+impl Block for Sum {
+    fn build<'k>(&self, k: &'k Builder, io: SumPorts<Inside<'k>>) {
+        let (layout, bits) = (&self.layout, self.fill_bits);
+        let (read, read_buffer) = (k.delay("read_1", io.read), k.delay("read_buffer_1", io.read_buffer));
+        let term = |lane: usize| {
+            let counted = io.fill_mask.at(lane).mux(io.fill_quad.slice(lane * bits, bits), k.constant(bits, 0));
+            k.delay(&format!("term_{lane}"), counted.signed())
+        };
+        let terms = [0, 1, 2, 3].map(term);
+        let twice = |name: &str, value| k.delay(name, k.delay(&format!("{name}_1"), value));
+        let addition = Addition {
+            adds: twice("adds", io.fill),
+            index: twice("index", io.fill_index),
+            first: twice("first", io.fill_address.is(0)),
+            added: k.delay("added", terms[0] + terms[1] + (terms[2] + terms[3])),
+        };
+        let written: Vec<Expr> = (0..BUFFERS).map(|b| io.write & io.write_buffer.is(b as u64)).collect();
+        let coefficient = |n: usize| {
+            k.scope(&format!("coefficient_{n}"), || {
+                // Own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
+                let own = |name: &str, value: Expr<'_>| {
+                    let register = k.register(name, value.ty()).keep();
+                    register.set(value);
+                    register
+                };
+                let (reads, from) = (own("reads", read), own("from", read_buffer));
+                let writes: Vec<Net> = (0..BUFFERS).map(|b| own(&format!("writes_{b}"), written[b])).collect();
+                let data = layout.coefficient(io.write_data, n, 0);
+                let buffer = |b: usize| k.register(&format!("buffer_{b}"), Type::signed(layout.widths[n]));
+                let buffers: Vec<Net> = (0..=BUFFERS).map(buffer).collect();
+                let others: Vec<(u64, Expr)> = (1..).zip(buffers[1..].iter().map(Net::get)).collect();
+                let word = k.register("word", Type::signed(layout.widths[n]));
+                k.when(*reads, || word.set(from.case(&others, *buffers[0])));
+                for (writes, buffer) in writes.iter().zip(&buffers) {
+                    k.when(writes.get(), || buffer.set(data));
+                }
+                add(k, addition, n, buffers[START]);
+                word.get()
+            })
+        };
+        let sums: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+        io.word.set(concat(&sums.into_iter().rev().collect::<Vec<_>>()));
+    }
 }
 
 /// Adds to coefficient `n`, which is in `buffer`.
@@ -143,6 +118,7 @@ fn add<'k>(k: &'k Builder, addition: Addition<'k>, n: usize, buffer: Net<'k>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
@@ -233,6 +209,6 @@ mod tests {
             reads: Default::default(),
             writes: None,
         };
-        check(block.kernel.kernel(), &stimulus, &mut reference);
+        check(&kernel_of(&block), &stimulus, &mut reference);
     }
 }

@@ -1,28 +1,28 @@
 //! Taylor shift: moves the polynomials' centre by a grid step and halves the step, with additions and shifts only.
 
 use dermis_golden::fixed::words::schedule::EXPONENTS;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside};
 use crate::primitives::search::polynomial_word::PolynomialWord;
-use crate::wire::Wire;
 
-/// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
-/// two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms, one of
-/// which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Taylor {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid one
-    /// cycle before `word`.
-    pub step: Wire<In>,
-    /// Polynomials, one per lane; taken in every cycle.
-    pub word: Wire<In>,
-    /// The polynomials about the new centre; four cycles after `word`.
-    pub moved: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
+    /// two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms, one of
+    /// which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
+    pub struct Taylor {
+        layout: PolynomialWord,
+    }
+    ports TaylorPorts {
+        clock;
+        /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid one
+        /// cycle before `word`.
+        in step: STEP_BITS;
+        /// Polynomials, one per lane; taken in every cycle.
+        in word: layout.bits();
+        /// The polynomials about the new centre; four cycles after `word`.
+        out moved: layout.bits();
+    }
 }
 
 /// Cycles from `word` to `moved`.
@@ -30,29 +30,20 @@ pub const LATENCY: usize = 4;
 /// Width of `step`, in bits.
 const STEP_BITS: usize = 5;
 
-kernel_block!(Taylor, clock clk, inputs [step, word], outputs [moved]);
-
 impl Taylor {
     /// For polynomials in `layout`.
     pub fn new(layout: &PolynomialWord) -> Self {
-        let block = Taylor {
-            clk: Default::default(),
-            step: Wire::new(STEP_BITS),
-            word: Wire::new(layout.bits()),
-            moved: Wire::new(layout.bits()),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(layout))
+        Taylor { layout: layout.clone() }
     }
 }
 
-fn kernel(layout: &PolynomialWord) -> Kernel {
-    let k = Builder::new("taylor");
-    let (step, word) = (k.input("step", STEP_BITS), k.input("word", layout.bits()));
-    let lane = |lane| k.scope(&format!("lane_{lane}"), || moved(&k, layout, step, word, lane));
-    let lanes: Vec<Vec<Expr>> = (0..layout.lanes).map(lane).collect();
-    k.wire("moved", layout.join(&lanes));
-    k.finish()
+impl Block for Taylor {
+    fn build<'k>(&self, k: &'k Builder, io: TaylorPorts<Inside<'k>>) {
+        let layout = &self.layout;
+        let lane = |lane| k.scope(&format!("lane_{lane}"), || moved(k, layout, io.step, io.word, lane));
+        let lanes: Vec<Vec<Expr>> = (0..layout.lanes).map(lane).collect();
+        io.moved.set(layout.join(&lanes));
+    }
 }
 
 /// The polynomial of one lane: moved along x, then along y, then halved.
@@ -151,6 +142,7 @@ mod tests {
     use dermis_golden::fixed::stages::search::{halve, taylor_shift};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Pipeline};
     use crate::wire::Word;
 
@@ -188,7 +180,7 @@ mod tests {
             let step = step.replace(inputs[0]);
             step.map_or(vec![None], |step| moved(&[step, inputs[1]]))
         };
-        check(block.kernel.kernel(), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, delayed));
+        check(&kernel_of(&block), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, delayed));
     }
 
     /// Degrees 3, 2 and 1; the constant coefficient may wrap. Words no wider than their degree.
