@@ -74,16 +74,16 @@ macro_rules! board_top {
                 pub $miso: Wire<In>,
                 // Registers the way back of `ready` from the link's requests to the engine.
                 $slice: RegisterSlice,
-                $gate: FrameGate,
+                $gate: RustHdl<FrameGate>,
             )?
             $($unused: Signal<Local, Bit>,)?
-            power_on: PowerOn,
+            power_on: RustHdl<PowerOn>,
             // Registered once more, because the engine is large and its reset has a long route.
             engine_rst: RustHdl<Dff>,
-            line: $block,
+            line: RustHdl<$block>,
             link: PacketLink,
             engine: $engine,
-            lamps: Lamps,
+            lamps: RustHdl<Lamps>,
         }
 
         impl $name {
@@ -110,15 +110,15 @@ macro_rules! board_top {
                         adc_mosi: Default::default(),
                         $miso: Wire::new(engine.adc_miso.width()),
                         $slice: RegisterSlice::new(BEAT, true),
-                        $gate: FrameGate::default(),
+                        $gate: Default::default(),
                     )?
                     $($unused: Default::default(),)?
-                    power_on: PowerOn::default(),
+                    power_on: Default::default(),
                     engine_rst: Default::default(),
-                    line: line(&identity),
+                    line: RustHdl::new(line(&identity)),
                     link: PacketLink::new(&Shape::of(model), &identity),
                     engine,
-                    lamps: Lamps::new(identity.clock_hz),
+                    lamps: RustHdl::new(Lamps::new(identity.clock_hz)),
                 };
                 top.connect_all();
                 Ok(top)
