@@ -77,13 +77,13 @@ macro_rules! board_top {
                 $gate: FrameGate,
             )?
             $($unused: Signal<Local, Bit>,)?
-            power_on: PowerOn,
+            power_on: RustHdl<PowerOn>,
             // Registered once more, because the engine is large and its reset has a long route.
             engine_rst: RustHdl<Dff>,
-            line: $block,
+            line: RustHdl<$block>,
             link: PacketLink,
             engine: $engine,
-            lamps: Lamps,
+            lamps: RustHdl<Lamps>,
         }
 
         impl $name {
@@ -113,12 +113,12 @@ macro_rules! board_top {
                         $gate: FrameGate::default(),
                     )?
                     $($unused: Default::default(),)?
-                    power_on: PowerOn::default(),
+                    power_on: Default::default(),
                     engine_rst: Default::default(),
-                    line: line(&identity),
+                    line: RustHdl::new(line(&identity)),
                     link: PacketLink::new(&Shape::of(model), &identity),
                     engine,
-                    lamps: Lamps::new(identity.clock_hz),
+                    lamps: RustHdl::new(Lamps::new(identity.clock_hz)),
                 };
                 top.connect_all();
                 Ok(top)

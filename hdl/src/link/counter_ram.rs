@@ -1,49 +1,45 @@
 //! Identity of the board and counters of received and dropped packets, in one memory.
 
 use dermis_golden::wire::link::{Counters, Identity};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
-/// counters, in the order of [`Counters`], from 16.
-///
-/// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory and adder
-/// in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is not valid
-/// meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
-#[derive(dermis_hdl_derive::Block)]
-pub struct CounterRam {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high for at least eight cycles.
-    pub rst: Signal<In, Bit>,
-    /// A packet was accepted in this cycle.
-    pub taken: Signal<In, Bit>,
-    /// One bit per cause for which a packet is dropped: framing, CRC, unknown type, length; each high for the cycle of
-    /// its event.
-    pub fault: Wire<In>,
-    /// A packet was dropped in this cycle because earlier ones are not answered yet.
-    pub overrun: Signal<In, Bit>,
-    /// Counting is postponed.
-    pub hold: Signal<In, Bit>,
-    /// Entry to read, 5 bits; taken while no event is being counted.
-    pub address: Wire<In>,
-    /// The entry, 16 bits; one cycle after `address`, while `entry_valid` is high.
-    pub entry: Wire<Out>,
-    /// `entry` is that of `address`, and no counter is changing.
-    pub entry_valid: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
+    /// counters, in the order of [`Counters`], from 16.
+    ///
+    /// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory and adder
+    /// in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is not valid
+    /// meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
+    pub struct CounterRam {
+        /// The identity by entry, the first byte of each in the low bits.
+        words: Vec<(usize, u64)>,
+        /// There is a register between memory and adder.
+        registered: bool,
+    }
+    ports CounterRamPorts {
+        clock;
+        /// Synchronous reset, active high for at least eight cycles.
+        in rst;
+        /// A packet was accepted in this cycle.
+        in taken;
+        /// One bit per cause for which a packet is dropped: framing, CRC, unknown type, length; each high for the cycle of
+        /// its event.
+        in fault: EVENTS - 2;
+        /// A packet was dropped in this cycle because earlier ones are not answered yet.
+        in overrun;
+        /// Counting is postponed.
+        in hold;
+        /// Entry to read, 5 bits; taken while no event is being counted.
+        in address: 5;
+        /// The entry, 16 bits; one cycle after `address`, while `entry_valid` is high.
+        out entry: 16;
+        /// `entry` is that of `address`, and no counter is changing.
+        out entry_valid;
+    }
 }
-
-kernel_block!(
-    CounterRam,
-    clock clk,
-    inputs [rst, taken, fault, overrun, hold, address],
-    outputs [entry, entry_valid]
-);
 
 const ENTRIES: usize = 32;
 /// Entry of the first counter.
@@ -55,19 +51,7 @@ const EVENTS: usize = Counters::BYTES / 2;
 impl CounterRam {
     /// Answers requests for the identity with `identity`; with the register between memory and adder if `registered`.
     pub fn new(identity: &Identity, registered: bool) -> Self {
-        let block = CounterRam {
-            clk: Default::default(),
-            rst: Default::default(),
-            taken: Default::default(),
-            fault: Wire::new(EVENTS - 2),
-            overrun: Default::default(),
-            hold: Default::default(),
-            address: Wire::new(5),
-            entry: Wire::new(16),
-            entry_valid: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(&words(identity), registered))
+        CounterRam { words: words(identity), registered }
     }
 }
 
@@ -82,43 +66,43 @@ fn cycles(registered: bool) -> usize {
     3 + usize::from(registered)
 }
 
-fn kernel(words: &[(usize, u64)], registered: bool) -> Kernel {
-    let k = Builder::new("counter_ram");
-    let (rst, taken, fault) = (k.input("rst", 1), k.input("taken", 1), k.input("fault", EVENTS - 2));
-    let (overrun, hold, address) = (k.input("overrun", 1), k.input("hold", 1), k.input("address", 5));
-    let memory = k.memory("memory", ENTRIES, 16, Contents::Words(words.to_vec())).style("block").unchecked();
-    let which = k.register("which", Type::unsigned(count_bits(KINDS)));
-    let due = k.state("due", Type::unsigned(1), rst, 0);
-    let counted = k.register("counted", Type::unsigned(cycles(registered)));
-    let counted = counted.comment("Pipeline of a count: a bit for each cycle, of which the second last one writes.");
-    let [entry, raised] = ["entry", "raised"].map(|name| k.register(name, Type::unsigned(16)));
+impl Block for CounterRam {
+    fn build<'k>(&self, k: &'k Builder, io: CounterRamPorts<Inside<'k>>) {
+        let memory = k.memory("memory", ENTRIES, 16, Contents::Words(self.words.clone())).style("block").unchecked();
+        let which = k.register("which", Type::unsigned(count_bits(KINDS)));
+        let due = k.state("due", Type::unsigned(1), io.rst, 0);
+        let counted = k.register("counted", Type::unsigned(cycles(self.registered)));
+        let counted =
+            counted.comment("Pipeline of a count: a bit for each cycle, of which the second last one writes.");
+        let (entry, raised) = (io.entry.register(), k.register("raised", Type::unsigned(16)));
 
-    let events = k.wire("events", concat(&[overrun, fault, taken]));
-    let counts = k.wire("counts", *due & !hold);
-    let counter = k.constant(2, (COUNTS / KINDS) as u64).concat(*which);
-    entry.set(memory.read(counts.mux(counter, address)));
-    // A block RAM's output is slow.
-    let count = if registered { k.delay("count", *entry) } else { *entry };
-    raised.set(count.plus(1));
-    let writes = cycles(registered) - 2;
-    memory.write(rst | counted.at(writes), counter, rst.mux(k.constant(16, 0), *raised));
-    let goes_on: Vec<Expr> = (0..writes).rev().map(|cycle| counted.at(cycle) & !rst).collect();
-    counted.set(concat(&[&[counted.at(writes)], &goes_on[..], &[counts & !rst]].concat()));
-    due.set(events.any() | (*due & !counts));
-    // The number of the event, as each has its own bit.
-    let bit = |bit: usize| {
-        let of = (0..EVENTS).filter(|event| event >> bit & 1 == 1).map(|event| events.at(event));
-        of.reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
-    };
-    k.when(events.any(), || which.set(concat(&[bit(2), bit(1), bit(0)])));
-    k.when(rst, || which.set(which.plus(1)));
-    k.wire("entry_valid", counted.is(0));
-    k.finish()
+        let events = k.wire("events", concat(&[io.overrun, io.fault, io.taken]));
+        let counts = k.wire("counts", *due & !io.hold);
+        let counter = k.constant(2, (COUNTS / KINDS) as u64).concat(*which);
+        entry.set(memory.read(counts.mux(counter, io.address)));
+        // A block RAM's output is slow.
+        let count = if self.registered { k.delay("count", *entry) } else { *entry };
+        raised.set(count.plus(1));
+        let writes = cycles(self.registered) - 2;
+        memory.write(io.rst | counted.at(writes), counter, io.rst.mux(k.constant(16, 0), *raised));
+        let goes_on: Vec<Expr> = (0..writes).rev().map(|cycle| counted.at(cycle) & !io.rst).collect();
+        counted.set(concat(&[&[counted.at(writes)], &goes_on[..], &[counts & !io.rst]].concat()));
+        due.set(events.any() | (*due & !counts));
+        // The number of the event, as each has its own bit.
+        let bit = |bit: usize| {
+            let of = (0..EVENTS).filter(|event| event >> bit & 1 == 1).map(|event| events.at(event));
+            of.reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+        };
+        k.when(events.any(), || which.set(concat(&[bit(2), bit(1), bit(0)])));
+        k.when(io.rst, || which.set(which.plus(1)));
+        io.entry_valid.set(counted.is(0));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -207,9 +191,8 @@ mod tests {
     #[test]
     fn events_are_counted_and_the_identity_is_read() {
         for registered in [false, true] {
-            let kernel = kernel(&IDENTITY, registered);
-            let block = Body::new(kernel, &[], &[("entry", 16), ("entry_valid", 1)]);
-            check(block.kernel(), &stimulus(30_000), &mut Table { registered, ..Table::default() });
+            let block = CounterRam { words: IDENTITY.to_vec(), registered };
+            check(&kernel_of(&block), &stimulus(30_000), &mut Table { registered, ..Table::default() });
         }
     }
 }

@@ -1,11 +1,9 @@
 //! CRC-32, two bits per cycle: bytes on a link are further apart, and this takes few logic cells.
 
 use dermis_golden::wire::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
 /// Initial value of the CRC register.
 const START: u32 = u32::MAX;
@@ -15,71 +13,55 @@ const BEFORE: u32 = CRC_POLYNOMIAL >> 1;
 /// Cycles that a byte takes after the one with `load`.
 pub const CYCLES: u32 = 4;
 
-/// CRC of the received or of the sent bytes of a packet.
-///
-/// `load` XORs a byte into the low end of the register; the next four cycles process it. To send the CRC, the
-/// register's own low byte is loaded for each byte sent: the XOR clears it, which leaves only the shift to the next
-/// byte.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Crc {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// A packet starts: resets the CRC, with priority over `load`.
-    pub restart: Signal<In, Bit>,
-    /// A byte of the packet; valid with `load`.
-    pub octet: Wire<In>,
-    /// Take `octet` in this cycle; not while `busy`.
-    pub load: Signal<In, Bit>,
-    /// Lowest byte of the inverted CRC register; valid while not `busy`.
-    pub low: Wire<Out>,
-    /// The bytes so far end with their correct CRC; valid while not `busy`.
-    pub right: Signal<Out, Bit>,
-    /// A byte is being processed.
-    pub busy: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(Crc, clock clk, inputs [restart, octet, load], outputs [low, right, busy]);
-
-impl Default for Crc {
-    fn default() -> Self {
-        let block = Crc {
-            clk: Default::default(),
-            restart: Default::default(),
-            octet: Wire::new(8),
-            load: Default::default(),
-            low: Wire::new(8),
-            right: Default::default(),
-            busy: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
+block! {
+    /// CRC of the received or of the sent bytes of a packet.
+    ///
+    /// `load` XORs a byte into the low end of the register; the next four cycles process it. To send the CRC, the
+    /// register's own low byte is loaded for each byte sent: the XOR clears it, which leaves only the shift to the next
+    /// byte.
+    #[derive(Default)]
+    pub struct Crc {}
+    ports CrcPorts {
+        clock;
+        /// A packet starts: resets the CRC, with priority over `load`.
+        in restart;
+        /// A byte of the packet; valid with `load`.
+        in octet: 8;
+        /// Take `octet` in this cycle; not while `busy`.
+        in load;
+        /// Lowest byte of the inverted CRC register; valid while not `busy`.
+        out low: 8;
+        /// The bytes so far end with their correct CRC; valid while not `busy`.
+        out right;
+        /// A byte is being processed.
+        out busy;
     }
 }
 
-fn kernel() -> Kernel {
-    let k = Builder::new("crc");
-    let (restart, octet, load) = (k.input("restart", 1), k.input("octet", 8), k.input("load", 1));
-    let crc = k.state("crc", Type::unsigned(32), restart, START.into());
-    let left = k.state("left", Type::unsigned(3), restart, 0);
-    let busy = k.wire("busy", left.any());
-    k.wire("low", !crc.low(8));
-    k.wire("right", crc.is(CRC_RESIDUE.into()));
-    let feedback = |bit: usize, polynomial: u32| crc.at(bit).mux(k.constant(32, polynomial.into()), k.constant(32, 0));
-    k.when(busy, || {
-        crc.set(crc.slice(2, 30).extend(32) ^ feedback(0, BEFORE) ^ feedback(1, CRC_POLYNOMIAL));
-        left.set(left.minus(1));
-    });
-    k.when(load, || {
-        crc.set(crc.slice(8, 24).concat(crc.low(8) ^ octet));
-        left.set(k.constant(3, CYCLES.into()));
-    });
-    k.finish()
+impl Block for Crc {
+    fn build<'k>(&self, k: &'k Builder, io: CrcPorts<Inside<'k>>) {
+        let crc = k.state("crc", Type::unsigned(32), io.restart, START.into());
+        let left = k.state("left", Type::unsigned(3), io.restart, 0);
+        let busy = io.busy.set(left.any());
+        io.low.set(!crc.low(8));
+        io.right.set(crc.is(CRC_RESIDUE.into()));
+        let feedback =
+            |bit: usize, polynomial: u32| crc.at(bit).mux(k.constant(32, polynomial.into()), k.constant(32, 0));
+        k.when(busy, || {
+            crc.set(crc.slice(2, 30).extend(32) ^ feedback(0, BEFORE) ^ feedback(1, CRC_POLYNOMIAL));
+            left.set(left.minus(1));
+        });
+        k.when(io.load, || {
+            crc.set(crc.slice(8, 24).concat(crc.low(8) ^ io.octet));
+            left.set(k.constant(3, CYCLES.into()));
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
@@ -144,12 +126,9 @@ mod tests {
         // CRC-32/ISO-HDLC of "123456789".
         assert_eq!(!crc_32(b"123456789"), 0xcbf4_3926);
         let (block, all) = (Crc::default(), stimulus(6000));
-        check(block.kernel.kernel(), &all, &mut Bytes::default());
-        let right = Subject::from(block.kernel.kernel())
-            .simulated(&all)
-            .iter()
-            .filter(|outputs| outputs[2].number() == 1)
-            .count();
+        check(&kernel_of(&block), &all, &mut Bytes::default());
+        let right =
+            Subject::from(&kernel_of(&block)).simulated(&all).iter().filter(|outputs| outputs[2].number() == 1).count();
         assert!(right > 20, "{right} cycles with a correct CRC");
     }
 
@@ -162,7 +141,7 @@ mod tests {
         let crc = 0xcbf4_3926u32.to_le_bytes();
         let mut all = vec![vec![Word::from(true), Word::default(), Word::default()]];
         all.extend(b"123456789".iter().copied().chain(crc.map(|octet| !octet)).flat_map(load));
-        let outputs = Subject::from(Crc::default().kernel.kernel()).simulated(&all);
+        let outputs = Subject::from(&kernel_of(&Crc::default())).simulated(&all);
         // The low byte before each byte of the CRC is that byte; its inverse clears the register.
         for (at, &octet) in crc.iter().enumerate() {
             let cycle = 1 + (9 + at) * (CYCLES as usize + 1);

@@ -1,101 +1,68 @@
 //! Frame gate: of the frames of a scan, those that are asked for.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
-
-/// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose first beat
-/// comes while a request waits passes; the others are dropped, so that the engine never waits for the link.
-///
-/// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the array's rows
-/// driven meanwhile, and be old when they are sent.
-#[derive(dermis_hdl_derive::Block)]
-pub struct FrameGate {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A request waits.
-    pub requested: Signal<In, Bit>,
-    /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A beat that passes; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// A frame passes.
-    pub busy: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose first beat
+    /// comes while a request waits passes; the others are dropped, so that the engine never waits for the link.
+    ///
+    /// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the array's rows
+    /// driven meanwhile, and be old when they are sent.
+    #[derive(Default)]
+    pub struct FrameGate {}
+    ports FrameGatePorts {
+        clock;
+        reset;
+        /// A request waits.
+        in requested;
+        /// A beat of the engine, three words; valid with `s_axis_tvalid`.
+        in s_axis_tdata: BEAT;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A beat that passes; valid with `m_axis_tvalid`.
+        out m_axis_tdata: BEAT;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// A frame passes.
+        out busy;
+    }
 }
-
-kernel_block!(
-    FrameGate,
-    clock clk,
-    inputs [rst, requested, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, busy]
-);
 
 /// Width of a beat.
 const BEAT: usize = 96;
 
-impl Default for FrameGate {
-    fn default() -> Self {
-        let block = FrameGate {
-            clk: Default::default(),
-            rst: Default::default(),
-            requested: Default::default(),
-            s_axis_tdata: Wire::new(BEAT),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(BEAT),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            busy: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
+impl Block for FrameGate {
+    fn build<'k>(&self, k: &'k Builder, io: FrameGatePorts<Inside<'k>>) {
+        let passing = k.state("passing", Type::unsigned(1), io.rst, 0);
+        let passing = passing.comment("Also where the request is answered before the first beat is taken.");
+        let dropping = k.state("dropping", Type::unsigned(1), io.rst, 0);
+        let passes = k.wire("passes", *passing | (io.requested & !*dropping));
+        let accepted = io.s_axis_tready.set(io.m_axis_tready | !passes);
+        let ends = k.wire("ends", accepted & io.s_axis_tlast);
+        io.m_axis_tvalid.set(io.s_axis_tvalid & passes);
+        io.m_axis_tdata.set(io.s_axis_tdata);
+        io.m_axis_tlast.set(io.s_axis_tlast);
+        io.busy.set(*passing);
+        k.when(io.s_axis_tvalid, || {
+            passing.set(passes & !ends);
+            dropping.set(!passes & !ends);
+        });
     }
-}
-
-fn kernel() -> Kernel {
-    let k = Builder::new("frame_gate");
-    let (rst, requested, data) = (k.input("rst", 1), k.input("requested", 1), k.input("s_axis_tdata", BEAT));
-    let (given, last, ready) = (k.input("s_axis_tvalid", 1), k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-    let passing = k.state("passing", Type::unsigned(1), rst, 0);
-    let passing = passing.comment("Also where the request is answered before the first beat is taken.");
-    let dropping = k.state("dropping", Type::unsigned(1), rst, 0);
-    let passes = k.wire("passes", *passing | (requested & !*dropping));
-    let accepted = k.wire("s_axis_tready", ready | !passes);
-    let ends = k.wire("ends", accepted & last);
-    k.wire("m_axis_tvalid", given & passes);
-    k.wire("m_axis_tdata", data);
-    k.wire("m_axis_tlast", last);
-    k.wire("busy", *passing);
-    k.when(given, || {
-        passing.set(passes & !ends);
-        dropping.set(!passes & !ends);
-    });
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::wire::Word;
 
@@ -172,7 +139,7 @@ mod tests {
     #[test]
     fn frames_pass_whole_or_not_at_all() {
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 FrameGate::default(),
                 changes,
                 inputs [rst, requested, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],

@@ -1,65 +1,62 @@
 //! Frame ingress: from the payload bytes of a frame's packet to the engine's input stream, while they arrive.
 
 use dermis_golden::wire::link::code_bytes;
-use rust_hdl::prelude::*;
 
 use super::Shape;
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, table_beat};
-use crate::wire::Wire;
 
-/// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
-/// packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine drops the
-/// frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that is already
-/// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
-/// it.
-///
-/// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their packet's end as
-/// well: an image that is not whole ends early.
-///
-/// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses a code
-/// or byte because of that, or starts while the frame or image before is still held, is dropped too, and counts as an
-/// `overrun` if its packet is good.
-#[derive(dermis_hdl_derive::Block)]
-pub struct FrameIngress {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The header of a packet with a frame or an image is complete; high for one cycle.
-    pub frame_begin: Signal<In, Bit>,
-    /// The packet holds an image; valid with `frame_begin`.
-    pub image: Signal<In, Bit>,
-    /// `content` is a byte of the payload.
-    pub payload: Signal<In, Bit>,
-    /// A byte of the packet, 8 bits; valid with `payload`.
-    pub content: Wire<In>,
-    /// The frame's packet is complete and correct; high for one cycle.
-    pub good: Signal<In, Bit>,
-    /// The packet is damaged; high for one cycle.
-    pub bad: Signal<In, Bit>,
-    /// The engine gets the whole frame; with `good`.
-    pub taken: Signal<Out, Bit>,
-    /// The frame is dropped although its packet is good; with `good`.
-    pub overrun: Signal<Out, Bit>,
-    /// A taxel's code, two's complement, or a byte of an image, `stream_bits` wide; valid with `valid`.
-    pub code: Wire<Out>,
-    /// `code` is offered to the engine; held until `ready`.
-    pub valid: Signal<Out, Bit>,
-    /// The beat has `tlast`; valid with `valid`.
-    pub last: Signal<Out, Bit>,
-    /// The engine accepts the beat in this cycle.
-    pub ready: Signal<In, Bit>,
-    kernel: Body,
+block! {
+    /// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
+    /// packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine drops the
+    /// frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that is already
+    /// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
+    /// it.
+    ///
+    /// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their packet's end as
+    /// well: an image that is not whole ends early.
+    ///
+    /// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses a code
+    /// or byte because of that, or starts while the frame or image before is still held, is dropped too, and counts as an
+    /// `overrun` if its packet is good.
+    pub struct FrameIngress {
+        /// Codes of a frame.
+        taxels: usize,
+        /// Width of a code.
+        bits: usize,
+        /// Bytes of an image of tables; none where they are in the bitstream.
+        image_bytes: Option<usize>,
+    }
+    ports FrameIngressPorts {
+        clock;
+        reset;
+        /// The header of a packet with a frame or an image is complete; high for one cycle.
+        in frame_begin;
+        /// The packet holds an image; valid with `frame_begin`.
+        in image;
+        /// `content` is a byte of the payload.
+        in payload;
+        /// A byte of the packet, 8 bits; valid with `payload`.
+        in content: 8;
+        /// The frame's packet is complete and correct; high for one cycle.
+        in good;
+        /// The packet is damaged; high for one cycle.
+        in bad;
+        /// The engine gets the whole frame; with `good`.
+        out taken;
+        /// The frame is dropped although its packet is good; with `good`.
+        out overrun;
+        /// A taxel's code, two's complement, or a byte of an image, `stream_bits` wide; valid with `valid`.
+        out code: bits + usize::from(image_bytes.is_some());
+        /// `code` is offered to the engine; held until `ready`.
+        out valid;
+        /// The beat has `tlast`; valid with `valid`.
+        out last;
+        /// The engine accepts the beat in this cycle.
+        in ready;
+    }
 }
-
-kernel_block!(
-    FrameIngress,
-    clock clk,
-    inputs [rst, frame_begin, image, payload, content, good, bad, ready],
-    outputs [taken, overrun, code, valid, last]
-);
 
 /// Codes that are held until the end of the packet.
 const HELD: usize = 2;
@@ -67,24 +64,7 @@ const HELD: usize = 2;
 impl FrameIngress {
     /// For the frames and images of `shape`.
     pub fn new(shape: &Shape) -> Self {
-        let block = FrameIngress {
-            clk: Default::default(),
-            rst: Default::default(),
-            frame_begin: Default::default(),
-            image: Default::default(),
-            payload: Default::default(),
-            content: Wire::new(8),
-            good: Default::default(),
-            bad: Default::default(),
-            taken: Default::default(),
-            overrun: Default::default(),
-            code: Wire::new(shape.stream_bits()),
-            valid: Default::default(),
-            last: Default::default(),
-            ready: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(shape.codes(), shape.input_bits as usize, shape.image_bytes))
+        FrameIngress { taxels: shape.codes(), bits: shape.input_bits as usize, image_bytes: shape.image_bytes }
     }
 }
 
@@ -100,100 +80,98 @@ fn assemble<'k>(k: &'k Builder, content: Expr<'k>, enable: Expr<'k>, bits: usize
     content.low(bits - before).concat(*raw)
 }
 
-fn kernel(taxels: usize, bits: usize, image_bytes: Option<usize>) -> Kernel {
-    let k = Builder::new("frame_ingress");
-    let (rst, frame_begin, image) = (k.input("rst", 1), k.input("frame_begin", 1), k.input("image", 1));
-    let (payload, bytes) = (k.input("payload", 1), code_bytes(bits as u32));
-    let (content, good, bad, ready) =
-        (k.input("content", 8), k.input("good", 1), k.input("bad", 1), k.input("ready", 1));
-    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
-    let (b, d) = (count_bits(bytes), count_bits(taxels.max(image_bytes.unwrap_or_default())));
-    let beat_bits = bits + usize::from(image_bytes.is_some());
-    // Codes that leave before the end of the packet.
-    let early_codes = taxels.saturating_sub(HELD);
-    let byte_index = k.state("byte_index", Type::unsigned(b), rst, 0);
-    let [code, second] = ["code", "second"].map(|name| k.register(name, Type::unsigned(beat_bits)));
-    let fill = k.state("fill", Type::unsigned(2), rst, 0);
-    let delivered = k.state("delivered", Type::unsigned(d), rst, 0);
-    let flag = |name| k.state(name, bit, rst, 0);
-    let (within_frame, deaf, lost) = (flag("within_frame"), flag("deaf"), flag("lost"));
-    let (released, aborting) = (flag("released"), flag("aborting"));
-    let some_ahead = u64::from(early_codes > 0);
-    let ahead = k.state("ahead", bit, rst, some_ahead);
-    let ahead = ahead.comment("Codes that may leave before the end of the packet are left.");
+impl Block for FrameIngress {
+    fn build<'k>(&self, k: &'k Builder, io: FrameIngressPorts<Inside<'k>>) {
+        let FrameIngress { taxels, bits, image_bytes } = *self;
+        let bytes = code_bytes(bits as u32);
+        let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
+        let (b, d) = (count_bits(bytes), count_bits(taxels.max(image_bytes.unwrap_or_default())));
+        let beat_bits = io.code.bits();
+        // Codes that leave before the end of the packet.
+        let early_codes = taxels.saturating_sub(HELD);
+        let byte_index = k.state("byte_index", Type::unsigned(b), io.rst, 0);
+        let (code, second) = (io.code.register(), k.register("second", Type::unsigned(beat_bits)));
+        let fill = k.state("fill", Type::unsigned(2), io.rst, 0);
+        let delivered = k.state("delivered", Type::unsigned(d), io.rst, 0);
+        let flag = |name| k.state(name, bit, io.rst, 0);
+        let (within_frame, deaf, lost) = (flag("within_frame"), flag("deaf"), flag("lost"));
+        let (released, aborting) = (flag("released"), flag("aborting"));
+        let some_ahead = u64::from(early_codes > 0);
+        let ahead = k.state("ahead", bit, io.rst, some_ahead);
+        let ahead = ahead.comment("Codes that may leave before the end of the packet are left.");
 
-    let refused = k.wire("refused", *deaf | *lost);
-    let empty = fill.is(0);
-    let in_image = image_bytes.map(|bytes| (bytes, flag("in_image")));
-    // Of the packet's beats all but `left` are delivered.
-    let all_but = |left: usize| {
-        let frame = delivered.is(taxels.saturating_sub(left) as u64);
-        let of_image = |bytes: usize| delivered.is((bytes - left) as u64);
-        in_image.as_ref().map_or(frame, |(bytes, within)| within.mux(of_image(*bytes), frame))
-    };
-    let at_last = k.wire("at_last", all_but(1));
-    let early = k.wire("early", *aborting & empty);
-    let accepted = good & *within_frame;
-    let taken = k.wire("taken", accepted & !refused);
-    k.wire("overrun", accepted & refused);
-    let valid = k.wire("valid", *aborting | (!empty & (*released | *ahead)));
-    k.wire("last", early | at_last);
-    let moves = k.wire("moves", valid & ready & !early);
-    let aborts = k.wire("aborts", early & ready);
-    let waits = k.wire("waits", valid & !ready);
-    let hears = k.wire("hears", payload & !*deaf);
-    let arrived = assemble(&k, content, hears, bits, bytes);
-    let ends_code = byte_index.is(bytes as u64 - 1);
-    let (arrived, ends_code) = match &in_image {
-        None => (arrived, ends_code),
-        Some((_, within)) => {
-            let code = arrived.signed().extend(beat_bits).unsigned();
-            (within.mux(table_beat(&k, content, bits), code), **within | ends_code)
-        }
-    };
-    let arrived = k.wire("arrived", arrived);
-    let complete = k.wire("complete", hears & ends_code);
-    let left = k.wire("left", (*fill - moves).low(2));
-    let full = left.is(HELD as u64);
-    let push = k.wire("push", complete & !full);
-    let drop = k.wire("drop", *within_frame & !*deaf & (bad | (good & *lost)));
+        let refused = k.wire("refused", *deaf | *lost);
+        let empty = fill.is(0);
+        let in_image = image_bytes.map(|bytes| (bytes, flag("in_image")));
+        // Of the packet's beats all but `left` are delivered.
+        let all_but = |left: usize| {
+            let frame = delivered.is(taxels.saturating_sub(left) as u64);
+            let of_image = |bytes: usize| delivered.is((bytes - left) as u64);
+            in_image.as_ref().map_or(frame, |(bytes, within)| within.mux(of_image(*bytes), frame))
+        };
+        let at_last = k.wire("at_last", all_but(1));
+        let early = k.wire("early", *aborting & empty);
+        let accepted = io.good & *within_frame;
+        let taken = io.taken.set(accepted & !refused);
+        io.overrun.set(accepted & refused);
+        let valid = io.valid.set(*aborting | (!empty & (*released | *ahead)));
+        io.last.set(early | at_last);
+        let moves = k.wire("moves", valid & io.ready & !early);
+        let aborts = k.wire("aborts", early & io.ready);
+        let waits = k.wire("waits", valid & !io.ready);
+        let hears = k.wire("hears", io.payload & !*deaf);
+        let arrived = assemble(k, io.content, hears, bits, bytes);
+        let ends_code = byte_index.is(bytes as u64 - 1);
+        let (arrived, ends_code) = match &in_image {
+            None => (arrived, ends_code),
+            Some((_, within)) => {
+                let code = arrived.signed().extend(beat_bits).unsigned();
+                (within.mux(table_beat(k, io.content, bits), code), **within | ends_code)
+            }
+        };
+        let arrived = k.wire("arrived", arrived);
+        let complete = k.wire("complete", hears & ends_code);
+        let left = k.wire("left", (*fill - moves).low(2));
+        let full = left.is(HELD as u64);
+        let push = k.wire("push", complete & !full);
+        let drop = k.wire("drop", *within_frame & !*deaf & (io.bad | (io.good & *lost)));
 
-    k.when(hears, || byte_index.set(complete.mux(k.constant(b, 0), byte_index.plus(1))));
-    k.when(moves, || code.set(*second));
-    k.when(push & left.is(0), || code.set(arrived));
-    k.when(push & left.any(), || second.set(arrived));
-    fill.set(drop.mux(waits.extend(2), push.mux(left.plus(1), left)));
-    k.when(moves, || {
-        delivered.set(at_last.mux(k.constant(d, 0), delivered.plus(1)));
-        ahead.set(at_last.mux(k.constant(1, some_ahead), *ahead & !all_but(HELD + 1)));
-        k.when(at_last, || released.set(zero));
-    });
-    k.when(aborts, || {
-        delivered.set(k.constant(d, 0));
-        ahead.set(k.constant(1, some_ahead));
-        aborting.set(zero);
-    });
-    k.when(taken, || released.set(one));
-    k.when(drop, || aborting.set(waits | moves.mux(!at_last, delivered.any())));
-    k.when(complete & full, || lost.set(one));
-    k.when(good | bad, || within_frame.set(zero));
-    k.when(frame_begin, || {
-        within_frame.set(one);
-        deaf.set(!empty | *aborting);
-        lost.set(zero);
-        byte_index.set(k.constant(b, 0));
-    });
-    if let Some((_, within)) = &in_image {
-        let heard = k.wire("heard", frame_begin & empty & !*aborting);
-        k.when(heard, || {
-            within.set(image);
-            ahead.set(image | k.constant(1, some_ahead));
+        k.when(hears, || byte_index.set(complete.mux(k.constant(b, 0), byte_index.plus(1))));
+        k.when(moves, || code.set(*second));
+        k.when(push & left.is(0), || code.set(arrived));
+        k.when(push & left.any(), || second.set(arrived));
+        fill.set(drop.mux(waits.extend(2), push.mux(left.plus(1), left)));
+        k.when(moves, || {
+            delivered.set(at_last.mux(k.constant(d, 0), delivered.plus(1)));
+            ahead.set(at_last.mux(k.constant(1, some_ahead), *ahead & !all_but(HELD + 1)));
+            k.when(at_last, || released.set(zero));
         });
-        k.comment("What is held at an early end is a byte too.");
-        let no_byte = table_beat(&k, k.constant(8, 0), bits);
-        k.when(heard & image, || [code, second].iter().for_each(|held| held.set(no_byte)));
+        k.when(aborts, || {
+            delivered.set(k.constant(d, 0));
+            ahead.set(k.constant(1, some_ahead));
+            aborting.set(zero);
+        });
+        k.when(taken, || released.set(one));
+        k.when(drop, || aborting.set(waits | moves.mux(!at_last, delivered.any())));
+        k.when(complete & full, || lost.set(one));
+        k.when(io.good | io.bad, || within_frame.set(zero));
+        k.when(io.frame_begin, || {
+            within_frame.set(one);
+            deaf.set(!empty | *aborting);
+            lost.set(zero);
+            byte_index.set(k.constant(b, 0));
+        });
+        if let Some((_, within)) = &in_image {
+            let heard = k.wire("heard", io.frame_begin & empty & !*aborting);
+            k.when(heard, || {
+                within.set(io.image);
+                ahead.set(io.image | k.constant(1, some_ahead));
+            });
+            k.comment("What is held at an early end is a byte too.");
+            let no_byte = table_beat(k, k.constant(8, 0), bits);
+            k.when(heard & io.image, || [code, second].iter().for_each(|held| held.set(no_byte)));
+        }
     }
-    k.finish()
 }
 
 #[cfg(test)]
@@ -201,6 +179,7 @@ mod tests {
     use dermis_golden::fixed::stages::load;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -377,18 +356,8 @@ mod tests {
             [(5, 12, None), (2, 8, None), (7, 8, None), (4, 20, None), (2, 12, Some(20)), (7, 16, Some(9))]
         {
             let mut frames = Frames::new(taxels, bits, image);
-            let body = Body::new(
-                kernel(taxels, bits, image),
-                &[],
-                &[
-                    ("taken", 1),
-                    ("overrun", 1),
-                    ("code", bits + usize::from(image.is_some())),
-                    ("valid", 1),
-                    ("last", 1),
-                ],
-            );
-            check(body.kernel(), &stimulus(8000, &frames), &mut frames);
+            let block = FrameIngress { taxels, bits, image_bytes: image };
+            check(&kernel_of(&block), &stimulus(8000, &frames), &mut frames);
         }
     }
 }

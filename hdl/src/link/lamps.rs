@@ -1,32 +1,30 @@
 //! Status LEDs.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-
-/// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period after
-/// their event.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Lamps {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A packet is received or being answered.
-    pub activity: Signal<In, Bit>,
-    /// A packet was dropped in this cycle.
-    pub dropped: Signal<In, Bit>,
-    /// LED: blinks while the clock runs.
-    pub alive: Signal<Out, Bit>,
-    /// LED: lit by `activity`.
-    pub busy: Signal<Out, Bit>,
-    /// LED: lit by `dropped`.
-    pub error: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period after
+    /// their event.
+    pub struct Lamps {
+        /// `alive` has a period of 2^`bits` cycles.
+        bits: usize,
+    }
+    ports LampsPorts {
+        clock;
+        reset;
+        /// A packet is received or being answered.
+        in activity;
+        /// A packet was dropped in this cycle.
+        in dropped;
+        /// LED: blinks while the clock runs.
+        out alive;
+        /// LED: lit by `activity`.
+        out busy;
+        /// LED: lit by `dropped`.
+        out error;
+    }
 }
-
-kernel_block!(Lamps, clock clk, inputs [rst, activity, dropped], outputs [alive, busy, error]);
 
 /// The tick of the LED time is shorter than the period of `alive` by this power of two.
 const SHORTER: usize = 4;
@@ -34,40 +32,29 @@ const SHORTER: usize = 4;
 impl Lamps {
     /// For a clock of `clock_hz` Hz.
     pub fn new(clock_hz: u32) -> Self {
-        let block = Lamps {
-            clk: Default::default(),
-            rst: Default::default(),
-            activity: Default::default(),
-            dropped: Default::default(),
-            alive: Default::default(),
-            busy: Default::default(),
-            error: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel((clock_hz.ilog2() as usize).max(SHORTER + 2)))
+        Lamps { bits: (clock_hz.ilog2() as usize).max(SHORTER + 2) }
     }
 }
 
-/// With a period of 2^`bits` cycles.
-fn kernel(bits: usize) -> Kernel {
-    let k = Builder::new("lamps");
-    let (rst, activity, dropped) = (k.input("rst", 1), k.input("activity", 1), k.input("dropped", 1));
-    let count = k.state("count", Type::unsigned(bits), rst, 0);
-    count.set(count.plus(1));
-    k.wire("alive", count.top());
-    let tick = k.wire("tick", count.low(bits - SHORTER).all());
-    for (name, event) in [("busy", activity), ("error", dropped)] {
-        let left = k.state(&format!("{name}_left"), Type::unsigned(2), rst, 0);
-        k.when(tick, || left.set(left.slice(1, 1)));
-        k.when(event, || left.set(k.constant(2, 2)));
-        k.wire(name, left.any());
+impl Block for Lamps {
+    fn build<'k>(&self, k: &'k Builder, io: LampsPorts<Inside<'k>>) {
+        let count = k.state("count", Type::unsigned(self.bits), io.rst, 0);
+        count.set(count.plus(1));
+        io.alive.set(count.top());
+        let tick = k.wire("tick", count.low(self.bits - SHORTER).all());
+        for (name, led, event) in [("busy", io.busy, io.activity), ("error", io.error, io.dropped)] {
+            let left = k.state(&format!("{name}_left"), Type::unsigned(2), io.rst, 0);
+            k.when(tick, || left.set(left.slice(1, 1)));
+            k.when(event, || left.set(k.constant(2, 2)));
+            led.set(left.any());
+        }
     }
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -107,10 +94,6 @@ mod tests {
             bits.map(Word::from).to_vec()
         };
         let all: Vec<Vec<Word>> = (0..4000).map(cycle).collect();
-        check(
-            &Body::new(kernel(BITS), &[], &[("alive", 1), ("busy", 1), ("error", 1)]).kernel().clone(),
-            &all,
-            &mut Lit::default(),
-        );
+        check(&kernel_of(&Lamps { bits: BITS }), &all, &mut Lit::default());
     }
 }

@@ -1,60 +1,57 @@
 //! From the bytes of packets to requests: checks header, length and CRC.
 
 use dermis_golden::wire::link::{code_bytes, Header, Kind, OVERHEAD};
-use rust_hdl::prelude::*;
 
 use super::Shape;
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
-/// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
-///
-/// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header is complete
-/// and correct, then `payload` with each byte, in the same cycle.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Parser {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A byte of a packet; valid with `content_valid`.
-    pub content: Wire<In>,
-    /// `content` holds a byte.
-    pub content_valid: Signal<In, Bit>,
-    /// END was received: the packet is complete.
-    pub packet_end: Signal<In, Bit>,
-    /// A byte of the packet was lost.
-    pub spoiled: Signal<In, Bit>,
-    /// The packet's bytes so far end with their correct CRC.
-    pub crc_right: Signal<In, Bit>,
-    /// The header of a frame or image with the right length is complete.
-    pub frame_begin: Signal<Out, Bit>,
-    /// The packet is an image of tables; valid with `frame_begin`.
-    pub image: Signal<Out, Bit>,
-    /// `content` is a byte of the payload of a frame or image.
-    pub payload: Signal<Out, Bit>,
-    /// The packet is correct.
-    pub good: Signal<Out, Bit>,
-    /// The packet is dropped.
-    pub bad: Signal<Out, Bit>,
-    /// Cause, one bit each: framing, CRC, unknown type, length; valid with `bad`.
-    pub fault: Wire<Out>,
-    /// The packet's type; valid with `good`.
-    pub kind: Wire<Out>,
-    /// The packet's sequence number; valid with `good`.
-    pub number: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
+    /// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
+    ///
+    /// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header is complete
+    /// and correct, then `payload` with each byte, in the same cycle.
+    pub struct Parser {
+        /// Bytes of the payload of a frame.
+        frame_bytes: usize,
+        /// Types of the packets with a frame.
+        frame_kinds: Vec<u8>,
+        /// Bytes of an image of tables; none where they are in the bitstream.
+        image_bytes: Option<usize>,
+    }
+    ports ParserPorts {
+        clock;
+        reset;
+        /// A byte of a packet; valid with `content_valid`.
+        in content: 8;
+        /// `content` holds a byte.
+        in content_valid;
+        /// END was received: the packet is complete.
+        in packet_end;
+        /// A byte of the packet was lost.
+        in spoiled;
+        /// The packet's bytes so far end with their correct CRC.
+        in crc_right;
+        /// The header of a frame or image with the right length is complete.
+        out frame_begin;
+        /// The packet is an image of tables; valid with `frame_begin`.
+        out image;
+        /// `content` is a byte of the payload of a frame or image.
+        out payload;
+        /// The packet is correct.
+        out good;
+        /// The packet is dropped.
+        out bad;
+        /// Cause, one bit each: framing, CRC, unknown type, length; valid with `bad`.
+        out fault: 4;
+        /// The packet's type; valid with `good`.
+        out kind: 8;
+        /// The packet's sequence number; valid with `good`.
+        out number: 8;
+    }
 }
-
-kernel_block!(
-    Parser,
-    clock clk,
-    inputs [rst, content, content_valid, packet_end, spoiled, crc_right],
-    outputs [frame_begin, image, payload, good, bad, fault, kind, number]
-);
 
 const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
 /// Bits of `fault`.
@@ -66,26 +63,11 @@ const LENGTH: u64 = 8;
 impl Parser {
     /// For the frames and images of `shape`, whose payloads have at most 65535 bytes.
     pub fn new(shape: &Shape) -> Self {
-        let block = Parser {
-            clk: Default::default(),
-            rst: Default::default(),
-            content: Wire::new(8),
-            content_valid: Default::default(),
-            packet_end: Default::default(),
-            spoiled: Default::default(),
-            crc_right: Default::default(),
-            frame_begin: Default::default(),
-            image: Default::default(),
-            payload: Default::default(),
-            good: Default::default(),
-            bad: Default::default(),
-            fault: Wire::new(4),
-            kind: Wire::new(8),
-            number: Wire::new(8),
-            kernel: Body::default(),
-        };
-        let frame_kinds: Vec<u8> = shape.answers.requests().iter().map(|kind| *kind as u8).collect();
-        block.bind(kernel(shape.codes() * code_bytes(shape.input_bits), &frame_kinds, shape.image_bytes))
+        Parser {
+            frame_bytes: shape.codes() * code_bytes(shape.input_bits),
+            frame_kinds: shape.answers.requests().iter().map(|kind| *kind as u8).collect(),
+            image_bytes: shape.image_bytes,
+        }
     }
 }
 
@@ -126,70 +108,68 @@ fn any<'k>(none: Expr<'k>, conditions: impl Iterator<Item = Expr<'k>>) -> Expr<'
     conditions.reduce(|a, b| a | b).unwrap_or(none)
 }
 
-/// For frames of `frame_bytes` bytes of payload in packets of the types `frame_kinds`, and images of `image_bytes`.
-fn kernel(frame_bytes: usize, frame_kinds: &[u8], image_bytes: Option<usize>) -> Kernel {
-    let k = Builder::new("parser");
-    let (rst, content, content_valid) = (k.input("rst", 1), k.input("content", 8), k.input("content_valid", 1));
-    let (packet_end, spoiled, crc_right) = (k.input("packet_end", 1), k.input("spoiled", 1), k.input("crc_right", 1));
-    // The count stops at one more byte than the longest packet has.
-    let most = frame_bytes.max(image_bytes.unwrap_or_default()) + OVERHEAD + 1;
-    let (bit, byte, c) = (Type::unsigned(1), Type::unsigned(8), count_bits(most + 1));
-    let clears = k.wire("clears", rst | packet_end);
-    let count = k.state("count", Type::unsigned(c), clears, 0);
-    let [lost, streaming] = ["lost", "streaming"].map(|name| k.state(name, bit, clears, 0));
-    let good = k.state("good", bit, rst, 0);
-    let fault = k.state("fault", Type::unsigned(4), rst, 0);
-    let [kind, number] = ["kind", "number"].map(|name| k.register(name, byte));
+impl Block for Parser {
+    fn build<'k>(&self, k: &'k Builder, io: ParserPorts<Inside<'k>>) {
+        // The count stops at one more byte than the longest packet has.
+        let most = self.frame_bytes.max(self.image_bytes.unwrap_or_default()) + OVERHEAD + 1;
+        let (bit, c) = (Type::unsigned(1), count_bits(most + 1));
+        let clears = k.wire("clears", io.rst | io.packet_end);
+        let count = k.state("count", Type::unsigned(c), clears, 0);
+        let [lost, streaming] = ["lost", "streaming"].map(|name| k.state(name, bit, clears, 0));
+        let good = io.good.state(io.rst, 0);
+        let fault = io.fault.state(io.rst, 0);
+        let (kind, number) = (io.kind.register(), io.number.register());
 
-    let at = |index: usize| count.is(index as u64);
-    let never = k.constant(1, 0);
-    let payload = |name: &str, kinds: &[u8], bytes: usize| {
-        let is = any(never, kinds.iter().map(|&of| kind.is(of.into())));
-        let right = k.register(&format!("{name}_length"), bit);
-        Payload {
-            is: k.wire(name, is),
-            bytes,
-            right: right.comment("The length bytes so far are right for such a packet."),
-        }
-    };
-    let of_image = image_bytes.map(|bytes| payload("tables", &[Kind::Tables as u8], bytes));
-    k.wire("image", of_image.as_ref().map_or(never, |of| of.is));
-    let payloads = [payload("frame", frame_kinds, frame_bytes), payload("plain", &PLAIN_KINDS, 0)];
-    let payloads: Vec<Payload<'_>> = payloads.into_iter().chain(of_image).collect();
-    let too_short = count.less(k.constant(c, OVERHEAD as u64));
-    let wrong_crc = k.wire("wrong_crc", too_short | !crc_right);
-    let all = || payloads.iter();
-    // Those of which the bytes are passed on.
-    let passed = || all().filter(|of| of.bytes > 0);
-    let right_length = any(never, all().map(|of| of.is_right(*count)));
-    let wrong_length = k.wire("wrong_length", !right_length);
-    let empty = k.wire("empty", at(0) & !*lost);
-    let known = any(never, all().map(|of| of.is));
-    let cause = |cause: u64| k.constant(4, cause);
-    let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
-    let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
-    fault.set((packet_end & !empty).mux(found, cause(0)));
-    good.set(packet_end & !empty & !*lost & !wrong_crc & !wrong_length);
-    k.wire("bad", fault.any());
+        let at = |index: usize| count.is(index as u64);
+        let never = k.constant(1, 0);
+        let payload = |name: &str, kinds: &[u8], bytes: usize| {
+            let is = any(never, kinds.iter().map(|&of| kind.is(of.into())));
+            let right = k.register(&format!("{name}_length"), bit);
+            Payload {
+                is: k.wire(name, is),
+                bytes,
+                right: right.comment("The length bytes so far are right for such a packet."),
+            }
+        };
+        let of_image = self.image_bytes.map(|bytes| payload("tables", &[Kind::Tables as u8], bytes));
+        io.image.set(of_image.as_ref().map_or(never, |of| of.is));
+        let payloads = [payload("frame", &self.frame_kinds, self.frame_bytes), payload("plain", &PLAIN_KINDS, 0)];
+        let payloads: Vec<Payload<'_>> = payloads.into_iter().chain(of_image).collect();
+        let too_short = count.less(k.constant(c, OVERHEAD as u64));
+        let wrong_crc = k.wire("wrong_crc", too_short | !io.crc_right);
+        let all = || payloads.iter();
+        // Those of which the bytes are passed on.
+        let passed = || all().filter(|of| of.bytes > 0);
+        let right_length = any(never, all().map(|of| of.is_right(*count)));
+        let wrong_length = k.wire("wrong_length", !right_length);
+        let empty = k.wire("empty", at(0) & !*lost);
+        let known = any(never, all().map(|of| of.is));
+        let cause = |cause: u64| k.constant(4, cause);
+        let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
+        let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
+        fault.set((io.packet_end & !empty).mux(found, cause(0)));
+        good.set(io.packet_end & !empty & !*lost & !wrong_crc & !wrong_length);
+        io.bad.set(fault.any());
 
-    let begins = any(never, passed().map(|of| of.is & of.ends_header(content)));
-    let ends = any(never, passed().map(|of| of.ends(*count)));
-    let frame_begin = k.wire("frame_begin", content_valid & at(Header::BYTES - 1) & begins);
-    k.wire("payload", content_valid & *streaming);
-    k.when(spoiled, || lost.set(k.constant(1, 1)));
-    k.when(content_valid & !at(most), || count.set(count.plus(1)));
-    k.when(content_valid & ends, || streaming.set(never));
-    k.when(frame_begin, || streaming.set(k.constant(1, 1)));
-    let takes = k.wire("takes", content_valid & !clears);
-    k.when(takes & at(0), || kind.set(content));
-    k.when(takes & at(1), || number.set(content));
-    k.when(takes & (at(2) | at(3)), || all().for_each(|of| of.take(content, count.at(0))));
-    k.finish()
+        let begins = any(never, passed().map(|of| of.is & of.ends_header(io.content)));
+        let ends = any(never, passed().map(|of| of.ends(*count)));
+        let frame_begin = io.frame_begin.set(io.content_valid & at(Header::BYTES - 1) & begins);
+        io.payload.set(io.content_valid & *streaming);
+        k.when(io.spoiled, || lost.set(k.constant(1, 1)));
+        k.when(io.content_valid & !at(most), || count.set(count.plus(1)));
+        k.when(io.content_valid & ends, || streaming.set(never));
+        k.when(frame_begin, || streaming.set(k.constant(1, 1)));
+        let takes = k.wire("takes", io.content_valid & !clears);
+        k.when(takes & at(0), || kind.set(io.content));
+        k.when(takes & at(1), || number.set(io.content));
+        k.when(takes & (at(2) | at(3)), || all().for_each(|of| of.take(io.content, count.at(0))));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
@@ -341,23 +321,10 @@ mod tests {
         for (frame_bytes, image_bytes) in [(6, None), (300, None), (6, Some(14)), (300, Some(270)), (0, Some(20))] {
             let mut packet = Packet::of(frame_bytes, image_bytes);
             let all = stimulus(if frame_bytes > 100 { 80 } else { 800 }, &packet);
-            let block = Body::new(
-                kernel(frame_bytes, &FRAMES, image_bytes),
-                &[],
-                &[
-                    ("frame_begin", 1),
-                    ("image", 1),
-                    ("payload", 1),
-                    ("good", 1),
-                    ("bad", 1),
-                    ("fault", 4),
-                    ("kind", 8),
-                    ("number", 8),
-                ],
-            );
-            check(block.kernel(), &all, &mut packet);
+            let kernel = kernel_of(&Parser { frame_bytes, frame_kinds: FRAMES.to_vec(), image_bytes });
+            check(&kernel, &all, &mut packet);
             let faults: Vec<u64> =
-                Subject::from(block.kernel()).simulated(&all).iter().map(|outputs| outputs[1].number()).collect();
+                Subject::from(&kernel).simulated(&all).iter().map(|outputs| outputs[1].number()).collect();
             assert!([FRAMING, CRC, UNKNOWN, LENGTH].iter().all(|fault| faults.contains(fault)));
         }
     }

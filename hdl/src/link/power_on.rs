@@ -1,59 +1,45 @@
 //! Reset after configuration and from a button.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-
-/// `rst` is high for seventeen cycles after configuration, and while the button is held. Relies on the register values
-/// after configuration.
-#[derive(dermis_hdl_derive::Block)]
-pub struct PowerOn {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// The button, high when held; asynchronous to the clock.
-    pub button: Signal<In, Bit>,
-    /// Reset, active high, registered.
-    pub rst: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// `rst` is high for seventeen cycles after configuration, and while the button is held. Relies on the register values
+    /// after configuration.
+    #[derive(Default)]
+    pub struct PowerOn {}
+    ports PowerOnPorts {
+        clock;
+        /// The button, high when held; asynchronous to the clock.
+        in button;
+        /// Reset, active high, registered.
+        out rst;
+    }
 }
-
-kernel_block!(PowerOn, clock clk, inputs [button], outputs [rst]);
 
 /// Last value of the count; reset ends three cycles later.
 const LAST: u64 = 15;
 
-impl Default for PowerOn {
-    fn default() -> Self {
-        let block = PowerOn {
-            clk: Default::default(),
-            button: Default::default(),
-            rst: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
+impl Block for PowerOn {
+    fn build<'k>(&self, k: &'k Builder, io: PowerOnPorts<Inside<'k>>) {
+        let register = |name, bits, value| k.register(name, Type::unsigned(bits)).initially(value);
+        let (held, count) = (register("held", 2, 0), register("count", 4, 0));
+        let rst = io.rst.register().initially(1);
+        let counting = register("counting", 1, 1)
+            .comment("Registered once more: `rst` has long routes, the count is placed near the button.");
+        let counts = !count.is(LAST);
+        counting.set(counts);
+        rst.set(*counting);
+        held.set(held.low(1).concat(io.button));
+        k.when(counts, || count.set(count.plus(1)));
+        k.when(held.at(1), || count.set(k.constant(4, 0)));
     }
-}
-
-fn kernel() -> Kernel {
-    let k = Builder::new("power_on");
-    let button = k.input("button", 1);
-    let register = |name, bits, value| k.register(name, Type::unsigned(bits)).initially(value);
-    let (held, count, rst) = (register("held", 2, 0), register("count", 4, 0), register("rst", 1, 1));
-    let counting = register("counting", 1, 1)
-        .comment("Registered once more: `rst` has long routes, the count is placed near the button.");
-    let counts = !count.is(LAST);
-    counting.set(counts);
-    rst.set(*counting);
-    held.set(held.low(1).concat(button));
-    k.when(counts, || count.set(count.plus(1)));
-    k.when(held.at(1), || count.set(k.constant(4, 0)));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -89,6 +75,6 @@ mod tests {
             (0..pause).map(|cycle| vec![Word::from(cycle == 39)]).collect::<Vec<_>>()
         };
         let all: Vec<Vec<Word>> = (0..40).flat_map(pulse).collect();
-        check(PowerOn::default().kernel.kernel(), &all, &mut Since::default());
+        check(&kernel_of(&PowerOn::default()), &all, &mut Since::default());
     }
 }

@@ -1,140 +1,116 @@
 //! Queue of the requests that the board has accepted and not answered yet.
 
 use dermis_golden::wire::link::Kind;
-use rust_hdl::prelude::*;
 
 use super::{Shape, COUNTERS, FORCES, IDENTITY, RESULTANTS};
-use crate::kernel_block;
-use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
-/// the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one that comes
-/// before such a reading is answered has no answer of its own.
-///
-/// `offer` is high when a request can be answered, with the number of the request and the source of the
-/// answer; `begun` removes it.
-///
-/// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
-/// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a payload, and
-/// the request is dropped while the queue is full.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Requests {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A correct packet has been received; high for one cycle.
-    pub good: Signal<In, Bit>,
-    /// Its type; valid with `good`.
-    pub kind: Wire<In>,
-    /// Its sequence number; valid with `good`.
-    pub number: Wire<In>,
-    /// It is a frame or an image, and the engine gets it; with `good`.
-    pub taken: Signal<In, Bit>,
-    /// A request without payload is accepted; with `good`.
-    pub noted: Signal<Out, Bit>,
-    /// A request without payload is dropped, because one of its type is not answered yet, or the queue is full; with `good`.
-    pub overrun: Signal<Out, Bit>,
-    /// The engine offers a beat of an answer.
-    pub answered: Signal<In, Bit>,
-    /// An answer can start.
-    pub offer: Signal<Out, Bit>,
-    /// The offered answer starts in this cycle.
-    pub begun: Signal<In, Bit>,
-    /// Sequence number of its request; valid with `offer`.
-    pub answer_number: Wire<Out>,
-    /// Source of its payload, 2 bits; valid with `offer`.
-    pub source: Wire<Out>,
-    /// Requests for frames are not answered yet.
-    pub waiting: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
+    /// the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one that comes
+    /// before such a reading is answered has no answer of its own.
+    ///
+    /// `offer` is high when a request can be answered, with the number of the request and the source of the
+    /// answer; `begun` removes it.
+    ///
+    /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
+    /// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a payload, and
+    /// the request is dropped while the queue is full.
+    pub struct Requests {
+        /// Frames in the queue, a power of two.
+        depth: usize,
+        /// There are images of tables.
+        images: bool,
+        /// Types of the requests for frames that the hardware scans.
+        scanned: &'static [Kind],
+    }
+    ports RequestsPorts {
+        clock;
+        reset;
+        /// A correct packet has been received; high for one cycle.
+        in good;
+        /// Its type; valid with `good`.
+        in kind: 8;
+        /// Its sequence number; valid with `good`.
+        in number: 8;
+        /// It is a frame or an image, and the engine gets it; with `good`.
+        in taken;
+        /// A request without payload is accepted; with `good`.
+        out noted;
+        /// A request without payload is dropped, because one of its type is not answered yet, or the queue is full; with `good`.
+        out overrun;
+        /// The engine offers a beat of an answer.
+        in answered;
+        /// An answer can start.
+        out offer;
+        /// The offered answer starts in this cycle.
+        in begun;
+        /// Sequence number of its request; valid with `offer`.
+        out answer_number: 8;
+        /// Source of its payload, 2 bits; valid with `offer`.
+        out source: 2;
+        /// Requests for frames are not answered yet.
+        out waiting;
+    }
 }
-
-kernel_block!(
-    Requests,
-    clock clk,
-    inputs [rst, good, kind, number, taken, answered, begun],
-    outputs [noted, overrun, offer, answer_number, source, waiting]
-);
 
 impl Requests {
     /// For the requests of `shape`.
     pub fn new(shape: &Shape) -> Self {
-        let block = Requests {
-            clk: Default::default(),
-            rst: Default::default(),
-            good: Default::default(),
-            kind: Wire::new(8),
-            number: Wire::new(8),
-            taken: Default::default(),
-            noted: Default::default(),
-            overrun: Default::default(),
-            answered: Default::default(),
-            offer: Default::default(),
-            begun: Default::default(),
-            answer_number: Wire::new(8),
-            source: Wire::new(2),
-            waiting: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(shape.frames, shape.image_bytes.is_some(), shape.scanned()))
+        Requests { depth: shape.frames, images: shape.image_bytes.is_some(), scanned: shape.scanned() }
     }
 }
 
-/// With a queue of `depth` frames, a power of two, `images` of tables, and requests of the types `scanned` for frames that the
-/// hardware scans.
-fn kernel(depth: usize, images: bool, scanned: &[Kind]) -> Kernel {
-    let k = Builder::new("requests");
-    let (rst, good, kind) = (k.input("rst", 1), k.input("good", 1), k.input("kind", 8));
-    let (number, taken) = (k.input("number", 8), k.input("taken", 1));
-    let (answered, begun) = (k.input("answered", 1), k.input("begun", 1));
-    let (bit, byte, at) = (Type::unsigned(1), Type::unsigned(8), count_bits(depth));
-    let numbers = ["identity_number", "counters_number"].map(|name| k.register(name, byte));
-    let [identity, counters] = ["identity", "counters"].map(|name| k.state(name, bit, rst, 0));
-    let frames = k.memory("frames", depth, 9, Contents::Undefined);
-    let [head, tail] = ["head", "tail"].map(|name| k.state(name, Type::unsigned(at), rst, 0));
-    let fill = k.state("fill", Type::unsigned(at + 1), rst, 0);
+impl Block for Requests {
+    fn build<'k>(&self, k: &'k Builder, io: RequestsPorts<Inside<'k>>) {
+        let Requests { depth, images, scanned } = *self;
+        let (bit, byte, at) = (Type::unsigned(1), Type::unsigned(8), count_bits(depth));
+        let numbers = ["identity_number", "counters_number"].map(|name| k.register(name, byte));
+        let [identity, counters] = ["identity", "counters"].map(|name| k.state(name, bit, io.rst, 0));
+        let frames = k.memory("frames", depth, 9, Contents::Undefined);
+        let [head, tail] = ["head", "tail"].map(|name| k.state(name, Type::unsigned(at), io.rst, 0));
+        let fill = k.state("fill", Type::unsigned(at + 1), io.rst, 0);
 
-    let asks = |name, of: Kind| k.wire(name, good & kind.is(of as u64));
-    let is_scanned = scanned.iter().map(|of| kind.is(*of as u64)).reduce(|a, b| a | b);
-    let scan = is_scanned.map(|is| {
-        let asks = k.wire("asks_scan", good & is);
-        (asks, k.wire("room", !fill.is(depth as u64)))
-    });
-    let asked = [asks("asks_identity", Kind::Identify), asks("asks_counters", Kind::ReadCounters)];
-    let pending = [*identity, *counters];
-    let image = images.then(|| k.wire("image", taken & kind.is(Kind::Tables as u64)));
-    let queued = match (&scan, image) {
-        (Some((asks, room)), _) => k.wire("queued", *asks & *room),
-        (None, Some(image)) => k.wire("queued", taken & !image),
-        (None, None) => taken,
-    };
-    let to_answer = [asked[0], image.map_or(asked[1], |image| k.wire("asked_counters", asked[1] | image))];
-    let frame = k.wire("frame", frames.read(*head));
-    let waiting = k.wire("waiting", fill.any());
-    let noted = (asked[0] & !pending[0]) | (asked[1] & !pending[1]);
-    let overrun = (asked[0] & pending[0]) | (asked[1] & pending[1]);
-    k.wire("noted", scan.as_ref().map_or(noted, |(asks, room)| noted | (*asks & *room)));
-    k.wire("overrun", scan.as_ref().map_or(overrun, |(asks, room)| overrun | (*asks & !*room)));
-    k.wire("offer", *identity | *counters | (waiting & answered));
-    let from = |source: usize| k.constant(2, source as u64);
-    let of_frame = (waiting & frame.top()).mux(from(FORCES), from(RESULTANTS));
-    k.wire("source", identity.mux(from(IDENTITY), counters.mux(from(COUNTERS), of_frame)));
-    k.wire("answer_number", identity.mux(*numbers[0], counters.mux(*numbers[1], frame.low(8))));
+        let asks = |name, of: Kind| k.wire(name, io.good & io.kind.is(of as u64));
+        let is_scanned = scanned.iter().map(|of| io.kind.is(*of as u64)).reduce(|a, b| a | b);
+        let scan = is_scanned.map(|is| {
+            let asks = k.wire("asks_scan", io.good & is);
+            (asks, k.wire("room", !fill.is(depth as u64)))
+        });
+        let asked = [asks("asks_identity", Kind::Identify), asks("asks_counters", Kind::ReadCounters)];
+        let pending = [*identity, *counters];
+        let image = images.then(|| k.wire("image", io.taken & io.kind.is(Kind::Tables as u64)));
+        let queued = match (&scan, image) {
+            (Some((asks, room)), _) => k.wire("queued", *asks & *room),
+            (None, Some(image)) => k.wire("queued", io.taken & !image),
+            (None, None) => io.taken,
+        };
+        let to_answer = [asked[0], image.map_or(asked[1], |image| k.wire("asked_counters", asked[1] | image))];
+        let frame = k.wire("frame", frames.read(*head));
+        let waiting = io.waiting.set(fill.any());
+        let noted = (asked[0] & !pending[0]) | (asked[1] & !pending[1]);
+        let overrun = (asked[0] & pending[0]) | (asked[1] & pending[1]);
+        io.noted.set(scan.as_ref().map_or(noted, |(asks, room)| noted | (*asks & *room)));
+        io.overrun.set(scan.as_ref().map_or(overrun, |(asks, room)| overrun | (*asks & !*room)));
+        io.offer.set(*identity | *counters | (waiting & io.answered));
+        let from = |source: usize| k.constant(2, source as u64);
+        let of_frame = (waiting & frame.top()).mux(from(FORCES), from(RESULTANTS));
+        io.source.set(identity.mux(from(IDENTITY), counters.mux(from(COUNTERS), of_frame)));
+        io.answer_number.set(identity.mux(*numbers[0], counters.mux(*numbers[1], frame.low(8))));
 
-    for ((kept, asked), pending) in numbers.iter().zip(to_answer).zip(pending) {
-        k.when(asked & !pending, || kept.set(number));
+        for ((kept, asked), pending) in numbers.iter().zip(to_answer).zip(pending) {
+            k.when(asked & !pending, || kept.set(io.number));
+        }
+        frames.write(queued, *tail, io.kind.is(Kind::FrameForForces as u64).concat(io.number));
+        identity.set(identity.mux(!io.begun, to_answer[0]));
+        counters.set(counters.mux(!io.begun | *identity, to_answer[1]));
+        let pop = k.wire("pop", io.begun & !*identity & !*counters);
+        k.when(pop, || head.set(head.plus(1)));
+        k.when(queued, || tail.set(tail.plus(1)));
+        k.when(queued.differs(pop), || fill.set(queued.mux(fill.plus(1), fill.minus(1))));
     }
-    frames.write(queued, *tail, kind.is(Kind::FrameForForces as u64).concat(number));
-    identity.set(identity.mux(!begun, to_answer[0]));
-    counters.set(counters.mux(!begun | *identity, to_answer[1]));
-    let pop = k.wire("pop", begun & !*identity & !*counters);
-    k.when(pop, || head.set(head.plus(1)));
-    k.when(queued, || tail.set(tail.plus(1)));
-    k.when(queued.differs(pop), || fill.set(queued.mux(fill.plus(1), fill.minus(1))));
-    k.finish()
 }
 
 #[cfg(test)]
@@ -142,6 +118,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -259,10 +236,8 @@ mod tests {
     fn requests_are_answered_in_order() {
         for (images, scans) in [(false, false), (true, false), (true, true)] {
             let mut lists = Lists { images, scans, ..Lists::default() };
-            let outputs =
-                [("noted", 1), ("overrun", 1), ("offer", 1), ("answer_number", 8), ("source", 2), ("waiting", 1)];
-            let block = Body::new(kernel(DEPTH, images, if scans { &FRAMES } else { &[] }), &[], &outputs);
-            check(block.kernel(), &stimulus(8000, images, scans), &mut lists);
+            let block = Requests { depth: DEPTH, images, scanned: if scans { &FRAMES } else { &[] } };
+            check(&kernel_of(&block), &stimulus(8000, images, scans), &mut lists);
         }
     }
 }

@@ -1,53 +1,45 @@
 //! From the engine's beats to the words of an answer: all beats, or sums and status.
 
-use rust_hdl::prelude::*;
-
 use super::{Answers, Shape};
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With
-/// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is needed: for
-/// Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times,
-/// once per cycle; likewise for rows.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Resultants {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// An answer to a frame is being sent.
-    pub run: Signal<In, Bit>,
-    /// The word is accepted in this cycle.
-    pub taken: Signal<In, Bit>,
-    /// The answer consists of sums and status; constant during an answer.
-    pub summarise: Signal<In, Bit>,
-    /// A beat of the engine, 96 bits; valid with `beat_valid`.
-    pub beat: Wire<In>,
-    /// `beat` is offered; held until `beat_ready`.
-    pub beat_valid: Signal<In, Bit>,
-    /// The beat is its frame's last; valid with `beat_valid`.
-    pub beat_last: Signal<In, Bit>,
-    /// The beat is accepted in this cycle. Registered where sums are computed, so that the packer's logic is not in the
-    /// path of a fast engine: a beat that is a word then stays for two cycles after its word was accepted.
-    pub beat_ready: Signal<Out, Bit>,
-    /// A word of the payload, 96 bits; valid with `word_valid`.
-    pub word: Wire<Out>,
-    /// `word` is offered; held until `taken`.
-    pub word_valid: Signal<Out, Bit>,
-    /// The word is the payload's last; valid with `word_valid`.
-    pub word_last: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With
+    /// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is needed: for
+    /// Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times,
+    /// once per cycle; likewise for rows.
+    pub struct Resultants {
+        /// Rows and columns of the array whose forces are added up; none where all beats pass.
+        sides: Option<[usize; 2]>,
+    }
+    ports ResultantsPorts {
+        clock;
+        reset;
+        /// An answer to a frame is being sent.
+        in run;
+        /// The word is accepted in this cycle.
+        in taken;
+        /// The answer consists of sums and status; constant during an answer.
+        in summarise;
+        /// A beat of the engine, 96 bits; valid with `beat_valid`.
+        in beat: 96;
+        /// `beat` is offered; held until `beat_ready`.
+        in beat_valid;
+        /// The beat is its frame's last; valid with `beat_valid`.
+        in beat_last;
+        /// The beat is accepted in this cycle. Registered where sums are computed, so that the packer's logic is not in the
+        /// path of a fast engine: a beat that is a word then stays for two cycles after its word was accepted.
+        out beat_ready;
+        /// A word of the payload, 96 bits; valid with `word_valid`.
+        out word: 96;
+        /// `word` is offered; held until `taken`.
+        out word_valid;
+        /// The word is the payload's last; valid with `word_valid`.
+        out word_last;
+    }
 }
-
-kernel_block!(
-    Resultants,
-    clock clk,
-    inputs [rst, run, taken, summarise, beat, beat_valid, beat_last],
-    outputs [beat_ready, word, word_valid, word_last]
-);
 
 const ADD: u64 = 0;
 const FINISH: u64 = 1;
@@ -59,63 +51,30 @@ const LAST_WORD: u64 = 3;
 impl Resultants {
     /// For the array of `shape`.
     pub fn new(shape: &Shape) -> Self {
-        let block = Resultants {
-            clk: Default::default(),
-            rst: Default::default(),
-            run: Default::default(),
-            taken: Default::default(),
-            summarise: Default::default(),
-            beat: Wire::new(96),
-            beat_valid: Default::default(),
-            beat_last: Default::default(),
-            beat_ready: Default::default(),
-            word: Wire::new(96),
-            word_valid: Default::default(),
-            word_last: Default::default(),
-            kernel: Body::default(),
-        };
-        let k = Builder::new("resultants");
-        let ports = Ports::new(&k);
-        match shape.answers {
-            Answers::Both => sums(&k, ports, shape.rows, shape.cols),
-            Answers::Forces | Answers::Records => pass(&k, ports),
-        }
-        block.bind(k.finish())
+        Resultants { sides: (shape.answers == Answers::Both).then_some([shape.rows, shape.cols]) }
     }
 }
 
-/// The block's inputs.
-#[derive(Clone, Copy)]
-struct Ports<'k> {
-    rst: Expr<'k>,
-    run: Expr<'k>,
-    taken: Expr<'k>,
-    summarise: Expr<'k>,
-    beat: Expr<'k>,
-    beat_valid: Expr<'k>,
-    beat_last: Expr<'k>,
-}
-
-impl<'k> Ports<'k> {
-    fn new(k: &'k Builder) -> Self {
-        let [rst, run, taken, summarise] = ["rst", "run", "taken", "summarise"].map(|name| k.input(name, 1));
-        let beat = k.input("beat", 96);
-        let [beat_valid, beat_last] = ["beat_valid", "beat_last"].map(|name| k.input(name, 1));
-        Ports { rst, run, taken, summarise, beat, beat_valid, beat_last }
+impl Block for Resultants {
+    fn build<'k>(&self, k: &'k Builder, io: ResultantsPorts<Inside<'k>>) {
+        match self.sides {
+            Some(sides) => sums(k, io, sides),
+            None => pass(io),
+        }
     }
 }
 
 /// Beats pass as words.
-fn pass<'k>(k: &'k Builder, ports: Ports<'k>) {
-    k.wire("beat_ready", ports.run & ports.taken);
-    k.wire("word", ports.beat);
-    k.wire("word_valid", ports.run & ports.beat_valid);
-    k.wire("word_last", ports.beat_last);
+fn pass(io: ResultantsPorts<Inside>) {
+    io.beat_ready.set(io.run & io.taken);
+    io.word.set(io.beat);
+    io.word_valid.set(io.run & io.beat_valid);
+    io.word_last.set(io.beat_last);
 }
 
 /// Beats pass as words, or are added up.
-fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
-    let Ports { rst, run, taken, summarise, beat, beat_valid, beat_last } = ports;
+fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, [rows, cols]: [usize; 2]) {
+    let ResultantsPorts { rst, run, taken, summarise, beat, beat_valid, beat_last, .. } = io;
     // Every intermediate sum is at most the largest force word times taxels times the longer side.
     let bits = 32 + count_bits(rows * cols + 1) + count_bits(rows.max(cols));
     let (r, c, m, l) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)), count_bits(rows * cols + 1));
@@ -201,10 +160,10 @@ fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
     let all = k.wire("all", loaded.extend(64).concat(concat(&words)));
     let [low, second, third, high] = [0, 1, 2, 3].map(|word| all.slice(96 * word, 96));
     let of_sums = out.at(1).mux(out.at(0).mux(high, third), out.at(0).mux(second, low));
-    k.wire("beat_ready", *adding | *passing);
-    k.wire("word", passes.mux(beat, of_sums));
-    k.wire("word_valid", run & passes.mux(beat_valid & !*passing, sends));
-    k.wire("word_last", passes & beat_last);
+    io.beat_ready.set(*adding | *passing);
+    io.word.set(passes.mux(beat, of_sums));
+    io.word_valid.set(run & passes.mux(beat_valid & !*passing, sends));
+    io.word_last.set(passes & beat_last);
 }
 
 #[cfg(test)]
@@ -212,6 +171,7 @@ mod tests {
     use dermis_golden::wire::link::Sums;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -346,7 +306,7 @@ mod tests {
                 scans: false,
             };
             let mut answers = Expected { rows, cols, ..Expected::default() };
-            check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);
+            check(&kernel_of(&Resultants::new(&shape)), &stimulus(12_000, rows, cols), &mut answers);
         }
     }
 }

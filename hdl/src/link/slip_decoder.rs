@@ -1,86 +1,56 @@
 //! SLIP decoder: from the bytes of the link to the bytes of packets.
 
 use dermis_golden::wire::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
 /// The byte after an escape is decoded from its last two bits; `spoiled` reports bytes that must not follow an escape.
 const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 2..=3]));
 
-/// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the next
-/// END.
-#[derive(dermis_hdl_derive::Block)]
-pub struct SlipDecoder {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A received byte; valid with `valid`.
-    pub data: Wire<In>,
-    /// A byte was received in this cycle.
-    pub valid: Signal<In, Bit>,
-    /// A byte was received with an error in this cycle.
-    pub broken: Signal<In, Bit>,
-    /// A byte of a packet; valid with `content_valid`.
-    pub content: Wire<Out>,
-    /// `content` holds a byte.
-    pub content_valid: Signal<Out, Bit>,
-    /// END was received: the packet is complete; high for one cycle.
-    pub packet_end: Signal<Out, Bit>,
-    /// A byte of the packet was lost; high for one cycle.
-    pub spoiled: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(
-    SlipDecoder,
-    clock clk,
-    inputs [rst, data, valid, broken],
-    outputs [content, content_valid, packet_end, spoiled]
-);
-
-impl Default for SlipDecoder {
-    fn default() -> Self {
-        let block = SlipDecoder {
-            clk: Default::default(),
-            rst: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            broken: Default::default(),
-            content: Wire::new(8),
-            content_valid: Default::default(),
-            packet_end: Default::default(),
-            spoiled: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
+block! {
+    /// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the next
+    /// END.
+    #[derive(Default)]
+    pub struct SlipDecoder {}
+    ports SlipDecoderPorts {
+        clock;
+        reset;
+        /// A received byte; valid with `valid`.
+        in data: 8;
+        /// A byte was received in this cycle.
+        in valid;
+        /// A byte was received with an error in this cycle.
+        in broken;
+        /// A byte of a packet; valid with `content_valid`.
+        out content: 8;
+        /// `content` holds a byte.
+        out content_valid;
+        /// END was received: the packet is complete; high for one cycle.
+        out packet_end;
+        /// A byte of the packet was lost; high for one cycle.
+        out spoiled;
     }
 }
 
-fn kernel() -> Kernel {
-    let k = Builder::new("slip_decoder");
-    let (rst, data) = (k.input("rst", 1), k.input("data", 8));
-    let (valid, broken) = (k.input("valid", 1), k.input("broken", 1));
-    let bit = Type::unsigned(1);
-    let escaped = k.state("escaped", bit, rst, 0);
-    let content = k.register("content", Type::unsigned(8));
-    let [content_valid, packet_end, spoiled] =
-        ["content_valid", "packet_end", "spoiled"].map(|name| k.state(name, bit, rst, 0));
-    let byte = |byte: u8| k.constant(8, byte.into());
-    let is = |byte: u8| data.is(byte.into());
-    let (is_end, is_escape, is_idle) =
-        (k.wire("is_end", is(END)), k.wire("is_escape", is(ESC)), k.wire("is_idle", is(IDLE)));
-    let stands = k.wire("stands", is(ESC_END) | is(ESC_ESC) | is(ESC_IDLE));
-    let special = data.at(1).mux(byte(IDLE), data.at(0).mux(byte(ESC), byte(END)));
-    content.set((!*escaped).mux(data, special));
-    content_valid.set(valid & !is_end & !is_idle & escaped.mux(stands, !is_escape));
-    packet_end.set(valid & is_end);
-    spoiled.set(broken | (valid & *escaped & !stands & !is_end & !is_idle));
-    k.when(valid & !is_idle, || escaped.set(is_escape & !*escaped));
-    k.finish()
+impl Block for SlipDecoder {
+    fn build<'k>(&self, k: &'k Builder, io: SlipDecoderPorts<Inside<'k>>) {
+        let escaped = k.state("escaped", Type::unsigned(1), io.rst, 0);
+        let content = io.content.register();
+        let [content_valid, packet_end, spoiled] =
+            [io.content_valid, io.packet_end, io.spoiled].map(|output| output.state(io.rst, 0));
+        let byte = |byte: u8| k.constant(8, byte.into());
+        let is = |byte: u8| io.data.is(byte.into());
+        let (is_end, is_escape, is_idle) =
+            (k.wire("is_end", is(END)), k.wire("is_escape", is(ESC)), k.wire("is_idle", is(IDLE)));
+        let stands = k.wire("stands", is(ESC_END) | is(ESC_ESC) | is(ESC_IDLE));
+        let special = io.data.at(1).mux(byte(IDLE), io.data.at(0).mux(byte(ESC), byte(END)));
+        content.set((!*escaped).mux(io.data, special));
+        content_valid.set(io.valid & !is_end & !is_idle & escaped.mux(stands, !is_escape));
+        packet_end.set(io.valid & is_end);
+        spoiled.set(io.broken | (io.valid & *escaped & !stands & !is_end & !is_idle));
+        k.when(io.valid & !is_idle, || escaped.set(is_escape & !*escaped));
+    }
 }
 
 #[cfg(test)]
@@ -88,6 +58,7 @@ mod tests {
     use dermis_golden::wire::link::slip::{unescape, SPECIAL};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -143,6 +114,6 @@ mod tests {
             ]
         };
         let all: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
-        check(SlipDecoder::default().kernel.kernel(), &all, &mut Meaning::default());
+        check(&kernel_of(&SlipDecoder::default()), &all, &mut Meaning::default());
     }
 }

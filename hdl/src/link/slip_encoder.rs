@@ -1,94 +1,74 @@
 //! SLIP encoder: from the bytes of packets to the bytes of the link.
 
 use dermis_golden::wire::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-/// Escapes bytes as SLIP requires; with `border`, an END between packets is sent unescaped.
-///
-/// With many lanes the block has two extra registers, because the link's pins may be far from the packer: whether a
-/// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted it.
-#[derive(dermis_hdl_derive::Block)]
-pub struct SlipEncoder {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A byte of a packet; valid with `content_valid`.
-    pub content: Wire<In>,
-    /// Send an END in place of `content`; valid with `content_valid`.
-    pub border: Signal<In, Bit>,
-    /// A byte or an END is offered; held until `content_ready`.
-    pub content_valid: Signal<In, Bit>,
-    /// The byte is accepted; with registers, one cycle after the link took its last part.
-    pub content_ready: Signal<Out, Bit>,
-    /// A byte for the link; valid with `valid`.
-    pub data: Wire<Out>,
-    /// `data` is offered; held until `ready`.
-    pub valid: Signal<Out, Bit>,
-    /// The link accepts the byte in this cycle.
-    pub ready: Signal<In, Bit>,
-    kernel: Body,
+block! {
+    /// Escapes bytes as SLIP requires; with `border`, an END between packets is sent unescaped.
+    ///
+    /// With many lanes the block has two extra registers, because the link's pins may be far from the packer: whether a
+    /// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted it.
+    pub struct SlipEncoder {
+        /// There are the two extra registers.
+        registered: bool,
+    }
+    ports SlipEncoderPorts {
+        clock;
+        reset;
+        /// A byte of a packet; valid with `content_valid`.
+        in content: 8;
+        /// Send an END in place of `content`; valid with `content_valid`.
+        in border;
+        /// A byte or an END is offered; held until `content_ready`.
+        in content_valid;
+        /// The byte is accepted; with registers, one cycle after the link took its last part.
+        out content_ready;
+        /// A byte for the link; valid with `valid`.
+        out data: 8;
+        /// `data` is offered; held until `ready`.
+        out valid;
+        /// The link accepts the byte in this cycle.
+        in ready;
+    }
 }
-
-kernel_block!(
-    SlipEncoder,
-    clock clk,
-    inputs [rst, content, border, content_valid, ready],
-    outputs [content_ready, data, valid]
-);
 
 impl SlipEncoder {
     /// With the two extra registers if `registered`.
     pub fn new(registered: bool) -> Self {
-        let block = SlipEncoder {
-            clk: Default::default(),
-            rst: Default::default(),
-            content: Wire::new(8),
-            border: Default::default(),
-            content_valid: Default::default(),
-            content_ready: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            ready: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(registered))
+        SlipEncoder { registered }
     }
 }
 
-fn kernel(registered: bool) -> Kernel {
-    let k = Builder::new("slip_encoder");
-    let (rst, content, border) = (k.input("rst", 1), k.input("content", 8), k.input("border", 1));
-    let (content_valid, ready) = (k.input("content_valid", 1), k.input("ready", 1));
-    let bit = Type::unsigned(1);
-    let second = k.state("second", bit, rst, 0);
-    let byte = |byte: u8| k.constant(8, byte.into());
-    let is_end = k.wire("is_end", content.equals(byte(END)));
-    let is_escape = k.wire("is_escape", content.equals(byte(ESC)));
-    let found = k.wire("found", !border & (is_end | is_escape | content.equals(byte(IDLE))));
-    let registers = registered
-        .then(|| (k.register("special", bit), k.state("stands", bit, rst, 0), k.state("content_ready", bit, rst, 0)));
-    let (special, stands) = registers.map_or((found, content_valid), |(special, stands, _)| (*special, *stands));
-    let taken = k.wire("taken", stands & ready & (!special | *second));
-    match registers {
-        None => {
-            k.wire("content_ready", taken);
+impl Block for SlipEncoder {
+    fn build<'k>(&self, k: &'k Builder, io: SlipEncoderPorts<Inside<'k>>) {
+        let bit = Type::unsigned(1);
+        let second = k.state("second", bit, io.rst, 0);
+        let byte = |byte: u8| k.constant(8, byte.into());
+        let is_end = k.wire("is_end", io.content.equals(byte(END)));
+        let is_escape = k.wire("is_escape", io.content.equals(byte(ESC)));
+        let found = k.wire("found", !io.border & (is_end | is_escape | io.content.equals(byte(IDLE))));
+        let registers = self.registered.then(|| {
+            (k.register("special", bit), k.state("stands", bit, io.rst, 0), io.content_ready.state(io.rst, 0))
+        });
+        let (special, stands) = registers.map_or((found, io.content_valid), |(special, stands, _)| (*special, *stands));
+        let taken = k.wire("taken", stands & io.ready & (!special | *second));
+        match registers {
+            None => {
+                io.content_ready.set(taken);
+            }
+            Some((special, stands, content_ready)) => {
+                special.set(found);
+                stands.set(io.content_valid & !taken & !*content_ready);
+                content_ready.set(taken);
+            }
         }
-        Some((special, stands, content_ready)) => {
-            special.set(found);
-            stands.set(content_valid & !taken & !*content_ready);
-            content_ready.set(taken);
-        }
+        let after = is_end.mux(byte(ESC_END), is_escape.mux(byte(ESC_ESC), byte(ESC_IDLE)));
+        io.data.set(io.border.mux(byte(END), (!special).mux(io.content, (!*second).mux(byte(ESC), after))));
+        io.valid.set(stands);
+        k.when(stands & io.ready, || second.set(special & !*second));
     }
-    let after = is_end.mux(byte(ESC_END), is_escape.mux(byte(ESC_ESC), byte(ESC_IDLE)));
-    k.wire("data", border.mux(byte(END), (!special).mux(content, (!*second).mux(byte(ESC), after))));
-    k.wire("valid", stands);
-    k.when(stands & ready, || second.set(special & !*second));
-    k.finish()
 }
 
 #[cfg(test)]
@@ -96,11 +76,13 @@ mod tests {
     use dermis_golden::wire::link::slip::{escape, SPECIAL};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
     /// The bytes of the link for a byte of the packet, one after the other.
     struct Parts {
+        /// There are the two extra registers.
         registered: bool,
         sent: usize,
         /// With registers: the byte is known, and whether it was taken in the cycle before.
@@ -182,7 +164,7 @@ mod tests {
     fn each_byte_leaves_as_itself_or_as_its_escape() {
         for registered in [false, true] {
             let block = SlipEncoder::new(registered);
-            check(block.kernel.kernel(), &stimulus(6000, registered), &mut Parts::new(registered));
+            check(&kernel_of(&block), &stimulus(6000, registered), &mut Parts::new(registered));
         }
     }
 }

@@ -1,138 +1,101 @@
 //! Selects the bytes of an answer from its source.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Output, Type};
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
-use crate::wire::Wire;
-
-/// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
-///
-/// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five cycles
-/// after it asked for it.
-/// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Sources {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Source of the answer being sent, 2 bits; valid from the cycle after `begun` until the answer's last byte.
-    pub source: Wire<In>,
-    /// An answer starts in this cycle.
-    pub begun: Signal<In, Bit>,
-    /// Words of the payload are needed.
-    pub wanted: Signal<In, Bit>,
-    /// Byte of the word that is needed, 4 bits; valid while `wanted` is high.
-    pub index: Wire<In>,
-    /// The last byte of a word is accepted in this cycle.
-    pub taken: Signal<In, Bit>,
-    /// Entry of the counter RAM to read, 5 bits; valid in every cycle, one cycle ahead of `entry`.
-    pub address: Wire<Out>,
-    /// The entry, two bytes; valid with `entry_valid`.
-    pub entry: Wire<In>,
-    /// `entry` is that of `address`.
-    pub entry_valid: Signal<In, Bit>,
-    /// A word of the engine's answer, 96 bits; valid with `answer_valid`.
-    pub answer: Wire<In>,
-    /// `answer` holds a word.
-    pub answer_valid: Signal<In, Bit>,
-    /// The word is the last of the answer; valid with `answer_valid`.
-    pub answer_last: Signal<In, Bit>,
-    /// The engine's answer is needed.
-    pub answer_wanted: Signal<Out, Bit>,
-    /// The engine's answer consists of sums and status.
-    pub summarise: Signal<Out, Bit>,
-    /// The byte `index` of the word; valid with `word_valid`.
-    pub octet: Wire<Out>,
-    /// The word is valid.
-    pub word_valid: Signal<Out, Bit>,
-    /// The word is the payload's last; valid with `word_valid`.
-    pub word_last: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
+    ///
+    /// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five cycles
+    /// after it asked for it.
+    /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
+    pub struct Sources {
+        /// There are the four register stages.
+        registered: bool,
+    }
+    ports SourcesPorts {
+        clock;
+        /// Source of the answer being sent, 2 bits; valid from the cycle after `begun` until the answer's last byte.
+        in source: 2;
+        /// An answer starts in this cycle.
+        in begun;
+        /// Words of the payload are needed.
+        in wanted;
+        /// Byte of the word that is needed, 4 bits; valid while `wanted` is high.
+        in index: 4;
+        /// The last byte of a word is accepted in this cycle.
+        in taken;
+        /// Entry of the counter RAM to read, 5 bits; valid in every cycle, one cycle ahead of `entry`.
+        out address: 5;
+        /// The entry, two bytes; valid with `entry_valid`.
+        in entry: 16;
+        /// `entry` is that of `address`.
+        in entry_valid;
+        /// A word of the engine's answer, 96 bits; valid with `answer_valid`.
+        in answer: 96;
+        /// `answer` holds a word.
+        in answer_valid;
+        /// The word is the last of the answer; valid with `answer_valid`.
+        in answer_last;
+        /// The engine's answer is needed.
+        out answer_wanted;
+        /// The engine's answer consists of sums and status.
+        out summarise;
+        /// The byte `index` of the word; valid with `word_valid`.
+        out octet: 8;
+        /// The word is valid.
+        out word_valid;
+        /// The word is the payload's last; valid with `word_valid`.
+        out word_last;
+    }
 }
-
-kernel_block!(
-    Sources,
-    clock clk,
-    inputs [source, begun, wanted, index, taken, entry, entry_valid, answer, answer_valid, answer_last],
-    outputs [address, answer_wanted, summarise, octet, word_valid, word_last]
-);
 
 impl Sources {
     /// With the four register stages if `registered`.
     pub fn new(registered: bool) -> Self {
-        let block = Sources {
-            clk: Default::default(),
-            source: Wire::new(2),
-            begun: Default::default(),
-            wanted: Default::default(),
-            index: Wire::new(4),
-            taken: Default::default(),
-            address: Wire::new(5),
-            entry: Wire::new(16),
-            entry_valid: Default::default(),
-            answer: Wire::new(96),
-            answer_valid: Default::default(),
-            answer_last: Default::default(),
-            answer_wanted: Default::default(),
-            summarise: Default::default(),
-            octet: Wire::new(8),
-            word_valid: Default::default(),
-            word_last: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(registered))
+        Sources { registered }
     }
 }
 
-/// A register of `value`, or a wire.
-fn stage<'k>(k: &'k Builder, registered: bool, name: &str, value: Expr<'k>) -> Expr<'k> {
-    if registered {
-        k.delay(name, value)
-    } else {
-        k.wire(name, value)
+impl Block for Sources {
+    fn build<'k>(&self, k: &'k Builder, io: SourcesPorts<Inside<'k>>) {
+        let second = k.register("second", Type::unsigned(1));
+        // A register of `value`, or a wire.
+        let stage = |name: &str, value| if self.registered { k.delay(name, value) } else { k.wire(name, value) };
+        let shown = |output: Output<'k>, value| if self.registered { output.delay(value) } else { output.set(value) };
+        let was_taken = stage("was_taken", io.taken);
+        second.set(!io.begun & (*second | was_taken));
+        io.address.set(concat(&[io.source.at(0), *second, io.index.slice(1, 3)]));
+        let is_answer = io.source.at(1);
+        // The packer, which holds the index, is a long way from the engine's answer.
+        let chosen = stage("chosen", io.index);
+        io.answer_wanted.set(io.wanted & is_answer);
+        let [high, middle, low] = [2, 1, 0].map(|word| io.answer.slice(32 * word, 32));
+        let word = stage("answer_word", chosen.at(3).mux(high, chosen.at(2).mux(middle, low)));
+        let half = chosen.at(1).mux(word.slice(16, 16), word.low(16));
+        // The block RAM of the counters is slow and far away: nothing stands between it and its register.
+        let both = k.wire("both", is_answer.mux(stage("answer_half", half), stage("kept_entry", io.entry)));
+        let valid = stage("valid", is_answer.mux(io.answer_valid, io.entry_valid));
+        let last = stage("last", is_answer.mux(io.answer_last, io.source.at(0) | *second));
+        shown(io.octet, chosen.at(0).mux(both.slice(8, 8), both.low(8)));
+        shown(io.word_valid, stage("half_valid", valid));
+        shown(io.word_last, stage("half_last", last));
+        shown(io.summarise, !io.source.at(0));
     }
-}
-
-fn kernel(registered: bool) -> Kernel {
-    let k = Builder::new("sources");
-    let (source, begun, wanted) = (k.input("source", 2), k.input("begun", 1), k.input("wanted", 1));
-    let (index, taken) = (k.input("index", 4), k.input("taken", 1));
-    let (entry, entry_valid) = (k.input("entry", 16), k.input("entry_valid", 1));
-    let (answer, answer_valid, answer_last) =
-        (k.input("answer", 96), k.input("answer_valid", 1), k.input("answer_last", 1));
-    let second = k.register("second", Type::unsigned(1));
-    let stage = |name: &str, value| stage(&k, registered, name, value);
-    let was_taken = stage("was_taken", taken);
-    second.set(!begun & (*second | was_taken));
-    k.wire("address", concat(&[source.at(0), *second, index.slice(1, 3)]));
-    let is_answer = source.at(1);
-    // The packer, which holds the index, is a long way from the engine's answer.
-    let chosen = stage("chosen", index);
-    k.wire("answer_wanted", wanted & is_answer);
-    let [high, middle, low] = [2, 1, 0].map(|word| answer.slice(32 * word, 32));
-    let word = stage("answer_word", chosen.at(3).mux(high, chosen.at(2).mux(middle, low)));
-    let half = chosen.at(1).mux(word.slice(16, 16), word.low(16));
-    // The block RAM of the counters is slow and far away: nothing stands between it and its register.
-    let both = k.wire("both", is_answer.mux(stage("answer_half", half), stage("kept_entry", entry)));
-    let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
-    let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
-    stage("octet", chosen.at(0).mux(both.slice(8, 8), both.low(8)));
-    stage("word_valid", stage("half_valid", valid));
-    stage("word_last", stage("half_last", last));
-    stage("summarise", !source.at(0));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::{COUNTERS, IDENTITY};
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
     /// Selects from whole words; with registers, the index of the cycle before selects a word, then two bytes, then one.
     #[derive(Default)]
     struct Selection {
+        /// There are the four register stages.
         registered: bool,
         second: Option<bool>,
         was_taken: Option<bool>,
@@ -240,7 +203,7 @@ mod tests {
         let all: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
         for registered in [false, true] {
             let mut selection = Selection { registered, ..Selection::default() };
-            check(Sources::new(registered).kernel.kernel(), &all, &mut selection);
+            check(&kernel_of(&Sources::new(registered)), &all, &mut selection);
         }
     }
 }

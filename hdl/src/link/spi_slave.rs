@@ -1,146 +1,120 @@
 //! SPI slave: between the bytes of the link and an SPI controller, whose clock is a domain of its own.
 
 use dermis_golden::wire::link::slip::IDLE;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-/// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are in the controller's
-/// clock domain:
-///
-/// ```text
-///  mosi -> sclk_mosi -> sclk_shift -> sclk_received --(sclk_toggle, 2 registers)--> data, valid
-///  miso <-----------------'   ^------ sclk_kept <--(offer, 2 registers)------------ offered <- send_data
-///                                          '-------(sclk_taken, 2 registers)------> send_ready
-/// ```
-/// Receiving: the eighth rising edge stores the byte and flips a toggle. `clk` sees the toggle at its third edge after
-/// that at the latest; the byte stays unchanged for eight periods of `spi_sclk`. An incomplete byte is dropped.
-///
-/// Sending: the bits change on falling edges. The eighth rising edge of a byte stores the next one if `clk` offers one,
-/// and acknowledges it; the falling edge then loads it, or IDLE. The stored byte is released only when the controller
-/// has sampled all eight of its bits: if a transaction ends earlier, the next one sends that byte again from its first
-/// bit. The first byte of a transaction is IDLE.
-///
-/// While `spi_cs_n` is high, edges of `spi_sclk` have no effect: they are for another slave.
-#[derive(dermis_hdl_derive::Block)]
-pub struct SpiSlave {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high: no byte to send is accepted.
-    pub rst: Signal<In, Bit>,
-    /// The controller's clock.
-    pub spi_sclk: Signal<In, Bit>,
-    /// Chip select, low during a transaction.
-    pub spi_cs_n: Signal<In, Bit>,
-    /// Data from the controller, sampled on the rising edge of `spi_sclk`.
-    pub spi_mosi: Signal<In, Bit>,
-    /// Data to the controller, changes on the falling edge of `spi_sclk`.
-    pub spi_miso: Signal<Out, Bit>,
-    /// The byte received last; valid with `valid`.
-    pub data: Wire<Out>,
-    /// A byte was received in this cycle.
-    pub valid: Signal<Out, Bit>,
-    /// A byte to send; valid with `send_valid`.
-    pub send_data: Wire<In>,
-    /// `send_data` is offered; held until `send_ready`.
-    pub send_valid: Signal<In, Bit>,
-    /// The byte is accepted in this cycle.
-    pub send_ready: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are in the controller's
+    /// clock domain:
+    ///
+    /// ```text
+    ///  mosi -> sclk_mosi -> sclk_shift -> sclk_received --(sclk_toggle, 2 registers)--> data, valid
+    ///  miso <-----------------'   ^------ sclk_kept <--(offer, 2 registers)------------ offered <- send_data
+    ///                                          '-------(sclk_taken, 2 registers)------> send_ready
+    /// ```
+    /// Receiving: the eighth rising edge stores the byte and flips a toggle. `clk` sees the toggle at its third edge after
+    /// that at the latest; the byte stays unchanged for eight periods of `spi_sclk`. An incomplete byte is dropped.
+    ///
+    /// Sending: the bits change on falling edges. The eighth rising edge of a byte stores the next one if `clk` offers one,
+    /// and acknowledges it; the falling edge then loads it, or IDLE. The stored byte is released only when the controller
+    /// has sampled all eight of its bits: if a transaction ends earlier, the next one sends that byte again from its first
+    /// bit. The first byte of a transaction is IDLE.
+    ///
+    /// While `spi_cs_n` is high, edges of `spi_sclk` have no effect: they are for another slave.
+    #[derive(Default)]
+    pub struct SpiSlave {}
+    ports SpiSlavePorts {
+        clock;
+        /// Synchronous reset, active high: no byte to send is accepted.
+        in rst;
+        /// The controller's clock.
+        in spi_sclk;
+        /// Chip select, low during a transaction.
+        in spi_cs_n;
+        /// Data from the controller, sampled on the rising edge of `spi_sclk`.
+        in spi_mosi;
+        /// Data to the controller, changes on the falling edge of `spi_sclk`.
+        out spi_miso;
+        /// The byte received last; valid with `valid`.
+        out data: 8;
+        /// A byte was received in this cycle.
+        out valid;
+        /// A byte to send; valid with `send_valid`.
+        in send_data: 8;
+        /// `send_data` is offered; held until `send_ready`.
+        in send_valid;
+        /// The byte is accepted in this cycle.
+        out send_ready;
+    }
 }
 
 /// Index of the last bit of a byte.
 const LAST: usize = 7;
 
-kernel_block!(
-    SpiSlave,
-    clock clk,
-    inputs [rst, spi_sclk, spi_cs_n, spi_mosi, send_data, send_valid],
-    outputs [spi_miso, data, valid, send_ready]
-);
-
-impl Default for SpiSlave {
-    fn default() -> Self {
-        let block = SpiSlave {
-            clk: Default::default(),
-            rst: Default::default(),
-            spi_sclk: Default::default(),
-            spi_cs_n: Default::default(),
-            spi_mosi: Default::default(),
-            spi_miso: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            send_data: Wire::new(8),
-            send_valid: Default::default(),
-            send_ready: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
-    }
-}
-
-fn kernel() -> Kernel {
-    let k = Builder::new("spi_slave");
-    let (rst, sclk) = (k.input("rst", 1), k.input("spi_sclk", 1));
-    let (cs_n, mosi) = (k.input("spi_cs_n", 1), k.input("spi_mosi", 1));
-    let (send_data, send_valid) = (k.input("send_data", 8), k.input("send_valid", 1));
-    let (bit, byte, idle) = (Type::unsigned(1), Type::unsigned(8), u64::from(IDLE));
-    let (sclk_bit, sclk_shift, sclk_carries) = k.falling(sclk, || {
-        let sclk_bit = k.state("sclk_bit", Type::unsigned(3), cs_n, 0);
-        let sclk_bit = sclk_bit.comment("Controller's clock domain, falling edges; reset between transactions.");
-        (sclk_bit, k.state("sclk_shift", byte, cs_n, idle), k.state("sclk_carries", bit, cs_n, 0))
-    });
-    let (sclk_mosi, [sclk_received, sclk_kept], sclk_offered, [sclk_toggle, sclk_full, sclk_taken]) =
-        k.rising(sclk, || {
-            let sclk_mosi = k.register("sclk_mosi", bit).comment(
+impl Block for SpiSlave {
+    fn build<'k>(&self, k: &'k Builder, io: SpiSlavePorts<Inside<'k>>) {
+        let (bit, byte, idle) = (Type::unsigned(1), Type::unsigned(8), u64::from(IDLE));
+        let (sclk_bit, sclk_shift, sclk_carries) = k.falling(io.spi_sclk, || {
+            let sclk_bit = k.state("sclk_bit", Type::unsigned(3), io.spi_cs_n, 0);
+            let sclk_bit = sclk_bit.comment("Controller's clock domain, falling edges; reset between transactions.");
+            (sclk_bit, k.state("sclk_shift", byte, io.spi_cs_n, idle), k.state("sclk_carries", bit, io.spi_cs_n, 0))
+        });
+        let (sclk_mosi, [sclk_received, sclk_kept], sclk_offered, [sclk_toggle, sclk_full, sclk_taken]) =
+            k.rising(io.spi_sclk, || {
+                let sclk_mosi = k.register("sclk_mosi", bit).comment(
                 "Controller's clock domain, rising edges; not reset: the handshake with clk holds across transactions.",
             );
-            let bytes = ["sclk_received", "sclk_kept"].map(|name| k.register(name, byte));
-            let sclk_offered = k.register("sclk_offered", Type::unsigned(2)).initially(0);
-            let bits = ["sclk_toggle", "sclk_full", "sclk_taken"].map(|name| k.register(name, bit).initially(0));
-            (sclk_mosi, bytes, sclk_offered, bits)
+                let bytes = ["sclk_received", "sclk_kept"].map(|name| k.register(name, byte));
+                let sclk_offered = k.register("sclk_offered", Type::unsigned(2)).initially(0);
+                let bits = ["sclk_toggle", "sclk_full", "sclk_taken"].map(|name| k.register(name, bit).initially(0));
+                (sclk_mosi, bytes, sclk_offered, bits)
+            });
+        let received = k.register("received", Type::unsigned(3)).initially(0).comment("Domain of clk.");
+        let (taken, offer) =
+            (k.register("taken", Type::unsigned(2)).initially(0), k.register("offer", bit).initially(0));
+        let offered = k.register("offered", byte);
+
+        let last = k.wire("sclk_last", sclk_bit.is(LAST as u64));
+        sclk_mosi.set(io.spi_mosi);
+        sclk_offered.set(sclk_offered.at(0).concat(*offer));
+        k.when(last, || {
+            sclk_received.set(sclk_shift.low(7).concat(io.spi_mosi));
+            sclk_toggle.set(!*sclk_toggle);
+            sclk_carries.set(*sclk_full);
         });
-    let received = k.register("received", Type::unsigned(3)).initially(0).comment("Domain of clk.");
-    let (taken, offer) = (k.register("taken", Type::unsigned(2)).initially(0), k.register("offer", bit).initially(0));
-    let offered = k.register("offered", byte);
+        let stores = k.wire("sclk_stores", last & (*sclk_carries | !*sclk_full));
+        k.when(stores, || {
+            sclk_full.set(sclk_offered.at(1).differs(*sclk_taken));
+            sclk_taken.set(sclk_offered.at(1));
+            sclk_kept.set(*offered);
+        });
+        sclk_bit.set(sclk_bit.plus(1));
+        let next = sclk_full.mux(*sclk_kept, k.constant(8, idle));
+        sclk_shift.set((!last).mux(sclk_shift.low(7).concat(*sclk_mosi), next));
 
-    let last = k.wire("sclk_last", sclk_bit.is(LAST as u64));
-    sclk_mosi.set(mosi);
-    sclk_offered.set(sclk_offered.at(0).concat(*offer));
-    k.when(last, || {
-        sclk_received.set(sclk_shift.low(7).concat(mosi));
-        sclk_toggle.set(!*sclk_toggle);
-        sclk_carries.set(*sclk_full);
-    });
-    let stores = k.wire("sclk_stores", last & (*sclk_carries | !*sclk_full));
-    k.when(stores, || {
-        sclk_full.set(sclk_offered.at(1).differs(*sclk_taken));
-        sclk_taken.set(sclk_offered.at(1));
-        sclk_kept.set(*offered);
-    });
-    sclk_bit.set(sclk_bit.plus(1));
-    let next = sclk_full.mux(*sclk_kept, k.constant(8, idle));
-    sclk_shift.set((!last).mux(sclk_shift.low(7).concat(*sclk_mosi), next));
-
-    k.wire("spi_miso", sclk_shift.top());
-    k.wire("data", *sclk_received);
-    k.wire("valid", received.at(1).differs(received.at(2)));
-    let send_ready = k.wire("send_ready", taken.at(1).equals(*offer));
-    received.set(received.low(2).concat(*sclk_toggle));
-    taken.set(taken.at(0).concat(*sclk_taken));
-    k.when(send_valid & send_ready & !rst, || {
-        offer.set(!*offer);
-        offered.set(send_data);
-    });
-    k.finish()
+        io.spi_miso.set(sclk_shift.top());
+        io.data.set(*sclk_received);
+        io.valid.set(received.at(1).differs(received.at(2)));
+        let send_ready = io.send_ready.set(taken.at(1).equals(*offer));
+        received.set(received.low(2).concat(*sclk_toggle));
+        taken.set(taken.at(0).concat(*sclk_taken));
+        k.when(io.send_valid & send_ready & !io.rst, || {
+            offer.set(!*offer);
+            offered.set(io.send_data);
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use rust_hdl::prelude::Block as _;
+
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
+    use crate::language::RustHdl;
     use crate::simulate::settles;
     use crate::wire::Word;
 
@@ -245,12 +219,12 @@ mod tests {
 
     #[test]
     fn both_clocks_see_what_the_registers_of_the_other_say() {
-        check(SpiSlave::default().kernel.kernel(), &stimulus(20_000), &mut Sides::default());
+        check(&kernel_of(&SpiSlave::default()), &stimulus(20_000), &mut Sides::default());
     }
 
     /// The block, the bytes that the `clk` side has received, and the bytes it still has to send.
     struct Bench {
-        block: SpiSlave,
+        block: RustHdl<SpiSlave>,
         received: Vec<u8>,
         sending: Vec<u8>,
         clock: bool,
@@ -258,7 +232,7 @@ mod tests {
 
     impl Bench {
         fn new(sending: &[u8]) -> Bench {
-            let mut block = SpiSlave::default();
+            let mut block = RustHdl::<SpiSlave>::default();
             block.connect_all();
             block.spi_cs_n.next = true;
             let mut bench = Bench { block, received: Vec::new(), sending: sending.to_vec(), clock: false };

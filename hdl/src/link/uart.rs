@@ -1,80 +1,67 @@
 //! UART: between the bytes of the link and its two lines.
 
 use dermis_golden::wire::link::Identity;
-use rust_hdl::prelude::*;
 
 use super::{UartReceiver, UartTransmitter};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 
-/// [`UartReceiver`] and [`UartTransmitter`] side by side.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Uart {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Line from the host, high when idle; asynchronous to the clock.
-    pub uart_rx: Signal<In, Bit>,
-    /// Line to the host, high when idle.
-    pub uart_tx: Signal<Out, Bit>,
-    /// The byte received last; valid with `valid`.
-    pub data: Wire<Out>,
-    /// A byte was received in this cycle.
-    pub valid: Signal<Out, Bit>,
-    /// A byte without stop bit was received in this cycle.
-    pub broken: Signal<Out, Bit>,
-    /// A byte to send; valid with `send_valid`.
-    pub send_data: Wire<In>,
-    /// `send_data` is offered; held until `send_ready`.
-    pub send_valid: Signal<In, Bit>,
-    /// The byte is accepted in this cycle.
-    pub send_ready: Signal<Out, Bit>,
-    receiver: UartReceiver,
-    transmitter: UartTransmitter,
+block! {
+    /// [`UartReceiver`] and [`UartTransmitter`] side by side.
+    pub struct Uart {
+        /// Bit rate of the line in bit/s.
+        bit_rate: u32,
+        /// Clock in Hz.
+        clock_hz: u32,
+    }
+    ports UartPorts {
+        clock;
+        reset;
+        /// Line from the host, high when idle; asynchronous to the clock.
+        in uart_rx;
+        /// Line to the host, high when idle.
+        out uart_tx;
+        /// The byte received last; valid with `valid`.
+        out data: 8;
+        /// A byte was received in this cycle.
+        out valid;
+        /// A byte without stop bit was received in this cycle.
+        out broken;
+        /// A byte to send; valid with `send_valid`.
+        in send_data: 8;
+        /// `send_data` is offered; held until `send_ready`.
+        in send_valid;
+        /// The byte is accepted in this cycle.
+        out send_ready;
+    }
 }
 
 impl Uart {
     /// For the bit rate and the clock of `identity`.
     pub fn new(identity: &Identity) -> Self {
-        Uart {
-            clk: Default::default(),
-            rst: Default::default(),
-            uart_rx: Default::default(),
-            uart_tx: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            broken: Default::default(),
-            send_data: Wire::new(8),
-            send_valid: Default::default(),
-            send_ready: Default::default(),
-            receiver: UartReceiver::new(identity.bit_rate, identity.clock_hz),
-            transmitter: UartTransmitter::new(identity.bit_rate, identity.clock_hz),
-        }
+        Uart { bit_rate: identity.bit_rate, clock_hz: identity.clock_hz }
     }
 }
 
-impl Logic for Uart {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.receiver.clk.next = self.clk.val();
-        self.transmitter.clk.next = self.clk.val();
-        self.receiver.rst.next = self.rst.val();
-        self.transmitter.rst.next = self.rst.val();
-        self.receiver.line.next = self.uart_rx.val();
-        self.data.next = self.receiver.data.val();
-        self.valid.next = self.receiver.valid.val();
-        self.broken.next = self.receiver.broken.val();
-        self.transmitter.data.next = self.send_data.val();
-        self.transmitter.valid.next = self.send_valid.val();
-        self.send_ready.next = self.transmitter.ready.val();
-        self.uart_tx.next = self.transmitter.line.val();
+impl Block for Uart {
+    fn build<'k>(&self, k: &'k Builder, io: UartPorts<Inside<'k>>) {
+        let receiver = k.instance("receiver", UartReceiver::new(self.bit_rate, self.clock_hz));
+        let transmitter = k.instance("transmitter", UartTransmitter::new(self.bit_rate, self.clock_hz));
+        receiver.line.set(io.uart_rx);
+        io.data.set(receiver.data);
+        io.valid.set(receiver.valid);
+        io.broken.set(receiver.broken);
+        transmitter.data.set(io.send_data);
+        transmitter.valid.set(io.send_valid);
+        io.send_ready.set(transmitter.ready);
+        io.uart_tx.set(transmitter.line);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::link::uart_receiver::tests::{stimulus, Sampler, BAUD, CLOCK_HZ};
     use crate::link::uart_transmitter::tests::Sending;
@@ -107,7 +94,7 @@ mod tests {
         let mut identity = Identity::default();
         (identity.bit_rate, identity.clock_hz) = (BAUD, CLOCK_HZ);
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Uart::new(&identity),
                 changes,
                 inputs [rst, uart_rx, send_data, send_valid],

@@ -1,35 +1,32 @@
 //! UART receiver: from the line to bytes.
 
-use rust_hdl::prelude::*;
-
 use super::phase::Phase;
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-/// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are sampled
-/// in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop bit. A byte
-/// without stop bit is `broken`; the next one starts only after the line has been idle again.
-///
-/// `valid` and `broken` are pulses of one cycle; `data` is stable until the first data bit of the next byte.
-#[derive(dermis_hdl_derive::Block)]
-pub struct UartReceiver {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The line, high when idle; asynchronous to the clock.
-    pub line: Signal<In, Bit>,
-    /// The byte received last; valid with `valid`.
-    pub data: Wire<Out>,
-    /// A byte was received in this cycle.
-    pub valid: Signal<Out, Bit>,
-    /// A byte without stop bit was received in this cycle.
-    pub broken: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are sampled
+    /// in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop bit. A byte
+    /// without stop bit is `broken`; the next one starts only after the line has been idle again.
+    ///
+    /// `valid` and `broken` are pulses of one cycle; `data` is stable until the first data bit of the next byte.
+    pub struct UartReceiver {
+        /// Bit timing on the line.
+        timing: Phase,
+    }
+    ports UartReceiverPorts {
+        clock;
+        reset;
+        /// The line, high when idle; asynchronous to the clock.
+        in line;
+        /// The byte received last; valid with `valid`.
+        out data: 8;
+        /// A byte was received in this cycle.
+        out valid;
+        /// A byte without stop bit was received in this cycle.
+        out broken;
+    }
 }
-
-kernel_block!(UartReceiver, clock clk, inputs [rst, line], outputs [data, valid, broken]);
 
 /// Bits from start bit to stop bit.
 const BITS: u64 = 10;
@@ -37,56 +34,47 @@ const BITS: u64 = 10;
 impl UartReceiver {
     /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
-        let block = UartReceiver {
-            clk: Default::default(),
-            rst: Default::default(),
-            line: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            broken: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(Phase::new(baud, clock_hz)))
+        UartReceiver { timing: Phase::new(baud, clock_hz) }
     }
 }
 
-fn kernel(timing: Phase) -> Kernel {
-    let k = Builder::new("uart_receiver");
-    let (rst, line) = (k.input("rst", 1), k.input("line", 1));
-    let bit = Type::unsigned(1);
-    let samples = k.register("samples", Type::unsigned(5));
-    let armed = k.state("armed", bit, rst, 0);
-    let sampled =
-        k.register("sampled", bit).comment("Bit, shift and stop are registered to shorten the route to the data.");
-    let (shifts, stops) = (k.register("shifts", bit), k.state("stops", bit, rst, 0));
-    let left = k.state("left", Type::unsigned(4), rst, 0);
-    let phase = k.register("phase", Type::unsigned(timing.fraction));
-    let data = k.register("data", Type::unsigned(8));
-    let (valid, broken) = (k.state("valid", bit, rst, 0), k.state("broken", bit, rst, 0));
+impl Block for UartReceiver {
+    fn build<'k>(&self, k: &'k Builder, io: UartReceiverPorts<Inside<'k>>) {
+        let bit = Type::unsigned(1);
+        let samples = k.register("samples", Type::unsigned(5));
+        let armed = k.state("armed", bit, io.rst, 0);
+        let sampled =
+            k.register("sampled", bit).comment("Bit, shift and stop are registered to shorten the route to the data.");
+        let (shifts, stops) = (k.register("shifts", bit), k.state("stops", bit, io.rst, 0));
+        let left = k.state("left", Type::unsigned(4), io.rst, 0);
+        let phase = k.register("phase", Type::unsigned(self.timing.fraction));
+        let data = io.data.register();
+        let (valid, broken) = (io.valid.state(io.rst, 0), io.broken.state(io.rst, 0));
 
-    let [a, b, c] = [4, 3, 2].map(|at| samples.at(at));
-    let level = k.wire("level", (a & b) | (a & c) | (b & c));
-    let idle = k.wire("idle", left.is(0));
-    let sum = k.wire("sum", *phase + k.constant(timing.fraction, timing.increment));
-    let tick = k.wire("tick", !idle & sum.top());
-    let (first, last) = (left.is(BITS), left.is(1));
-    samples.set(samples.low(4).concat(line));
-    phase.set(idle.mux(k.constant(timing.fraction, timing.half), sum.low(timing.fraction)));
-    sampled.set(level);
-    shifts.set(tick & !first & !last);
-    stops.set(tick & last);
-    k.when(*shifts, || data.set(sampled.concat(data.slice(1, 7))));
-    valid.set(*stops & *sampled);
-    broken.set(*stops & !*sampled);
-    k.when(tick, || left.set((first & level).mux(k.constant(4, 0), left.minus(1))));
-    k.when(idle, || armed.set(level));
-    k.when(idle & *armed & !level, || left.set(k.constant(4, BITS)));
-    k.finish()
+        let [a, b, c] = [4, 3, 2].map(|at| samples.at(at));
+        let level = k.wire("level", (a & b) | (a & c) | (b & c));
+        let idle = k.wire("idle", left.is(0));
+        let sum = k.wire("sum", *phase + k.constant(self.timing.fraction, self.timing.increment));
+        let tick = k.wire("tick", !idle & sum.top());
+        let (first, last) = (left.is(BITS), left.is(1));
+        samples.set(samples.low(4).concat(io.line));
+        phase.set(idle.mux(k.constant(self.timing.fraction, self.timing.half), sum.low(self.timing.fraction)));
+        sampled.set(level);
+        shifts.set(tick & !first & !last);
+        stops.set(tick & last);
+        k.when(*shifts, || data.set(sampled.concat(data.slice(1, 7))));
+        valid.set(*stops & *sampled);
+        broken.set(*stops & !*sampled);
+        k.when(tick, || left.set((first & level).mux(k.constant(4, 0), left.minus(1))));
+        k.when(idle, || armed.set(level));
+        k.when(idle & *armed & !level, || left.set(k.constant(4, BITS)));
+    }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
@@ -172,8 +160,8 @@ pub(super) mod tests {
     #[test]
     fn bytes_are_sampled_in_the_middle_of_their_bits() {
         let (block, all) = (UartReceiver::new(BAUD, CLOCK_HZ), stimulus(300));
-        check(block.kernel.kernel(), &all, &mut Sampler::default());
-        let outputs = Subject::from(block.kernel.kernel()).simulated(&all);
+        check(&kernel_of(&block), &all, &mut Sampler::default());
+        let outputs = Subject::from(&kernel_of(&block)).simulated(&all);
         let count = |k: usize| outputs.iter().filter(|outputs| outputs[k].number() == 1).count();
         assert!(count(1) > 150 && count(2) > 10, "{} bytes, {} broken", count(1), count(2));
     }

@@ -1,31 +1,28 @@
 //! UART transmitter: from bytes to the line.
 
-use rust_hdl::prelude::*;
-
 use super::phase::Phase;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
-/// Start bit, eight data bits, stop bit. A byte is accepted when `valid` and `ready` are both high.
-#[derive(dermis_hdl_derive::Block)]
-pub struct UartTransmitter {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The byte; valid with `valid`.
-    pub data: Wire<In>,
-    /// `data` is offered; held until `ready`.
-    pub valid: Signal<In, Bit>,
-    /// The byte is accepted in this cycle.
-    pub ready: Signal<Out, Bit>,
-    /// The line, high when idle.
-    pub line: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Start bit, eight data bits, stop bit. A byte is accepted when `valid` and `ready` are both high.
+    pub struct UartTransmitter {
+        /// Bit timing on the line.
+        timing: Phase,
+    }
+    ports UartTransmitterPorts {
+        clock;
+        reset;
+        /// The byte; valid with `valid`.
+        in data: 8;
+        /// `data` is offered; held until `ready`.
+        in valid;
+        /// The byte is accepted in this cycle.
+        out ready;
+        /// The line, high when idle.
+        out line;
+    }
 }
-
-kernel_block!(UartTransmitter, clock clk, inputs [rst, data, valid], outputs [ready, line]);
 
 /// Bits from start bit to stop bit.
 const BITS: usize = 10;
@@ -33,47 +30,38 @@ const BITS: usize = 10;
 impl UartTransmitter {
     /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
-        let block = UartTransmitter {
-            clk: Default::default(),
-            rst: Default::default(),
-            data: Wire::new(8),
-            valid: Default::default(),
-            ready: Default::default(),
-            line: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(Phase::new(baud, clock_hz)))
+        UartTransmitter { timing: Phase::new(baud, clock_hz) }
     }
 }
 
-fn kernel(timing: Phase) -> Kernel {
-    let k = Builder::new("uart_transmitter");
-    let (rst, data, valid) = (k.input("rst", 1), k.input("data", 8), k.input("valid", 1));
-    let left = k.state("left", Type::unsigned(4), rst, 0);
-    let phase = k.register("phase", Type::unsigned(timing.fraction));
-    let shift = k.register("shift", Type::unsigned(BITS));
-    let line = k.state("line", Type::unsigned(1), rst, 1).initially(1);
-    let line = line.comment("Idle after configuration: a low line would be a start bit.");
-    let (one, zero) = (k.constant(1, 1), k.constant(1, 0));
-    let ready = k.wire("ready", left.is(0));
-    let sum = k.wire("sum", *phase + k.constant(timing.fraction, timing.increment));
-    let tick = sum.top();
-    phase.set(ready.mux(k.constant(timing.fraction, 0), sum.low(timing.fraction)));
-    k.when(tick, || {
-        shift.set(one.concat(shift.slice(1, BITS - 1)));
-        left.set(left.minus(1));
-    });
-    k.when(ready, || {
-        shift.set(concat(&[one, data, zero]));
-        left.set(valid.mux(k.constant(4, BITS as u64), k.constant(4, 0)));
-    });
-    line.set(ready | shift.at(0));
-    k.finish()
+impl Block for UartTransmitter {
+    fn build<'k>(&self, k: &'k Builder, io: UartTransmitterPorts<Inside<'k>>) {
+        let left = k.state("left", Type::unsigned(4), io.rst, 0);
+        let phase = k.register("phase", Type::unsigned(self.timing.fraction));
+        let shift = k.register("shift", Type::unsigned(BITS));
+        let line = io.line.state(io.rst, 1).initially(1);
+        let line = line.comment("Idle after configuration: a low line would be a start bit.");
+        let (one, zero) = (k.constant(1, 1), k.constant(1, 0));
+        let ready = io.ready.set(left.is(0));
+        let sum = k.wire("sum", *phase + k.constant(self.timing.fraction, self.timing.increment));
+        let tick = sum.top();
+        phase.set(ready.mux(k.constant(self.timing.fraction, 0), sum.low(self.timing.fraction)));
+        k.when(tick, || {
+            shift.set(one.concat(shift.slice(1, BITS - 1)));
+            left.set(left.minus(1));
+        });
+        k.when(ready, || {
+            shift.set(concat(&[one, io.data, zero]));
+            left.set(io.valid.mux(k.constant(4, BITS as u64), k.constant(4, 0)));
+        });
+        line.set(ready | shift.at(0));
+    }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::link::uart_receiver::tests::{BAUD, CLOCK_HZ};
     use crate::wire::Word;
@@ -113,6 +101,6 @@ pub(super) mod tests {
             vec![Word::from(rst), Word::from(u64::from(random.u8(..))), Word::from(random.u8(..8) == 0)]
         };
         let all: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
-        check(UartTransmitter::new(BAUD, CLOCK_HZ).kernel.kernel(), &all, &mut Sending::default());
+        check(&kernel_of(&UartTransmitter::new(BAUD, CLOCK_HZ)), &all, &mut Sending::default());
     }
 }
