@@ -75,7 +75,7 @@ design!(engine::Engine, |engine: &engine::Engine| {
     engine.pass.lanes.memory_files().into_iter().chain(columns).chain(table).collect()
 });
 
-design!(serial::Engine, |engine: &serial::Engine| engine.pass.memory_files());
+design!(serial::Engine, |engine: &serial::Engine| serial::Pass::memory_files(engine.pass.kernel()));
 
 /// The stages of an engine in the order of the data flow.
 pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
