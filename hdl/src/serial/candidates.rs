@@ -11,117 +11,105 @@
 
 use dermis_golden::fixed::plan::serial::word_bits;
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
 use super::one_of;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
-/// Schedule in the module docs; `value` and `index` are registered, one cycle after the sums.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Candidates {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// A coefficient, signed; that of `cycle`, taken in every cycle.
-    pub word: Wire<In>,
-    /// Cycle of the polynomial, 4i + j; valid in every cycle.
-    pub cycle: Wire<In>,
-    /// Bit 0, the polynomial that arrives is to be evaluated, bit 1, so was the previous one; valid in every cycle.
-    pub present: Wire<In>,
-    /// Bit 0, the polynomial that arrives is the sum polynomial, bit 1, the previous one was; valid with the bits of
-    /// `present`.
-    pub sums: Wire<In>,
-    /// A candidate's value p, signed; valid with `valid`.
-    pub value: Wire<Out>,
-    /// Index of the candidate, 3(y + 1) + x + 1; valid with `valid`.
-    pub index: Wire<Out>,
-    /// `value` is valid.
-    pub valid: Signal<Out, Bit>,
-    /// `value` belongs to the sum polynomial; valid with `valid`.
-    pub sum: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Schedule in the module docs; `value` and `index` are registered, one cycle after the sums.
+    pub struct Candidates {
+        /// Width of a coefficient and of a value.
+        bits: usize,
+        degree: usize,
+    }
+    ports CandidatesPorts {
+        clock;
+        /// A coefficient, signed; that of `cycle`, taken in every cycle.
+        in word: bits;
+        /// Cycle of the polynomial, 4i + j; valid in every cycle.
+        in cycle: 4;
+        /// Bit 0, the polynomial that arrives is to be evaluated, bit 1, so was the previous one; valid in every cycle.
+        in present: 2;
+        /// Bit 0, the polynomial that arrives is the sum polynomial, bit 1, the previous one was; valid with the bits
+        /// of `present`.
+        in sums: 2;
+        /// A candidate's value p, signed; valid with `valid`.
+        out value: bits;
+        /// Index of the candidate, 3(y + 1) + x + 1; valid with `valid`.
+        out index: 4;
+        /// `value` is valid.
+        out valid;
+        /// `value` belongs to the sum polynomial; valid with `valid`.
+        out sum;
+    }
 }
-
-kernel_block!(Candidates, clock clk, inputs [word, cycle, present, sums], outputs [value, index, valid, sum]);
 
 impl Candidates {
     /// With the widths and the degree of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        let bits = word_bits(formats);
-        let block = Candidates {
-            clk: Default::default(),
-            word: Wire::new(bits),
-            cycle: Wire::new(4),
-            present: Wire::new(2),
-            sums: Wire::new(2),
-            value: Wire::new(bits),
-            index: Wire::new(4),
-            valid: Default::default(),
-            sum: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits, formats.degree))
+        Candidates { bits: word_bits(formats), degree: formats.degree }
     }
 }
 
 /// Cycle in which each candidate leaves, by its index; those of the previous polynomial leave before cycle 4.
 const LEAVES: [usize; 9] = [0, 5, 15, 3, 1, 2, 14, 4, 13];
 
-fn kernel(bits: usize, degree: usize) -> Kernel {
-    let k = Builder::new("candidates");
-    let (word, cycle) = (k.input("word", bits), k.input("cycle", 4));
-    let (present, sums) = (k.input("present", 2), k.input("sums", 2));
-    let [u, v, m, n, a, h, g] = ["u", "v", "m", "n", "a", "h", "g"].map(|name| k.register(name, Type::unsigned(bits)));
-    let value = k.register("value", Type::unsigned(bits));
-    let index = k.register("index", Type::unsigned(4));
-    let [valid, sum] = ["valid", "sum"].map(|name| k.register(name, Type::unsigned(1)));
+impl Block for Candidates {
+    fn build<'k>(&self, k: &'k Builder, io: CandidatesPorts<Inside<'k>>) {
+        let Candidates { bits, degree } = *self;
+        let [u, v, m, n, a, h, g] =
+            ["u", "v", "m", "n", "a", "h", "g"].map(|name| k.register(name, Type::unsigned(bits)));
+        let [value, index] = [io.value, io.index].map(|output| output.register());
+        let [valid, sum] = [io.valid, io.sum].map(|output| output.register());
 
-    let is = |cycles: &[usize]| one_of(&k, cycle, cycles);
-    let zero = k.constant(bits, 0);
-    let power = k.wire("power", cycle.slice(2, 2) + cycle.low(2));
-    let counts = k.wire("counts", !k.constant(3, degree as u64).less(power));
-    let even = !cycle.at(2);
-    k.comment("Term of the alternating sums V and N: complemented where j is odd, with a carry.");
-    let alternates = cycle.at(0);
-    let term = k.wire("term", word ^ concat(&vec![alternates; bits]));
-    // Cleared when the last candidate has left, so that the adder needs no gate at the start of a polynomial.
-    k.when(even & counts, || {
-        u.set((*u + word).low(bits));
-        v.set((is(&[0]).mux(zero, *v) + term + alternates).low(bits));
-    });
-    k.when(is(&[15]), || u.set(zero));
-    k.when(!even & counts, || {
-        m.set((*m + word).low(bits));
-        n.set((*n + term + alternates).low(bits));
-    });
-    k.when(is(&[3]), || [m, n].iter().for_each(|sum| sum.set(zero)));
-    k.when(is(&[0]), || a.set(word));
-    k.when(is(&[8]), || h.set(if degree >= 2 { (*a + word).low(bits) } else { *a }));
-    let growing: &[usize] = if degree >= 3 { &[4, 12] } else { &[4] };
-    k.when(is(growing), || g.set((*g + word).low(bits)));
-    k.when(is(&[3]), || g.set(zero));
+        let is = |cycles: &[usize]| one_of(k, io.cycle, cycles);
+        let zero = k.constant(bits, 0);
+        let power = k.wire("power", io.cycle.slice(2, 2) + io.cycle.low(2));
+        let counts = k.wire("counts", !k.constant(3, degree as u64).less(power));
+        let even = !io.cycle.at(2);
+        k.comment("Term of the alternating sums V and N: complemented where j is odd, with a carry.");
+        let alternates = io.cycle.at(0);
+        let term = k.wire("term", io.word ^ concat(&vec![alternates; bits]));
+        // Cleared when the last candidate has left, so that the adder needs no gate at the start of a polynomial.
+        k.when(even & counts, || {
+            u.set((*u + io.word).low(bits));
+            v.set((is(&[0]).mux(zero, *v) + term + alternates).low(bits));
+        });
+        k.when(is(&[15]), || u.set(zero));
+        k.when(!even & counts, || {
+            m.set((*m + io.word).low(bits));
+            n.set((*n + term + alternates).low(bits));
+        });
+        k.when(is(&[3]), || [m, n].iter().for_each(|sum| sum.set(zero)));
+        k.when(is(&[0]), || a.set(io.word));
+        k.when(is(&[8]), || h.set(if degree >= 2 { (*a + io.word).low(bits) } else { *a }));
+        let growing: &[usize] = if degree >= 3 { &[4, 12] } else { &[4] };
+        k.when(is(growing), || g.set((*g + io.word).low(bits)));
+        k.when(is(&[3]), || g.set(zero));
 
-    let middle = is(&[2, 3]);
-    let base = k.wire("base", middle.mux(*h, is(&[5, 15, 0]).mux(*v, *u)));
-    let part = k.wire("part", middle.mux(*g, is(&[15, 0]).mux(*n, *m)));
-    let alone = k.wire("alone", is(&[1, 4, 5]));
-    let negate = k.wire("negate", is(&[14, 0, 3]));
-    let other = k.wire("other", alone.mux(zero, part ^ concat(&vec![negate; bits])));
-    value.set((base + other + negate).low(bits));
-    let from_before = k.wire("from_before", is(&[0, 2, 3]));
-    let leaves = from_before | alone | !cycle.less(k.constant(4, 13));
-    let bit =
-        |bit: usize| is(&(0..9).filter(|index| index >> bit & 1 == 1).map(|index| LEAVES[index]).collect::<Vec<_>>());
-    index.set(concat(&[bit(3), bit(2), bit(1), bit(0)]));
-    valid.set(leaves & from_before.mux(present.at(1), present.at(0)));
-    sum.set(from_before.mux(sums.at(1), sums.at(0)));
-    k.finish()
+        let middle = is(&[2, 3]);
+        let base = k.wire("base", middle.mux(*h, is(&[5, 15, 0]).mux(*v, *u)));
+        let part = k.wire("part", middle.mux(*g, is(&[15, 0]).mux(*n, *m)));
+        let alone = k.wire("alone", is(&[1, 4, 5]));
+        let negate = k.wire("negate", is(&[14, 0, 3]));
+        let other = k.wire("other", alone.mux(zero, part ^ concat(&vec![negate; bits])));
+        value.set((base + other + negate).low(bits));
+        let from_before = k.wire("from_before", is(&[0, 2, 3]));
+        let leaves = from_before | alone | !io.cycle.less(k.constant(4, 13));
+        let bit = |bit: usize| {
+            is(&(0..9).filter(|index| index >> bit & 1 == 1).map(|index| LEAVES[index]).collect::<Vec<_>>())
+        };
+        index.set(concat(&[bit(3), bit(2), bit(1), bit(0)]));
+        valid.set(leaves & from_before.mux(io.present.at(1), io.present.at(0)));
+        sum.set(from_before.mux(io.sums.at(1), io.sums.at(0)));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -198,10 +186,9 @@ mod tests {
                 (0..16).map(cycle).collect::<Vec<_>>()
             };
             let all: Vec<Vec<Word>> = (0..200).flat_map(polynomial).collect();
-            let ports = [("value", BITS), ("index", 4), ("valid", 1), ("sum", 1)];
-            let block = Body::new(kernel(BITS, degree), &[], &ports);
+            let block = Candidates { bits: BITS, degree };
             let mut evaluated = Evaluated { degree, polynomials: Default::default(), out: None, cycle: None };
-            check(block.kernel(), &all, &mut evaluated);
+            check(&kernel_of(&block), &all, &mut evaluated);
         }
     }
 }

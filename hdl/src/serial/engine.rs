@@ -4,6 +4,7 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::plan::serial::{floor_bits, product_bits, word_bits, SLOT};
+use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
 use rust_hdl::prelude::*;
@@ -22,24 +23,24 @@ engine! {
     pub struct Engine {
         stages {
             receive: Receive => "receive.rs",
-            reorder: TaxelReorder => "taxel_reorder.rs",
+            reorder: RustHdl<TaxelReorder> => "taxel_reorder.rs",
             pass_sequencer: PassSequencer => "pass_sequencer.rs",
-            rounder: Rounder => "rounder.rs",
-            butterfly: SerialButterfly => "serial_butterfly.rs",
-            pass: Pass => "pass.rs",
+            rounder: RustHdl<Rounder> => "rounder.rs",
+            butterfly: RustHdl<SerialButterfly> => "serial_butterfly.rs",
+            pass: RustHdl<Pass> => "pass.rs",
             raw: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            unfold: Unfold => "unfold.rs",
-            banks: Banks => "banks.rs",
+            unfold: RustHdl<Unfold> => "unfold.rs",
+            banks: RustHdl<Banks> => "banks.rs",
             search_sequencer: SearchSequencer => "search_sequencer.rs",
-            along_x: Horner => "horner.rs",
+            along_x: RustHdl<Horner> => "horner.rs",
             transposed: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            along_y: Horner => "horner.rs",
-            coefficient_shift: CoefficientShift => "coefficient_shift.rs",
-            candidates: Candidates => "candidates.rs",
-            score: Score => "score.rs",
+            along_y: RustHdl<Horner> => "horner.rs",
+            coefficient_shift: RustHdl<CoefficientShift> => "coefficient_shift.rs",
+            candidates: RustHdl<Candidates> => "candidates.rs",
+            score: RustHdl<Score> => "score.rs",
             floors: RustHdl<Ram> => "../primitives/memory/ram.rs",
             totals: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            forces: Forces => "forces.rs",
+            forces: RustHdl<Forces> => "forces.rs",
         }
         control {
             shifted: RustHdl<Slice>,
@@ -61,7 +62,6 @@ impl Engine {
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
-        let forces = Forces::new(model, unrounded);
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
@@ -69,30 +69,30 @@ impl Engine {
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(forces.m_axis_tdata.width()),
+            m_axis_tdata: Wire::new(3 * FORCE_BITS as usize),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             receive: Receive::new(f, model.noise_floor),
-            reorder: TaxelReorder::new(model.layout()),
+            reorder: RustHdl::new(TaxelReorder::new(model.layout())),
             pass_sequencer: PassSequencer::new(f, unrounded, rounded),
             rounder: Rounder::new(unrounded, rounded),
             shifted: RustHdl::new(Slice::new(32, rounded)),
             butterfly: SerialButterfly::new(rounded),
             pass: Pass::new(model),
             raw: RustHdl::new(Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw])),
-            unfold: Unfold::new(f, rounded + 2),
-            banks: Banks::new(f),
+            unfold: RustHdl::new(Unfold::new(f, rounded + 2)),
+            banks: RustHdl::new(Banks::new(f)),
             search_sequencer: SearchSequencer::new(f),
-            along_x: Horner::new(word),
+            along_x: RustHdl::new(Horner::new(word)),
             transposed: RustHdl::new(Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed])),
-            along_y: Horner::new(word),
-            coefficient_shift: CoefficientShift::new(word, f.search_bits[0] as usize),
-            candidates: Candidates::new(f),
-            score: Score::new(f),
+            along_y: RustHdl::new(Horner::new(word)),
+            coefficient_shift: RustHdl::new(CoefficientShift::new(word, f.search_bits[0] as usize)),
+            candidates: RustHdl::new(Candidates::new(f)),
+            score: RustHdl::new(Score::new(f)),
             floors: RustHdl::new(Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors])),
             totals: RustHdl::new(Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals])),
-            forces,
+            forces: RustHdl::new(Forces::new(model, unrounded)),
             computing: Default::default(),
             condition: Default::default(),
             framing: Default::default(),

@@ -14,14 +14,12 @@ use dermis_golden::fixed::stages::send::{CONDITION, FOUND, FRAMING, STATUS_BEATS
 use dermis_golden::fixed::words::formats::{FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
 use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::{NO_CONTACT, SCORE_LOW};
-use rust_hdl::prelude::*;
 
 use super::pass_sequencer::SATURATION_BITS;
 use super::rounder::SHIFT_BITS;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Net, Type};
 use crate::primitives::{count_bits, position_bits, status_bits};
-use crate::wire::Wire;
 
 const WORD: usize = FORCE_BITS as usize;
 const FACTOR: usize = FACTOR_BITS as usize;
@@ -33,91 +31,80 @@ const AGAIN_PHASE: u64 = FIRST_BEAT - BEAT;
 /// Width of the count of cycles to the first beat, in bits.
 const CYCLES: usize = 20;
 
-/// Values in, beats out; timing in the module docs.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Forces {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// All values are in the bank: start sending.
-    pub start: Signal<In, Bit>,
-    /// Row-major index of the taxel to read; valid from the cycle after `start` until the frame's last force.
-    pub index: Wire<Out>,
-    /// Place 4·quad + lane of that taxel; one cycle after `index`.
-    pub place: Wire<In>,
-    /// Index of the taxel's polynomial; combinational from `place`.
-    pub wanted: Wire<Out>,
-    /// Value p(μ*) of the taxel, signed; one cycle after `wanted`.
-    pub value: Wire<In>,
-    /// μ1 in grid steps of the last level, signed; stable while sending.
-    pub best_x: Wire<In>,
-    /// μ2 in grid steps of the last level, signed; stable while sending.
-    pub best_y: Wire<In>,
-    /// Score of the best candidate, signed, 2^−6; stable while sending.
-    pub score: Wire<In>,
-    /// The search found a candidate; stable while sending.
-    pub found: Signal<In, Bit>,
-    /// The frame meets the scene's condition; stable while sending.
-    pub condition: Signal<In, Bit>,
-    /// `tlast` was early or missing; stable while sending.
-    pub framing: Signal<In, Bit>,
-    /// Left shift of `normalise`; stable while sending.
-    pub normalise: Wire<In>,
-    /// Right shift of `rescale`; stable while sending.
-    pub rescale: Wire<In>,
-    /// Words saturated by `rescale`; stable while sending.
-    pub saturations: Wire<In>,
-    /// A frame starts: its cycle count restarts.
-    pub frame_begin: Signal<In, Bit>,
-    /// Product for the rounder, signed; its force word is on `rounded` four cycles later.
-    pub product: Wire<Out>,
-    /// Right shift for the rounder; valid with `product`.
-    pub round_shift: Wire<Out>,
-    /// Word from the rounder, 32 bits signed; four cycles after `product`.
-    pub rounded: Wire<In>,
-    /// `rounded` was saturated.
-    pub clipped: Signal<In, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// The frame's last beat is accepted in this cycle.
-    pub done: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(
-    Forces,
-    clock clk,
-    inputs [
-        rst, start, place, value, best_x, best_y, score, found, condition, framing, normalise, rescale, saturations,
-        frame_begin, rounded, clipped, m_axis_tready
-    ],
-    outputs [index, wanted, product, round_shift, m_axis_tdata, m_axis_tvalid, m_axis_tlast, done]
-);
-
-/// Widths of the words, and constants of the scene.
-#[derive(Clone, Copy)]
-struct Sizes {
-    places: usize,
-    wanted: usize,
-    /// A larger score is that of no clean frame.
-    score_limit: Option<i64>,
-    /// Width of a word from the bank, and of the value p(μ*) in it.
-    word: usize,
-    value: usize,
-    score: usize,
-    unrounded: usize,
-    mu_step: i64,
-    mu_fraction: u32,
-    shift_base: i64,
-    threshold: i64,
-    taxels: u64,
+block! {
+    /// Values in, beats out; timing in the module docs.
+    pub struct Forces {
+        /// Width of a place.
+        places: usize,
+        /// Width of a polynomial's number.
+        wanted: usize,
+        /// A larger score is that of no clean frame.
+        score_limit: Option<i64>,
+        /// Width of a word from the bank, and of the value p(μ*) in it.
+        word: usize,
+        value: usize,
+        /// Width of the score.
+        score: usize,
+        /// Width of a word for the rounder.
+        unrounded: usize,
+        mu_step: i64,
+        mu_fraction: u32,
+        shift_base: i64,
+        threshold: i64,
+        taxels: u64,
+    }
+    ports ForcesPorts {
+        clock;
+        reset;
+        /// All values are in the bank: start sending.
+        in start;
+        /// Row-major index of the taxel to read; valid from the cycle after `start` until the frame's last force.
+        out index: places;
+        /// Place 4·quad + lane of that taxel; one cycle after `index`.
+        in place: places;
+        /// Index of the taxel's polynomial; combinational from `place`.
+        out wanted: wanted;
+        /// Value p(μ*) of the taxel, signed; one cycle after `wanted`.
+        in value: word;
+        /// μ1 in grid steps of the last level, signed; stable while sending.
+        in best_x: position_bits();
+        /// μ2 in grid steps of the last level, signed; stable while sending.
+        in best_y: position_bits();
+        /// Score of the best candidate, signed, 2^−6; stable while sending.
+        in score: score;
+        /// The search found a candidate; stable while sending.
+        in found;
+        /// The frame meets the scene's condition; stable while sending.
+        in condition;
+        /// `tlast` was early or missing; stable while sending.
+        in framing;
+        /// Left shift of `normalise`; stable while sending.
+        in normalise: SHIFT_BITS;
+        /// Right shift of `rescale`; stable while sending.
+        in rescale: SHIFT_BITS;
+        /// Words saturated by `rescale`; stable while sending.
+        in saturations: SATURATION_BITS;
+        /// A frame starts: its cycle count restarts.
+        in frame_begin;
+        /// Product for the rounder, signed; its force word is on `rounded` four cycles later.
+        out product: unrounded;
+        /// Right shift for the rounder; valid with `product`.
+        out round_shift: SHIFT_BITS;
+        /// Word from the rounder, 32 bits signed; four cycles after `product`.
+        in rounded: WORD;
+        /// `rounded` was saturated.
+        in clipped;
+        /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
+        out m_axis_tdata: 3 * WORD;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// The frame's last beat is accepted in this cycle.
+        out done;
+    }
 }
 
 impl Forces {
@@ -126,7 +113,7 @@ impl Forces {
         let f = model.formats();
         let rescale_max = i64::from(f.raw_length_max.saturating_sub(f.vector_bits - 1));
         let headroom = i64::from(FORCE_BITS - f.search_bits[0]);
-        let sizes = Sizes {
+        Forces {
             places: count_bits(4 * f.quads),
             wanted: count_bits(polynomials(f)),
             word: word_bits(f),
@@ -139,37 +126,7 @@ impl Forces {
             threshold: model.threshold,
             score_limit: model.score_limit.map(i64::from),
             taxels: 4 * f.quads as u64,
-        };
-        let block = Forces {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            index: Wire::new(sizes.places),
-            place: Wire::new(sizes.places),
-            wanted: Wire::new(sizes.wanted),
-            value: Wire::new(sizes.word),
-            best_x: Wire::new(position_bits()),
-            best_y: Wire::new(position_bits()),
-            score: Wire::new(sizes.score),
-            found: Default::default(),
-            condition: Default::default(),
-            framing: Default::default(),
-            normalise: Wire::new(SHIFT_BITS),
-            rescale: Wire::new(SHIFT_BITS),
-            saturations: Wire::new(SATURATION_BITS),
-            frame_begin: Default::default(),
-            product: Wire::new(unrounded),
-            round_shift: Wire::new(SHIFT_BITS),
-            rounded: Wire::new(WORD),
-            clipped: Default::default(),
-            m_axis_tdata: Wire::new(3 * WORD),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            done: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(sizes))
+        }
     }
 }
 
@@ -211,139 +168,133 @@ impl<'k> Status<'k> {
     }
 }
 
-fn kernel(sizes: Sizes) -> Kernel {
-    let Sizes { places, value: value_bits, .. } = sizes;
-    let k = Builder::new("forces");
-    let (rst, start) = (k.input("rst", 1), k.input("start", 1));
-    let (place, value) = (k.input("place", places), k.input("value", sizes.word));
-    let best = ["best_x", "best_y"].map(|name| k.input(name, position_bits()));
-    let score = k.input("score", sizes.score);
-    let [found, condition, framing] = ["found", "condition", "framing"].map(|name| k.input(name, 1));
-    let [normalise, rescale] = ["normalise", "rescale"].map(|name| k.input(name, SHIFT_BITS));
-    let (saturations, frame_begin) = (k.input("saturations", SATURATION_BITS), k.input("frame_begin", 1));
-    let (rounded, clipped, ready) = (k.input("rounded", WORD), k.input("clipped", 1), k.input("m_axis_tready", 1));
-    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
-    let [scaling, sending, valid] = ["scaling", "sending", "valid"].map(|name| k.state(name, bit, rst, 0));
-    let [status, counting, contact] = ["status", "counting", "contact"].map(|name| k.register(name, bit));
-    let phase = k.register("phase", Type::unsigned(4));
-    let [beat, ahead] = ["beat", "ahead"].map(|name| k.register(name, Type::unsigned(places)));
-    let factor_a = k.register("factor_a", Type::signed(value_bits));
-    let [factor_b, mu_x, mu_y] = ["factor_b", "mu_x", "mu_y"].map(|name| k.register(name, Type::signed(FACTOR)));
-    let result = k.register("result", Type::signed(value_bits + FACTOR));
-    let words = ["fx", "fy", "fz"].map(|name| k.register(name, Type::unsigned(WORD)));
-    let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
-    let first_cycles = k.register("first_cycles", Type::unsigned(CYCLES));
+impl Block for Forces {
+    fn build<'k>(&self, k: &'k Builder, io: ForcesPorts<Inside<'k>>) {
+        let Forces { places, value: value_bits, .. } = *self;
+        let best = [io.best_x, io.best_y];
+        let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
+        let [scaling, sending, valid] = ["scaling", "sending", "valid"].map(|name| k.state(name, bit, io.rst, 0));
+        let [status, counting, contact] = ["status", "counting", "contact"].map(|name| k.register(name, bit));
+        let phase = k.register("phase", Type::unsigned(4));
+        let [beat, ahead] = ["beat", "ahead"].map(|name| k.register(name, Type::unsigned(places)));
+        let factor_a = k.register("factor_a", Type::signed(value_bits));
+        let [factor_b, mu_x, mu_y] = ["factor_b", "mu_x", "mu_y"].map(|name| k.register(name, Type::signed(FACTOR)));
+        let result = k.register("result", Type::signed(value_bits + FACTOR));
+        let words = ["fx", "fy", "fz"].map(|name| k.register(name, Type::unsigned(WORD)));
+        let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
+        let first_cycles = k.register("first_cycles", Type::unsigned(CYCLES));
 
-    let at = |phases: &[usize]| super::one_of(&k, *phase, phases);
-    let sends = k.wire("sends", !*scaling & *sending);
-    let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & ready);
-    let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
-    let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
-    let last_force = k.wire("last_force", !*status & beat.is(sizes.taxels - 1));
-    let [fx, fy, fz] = words;
-    let size = fz.top().mux((k.constant(WORD, 0) - *fz).low(WORD), *fz);
-    let too_small = match sizes.threshold {
-        0 => zero,
-        threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
-    };
-    let settled_shift = force_shift(&k, sizes.shift_base, normalise, rescale);
-    let mut bits = vec![(FRAMING, framing), (NO_CONTACT, !*contact), (FOUND, found), (CONDITION, condition)];
-    bits.extend(sizes.score_limit.map(|limit| {
-        let low = found & k.signed_constant(sizes.score, limit).less(score.signed());
-        (SCORE_LOW, k.wire("score_low", low))
-    }));
-    let highest = bits.iter().map(|(field, _)| field.low).fold(0, u32::max);
-    let state = Status {
-        best,
-        score,
-        flags: concat(&status_bits(&k, &bits, highest + 1)),
-        found,
-        normalise,
-        rescale,
-        counts: [saturations, *force_saturations, *first_cycles],
-    };
-    let own = beat.low(places.min(2));
-    let [status_x, status_y, status_z] = [0, 1, 2].map(|axis| {
-        let name = ["status_x", "status_y", "status_z"][axis];
-        k.wire(name, state.word(&k, own, axis))
-    });
-    let of_status = phase.at(1).mux(status_z, phase.at(0).mux(status_y, status_x));
-    let captured = k.wire("captured", (!*status).mux(rounded, of_status));
+        let at = |phases: &[usize]| super::one_of(k, *phase, phases);
+        let sends = k.wire("sends", !*scaling & *sending);
+        let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & io.m_axis_tready);
+        let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
+        let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
+        let last_force = k.wire("last_force", !*status & beat.is(self.taxels - 1));
+        let [fx, fy, fz] = words;
+        let size = fz.top().mux((k.constant(WORD, 0) - *fz).low(WORD), *fz);
+        let too_small = match self.threshold {
+            0 => zero,
+            threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
+        };
+        let settled_shift = force_shift(k, self.shift_base, io.normalise, io.rescale);
+        let mut bits =
+            vec![(FRAMING, io.framing), (NO_CONTACT, !*contact), (FOUND, io.found), (CONDITION, io.condition)];
+        bits.extend(self.score_limit.map(|limit| {
+            let low = io.found & k.signed_constant(self.score, limit).less(io.score.signed());
+            (SCORE_LOW, k.wire("score_low", low))
+        }));
+        let highest = bits.iter().map(|(field, _)| field.low).fold(0, u32::max);
+        let state = Status {
+            best,
+            score: io.score,
+            flags: concat(&status_bits(k, &bits, highest + 1)),
+            found: io.found,
+            normalise: io.normalise,
+            rescale: io.rescale,
+            counts: [io.saturations, *force_saturations, *first_cycles],
+        };
+        let own = beat.low(places.min(2));
+        let [status_x, status_y, status_z] = [0, 1, 2].map(|axis| {
+            let name = ["status_x", "status_y", "status_z"][axis];
+            k.wire(name, state.word(k, own, axis))
+        });
+        let of_status = phase.at(1).mux(status_z, phase.at(0).mux(status_y, status_x));
+        let captured = k.wire("captured", (!*status).mux(io.rounded, of_status));
 
-    result.set(*factor_a * *factor_b);
-    // The beats. They come first: what waits for m_axis_tready arrives late, so the μ words take precedence.
-    let is_force = !*status;
-    k.when(sends, || {
-        k.when(!at(&[LAST_PHASE as usize]), || phase.set(phase.plus(1)));
-        k.when(take_value, || {
-            factor_a.set(value.low(value_bits).signed());
-            factor_b.set(*mu_x);
-            ahead.set(ahead.plus(1));
+        result.set(*factor_a * *factor_b);
+        // The beats. They come first: what waits for m_axis_tready arrives late, so the μ words take precedence.
+        let is_force = !*status;
+        k.when(sends, || {
+            k.when(!at(&[LAST_PHASE as usize]), || phase.set(phase.plus(1)));
+            k.when(take_value, || {
+                factor_a.set(io.value.low(value_bits).signed());
+                factor_b.set(*mu_x);
+                ahead.set(ahead.plus(1));
+            });
+            k.when(at(&[3]), || factor_b.set(*mu_y));
+            k.when(at(&[4]), || factor_b.set(k.signed_constant(FACTOR, 1 << self.mu_fraction)));
+            k.when(at(&[8, 9, 10]), || {
+                // All three enter at fz and shift down: only one register has the multiplexer.
+                fx.set(*fy);
+                fy.set(*fz);
+                fz.set(captured);
+                k.when(io.clipped & is_force, || force_saturations.set(force_saturations.plus(1)));
+            });
+            k.when(at(&[11]), || {
+                k.when(is_force & too_small, || words.iter().for_each(|word: &Net<'_>| word.set(k.constant(WORD, 0))));
+                k.when(is_force & !too_small & fz.any(), || contact.set(one));
+                counting.set(zero);
+                valid.set(one);
+            });
+            k.when(beat_taken, || {
+                phase.set(k.constant(4, AGAIN_PHASE));
+                valid.set(zero);
+                beat.set(last_force.mux(k.constant(places, 0), beat.plus(1)));
+                k.when(last_force, || status.set(one));
+                k.when(last_beat, || sending.set(zero));
+            });
         });
-        k.when(at(&[3]), || factor_b.set(*mu_y));
-        k.when(at(&[4]), || factor_b.set(k.signed_constant(FACTOR, 1 << sizes.mu_fraction)));
-        k.when(at(&[8, 9, 10]), || {
-            // All three enter at fz and shift down: only one register has the multiplexer.
-            fx.set(*fy);
-            fy.set(*fz);
-            fz.set(captured);
-            k.when(clipped & is_force, || force_saturations.set(force_saturations.plus(1)));
+        // The two μ words.
+        let scaled = at(&[MU_WORDS as usize - 1]);
+        k.when(*scaling, || {
+            phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
+            k.when(at(&[0]), || {
+                factor_a.set(k.signed_constant(value_bits, self.mu_step));
+                factor_b.set(best[0].signed());
+            });
+            k.when(at(&[1]), || factor_b.set(best[1].signed()));
+            for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
+                k.when(at(&[phase]), || word.set(io.rounded.low(FACTOR).signed()));
+            }
+            k.when(scaled, || {
+                scaling.set(zero);
+                sending.set(one);
+            });
         });
-        k.when(at(&[11]), || {
-            k.when(is_force & too_small, || words.iter().for_each(|word: &Net<'_>| word.set(k.constant(WORD, 0))));
-            k.when(is_force & !too_small & fz.any(), || contact.set(one));
-            counting.set(zero);
-            valid.set(one);
+        k.when(!*scaling & !*sending & io.start, || {
+            scaling.set(one);
+            phase.set(k.constant(4, 0));
+            status.set(zero);
+            beat.set(k.constant(places, 0));
+            ahead.set(k.constant(places, 0));
+            force_saturations.set(k.constant(SATURATION_BITS, 0));
+            contact.set(zero);
         });
-        k.when(beat_taken, || {
-            phase.set(k.constant(4, AGAIN_PHASE));
-            valid.set(zero);
-            beat.set(last_force.mux(k.constant(places, 0), beat.plus(1)));
-            k.when(last_force, || status.set(one));
-            k.when(last_beat, || sending.set(zero));
+        k.when(*counting, || first_cycles.set(first_cycles.plus(1)));
+        k.when(io.frame_begin, || {
+            counting.set(one);
+            first_cycles.set(k.constant(CYCLES, COUNTED_LATER));
         });
-    });
-    // The two μ words.
-    let scaled = at(&[MU_WORDS as usize - 1]);
-    k.when(*scaling, || {
-        phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
-        k.when(at(&[0]), || {
-            factor_a.set(k.signed_constant(value_bits, sizes.mu_step));
-            factor_b.set(best[0].signed());
-        });
-        k.when(at(&[1]), || factor_b.set(best[1].signed()));
-        for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
-            k.when(at(&[phase]), || word.set(rounded.low(FACTOR).signed()));
-        }
-        k.when(scaled, || {
-            scaling.set(zero);
-            sending.set(one);
-        });
-    });
-    k.when(!*scaling & !*sending & start, || {
-        scaling.set(one);
-        phase.set(k.constant(4, 0));
-        status.set(zero);
-        beat.set(k.constant(places, 0));
-        ahead.set(k.constant(places, 0));
-        force_saturations.set(k.constant(SATURATION_BITS, 0));
-        contact.set(zero);
-    });
-    k.when(*counting, || first_cycles.set(first_cycles.plus(1)));
-    k.when(frame_begin, || {
-        counting.set(one);
-        first_cycles.set(k.constant(CYCLES, COUNTED_LATER));
-    });
 
-    k.wire("index", *ahead);
-    k.wire("wanted", place.extend(sizes.wanted).plus(1));
-    k.wire("product", result.extend(sizes.unrounded).unsigned());
-    k.wire("round_shift", scaling.mux(k.constant(SHIFT_BITS, MU_ROUND.into()), settled_shift));
-    k.wire("m_axis_tdata", concat(&[*fz, *fy, *fx]));
-    k.wire("m_axis_tvalid", *valid);
-    let last = k.wire("m_axis_tlast", *valid & last_beat);
-    k.wire("done", last & ready);
-    k.finish()
+        io.index.set(*ahead);
+        io.wanted.set(io.place.extend(self.wanted).plus(1));
+        io.product.set(result.extend(self.unrounded).unsigned());
+        io.round_shift.set(scaling.mux(k.constant(SHIFT_BITS, MU_ROUND.into()), settled_shift));
+        io.m_axis_tdata.set(concat(&[*fz, *fy, *fx]));
+        io.m_axis_tvalid.set(*valid);
+        let last = io.m_axis_tlast.set(*valid & last_beat);
+        io.done.set(last & io.m_axis_tready);
+    }
 }
 
 #[cfg(test)]

@@ -1,85 +1,72 @@
 //! Taylor shift along one axis: polynomials of up to four coefficients about a centre moved by −1, 0 or 1, one
 //! coefficient per cycle.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
-
-/// ```text
-/// word (c3, c2, c1, c0) --> s0 --> s1 --> s2 --> s3 --> moved (c0, c1, c2, c3 about the new centre)
-/// ```
-/// Horner's scheme as a systolic chain: register k runs k cycles behind and accumulates the values that pass it, so
-/// that all four are complete when c0 has arrived. They leave in the next four cycles, each before its register
-/// restarts. `element` counts the cycles of a polynomial, `top` is its degree; coefficients above the degree are
-/// ignored, and the outputs in their place are undefined.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Horner {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Coefficient 3 − `element` of the polynomial that enters, signed; taken in every cycle.
-    pub word: Wire<In>,
-    /// Cycle of the polynomial, 0..=3; valid in every cycle.
-    pub element: Wire<In>,
-    /// Degree of the polynomial that enters; valid with `word`.
-    pub top: Wire<In>,
-    /// The centre moves.
-    pub moves: Signal<In, Bit>,
-    /// By −1 instead of +1; valid with `moves`.
-    pub down: Signal<In, Bit>,
-    /// Coefficient `element` of the previous polynomial about the new centre, signed; combinational from `element`, in
-    /// the four cycles after that polynomial's last coefficient.
-    pub moved: Wire<Out>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// word (c3, c2, c1, c0) --> s0 --> s1 --> s2 --> s3 --> moved (c0, c1, c2, c3 about the new centre)
+    /// ```
+    /// Horner's scheme as a systolic chain: register k runs k cycles behind and accumulates the values that pass it, so
+    /// that all four are complete when c0 has arrived. They leave in the next four cycles, each before its register
+    /// restarts. `element` counts the cycles of a polynomial, `top` is its degree; coefficients above the degree are
+    /// ignored, and the outputs in their place are undefined.
+    pub struct Horner {
+        bits: usize,
+    }
+    ports HornerPorts {
+        clock;
+        /// Coefficient 3 − `element` of the polynomial that enters, signed; taken in every cycle.
+        in word: bits;
+        /// Cycle of the polynomial, 0..=3; valid in every cycle.
+        in element: 2;
+        /// Degree of the polynomial that enters; valid with `word`.
+        in top: 2;
+        /// The centre moves.
+        in moves;
+        /// By −1 instead of +1; valid with `moves`.
+        in down;
+        /// Coefficient `element` of the previous polynomial about the new centre, signed; combinational from `element`,
+        /// in the four cycles after that polynomial's last coefficient.
+        out moved: bits;
+    }
 }
-
-kernel_block!(Horner, clock clk, inputs [word, element, top, moves, down], outputs [moved]);
 
 impl Horner {
     /// For coefficients of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        let block = Horner {
-            clk: Default::default(),
-            word: Wire::new(bits),
-            element: Wire::new(2),
-            top: Wire::new(2),
-            moves: Default::default(),
-            down: Default::default(),
-            moved: Wire::new(bits),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits))
+        Horner { bits }
     }
 }
 
-fn kernel(bits: usize) -> Kernel {
-    let k = Builder::new("horner");
-    let (word, element, top) = (k.input("word", bits), k.input("element", 2), k.input("top", 2));
-    let (moves, down) = (k.input("moves", 1), k.input("down", 1));
-    let [s0, s1, s2, s3] = ["s0", "s1", "s2", "s3"].map(|name| k.register(name, Type::unsigned(bits)));
-    let inverted = k.wire("inverted", concat(&vec![down; bits]));
-    k.comment("Zero at the start of a polynomial; complement, with a carry, where the centre moves by -1.");
-    // Register `at` takes coefficient 3 − element + at.
-    for (at, (register, incoming)) in [(&s0, word), (&s1, *s0), (&s2, *s1)].into_iter().enumerate() {
-        let starts = element.equals((k.constant(2, (3 + at as u64) % 4) - top).low(2));
-        let adds = k.wire(&format!("adds{at}"), moves & !starts);
-        let kept = adds.mux(**register ^ inverted, k.constant(bits, 0));
-        let sum = (incoming + kept + (adds & down)).low(bits);
-        match at {
-            0 => register.set(sum),
-            1 => k.when(element.any(), || register.set(sum)),
-            _ => k.when(element.at(1), || register.set(sum)),
+impl Block for Horner {
+    fn build<'k>(&self, k: &'k Builder, io: HornerPorts<Inside<'k>>) {
+        let bits = self.bits;
+        let [s0, s1, s2, s3] = ["s0", "s1", "s2", "s3"].map(|name| k.register(name, Type::unsigned(bits)));
+        let inverted = k.wire("inverted", concat(&vec![io.down; bits]));
+        k.comment("Zero at the start of a polynomial; complement, with a carry, where the centre moves by -1.");
+        // Register `at` takes coefficient 3 − element + at.
+        for (at, (register, incoming)) in [(&s0, io.word), (&s1, *s0), (&s2, *s1)].into_iter().enumerate() {
+            let starts = io.element.equals((k.constant(2, (3 + at as u64) % 4) - io.top).low(2));
+            let adds = k.wire(&format!("adds{at}"), io.moves & !starts);
+            let kept = adds.mux(**register ^ inverted, k.constant(bits, 0));
+            let sum = (incoming + kept + (adds & io.down)).low(bits);
+            match at {
+                0 => register.set(sum),
+                1 => k.when(io.element.any(), || register.set(sum)),
+                _ => k.when(io.element.at(1), || register.set(sum)),
+            }
         }
+        k.when(io.element.is(3), || s3.set(*s2));
+        io.moved.set(io.element.case(&[(0, *s0), (1, *s1), (2, *s2)], *s3));
     }
-    k.when(element.is(3), || s3.set(*s2));
-    k.wire("moved", element.case(&[(0, *s0), (1, *s1), (2, *s2)], *s3));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -127,6 +114,6 @@ mod tests {
             (0..4).map(cycle).collect::<Vec<_>>()
         };
         let all: Vec<Vec<Word>> = (0..1000).flat_map(polynomial).collect();
-        check(Horner::new(BITS).kernel.kernel(), &all, &mut Polynomials::default());
+        check(&kernel_of(&Horner::new(BITS)), &all, &mut Polynomials::default());
     }
 }

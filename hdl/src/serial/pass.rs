@@ -14,12 +14,11 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::plan::serial::{coefficients, first_vector, OPERAND_BITS, WIDE};
 use dermis_golden::fixed::words::schedule::Kind;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Word;
 
 /// File of the coefficients as wide as an operand.
 pub const WIDE_FILE: &str = "coefficients.hex";
@@ -27,66 +26,53 @@ pub const WIDE_FILE: &str = "coefficients.hex";
 pub const LOW_FILE: &str = "coefficients_low.hex";
 const OPERAND: usize = OPERAND_BITS as usize;
 
-/// Four multiply-accumulate lanes; timing in the module docs.
-#[derive(LogicBlock)]
-pub struct Pass {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A product is issued in this cycle.
-    pub valid: Signal<In, Bit>,
-    /// The product is the last of its row; valid with `valid`.
-    pub last: Signal<In, Bit>,
-    /// Wide matrix, row and column of the coefficient; valid with `valid`.
-    pub address: Wire<In>,
-    /// Use the low limb of Cz⁺ in place of the wide matrix; valid with `valid`.
-    pub low: Signal<In, Bit>,
-    /// Vector and column of the operand; valid with `valid`.
-    pub operand_address: Wire<In>,
-    /// Source parity = target parity with both bits inverted; valid with `valid`.
-    pub flip: Signal<In, Bit>,
-    /// The product is of two high limbs and is shifted left; valid with `valid`.
-    pub align: Signal<In, Bit>,
-    /// Write `write_data` to the operand memory.
-    pub write: Signal<In, Bit>,
-    /// Vector and quad to write; valid with `write`.
-    pub write_address: Wire<In>,
-    /// Parity to write, 2 bits; valid with `write`.
-    pub write_lane: Wire<In>,
-    /// Operand of 16 bits, signed; valid with `write`.
-    pub write_data: Wire<In>,
-    /// All four accumulators, `acc_bits` each, signed; valid with `quad_valid`.
-    pub quad: Wire<Out>,
-    /// The accumulators hold a row; the first leaves in this cycle.
-    pub quad_valid: Signal<Out, Bit>,
-    /// One accumulator, `acc_bits` wide, signed; valid with `word_valid`.
-    pub word: Wire<Out>,
-    /// `word` is valid.
-    pub word_valid: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(
-    Pass,
-    clock clk,
-    inputs [
-        rst, valid, last, address, low, operand_address, flip, align, write, write_address, write_lane, write_data
-    ],
-    outputs [quad, quad_valid, word, word_valid]
-);
-
-/// Coefficients by address, and the widths that depend on the scene.
-struct Tables {
-    wide: Vec<[i64; 4]>,
-    /// Of Cz⁺; empty if it has no low limb.
-    low: Vec<[i64; 4]>,
-    low_bits: usize,
-    /// Left shift of a product of two high limbs.
-    align: usize,
-    acc_bits: usize,
-    address_bits: usize,
-    operand_bits: usize,
+block! {
+    /// Four multiply-accumulate lanes; timing in the module docs.
+    pub struct Pass {
+        wide: Vec<[i64; 4]>,
+        /// Of Cz⁺; empty if it has no low limb.
+        low: Vec<[i64; 4]>,
+        low_bits: usize,
+        /// Left shift of a product of two high limbs.
+        align: usize,
+        acc_bits: usize,
+        address_bits: usize,
+        operand_bits: usize,
+    }
+    ports PassPorts {
+        clock;
+        reset;
+        /// A product is issued in this cycle.
+        in valid;
+        /// The product is the last of its row; valid with `valid`.
+        in last;
+        /// Wide matrix, row and column of the coefficient; valid with `valid`.
+        in address: address_bits;
+        /// Use the low limb of Cz⁺ in place of the wide matrix; valid with `valid`.
+        in low;
+        /// Vector and column of the operand; valid with `valid`.
+        in operand_address: operand_bits;
+        /// Source parity = target parity with both bits inverted; valid with `valid`.
+        in flip;
+        /// The product is of two high limbs and is shifted left; valid with `valid`.
+        in align;
+        /// Write `write_data` to the operand memory.
+        in write;
+        /// Vector and quad to write; valid with `write`.
+        in write_address: operand_bits;
+        /// Parity to write, 2 bits; valid with `write`.
+        in write_lane: 2;
+        /// Operand of 16 bits, signed; valid with `write`.
+        in write_data: OPERAND;
+        /// All four accumulators, `acc_bits` each, signed; valid with `quad_valid`.
+        out quad: 4 * acc_bits;
+        /// The accumulators hold a row; the first leaves in this cycle.
+        out quad_valid;
+        /// One accumulator, `acc_bits` wide, signed; valid with `word_valid`.
+        out word: acc_bits;
+        /// `word` is valid.
+        out word_valid;
+    }
 }
 
 impl Pass {
@@ -96,7 +82,7 @@ impl Pass {
         let bits = count_bits(f.quads);
         let table = |kind| coefficients(f, model.quantised(), kind);
         let low_bits = f.inverse_low_bits as usize;
-        let tables = Tables {
+        Pass {
             wide: WIDE.into_iter().flat_map(table).collect(),
             low: if low_bits > 0 { table(Kind::InverseLow) } else { Vec::new() },
             low_bits,
@@ -104,33 +90,12 @@ impl Pass {
             acc_bits: f.acc_bits as usize,
             address_bits: 2 + 2 * bits,
             operand_bits: count_bits(first_vector(f) + f.operand_vectors()) + bits,
-        };
-        let block = Pass {
-            clk: Default::default(),
-            rst: Default::default(),
-            valid: Default::default(),
-            last: Default::default(),
-            address: Wire::new(tables.address_bits),
-            low: Default::default(),
-            operand_address: Wire::new(tables.operand_bits),
-            flip: Default::default(),
-            align: Default::default(),
-            write: Default::default(),
-            write_address: Wire::new(tables.operand_bits),
-            write_lane: Wire::new(2),
-            write_data: Wire::new(OPERAND),
-            quad: Wire::new(4 * tables.acc_bits),
-            quad_valid: Default::default(),
-            word: Wire::new(tables.acc_bits),
-            word_valid: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(&tables))
+        }
     }
 
-    /// Memory files: name and text.
-    pub fn memory_files(&self) -> Vec<(&'static str, String)> {
-        let texts = self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text);
+    /// Memory files of the block with this kernel: name and text.
+    pub fn memory_files(kernel: &Kernel) -> Vec<(&'static str, String)> {
+        let texts = kernel.memory_files().into_iter().map(|(_, text)| text);
         [WIDE_FILE, LOW_FILE].into_iter().zip(texts).collect()
     }
 }
@@ -152,92 +117,92 @@ fn coefficient_memory<'k>(
     *word
 }
 
-fn kernel(tables: &Tables) -> Kernel {
-    let &Tables { low_bits, align: by, acc_bits: acc, address_bits, operand_bits, .. } = tables;
-    let k = Builder::new("pass");
-    let (rst, valid, last) = (k.input("rst", 1), k.input("valid", 1), k.input("last", 1));
-    let (address, low) = (k.input("address", address_bits), k.input("low", 1));
-    let operand_address = k.input("operand_address", operand_bits);
-    let (flip, align, write) = (k.input("flip", 1), k.input("align", 1), k.input("write", 1));
-    let (write_address, write_lane) = (k.input("write_address", operand_bits), k.input("write_lane", 2));
-    let write_data = k.input("write_data", OPERAND);
+impl Block for Pass {
+    fn build<'k>(&self, k: &'k Builder, io: PassPorts<Inside<'k>>) {
+        let &Pass { low_bits, align: by, acc_bits: acc, operand_bits, .. } = self;
+        let wide_word = coefficient_memory(
+            k,
+            Holds::Coefficients,
+            ["wide", "wide_word", WIDE_FILE],
+            &self.wide,
+            OPERAND,
+            io.address,
+        );
+        let low_word = (low_bits > 0).then(|| {
+            let own = io.address.low(count_bits(self.low.len()));
+            (
+                k.delay("low_selected", io.low),
+                coefficient_memory(
+                    k,
+                    Holds::LowCoefficients,
+                    ["low_memory", "low_word", LOW_FILE],
+                    &self.low,
+                    low_bits,
+                    own,
+                ),
+            )
+        });
+        // valid, last, align
+        let [first, second, third] =
+            ["control0", "control1", "control2"].map(|name| k.register(name, Type::unsigned(3)));
+        first.set(concat(&[io.valid & !io.rst, io.last, io.align]));
+        second.set((first.at(2) & !io.rst).concat(first.low(2)));
+        third.set((second.at(2) & !io.rst).concat(second.low(2)));
+        let (adds, ends, aligns) = (third.at(2), third.at(1), third.at(0));
+        let reading = k.state("reading", Type::unsigned(1), io.rst, 0);
+        let idle = k.wire("idle", io.rst | !*reading);
+        let read = k.state("read", Type::unsigned(2), idle, 0);
+        let clears = k.wire("clears", io.rst | (*reading & read.is(3)));
+        reading.set((adds & ends) | (*reading & !read.is(3)));
+        read.set(read.plus(1));
 
-    let wide_word =
-        coefficient_memory(&k, Holds::Coefficients, ["wide", "wide_word", WIDE_FILE], &tables.wide, OPERAND, address);
-    let low_word = (low_bits > 0).then(|| {
-        let own = address.low(count_bits(tables.low.len()));
-        let selected = k.register("low_selected", Type::unsigned(1));
-        selected.set(low);
-        (
-            *selected,
-            coefficient_memory(
-                &k,
-                Holds::LowCoefficients,
-                ["low_memory", "low_word", LOW_FILE],
-                &tables.low,
-                low_bits,
-                own,
-            ),
-        )
-    });
-    // valid, last, align
-    let [first, second, third] = ["control0", "control1", "control2"].map(|name| k.register(name, Type::unsigned(3)));
-    first.set(concat(&[valid & !rst, last, align]));
-    second.set((first.at(2) & !rst).concat(first.low(2)));
-    third.set((second.at(2) & !rst).concat(second.low(2)));
-    let (adds, ends, aligns) = (third.at(2), third.at(1), third.at(0));
-    let reading = k.state("reading", Type::unsigned(1), rst, 0);
-    let idle = k.wire("idle", rst | !*reading);
-    let read = k.state("read", Type::unsigned(2), idle, 0);
-    let clears = k.wire("clears", rst | (*reading & read.is(3)));
-    reading.set((adds & ends) | (*reading & !read.is(3)));
-    read.set(read.plus(1));
-
-    let accumulators = [0, 1, 2, 3].map(|lane| {
-        let named = |name: &str| format!("{name}{lane}");
-        let operands = k.memory(&named("operands"), 2 << operand_bits, OPERAND, Contents::Undefined);
-        let operands = operands.holds(Holds::Operands(lane));
-        let ty = Type::signed(OPERAND);
-        let operand = k.register(&named("operand"), Type::unsigned(OPERAND));
-        let [coefficient, factor] = ["coefficient", "factor"].map(|name| k.register(&named(name), ty));
-        let product = k.register(&named("product"), Type::signed(2 * OPERAND));
-        let accumulator = k.state(&named("accumulator"), Type::unsigned(acc), clears, 0);
-        // A lane holds its own parity, and in the upper half the opposite one.
-        let opposite = write_lane.at(0) ^ write_lane.at(1);
-        let own = if lane == 0 || lane == 3 { !opposite } else { opposite };
-        let half = if lane % 2 == 1 { !write_lane.at(0) } else { write_lane.at(0) };
-        operands.write(write & own, half.concat(write_address), write_data);
-        operand.set(operands.read(flip.concat(operand_address)));
-        let wide = wide_word.slice(lane * OPERAND, OPERAND);
-        let own = low_word
-            .map_or(wide, |(selected, word)| selected.mux(word.slice(lane * low_bits, low_bits).extend(OPERAND), wide));
-        coefficient.set(own.signed());
-        factor.set(operand.signed());
-        product.set(*coefficient * *factor);
-        // The sums fit an accumulator, so the higher bits of a product are not needed.
-        let shifted = |by: usize| {
-            let shifted = product.shift_left(by);
-            if shifted.bits() > acc {
-                shifted.low(acc)
-            } else {
-                shifted.extend(acc).unsigned()
-            }
-        };
-        let aligned = if by == 0 { shifted(0) } else { aligns.mux(shifted(by), shifted(0)) };
-        k.when(adds, || accumulator.set((*accumulator + aligned).low(acc)));
-        *accumulator
-    });
-    let [a, b, c, d] = accumulators;
-    k.wire("quad", concat(&[d, c, b, a]));
-    k.wire("quad_valid", *reading & read.is(0));
-    k.wire("word", read.case(&[(0, a), (1, b), (2, c)], d));
-    k.wire("word_valid", *reading);
-    k.finish()
+        let accumulators = [0, 1, 2, 3].map(|lane| {
+            let named = |name: &str| format!("{name}{lane}");
+            let operands = k.memory(&named("operands"), 2 << operand_bits, OPERAND, Contents::Undefined);
+            let operands = operands.holds(Holds::Operands(lane));
+            let ty = Type::signed(OPERAND);
+            let operand = k.register(&named("operand"), Type::unsigned(OPERAND));
+            let [coefficient, factor] = ["coefficient", "factor"].map(|name| k.register(&named(name), ty));
+            let product = k.register(&named("product"), Type::signed(2 * OPERAND));
+            let accumulator = k.state(&named("accumulator"), Type::unsigned(acc), clears, 0);
+            // A lane holds its own parity, and in the upper half the opposite one.
+            let opposite = io.write_lane.at(0) ^ io.write_lane.at(1);
+            let own = if lane == 0 || lane == 3 { !opposite } else { opposite };
+            let half = if lane % 2 == 1 { !io.write_lane.at(0) } else { io.write_lane.at(0) };
+            operands.write(io.write & own, half.concat(io.write_address), io.write_data);
+            operand.set(operands.read(io.flip.concat(io.operand_address)));
+            let wide = wide_word.slice(lane * OPERAND, OPERAND);
+            let own = low_word.map_or(wide, |(selected, word)| {
+                selected.mux(word.slice(lane * low_bits, low_bits).extend(OPERAND), wide)
+            });
+            coefficient.set(own.signed());
+            factor.set(operand.signed());
+            product.set(*coefficient * *factor);
+            // The sums fit an accumulator, so the higher bits of a product are not needed.
+            let shifted = |by: usize| {
+                let shifted = product.shift_left(by);
+                if shifted.bits() > acc {
+                    shifted.low(acc)
+                } else {
+                    shifted.extend(acc).unsigned()
+                }
+            };
+            let aligned = if by == 0 { shifted(0) } else { aligns.mux(shifted(by), shifted(0)) };
+            k.when(adds, || accumulator.set((*accumulator + aligned).low(acc)));
+            *accumulator
+        });
+        let [a, b, c, d] = accumulators;
+        io.quad.set(concat(&[d, c, b, a]));
+        io.quad_valid.set(*reading & read.is(0));
+        io.word.set(read.case(&[(0, a), (1, b), (2, c)], d));
+        io.word_valid.set(*reading);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
 
     const ADDRESS: usize = 5;
@@ -247,7 +212,7 @@ mod tests {
 
     /// Whole products in integers; three cycles later they are in the accumulators.
     struct Lanes {
-        tables: Tables,
+        tables: Pass,
         operands: [[Option<i64>; 4]; 1 << OPERANDS],
         /// Products and whether they are the last of a row, the newest first.
         products: [Option<([i64; 4], bool)>; 3],
@@ -302,10 +267,10 @@ mod tests {
         }
     }
 
-    fn tables(random: &mut fastrand::Rng, low: bool, acc_bits: usize) -> Tables {
+    fn tables(random: &mut fastrand::Rng, low: bool, acc_bits: usize) -> Pass {
         let wide = (0..1 << ADDRESS).map(|_| [(); 4].map(|()| i64::from(random.i16(..)) >> 5)).collect();
         let low_words = (0..8).map(|_| [(); 4].map(|()| random.i64(0..1 << LOW_BITS)));
-        Tables {
+        Pass {
             wide,
             low: if low { low_words.collect() } else { Vec::new() },
             low_bits: if low { LOW_BITS } else { 0 },
@@ -359,8 +324,6 @@ mod tests {
     fn the_lanes_multiply_and_add_in_step() {
         for (low, acc) in [(false, 30), (true, 38)] {
             let tables = || tables(&mut fastrand::Rng::with_seed(28), low, acc);
-            let ports = [("quad", 4 * acc), ("quad_valid", 1), ("word", acc), ("word_valid", 1)];
-            let block = Body::new(kernel(&tables()), &[], &ports);
             let mut lanes = Lanes {
                 tables: tables(),
                 operands: [[None; 4]; 1 << OPERANDS],
@@ -369,7 +332,7 @@ mod tests {
                 read: None,
                 reset: false,
             };
-            check(block.kernel(), &stimulus(6000, low), &mut lanes);
+            check(&kernel_of(&tables()), &stimulus(6000, low), &mut lanes);
         }
     }
 }

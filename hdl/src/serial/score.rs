@@ -9,164 +9,128 @@
 use dermis_golden::fixed::plan::serial::{floor_bits, word_bits};
 use dermis_golden::fixed::stages::search::log_table;
 use dermis_golden::fixed::words::formats::{Formats, EPSILON_SHIFT, LOG_FRACTION};
-use rust_hdl::prelude::*;
 
 use super::{bits_of, one_of};
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
 /// Width of the leading one's position: words have at most 32 bits.
 const PLACE_BITS: usize = 5;
 const LOG_BITS: usize = PLACE_BITS + LOG_FRACTION as usize;
 
-/// Function in the module docs. A total is written to its memory six cycles after its value arrived; the values of a
-/// candidate are 16 cycles apart.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Score {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A candidate's value p, signed; valid with `valid`.
-    pub value: Wire<In>,
-    /// Index of the candidate; valid with `valid`.
-    pub index: Wire<In>,
-    /// `value` is valid.
-    pub valid: Signal<In, Bit>,
-    /// `value` is Σp; valid with `valid`.
-    pub sum: Signal<In, Bit>,
-    /// The candidate's floor ⌊Σp / 2^20⌋; one cycle after `index`.
-    pub floor: Wire<In>,
-    /// Write `floor_data`.
-    pub floor_write: Signal<Out, Bit>,
-    /// Index of the candidate whose floor is written; valid with `floor_write`.
-    pub floor_index: Wire<Out>,
-    /// Floor to write, 0 if Σp ≤ 0; valid with `floor_write`.
-    pub floor_data: Wire<Out>,
-    /// Index of the candidate whose total is read; one cycle ahead of `total`.
-    pub read_index: Wire<Out>,
-    /// `{Σp > 0, total}`, total signed, 2^−6; one cycle after `read_index`.
-    pub total: Wire<In>,
-    /// Write `write_data`.
-    pub write: Signal<Out, Bit>,
-    /// Index of the candidate whose total is written; valid with `write`.
-    pub write_index: Wire<Out>,
-    /// `{Σp > 0, total}` to write; valid with `write`.
-    pub write_data: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Function in the module docs. A total is written to its memory six cycles after its value arrived; the values of
+    /// a candidate are 16 cycles apart.
+    pub struct Score {
+        word: usize,
+        floor: usize,
+        score: usize,
+        taxels: u64,
+    }
+    ports ScorePorts {
+        clock;
+        reset;
+        /// A candidate's value p, signed; valid with `valid`.
+        in value: word;
+        /// Index of the candidate; valid with `valid`.
+        in index: 4;
+        /// `value` is valid.
+        in valid;
+        /// `value` is Σp; valid with `valid`.
+        in sum;
+        /// The candidate's floor ⌊Σp / 2^20⌋; one cycle after `index`.
+        in floor: floor;
+        /// Write `floor_data`.
+        out floor_write;
+        /// Index of the candidate whose floor is written; valid with `floor_write`.
+        out floor_index: 4;
+        /// Floor to write, 0 if Σp ≤ 0; valid with `floor_write`.
+        out floor_data: floor;
+        /// Index of the candidate whose total is read; one cycle ahead of `total`.
+        out read_index: 4;
+        /// `{Σp > 0, total}`, total signed, 2^−6; one cycle after `read_index`.
+        in total: score + 1;
+        /// Write `write_data`.
+        out write;
+        /// Index of the candidate whose total is written; valid with `write`.
+        out write_index: 4;
+        /// `{Σp > 0, total}` to write; valid with `write`.
+        out write_data: score + 1;
+    }
 }
-
-kernel_block!(
-    Score,
-    clock clk,
-    inputs [rst, value, index, valid, sum, floor, total],
-    outputs [floor_write, floor_index, floor_data, read_index, write, write_index, write_data]
-);
 
 impl Score {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        let sizes = Sizes {
+        Score {
             word: word_bits(formats),
             floor: floor_bits(formats),
             score: formats.score_bits as usize,
             taxels: 4 * formats.quads as u64,
-        };
-        let total = sizes.score + 1;
-        let block = Score {
-            clk: Default::default(),
-            rst: Default::default(),
-            value: Wire::new(sizes.word),
-            index: Wire::new(4),
-            valid: Default::default(),
-            sum: Default::default(),
-            floor: Wire::new(sizes.floor),
-            floor_write: Default::default(),
-            floor_index: Wire::new(4),
-            floor_data: Wire::new(sizes.floor),
-            read_index: Wire::new(4),
-            total: Wire::new(total),
-            write: Default::default(),
-            write_index: Wire::new(4),
-            write_data: Wire::new(total),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(sizes))
+        }
     }
 }
 
-/// Widths of the words and number of taxels.
-#[derive(Clone, Copy)]
-struct Sizes {
-    word: usize,
-    floor: usize,
-    score: usize,
-    taxels: u64,
-}
+impl Block for Score {
+    fn build<'k>(&self, k: &'k Builder, io: ScorePorts<Inside<'k>>) {
+        let Score { word: bits, floor, score, taxels } = *self;
+        let [magnitude, argument] = ["magnitude", "argument"].map(|name| k.register(name, Type::unsigned(bits)));
+        let (coarse, place_high) =
+            (k.register("coarse", Type::unsigned(12)), k.register("place_high", Type::unsigned(2)));
+        let [logarithm, late] = ["logarithm", "late"].map(|name| k.register(name, Type::unsigned(LOG_BITS)));
+        let indices = [0, 1, 2, 3, 4].map(|step| k.register(&format!("index{step}"), Type::unsigned(4)));
+        // valid, sum, positive of each pipeline step
+        let kinds = [0, 1, 2, 3, 4].map(|step| k.state(&format!("kind{step}"), Type::unsigned(3), io.rst, 0));
 
-fn kernel(sizes: Sizes) -> Kernel {
-    let Sizes { word: bits, floor, score, taxels } = sizes;
-    let k = Builder::new("score");
-    let (rst, value, index) = (k.input("rst", 1), k.input("value", bits), k.input("index", 4));
-    let (valid, sum, floor_in) = (k.input("valid", 1), k.input("sum", 1), k.input("floor", floor));
-    let total = k.input("total", score + 1);
-    let [magnitude, argument] = ["magnitude", "argument"].map(|name| k.register(name, Type::unsigned(bits)));
-    let (coarse, place_high) = (k.register("coarse", Type::unsigned(12)), k.register("place_high", Type::unsigned(2)));
-    let [logarithm, late] = ["logarithm", "late"].map(|name| k.register(name, Type::unsigned(LOG_BITS)));
-    let indices = [0, 1, 2, 3, 4].map(|step| k.register(&format!("index{step}"), Type::unsigned(4)));
-    // valid, sum, positive of each pipeline step
-    let kinds = [0, 1, 2, 3, 4].map(|step| k.state(&format!("kind{step}"), Type::unsigned(3), rst, 0));
+        let negative = k.wire("negative", io.value.top() & !io.sum);
+        magnitude.set(((io.value ^ concat(&vec![negative; bits])) + negative).low(bits));
+        let of_floor = kinds[0].at(1).mux(k.constant(floor, 0), io.floor);
+        argument.set((*magnitude + of_floor).low(bits));
+        k.comment("Leading one: by 16 and by 8 in one cycle, by 4, 2 and 1 in the next.");
+        let whole = k.wire("whole", argument.extend(32));
+        let upper = k.wire("upper", whole.slice(16, 16).any());
+        let half = k.wire("half", upper.mux(whole.slice(12, 20), whole.low(16).shift_left(4)));
+        let upper_byte = k.wire("upper_byte", half.slice(12, 8).any());
+        coarse.set(upper_byte.mux(half.slice(8, 12), half.low(12)));
+        place_high.set(upper.concat(upper_byte));
+        let fours = k.wire("fours", coarse.slice(8, 4).any());
+        let byte_left = k.wire("byte_left", fours.mux(coarse.slice(4, 8), coarse.low(8)));
+        let twos = k.wire("twos", byte_left.slice(6, 2).any());
+        let pair_left = k.wire("pair_left", twos.mux(byte_left.slice(2, 6), byte_left.low(6)));
+        let ones = pair_left.at(5);
+        let mantissa = k.wire("mantissa", ones.mux(pair_left.slice(1, 4), pair_left.low(4)));
+        // As gates: synthesis would map a table to a memory.
+        let table = bits_of(LOG_FRACTION as usize, |bit| {
+            let cells = log_table().iter().enumerate().filter(|(_, entry)| **entry >> bit & 1 == 1);
+            one_of(k, mantissa, &cells.map(|(cell, _)| cell).collect::<Vec<_>>())
+        });
+        logarithm.set(concat(&[*place_high, fours, twos, ones, table]));
+        late.set(*logarithm);
 
-    let negative = k.wire("negative", value.top() & !sum);
-    magnitude.set(((value ^ concat(&vec![negative; bits])) + negative).low(bits));
-    let of_floor = kinds[0].at(1).mux(k.constant(floor, 0), floor_in);
-    argument.set((*magnitude + of_floor).low(bits));
-    k.comment("Leading one: by 16 and by 8 in one cycle, by 4, 2 and 1 in the next.");
-    let whole = k.wire("whole", argument.extend(32));
-    let upper = k.wire("upper", whole.slice(16, 16).any());
-    let half = k.wire("half", upper.mux(whole.slice(12, 20), whole.low(16).shift_left(4)));
-    let upper_byte = k.wire("upper_byte", half.slice(12, 8).any());
-    coarse.set(upper_byte.mux(half.slice(8, 12), half.low(12)));
-    place_high.set(upper.concat(upper_byte));
-    let fours = k.wire("fours", coarse.slice(8, 4).any());
-    let byte_left = k.wire("byte_left", fours.mux(coarse.slice(4, 8), coarse.low(8)));
-    let twos = k.wire("twos", byte_left.slice(6, 2).any());
-    let pair_left = k.wire("pair_left", twos.mux(byte_left.slice(2, 6), byte_left.low(6)));
-    let ones = pair_left.at(5);
-    let mantissa = k.wire("mantissa", ones.mux(pair_left.slice(1, 4), pair_left.low(4)));
-    // As gates: synthesis would map a table to a memory.
-    let table = bits_of(LOG_FRACTION as usize, |bit| {
-        let cells = log_table().iter().enumerate().filter(|(_, entry)| **entry >> bit & 1 == 1);
-        one_of(&k, mantissa, &cells.map(|(cell, _)| cell).collect::<Vec<_>>())
-    });
-    logarithm.set(concat(&[*place_high, fours, twos, ones, table]));
-    late.set(*logarithm);
+        let values = [io.index, *indices[0], *indices[1], *indices[2], *indices[3]];
+        indices.iter().zip(values).for_each(|(register, value)| register.set(value));
+        let positive = !io.value.top() & io.value.any();
+        let values = [concat(&[io.valid, io.sum, positive]), *kinds[0], *kinds[1], *kinds[2], *kinds[3]];
+        kinds.iter().zip(values).for_each(|(register, value)| register.set(value));
 
-    let values = [index, *indices[0], *indices[1], *indices[2], *indices[3]];
-    indices.iter().zip(values).for_each(|(register, value)| register.set(value));
-    let positive = !value.top() & value.any();
-    let values = [concat(&[valid, sum, positive]), *kinds[0], *kinds[1], *kinds[2], *kinds[3]];
-    kinds.iter().zip(values).for_each(|(register, value)| register.set(value));
-
-    let room = score - LOG_BITS;
-    let multiples =
-        (0..room).filter(|shift| taxels >> shift & 1 == 1).map(|shift| late.shift_left(shift).extend(score));
-    let weighted = multiples.reduce(|a, b| (a + b).low(score)).unwrap_or(k.constant(score, 0));
-    let weighted = k.wire("weighted", weighted);
-    let grown = k.wire("grown", (total.low(score) + *late).low(score));
-    let [first, .., last] = kinds;
-    k.wire("floor_write", first.at(2) & first.at(1));
-    k.wire("floor_index", *indices[0]);
-    let low = EPSILON_SHIFT as usize;
-    let top = if bits > low { magnitude.slice(low, bits - low) } else { k.constant(floor, 0) };
-    k.wire("floor_data", first.at(0).mux(top, k.constant(floor, 0)));
-    k.wire("read_index", *indices[3]);
-    k.wire("write", last.at(2));
-    k.wire("write_index", *indices[4]);
-    let negated = (k.constant(score, 0) - weighted).low(score);
-    k.wire("write_data", last.at(1).mux(last.at(0).concat(negated), total.at(score).concat(grown)));
-    k.finish()
+        let room = score - LOG_BITS;
+        let multiples =
+            (0..room).filter(|shift| taxels >> shift & 1 == 1).map(|shift| late.shift_left(shift).extend(score));
+        let weighted = multiples.reduce(|a, b| (a + b).low(score)).unwrap_or(k.constant(score, 0));
+        let weighted = k.wire("weighted", weighted);
+        let grown = k.wire("grown", (io.total.low(score) + *late).low(score));
+        let [first, .., last] = kinds;
+        io.floor_write.set(first.at(2) & first.at(1));
+        io.floor_index.set(*indices[0]);
+        let low = EPSILON_SHIFT as usize;
+        let top = if bits > low { magnitude.slice(low, bits - low) } else { k.constant(floor, 0) };
+        io.floor_data.set(first.at(0).mux(top, k.constant(floor, 0)));
+        io.read_index.set(*indices[3]);
+        io.write.set(last.at(2));
+        io.write_index.set(*indices[4]);
+        let negated = (k.constant(score, 0) - weighted).low(score);
+        io.write_data.set(last.at(1).mux(last.at(0).concat(negated), io.total.at(score).concat(grown)));
+    }
 }
 
 #[cfg(test)]
@@ -174,10 +138,11 @@ mod tests {
     use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const SIZES: Sizes = Sizes { word: 29, floor: 9, score: 20, taxels: 44 };
+    const SIZES: Score = Score { word: 29, floor: 9, score: 20, taxels: 44 };
     const STEPS: usize = 5;
 
     /// A value on its way: p or Σp, index, whether it is Σp; then its logarithm.
@@ -254,15 +219,6 @@ mod tests {
             ]
         };
         let all: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
-        let ports = [
-            ("floor_write", 1),
-            ("floor_index", 4),
-            ("floor_data", SIZES.floor),
-            ("read_index", 4),
-            ("write", 1),
-            ("write_index", 4),
-            ("write_data", SIZES.score + 1),
-        ];
-        check(Body::new(kernel(SIZES), &[], &ports).kernel(), &all, &mut Values::default());
+        check(&kernel_of(&SIZES), &all, &mut Values::default());
     }
 }

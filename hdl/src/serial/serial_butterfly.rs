@@ -1,89 +1,70 @@
 //! The Hadamard butterfly of the serial engine, for `fold` and `unfold`: a quad enters in four cycles and leaves in
 //! four.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 use crate::primitives::subtracted;
-use crate::wire::Wire;
 
-/// ```text
-/// word, valid (four of a quad) --> four accumulators --> transformed, one after the other
-/// ```
-/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::physics::symmetry::parity::hadamard). The first
-/// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
-#[derive(dermis_hdl_derive::Block)]
-pub struct SerialButterfly {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A word of a quad, signed, lanes in order; valid with `valid`.
-    pub word: Wire<In>,
-    /// `word` is valid.
-    pub valid: Signal<In, Bit>,
-    /// All four sums; valid with `quad_valid`.
-    pub quad: Wire<Out>,
-    /// The first of the four sums leaves in this cycle.
-    pub quad_valid: Signal<Out, Bit>,
-    /// One sum, two bits wider than a word, signed; valid with `transformed_valid`.
-    pub transformed: Wire<Out>,
-    /// `transformed` is valid.
-    pub transformed_valid: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// word, valid (four of a quad) --> four accumulators --> transformed, one after the other
+    /// ```
+    /// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::physics::symmetry::parity::hadamard).
+    /// The first sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
+    pub struct SerialButterfly {
+        /// Width of a word.
+        bits: usize,
+    }
+    ports SerialButterflyPorts {
+        clock;
+        reset;
+        /// A word of a quad, signed, lanes in order; valid with `valid`.
+        in word: bits;
+        /// `word` is valid.
+        in valid;
+        /// All four sums; valid with `quad_valid`.
+        out quad: 4 * (bits + 2);
+        /// The first of the four sums leaves in this cycle.
+        out quad_valid;
+        /// One sum, two bits wider than a word, signed; valid with `transformed_valid`.
+        out transformed: bits + 2;
+        /// `transformed` is valid.
+        out transformed_valid;
+    }
 }
-
-kernel_block!(
-    SerialButterfly,
-    clock clk,
-    inputs [rst, word, valid],
-    outputs [quad, quad_valid, transformed, transformed_valid]
-);
 
 impl SerialButterfly {
     /// For words of `bits` bits; sums have two more.
     pub fn new(bits: usize) -> Self {
-        let block = SerialButterfly {
-            clk: Default::default(),
-            rst: Default::default(),
-            word: Wire::new(bits),
-            valid: Default::default(),
-            quad: Wire::new(4 * (bits + 2)),
-            quad_valid: Default::default(),
-            transformed: Wire::new(bits + 2),
-            transformed_valid: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits))
+        SerialButterfly { bits }
     }
 }
 
-fn kernel(bits: usize) -> Kernel {
-    let k = Builder::new("serial_butterfly");
-    let (rst, word, valid) = (k.input("rst", 1), k.input("word", bits).signed(), k.input("valid", 1));
-    let count = Type::unsigned(2);
-    let (taken, giving) = (k.state("taken", count, rst, 0), k.state("giving", Type::unsigned(1), rst, 0));
-    let idle = k.wire("idle", rst | !*giving);
-    let given = k.state("given", count, idle, 0);
-    let ends = k.wire("ends", *giving & given.is(3));
-    let clears = k.wire("clears", rst | ends);
-    let sums = ["sum0", "sum1", "sum2", "sum3"].map(|name| k.state(name, Type::signed(bits + 2), clears, 0));
-    k.when(valid, || {
-        for (sum, odd) in sums.iter().zip(subtracted(&k, *taken)) {
-            let [less, more] = [**sum - word, **sum + word].map(|sum| sum.low(bits + 2).signed());
-            sum.set(odd.mux(less, more));
-        }
-        taken.set(taken.plus(1));
-    });
-    given.set(given.plus(1));
-    giving.set((valid & taken.is(3)) | (*giving & !given.is(3)));
-    let [sum0, sum1, sum2, sum3] = sums.map(|sum| sum.get());
-    k.wire("quad", concat(&[sum3, sum2, sum1, sum0]));
-    k.wire("quad_valid", *giving & given.is(0));
-    k.wire("transformed", given.case(&[(0, sum0), (1, sum1), (2, sum2)], sum3).unsigned());
-    k.wire("transformed_valid", *giving);
-    k.finish()
+impl Block for SerialButterfly {
+    fn build<'k>(&self, k: &'k Builder, io: SerialButterflyPorts<Inside<'k>>) {
+        let (word, bits) = (io.word.signed(), self.bits + 2);
+        let count = Type::unsigned(2);
+        let (taken, giving) = (k.state("taken", count, io.rst, 0), k.state("giving", Type::unsigned(1), io.rst, 0));
+        let idle = k.wire("idle", io.rst | !*giving);
+        let given = k.state("given", count, idle, 0);
+        let ends = k.wire("ends", *giving & given.is(3));
+        let clears = k.wire("clears", io.rst | ends);
+        let sums = ["sum0", "sum1", "sum2", "sum3"].map(|name| k.state(name, Type::signed(bits), clears, 0));
+        k.when(io.valid, || {
+            for (sum, odd) in sums.iter().zip(subtracted(k, *taken)) {
+                let [less, more] = [**sum - word, **sum + word].map(|sum| sum.low(bits).signed());
+                sum.set(odd.mux(less, more));
+            }
+            taken.set(taken.plus(1));
+        });
+        given.set(given.plus(1));
+        giving.set((io.valid & taken.is(3)) | (*giving & !given.is(3)));
+        let [sum0, sum1, sum2, sum3] = sums.map(|sum| sum.get());
+        io.quad.set(concat(&[sum3, sum2, sum1, sum0]));
+        io.quad_valid.set(*giving & given.is(0));
+        io.transformed.set(given.case(&[(0, sum0), (1, sum1), (2, sum2)], sum3).unsigned());
+        io.transformed_valid.set(*giving);
+    }
 }
 
 #[cfg(test)]
@@ -91,6 +72,7 @@ mod tests {
     use dermis_golden::physics::symmetry::parity::hadamard;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -143,6 +125,6 @@ mod tests {
             inputs
         };
         let all: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
-        check(SerialButterfly::new(BITS).kernel.kernel(), &all, &mut Quads::default());
+        check(&kernel_of(&SerialButterfly::new(BITS)), &all, &mut Quads::default());
     }
 }

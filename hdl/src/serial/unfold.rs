@@ -3,85 +3,60 @@
 use dermis_golden::fixed::plan::serial::{polynomials, word_bits};
 use dermis_golden::fixed::words::formats::Formats;
 use dermis_golden::fixed::words::schedule::{vectors, EXPONENTS};
-use rust_hdl::prelude::*;
 
 use super::{bits_of, one_of};
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// Words of v_ij, one vector after the other, to words of the polynomial memory. Polynomial 0 is the sum, polynomial 1
-/// + p the taxel at place p; coefficient v_ij of a polynomial is at 4j + i.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Unfold {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A frame starts: the words of v_00 come next.
-    pub start: Signal<In, Bit>,
-    /// A word from the butterfly, signed, places in order; valid with `valid`.
-    pub transformed: Wire<In>,
-    /// `transformed` is valid.
-    pub valid: Signal<In, Bit>,
-    /// A taxel's coefficient, `vector_bits` + 2 wide, signed; valid with `taxel_valid`.
-    pub taxel: Wire<Out>,
-    /// `taxel` is valid.
-    pub taxel_valid: Signal<Out, Bit>,
-    /// Write `data` to the polynomial memory.
-    pub write: Signal<Out, Bit>,
-    /// `{0, polynomial, coefficient}`: lower region; valid with `write`.
-    pub address: Wire<Out>,
-    /// Coefficient of a taxel or of the sum, signed; valid with `write`.
-    pub data: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Words of v_ij, one vector after the other, to words of the polynomial memory. Polynomial 0 is the sum,
+    /// polynomial 1 + p the taxel at place p; coefficient v_ij of a polynomial is at 4j + i.
+    pub struct Unfold {
+        /// Width of a word from the butterfly, of a taxel's coefficient and of a word of the memory.
+        transformed: usize,
+        taxel: usize,
+        data: usize,
+        /// Width of a polynomial's number.
+        place: usize,
+        taxels: u64,
+        /// Number of the v_ij.
+        vectors: usize,
+    }
+    ports UnfoldPorts {
+        clock;
+        reset;
+        /// A frame starts: the words of v_00 come next.
+        in start;
+        /// A word from the butterfly, signed, places in order; valid with `valid`.
+        in transformed: transformed;
+        /// `transformed` is valid.
+        in valid;
+        /// A taxel's coefficient, `vector_bits` + 2 wide, signed; valid with `taxel_valid`.
+        out taxel: taxel;
+        /// `taxel` is valid.
+        out taxel_valid;
+        /// Write `data` to the polynomial memory.
+        out write;
+        /// `{0, polynomial, coefficient}`: lower region; valid with `write`.
+        out address: 1 + place + 4;
+        /// Coefficient of a taxel or of the sum, signed; valid with `write`.
+        out data: data;
+    }
 }
-
-kernel_block!(
-    Unfold,
-    clock clk,
-    inputs [rst, start, transformed, valid],
-    outputs [taxel, taxel_valid, write, address, data]
-);
 
 impl Unfold {
     /// With the widths of `formats`; words from the butterfly have `transformed` bits.
     pub fn new(formats: &Formats, transformed: usize) -> Self {
-        let sizes = Sizes {
+        Unfold {
             transformed,
             taxel: formats.vector_bits as usize + 2,
             data: word_bits(formats),
             place: count_bits(polynomials(formats)),
             taxels: 4 * formats.quads as u64,
             vectors: vectors(formats.degree),
-        };
-        let block = Unfold {
-            clk: Default::default(),
-            rst: Default::default(),
-            start: Default::default(),
-            transformed: Wire::new(transformed),
-            valid: Default::default(),
-            taxel: Wire::new(sizes.taxel),
-            taxel_valid: Default::default(),
-            write: Default::default(),
-            address: Wire::new(1 + sizes.place + 4),
-            data: Wire::new(sizes.data),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(sizes))
+        }
     }
-}
-
-/// Widths of the words and of a polynomial's number; numbers of taxels and of the v_ij.
-#[derive(Clone, Copy)]
-struct Sizes {
-    transformed: usize,
-    taxel: usize,
-    data: usize,
-    place: usize,
-    taxels: u64,
-    vectors: usize,
 }
 
 /// Position 4j + i of coefficient v_ij in its polynomial.
@@ -90,51 +65,49 @@ fn code(vector: usize) -> usize {
     (4 * j + i) as usize
 }
 
-fn kernel(sizes: Sizes) -> Kernel {
-    let Sizes { taxel, data, place, .. } = sizes;
-    let k = Builder::new("unfold");
-    let (rst, start) = (k.input("rst", 1), k.input("start", 1));
-    let (transformed, valid) = (k.input("transformed", sizes.transformed), k.input("valid", 1));
-    let bits = count_bits(sizes.vectors + 1);
-    let begins = k.wire("begins", start | rst);
-    let word = k.register("word", Type::unsigned(taxel));
-    let bit = Type::unsigned(1);
-    let (valid_then, closing) = (k.state("valid_then", bit, rst, 0), k.state("closing", bit, rst, 0));
-    let polynomial = k.state("polynomial", Type::unsigned(place), begins, 1);
-    let vector = k.state("vector", Type::unsigned(bits), begins, 0);
-    let sum = k.state("sum", Type::unsigned(data), begins, 0);
+impl Block for Unfold {
+    fn build<'k>(&self, k: &'k Builder, io: UnfoldPorts<Inside<'k>>) {
+        let Unfold { taxel, data, place, taxels, vectors, .. } = *self;
+        let bits = count_bits(vectors + 1);
+        let begins = k.wire("begins", io.start | io.rst);
+        let word = k.register("word", Type::unsigned(taxel));
+        let bit = Type::unsigned(1);
+        let (valid_then, closing) = (k.state("valid_then", bit, io.rst, 0), k.state("closing", bit, io.rst, 0));
+        let polynomial = k.state("polynomial", Type::unsigned(place), begins, 1);
+        let vector = k.state("vector", Type::unsigned(bits), begins, 0);
+        let sum = k.state("sum", Type::unsigned(data), begins, 0);
 
-    let last = k.wire("last", *valid_then & polynomial.is(sizes.taxels));
-    let of = |of: &dyn Fn(usize) -> usize, width: usize| {
-        bits_of(width, |bit| {
-            let set: Vec<usize> = (0..sizes.vectors).filter(|&vector| of(vector) >> bit & 1 == 1).collect();
-            one_of(&k, *vector, &set)
-        })
-    };
-    let degree = k.wire("degree", of(&|vector| (EXPONENTS[vector].0 + EXPONENTS[vector].1) as usize, 2));
-    k.comment("An extra bit on the right keeps the half LSB for the rounding.");
-    let doubled = transformed.concat(k.constant(1, 0)).signed();
-    let half = k.wire("half", doubled.shift_right_by(degree.concat(k.constant(1, 0))).unsigned().plus(1));
-    let wider = k.wire("wider", word.signed().extend(data).unsigned());
-    word.set(half.slice(1, taxel));
-    valid_then.set(valid);
-    closing.set(last);
-    k.when(*valid_then, || {
-        polynomial.set(last.mux(k.constant(place, 1), polynomial.plus(1)));
-        sum.set((*sum + wider).low(data));
-    });
-    k.when(*closing, || {
-        vector.set(vector.plus(1));
-        sum.set(k.constant(data, 0));
-    });
-    k.wire("taxel", *word);
-    k.wire("taxel_valid", *valid_then);
-    k.wire("write", *valid_then | *closing);
-    let zero = k.constant(place, 0);
-    let own = closing.mux(zero, *polynomial).concat(of(&code, 4));
-    k.wire("address", k.constant(1, 0).concat(own));
-    k.wire("data", closing.mux(*sum, wider));
-    k.finish()
+        let last = k.wire("last", *valid_then & polynomial.is(taxels));
+        let of = |of: &dyn Fn(usize) -> usize, width: usize| {
+            bits_of(width, |bit| {
+                let set: Vec<usize> = (0..vectors).filter(|&vector| of(vector) >> bit & 1 == 1).collect();
+                one_of(k, *vector, &set)
+            })
+        };
+        let degree = k.wire("degree", of(&|vector| (EXPONENTS[vector].0 + EXPONENTS[vector].1) as usize, 2));
+        k.comment("An extra bit on the right keeps the half LSB for the rounding.");
+        let doubled = io.transformed.concat(k.constant(1, 0)).signed();
+        let half = k.wire("half", doubled.shift_right_by(degree.concat(k.constant(1, 0))).unsigned().plus(1));
+        let wider = k.wire("wider", word.signed().extend(data).unsigned());
+        word.set(half.slice(1, taxel));
+        valid_then.set(io.valid);
+        closing.set(last);
+        k.when(*valid_then, || {
+            polynomial.set(last.mux(k.constant(place, 1), polynomial.plus(1)));
+            sum.set((*sum + wider).low(data));
+        });
+        k.when(*closing, || {
+            vector.set(vector.plus(1));
+            sum.set(k.constant(data, 0));
+        });
+        io.taxel.set(*word);
+        io.taxel_valid.set(*valid_then);
+        io.write.set(*valid_then | *closing);
+        let zero = k.constant(place, 0);
+        let own = closing.mux(zero, *polynomial).concat(of(&code, 4));
+        io.address.set(k.constant(1, 0).concat(own));
+        io.data.set(closing.mux(*sum, wider));
+    }
 }
 
 #[cfg(test)]
@@ -142,10 +115,11 @@ mod tests {
     use dermis_golden::fixed::words::arith::round_shift;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const SIZES: Sizes = Sizes { transformed: 22, taxel: 22, data: 27, place: 4, taxels: 12, vectors: 10 };
+    const SIZES: Unfold = Unfold { transformed: 22, taxel: 22, data: 27, place: 4, taxels: 12, vectors: 10 };
 
     /// Words of the vector so far; whether the last one has just come, or the sum is written.
     #[derive(Default)]
@@ -213,7 +187,6 @@ mod tests {
                 all.push(cycle(true, false, false, 0));
             }
         }
-        let ports = [("taxel", 22), ("taxel_valid", 1), ("write", 1), ("address", 9), ("data", 27)];
-        check(Body::new(kernel(SIZES), &[], &ports).kernel(), &all, &mut Vectors::default());
+        check(&kernel_of(&SIZES), &all, &mut Vectors::default());
     }
 }

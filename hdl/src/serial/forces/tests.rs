@@ -1,10 +1,11 @@
 //! The beats of a frame against plain integers.
 
 use super::*;
+use crate::language::kernel_of;
 use crate::language::testbench::{check, Reference};
 use crate::wire::Word;
 
-const SIZES: Sizes = Sizes {
+const SIZES: Forces = Forces {
     places: 5,
     wanted: 5,
     word: 29,
@@ -214,15 +215,5 @@ fn forces_are_sent_and_then_the_status() {
         inputs
     };
     let all: Vec<Vec<Word>> = (0..12_000).map(cycle).collect();
-    let ports = [
-        ("index", SIZES.places),
-        ("wanted", SIZES.wanted),
-        ("product", SIZES.unrounded),
-        ("round_shift", SHIFT_BITS),
-        ("m_axis_tdata", 3 * WORD),
-        ("m_axis_tvalid", 1),
-        ("m_axis_tlast", 1),
-        ("done", 1),
-    ];
-    check(Body::new(kernel(SIZES), &[], &ports).kernel(), &all, &mut Beats::default());
+    check(&kernel_of(&SIZES), &all, &mut Beats::default());
 }
