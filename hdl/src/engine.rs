@@ -23,8 +23,7 @@
 //!   sweep reads the memory that the next frame is written to, and must not wait.
 //!
 //! Without a search, and where block RAM is too short for a memory of the next frame, a frame starts when the previous
-//! one has been sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
-//! the stages that differ.
+//! one has been sent. Where the case is chosen per frame, it is chosen while the frame is received.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::quads::Quads;
@@ -32,68 +31,16 @@ use dermis_golden::spec::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::language::RustHdl;
-use crate::ports::one_of;
 use crate::primitives::{
     count_bits, largest, Arrival, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, OperandSource, StatusSource,
     SATURATION_BITS,
 };
 use crate::stage_list::engine;
 use crate::stages::{
-    Banks, Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax,
-    Rescale, Resultants, Search, SearchPorts, Segment, Send, Shear, Unfold, Unsearched, Window,
+    Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, Relax,
+    Rescale, Resultants, Search, Segment, Send, Shear, Unfold, Window,
 };
 use crate::wire::Wire;
-
-one_of! {
-    /// The stage that receives frames.
-    pub enum ReceiveStage: ReceivePorts {
-        /// One case.
-        Receive,
-        /// Several cases, one of which is chosen per frame.
-        Banks,
-    }
-}
-
-impl ReceiveStage {
-    fn new(model: &Model) -> Self {
-        match model.chooses() {
-            false => ReceiveStage::Receive(Box::new(Receive::new(model, 0))),
-            true => ReceiveStage::Banks(Box::new(Banks::new(model))),
-        }
-    }
-
-    /// Whether a case is chosen per frame.
-    pub(crate) fn chooses(&self) -> bool {
-        matches!(self, ReceiveStage::Banks(_))
-    }
-}
-
-one_of! {
-    /// The stage that finds p(μ*).
-    pub enum SearchStage: SearchPorts {
-        /// With a search for μ*.
-        Search,
-        /// μ* is 0.
-        Unsearched,
-    }
-}
-
-impl SearchStage {
-    /// Values that are output in a cycle.
-    pub(crate) fn width(&self) -> usize {
-        match self {
-            SearchStage::Search(search) => search.width(),
-            SearchStage::Unsearched(_) => Quads::LANES,
-        }
-    }
-
-    fn new(model: &Model) -> Self {
-        match model.searches() {
-            true => SearchStage::Search(Box::new(Search::new(model))),
-            false => SearchStage::Unsearched(Box::new(Unsearched::new(model))),
-        }
-    }
-}
 
 engine! {
     /// The parallel engine, the top module of the generated hardware.
@@ -113,7 +60,7 @@ engine! {
     pub struct Engine {
         stages {
             prepare: Prepare => "stages/prepare.rs",
-            receive: ReceiveStage => "stages/receive.rs",
+            receive: RustHdl<Receive> => "stages/receive.rs",
             normalise: RustHdl<Normalise> => "stages/normalise.rs",
             fold: RustHdl<Fold> => "stages/fold.rs",
             pass: Pass => "stages/pass.rs",
@@ -125,7 +72,7 @@ engine! {
             rescale: Rescale => "stages/rescale.rs",
             relax: RustHdl<Relax> => "stages/relax.rs",
             unfold: Unfold => "stages/unfold.rs",
-            search: SearchStage => "stages/search.rs",
+            search: RustHdl<Search> => "stages/search.rs",
             forces: Forces => "stages/forces.rs",
             send: Send => "stages/send.rs",
             label_beats: RustHdl<LabelBeats> => "stages/label_beats.rs",
@@ -177,7 +124,9 @@ engine! {
             behind: Signal<Local, Bit>,
             hand_over: Signal<Local, Bit>,
             begin_send: Signal<Local, Bit>,
+            _chooses: bool,
             _network: bool,
+            _width: usize,
             _contacts: bool,
         }
     }
@@ -204,7 +153,7 @@ impl Engine {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            receive: ReceiveStage::new(model),
+            receive: RustHdl::new(Receive::new(model)),
             fold: RustHdl::new(Fold::new(model)),
             pass: Pass::new(model),
             estimate: RustHdl::new(Estimate::new(model)),
@@ -213,11 +162,11 @@ impl Engine {
             window: RustHdl::new(Window::new(model)),
             label_beats: RustHdl::new(LabelBeats::new(model, forces.m_axis_tdata.width())),
             shear: RustHdl::new(Shear::new(model)),
-            operand_source: OperandSource::new(model),
+            operand_source: RustHdl::new(OperandSource::new(model)),
             status_source: StatusSource::new(model),
             relax: RustHdl::new(Relax::new(formats)),
             unfold: Unfold::new(model),
-            search: SearchStage::new(model),
+            search: RustHdl::new(Search::new(model)),
             forces,
             send: Send::new(model),
             resultants,
@@ -267,11 +216,23 @@ impl Engine {
             behind: Default::default(),
             hand_over: Default::default(),
             begin_send: Default::default(),
+            _chooses: model.chooses(),
             _network: formats.has_network(),
+            _width: if model.searches() { formats.search_width } else { Quads::LANES },
             _contacts: model.contacts() > 0,
         };
         engine.connect_all();
         engine
+    }
+
+    /// Whether a case is chosen per frame.
+    pub(crate) fn chooses(&self) -> bool {
+        self._chooses
+    }
+
+    /// Values p(μ*) that are output in a cycle.
+    pub(crate) fn width(&self) -> usize {
+        self._width
     }
 
     /// Whether a network gives μ.

@@ -48,7 +48,6 @@ mod core_file;
 mod error;
 mod generate;
 mod integration;
-mod ports;
 #[cfg(test)]
 mod scenes;
 mod simulate;

@@ -180,7 +180,7 @@ macro_rules! is_signed {
 
 streams!(engine::Engine {
     receive: receive.accept => [signed receive.taken_word],
-    choose if receive.chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
+    choose if chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
     normalise: fold.normalised_valid => [signed normalise.shifted; TAXELS],
     fold: fold.folded_valid => [signed fold.folded; PARITIES],
     instruction: pass.issued => [unsigned pass.which, unsigned pass.step] as INSTRUCTION_FIELD,
@@ -194,7 +194,7 @@ streams!(engine::Engine {
     unfold: unfold.taxels_valid => [signed unfold.taxels; TAXELS],
     search: search.compared
         => [signed search.best_x, signed search.best_y, signed search.score, unsigned search.taken] as SEARCH_FIELD,
-    forces: search.values_valid => [signed search.values; TAXELS by search.width],
+    forces: search.values_valid => [signed search.values; TAXELS by width],
 });
 
 streams!(serial::Engine {

@@ -45,6 +45,32 @@ pub trait Interface {
     fn visit_mut(ports: &mut Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &mut dyn SignalPort));
 }
 
+impl<B: Interface> Interface for &B {
+    type Ports<V: View> = B::Ports<V>;
+
+    const NAME: &'static str = B::NAME;
+
+    const CLOCKED: bool = B::CLOCKED;
+
+    fn ports<V: View>(&self, make: &mut dyn Make<V>) -> Self::Ports<V> {
+        (**self).ports(make)
+    }
+
+    fn visit(ports: &Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &dyn SignalPort)) {
+        B::visit(ports, visit);
+    }
+
+    fn visit_mut(ports: &mut Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &mut dyn SignalPort)) {
+        B::visit_mut(ports, visit);
+    }
+}
+
+impl<B: Block> Block for &B {
+    fn build<'k>(&'k self, k: &'k Builder, io: Self::Ports<Inside<'k>>) {
+        (**self).build(k, io);
+    }
+}
+
 /// The side from which ports are seen.
 pub trait View {
     /// An input of one bit.

@@ -74,7 +74,7 @@ macro_rules! board_top {
                 pub $miso: Wire<In>,
                 // Registers the way back of `ready` from the link's requests to the engine.
                 $slice: RustHdl<RegisterSlice>,
-                $gate: FrameGate,
+                $gate: RustHdl<FrameGate>,
             )?
             $($unused: Signal<Local, Bit>,)?
             power_on: RustHdl<PowerOn>,
@@ -110,7 +110,7 @@ macro_rules! board_top {
                         adc_mosi: Default::default(),
                         $miso: Wire::new(engine.adc_miso.width()),
                         $slice: RustHdl::new(RegisterSlice::new(BEAT, true)),
-                        $gate: FrameGate::default(),
+                        $gate: Default::default(),
                     )?
                     $($unused: Default::default(),)?
                     power_on: Default::default(),

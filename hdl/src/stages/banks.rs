@@ -1,192 +1,132 @@
-//! Replacement for stage `receive` where the case is chosen per frame: a frame buffer per case, and the choice of the
-//! case.
+//! Stage `receive` where the case is chosen per frame: a frame buffer per case, and the choice of the case.
 //!
 //! Every buffer receives every code, each in the layout of its own subarrays; reads come from the buffer of the chosen
 //! case. All buffers fill and become free together.
 
-use std::collections::BTreeMap;
-
-use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
-
-use super::{Choose, Receive, ReceivePorts};
-use crate::language::RustHdl;
-use crate::language::{Body, Builder, Expr, Kernel, Port, SEPARATOR};
-use crate::ports::has_ports;
+use super::receive::{Receive, ReceivePorts};
+use super::Choose;
+use crate::language::{Builder, Expr, Inside, Outside};
 use crate::primitives::expression_by_case;
 
-/// `full` is high once the case has been chosen too.
-///
-/// The scene decides how many buffers there are. `kernel_block!` binds the fields that it names, and a loop in `#[hdl_gen]`
-/// has a constant number of turns over an array of constant length: neither reaches the ports of a `Vec` of blocks. So
-/// `pins` lists them, and `update` and `connect` here do over that list what the macro writes over names.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Banks {
-    ports: ReceivePorts,
-    banks: Vec<Receive>,
-    choose: RustHdl<Choose>,
-    kernel: Body,
-}
-
-has_ports!(Banks: ReceivePorts);
-
-/// The block that has a port: this one, a frame buffer, or the choice.
-#[derive(Clone, Copy)]
-enum Of {
-    Own,
-    Bank(usize),
-    Choose,
-}
-
-impl Of {
-    /// Name of a port in the kernel.
-    fn port(self, port: &str) -> String {
-        match self {
-            Of::Own => port.to_owned(),
-            Of::Bank(number) => ["banks", &number.to_string(), port].join(SEPARATOR),
-            Of::Choose => ["choose", port].join(SEPARATOR),
-        }
+/// All `buffers` get what the stage gets; its outputs are those of the chosen one. `full` is high once the case has been
+/// chosen too.
+pub(super) fn build_banks<'k>(
+    k: &'k Builder,
+    io: ReceivePorts<Inside<'k>>,
+    choose: &'k Choose,
+    buffers: &'k [Receive],
+) {
+    let bank = |(number, buffer): (usize, &'k Receive)| k.instance(&format!("banks__{number}"), buffer);
+    let banks: Vec<ReceivePorts<Outside<'k>>> = buffers.iter().enumerate().map(bank).collect();
+    let choose = k.instance("choose", choose);
+    for bank in &banks {
+        bank.s_axis_tdata.set(io.s_axis_tdata);
+        bank.s_axis_tvalid.set(io.s_axis_tvalid);
+        bank.s_axis_tlast.set(io.s_axis_tlast);
+        bank.free.set(io.free);
+        // An address beyond a smaller buffer is meant for another one; its data are not used.
+        bank.quad_address.set(io.quad_address.low(bank.quad_address.bits()));
+        bank.part.set(io.part.low(bank.part.bits()));
+        bank.reported.set(io.reported);
+        bank.floor.set(io.floor);
     }
-}
-
-/// What the kernel reads.
-type Reads<'a> = Vec<(Of, &'static str, &'a dyn Port)>;
-/// What the kernel drives.
-type Drives<'a> = Vec<(Of, &'static str, &'a mut dyn Port)>;
-
-/// Adds the ports of `$ports` to two lists.
-macro_rules! divide {
-    ($of:expr, $type:ident, $ports:expr, $reads:ident [$($read:ident),+], $drives:ident [$($drive:ident),+]) => {
-        let $type { $($read,)+ $($drive,)+ .. } = $ports;
-        $($reads.push(($of, stringify!($read), $read));)+
-        $($drives.push(($of, stringify!($drive), $drive));)+
+    // All buffers fill and become free together: the handshake of the first is that of all.
+    let Some(first) = banks.first() else { return };
+    choose.code.set(io.s_axis_tdata);
+    choose.accept.set(first.accept);
+    choose.tlast.set(io.s_axis_tlast);
+    choose.free.set(io.free);
+    io.s_axis_tready.set(first.s_axis_tready);
+    io.accept.set(first.accept);
+    io.taken_word.set(first.taken_word);
+    io.row_end.set(first.row_end);
+    io.dropped.set(first.dropped);
+    io.framing.set(first.framing);
+    io.full.set(choose.settled);
+    io.which.set(choose.which);
+    let chosen = |of: fn(&ReceivePorts<Outside<'k>>) -> Expr<'k>| {
+        let each: Vec<Expr> = banks.iter().map(of).collect();
+        expression_by_case(choose.which, &each).unwrap_or(each[0])
     };
-}
-
-impl Banks {
-    /// A frame buffer for each case of `model`.
-    pub fn new(model: &Model) -> Self {
-        let cases = model.cases();
-        let mut block = Banks {
-            ports: ReceivePorts::new(cases, model.floor_bits()),
-            banks: (0..cases.len()).map(|case| Receive::new(model, case)).collect(),
-            choose: RustHdl::new(Choose::new(model)),
-            kernel: Body::default(),
-        };
-        let (_, reads, drives) = block.pins();
-        let reads: Vec<(String, usize)> =
-            reads.iter().map(|(of, name, port)| (of.port(name), port.port_bits())).collect();
-        let drives: Vec<(Of, &str, usize)> =
-            drives.iter().map(|(of, name, port)| (*of, *name, port.port_bits())).collect();
-        let inputs: Vec<(&str, usize)> = reads.iter().map(|(name, bits)| (name.as_str(), *bits)).collect();
-        let names: Vec<String> = drives.iter().map(|(of, name, _)| of.port(name)).collect();
-        let outputs: Vec<(&str, usize)> =
-            names.iter().zip(&drives).map(|(name, (.., bits))| (name.as_str(), *bits)).collect();
-        block.kernel = Body::new(kernel(&inputs, &drives, cases.len()), &inputs, &outputs);
-        block
-    }
-
-    /// The kernel and its pins: the ports of this block, and those of the blocks inside.
-    fn pins(&mut self) -> (&mut Body, Reads<'_>, Drives<'_>) {
-        let Banks { ports, banks, choose, kernel } = self;
-        let (mut reads, mut drives) = (Reads::new(), Drives::new());
-        divide!(
-            Of::Own, ReceivePorts, ports,
-            reads [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
-            drives [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing]
-        );
-        for (number, bank) in banks.iter_mut().enumerate() {
-            divide!(
-                Of::Bank(number), ReceivePorts, &mut **bank,
-                reads [s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive, negative, framing],
-                drives [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor]
-            );
-        }
-        divide!(
-            Of::Choose, Choose, choose, reads [which, settled], drives [clk, rst, code, accept, tlast, free]
-        );
-        (kernel, reads, drives)
-    }
-}
-
-impl Logic for Banks {
-    fn update(&mut self) {
-        let (kernel, reads, mut drives) = self.pins();
-        let changed = reads.iter().any(|(.., port)| port.has_new_value());
-        kernel.update(
-            false,
-            changed,
-            |set| reads.iter().enumerate().for_each(|(index, (.., port))| set(index, *port)),
-            |take| drives.iter_mut().enumerate().for_each(|(index, (.., port))| take(index, *port)),
-        );
-    }
-
-    fn connect(&mut self) {
-        self.pins().2.into_iter().for_each(|(.., port)| port.drive());
-    }
-}
-
-/// All buffers get what this block gets; its outputs are those of the chosen one.
-fn kernel(inputs: &[(&str, usize)], outputs: &[(Of, &str, usize)], cases: usize) -> Kernel {
-    let k = Builder::combinational("banks");
-    let read: BTreeMap<&str, Expr> = inputs.iter().map(|&(name, bits)| (name, k.input(name, bits))).collect();
-    let port = |of: Of, name: &str| read[of.port(name).as_str()];
-    for &(of, name, bits) in outputs {
-        let value = match (of, name) {
-            (Of::Own, "which") => port(Of::Choose, "which"),
-            (Of::Own, "full") => port(Of::Choose, "settled"),
-            (Of::Own, "quad" | "magnitude" | "positive" | "negative") => {
-                let each: Vec<Expr> = (0..cases).map(|number| port(Of::Bank(number), name)).collect();
-                expression_by_case(port(Of::Choose, "which"), &each).unwrap_or(each[0])
-            }
-            // All buffers fill and become free together: the handshake of the first is that of all.
-            (Of::Own, _) => port(Of::Bank(0), name),
-            (Of::Choose, "code") => port(Of::Own, "s_axis_tdata"),
-            (Of::Choose, "tlast") => port(Of::Own, "s_axis_tlast"),
-            (Of::Choose, "accept") => port(Of::Bank(0), "accept"),
-            // An address beyond a smaller buffer is meant for another one; its data are not used.
-            (Of::Bank(_) | Of::Choose, _) => port(Of::Own, name).low(bits),
-        };
-        k.wire(&of.port(name), value);
-    }
-    k.finish()
+    io.quad.set(chosen(|bank| bank.quad));
+    io.magnitude.set(chosen(|bank| bank.magnitude));
+    io.positive.set(chosen(|bank| bank.positive));
+    io.negative.set(chosen(|bank| bank.negative));
 }
 
 #[cfg(test)]
 mod tests {
+    use dermis_golden::fixed::Model;
     use dermis_golden::spec::scene::Scene;
 
+    use super::super::choose::tests::Expected;
+    use super::super::receive::tests::FrameBuffer;
     use super::*;
-    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
+    use crate::language::Change;
     use crate::wire::Word;
+
+    /// A frame buffer for each case, and the choice.
+    struct Banks<'a> {
+        buffers: Vec<FrameBuffer>,
+        choice: Expected<'a>,
+    }
+
+    impl Reference for Banks<'_> {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [which, settled] = <[_; 2]>::try_from(self.choice.outputs(&[])).unwrap();
+            let settles = settled.is_some_and(|settled| settled.number() == 1);
+            let index = which.map_or(0, |which| which.number() as usize);
+            let mut outputs = self.buffers[index].outputs(inputs);
+            (outputs[5], outputs[6]) = (settled, which);
+            // What is gathered of a subarray is that of the chosen case.
+            outputs[8..11].iter_mut().for_each(|gathered| *gathered = gathered.filter(|_| settles));
+            outputs
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let accept = self.buffers[0].outputs(inputs)[1].unwrap();
+            self.choice.clock(&[inputs[0], accept, inputs[3], inputs[4], inputs[1]]);
+            self.buffers.iter_mut().for_each(|buffer| buffer.clock(inputs));
+        }
+    }
 
     #[test]
     fn outputs_are_those_of_the_chosen_bank() {
         let text = "name = \"banks\"\n[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
-                    thickness_mm = 2.0\n[partition]\ncases = [0, 1]\n";
-        let mut banks = Banks::new(&Model::new(&Scene::parse(text, "banks.toml").unwrap()).unwrap());
-        let (_, reads, drives) = banks.pins();
-        let widths: Vec<usize> = reads.iter().map(|(.., port)| port.port_bits()).collect();
-        let inputs: Vec<String> = reads.iter().map(|(of, name, _)| of.port(name)).collect();
-        let outputs: Vec<(String, usize)> =
-            drives.iter().map(|(of, name, port)| (of.port(name), port.port_bits())).collect();
-        let of = |words: &[Word]| {
-            let read = |name: &str| words[inputs.iter().position(|input| input == name).expect(name)];
-            let which = read("choose__which").number();
-            let source = |output: &str| match output {
-                "which" => "choose__which".to_owned(),
-                "full" => "choose__settled".to_owned(),
-                "quad" | "magnitude" | "positive" | "negative" => format!("banks__{which}__{output}"),
-                "choose__code" => "s_axis_tdata".to_owned(),
-                "choose__tlast" => "s_axis_tlast".to_owned(),
-                "choose__accept" => "banks__0__accept".to_owned(),
-                inner if inner.contains("__") => inner.rsplit("__").next().unwrap().to_owned(),
-                own => format!("banks__0__{own}"),
-            };
-            // Only addresses are cut, and they are short.
-            let cut = |word: Word, bits: usize| if bits < 64 { Word::from(word.field(0, bits)) } else { word };
-            outputs.iter().map(|(output, bits)| Some(cut(read(&source(output)), *bits))).collect()
+                    thickness_mm = 2.0\n[partition]\ncases = [0, 1]\n[search]\nnoise_floor_MPa = 0.0\n";
+        let model = Model::new(&Scene::parse(text, "banks.toml").unwrap()).unwrap();
+        let choose = Choose::new(&model);
+        let banks = || Banks {
+            buffers: (0..2).map(|case| FrameBuffer::new(&model, case)).collect(),
+            choice: Expected::new(&choose),
         };
-        check(banks.kernel.kernel(), &random_words(2000, &widths), &mut Pipeline::new(0, outputs.len(), of));
+        let (mut state, mut random) = (banks(), fastrand::Rng::with_seed(7));
+        let sizes = model.cases().iter().map(|case| (case.formats.quads * case.parts.len(), case.parts.len()));
+        let (quads, parts) = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap();
+        let cycle = |cycle: usize| {
+            let beat = state.buffers[0].reception.beat(&mut random, cycle);
+            let settled = state.choice.outputs(&[])[1].is_some_and(|settled| settled.number() == 1);
+            let free = settled && random.u8(..40) == 0;
+            let [address, part] = [quads, parts].map(|limit| Word::from(random.u64(..limit as u64)));
+            let reported = random.u8(..20) == 0;
+            let inputs = [&beat[..], &[free.into(), address, part, reported.into(), Word::default()]].concat();
+            state.clock(&inputs);
+            inputs
+        };
+        let stimulus: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
+        let subject = |changes: &[Change]| {
+            subject_of!(
+                Receive::new(&model),
+                changes,
+                inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
+                outputs [
+                    s_axis_tready, accept, taken_word, row_end, dropped, full, which, quad, magnitude, positive,
+                    negative, framing
+                ],
+            )
+        };
+        let defects = [Change::value("", "choose__accept", |k| k.constant(1, 0))];
+        check_with_defects(subject, &stimulus, banks, &defects);
     }
 }

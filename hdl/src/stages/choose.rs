@@ -160,19 +160,18 @@ fn differ<'k>([above, below]: [Expr<'k>; 2], grid: Grid) -> Expr<'k> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use dermis_golden::fixed::stages::choose::FrameStats;
     use dermis_golden::spec::scene::Scene;
 
     use super::*;
-    use crate::language::kernel_of;
-    use crate::language::testbench::{check, Reference};
+    use crate::language::testbench::{check, subject_of, Reference};
     use crate::wire::Word;
 
     const BITS: usize = 12;
 
     /// The choice of the bit-true model, with the cycles that it takes.
-    struct Expected<'a> {
+    pub(crate) struct Expected<'a> {
         rule: &'a Choose,
         index: usize,
         seen: FrameStats,
@@ -183,7 +182,7 @@ mod tests {
     }
 
     impl<'a> Expected<'a> {
-        fn new(rule: &'a Choose) -> Self {
+        pub(crate) fn new(rule: &'a Choose) -> Self {
             Expected { rule, index: 0, seen: FrameStats::default(), left: None, which: None, settled: None }
         }
 
@@ -213,7 +212,7 @@ mod tests {
             self.settled = self.settled.map(|settled| (settled || chosen) && !free);
             self.left = self.left.map(|left| left - 1).filter(|left| *left > 0);
             if accept {
-                let code = inputs[4].signed(0, BITS) as i32;
+                let code = inputs[4].signed(0, rule.bits) as i32;
                 self.seen.add(&rule.sensor, self.index, code, rule.floor);
                 self.index += 1;
                 if self.index == rule.sensor.taxels() {
@@ -262,7 +261,9 @@ mod tests {
             (Condition::BothSigns, 0, vec![grid(1, 1), grid(2, 1)]),
         ] {
             let rule = Choose { sensor: sensor.clone(), grids, condition, floor, bits: BITS };
-            check(&kernel_of(&rule), &stimulus(&rule, 30_000), &mut Expected::new(&rule));
+            let subject =
+                subject_of!(rule, &[], inputs [rst, accept, tlast, free, code], outputs [which, settled]);
+            check(subject, &stimulus(&rule, 30_000), &mut Expected::new(&rule));
         }
     }
 }

@@ -32,7 +32,6 @@ mod unfold;
 mod unsearched;
 mod window;
 
-pub use banks::Banks;
 pub use choose::Choose;
 pub use contacts::Contacts;
 pub use estimate::Estimate;
@@ -44,14 +43,13 @@ pub use pass::Pass;
 pub use prepare::Prepare;
 #[cfg(test)]
 pub(crate) use receive::tests::Reception;
-pub use receive::{Receive, ReceivePorts};
+pub use receive::Receive;
 pub use relax::Relax;
 pub use rescale::Rescale;
 pub use resultants::Resultants;
-pub use search::{Search, SearchPorts};
+pub use search::Search;
 pub use segment::Segment;
 pub use send::Send;
 pub use shear::Shear;
 pub use unfold::Unfold;
-pub use unsearched::Unsearched;
 pub use window::Window;

@@ -7,227 +7,207 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
-use crate::ports::{has_ports, ports};
+use super::banks::build_banks;
+use super::Choose;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, frame_quads, largest, BitDelay, Delay, Dff, FrameStats, InputMask, LaneBroadcast, Ram, Scan,
+    count_bits, frame_quads, BitDelay, Delay, Dff, FrameStats, InputMask, LaneBroadcast, Ram, Scan,
 };
-use crate::wire::Wire;
 
-/// ```text
-/// s_axis --> frame buffer --> quad (two cycles after quad_address)
-///       \--> magnitude, positive, negative
-/// ```
-/// `full` is high from two cycles after the frame's last beat until `free`; the gathered values of a subarray are valid from
-/// two cycles after its last beat.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Receive {
-    ports: ReceivePorts,
-    scan: RustHdl<Scan>,
-    input_mask: RustHdl<InputMask>,
-    broadcast: RustHdl<LaneBroadcast>,
-    frame: RustHdl<Ram>,
-    stats: RustHdl<FrameStats>,
-    stats_enable: RustHdl<BitDelay>,
-    stats_part: RustHdl<Delay>,
-    stats_code: RustHdl<Delay>,
-    stats_address: RustHdl<Delay>,
-    stats_mask: RustHdl<Delay>,
-    clears: RustHdl<Dff>,
-    whole: RustHdl<Dff>,
-    complete: RustHdl<Dff>,
-    broken: RustHdl<Dff>,
-    taken: Signal<Local, Bit>,
-    early: Signal<Local, Bit>,
-}
-
-ports! {
-    /// Ports of a stage that receives frames.
-    pub struct ReceivePorts {
-        /// Clock; registers change on its rising edge.
-        pub clk: Signal<In, Clock>,
-        /// Synchronous reset, active high.
-        pub rst: Signal<In, Bit>,
+block! {
+    /// ```text
+    /// s_axis --> frame buffer --> quad (two cycles after quad_address)
+    ///       \--> magnitude, positive, negative
+    /// ```
+    /// `full` is high from two cycles after the frame's last beat until `free`; the gathered values of a subarray are valid from
+    /// two cycles after its last beat.
+    pub struct Receive {
+        /// Width of a code.
+        bits: usize,
+        /// Cases of which one is chosen per frame.
+        cases: usize,
+        /// Quads of a frame and subarrays, both of the largest case.
+        quads: usize,
+        parts: usize,
+        floor_bits: usize,
+        buffers: Buffers,
+    }
+    ports ReceivePorts {
+        clock;
+        reset;
         /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
-        pub s_axis_tdata: Wire<In>,
+        in s_axis_tdata: bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        pub s_axis_tvalid: Signal<In, Bit>,
+        in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
-        pub s_axis_tready: Signal<Out, Bit>,
+        out s_axis_tready;
         /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        pub s_axis_tlast: Signal<In, Bit>,
+        in s_axis_tlast;
         /// A beat is accepted in this cycle.
-        pub accept: Signal<Out, Bit>,
+        out accept;
         /// The accepted code, 0 for a dead taxel and for tension of a unipolar array; valid with `accept`.
-        pub taken_word: Wire<Out>,
+        out taken_word: bits;
         /// The taxel accepted is the last of a row of subarrays.
-        pub row_end: Signal<Out, Bit>,
+        out row_end;
         /// The beat accepted ends its frame early: the frame is dropped.
-        pub dropped: Signal<Out, Bit>,
+        out dropped;
         /// The frame buffer holds a whole frame, and `which` is its case; high until `free`.
-        pub full: Signal<Out, Bit>,
+        out full;
         /// The frame has been read: the buffer may be overwritten.
-        pub free: Signal<In, Bit>,
+        in free;
         /// Index of the chosen case; valid with `full`, 0 where there is one case.
-        pub which: Wire<Out>,
+        out which: count_bits(*cases);
         /// Address of the quad to read, over all subarrays; sampled in every cycle.
-        pub quad_address: Wire<In>,
+        in quad_address: count_bits(*quads);
         /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
-        pub quad: Wire<Out>,
+        out quad: 4 * bits;
         /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
-        pub part: Wire<In>,
+        in part: count_bits(*parts);
         /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
-        pub floor: Wire<In>,
+        in floor: floor_bits;
         /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid from two cycles after its last code
         /// until `free`.
-        pub magnitude: Wire<Out>,
+        out magnitude: bits - 1;
         /// A code of the subarray is above the noise floor; valid as `magnitude` is.
-        pub positive: Signal<Out, Bit>,
+        out positive;
         /// A code of the subarray is below minus the noise floor; valid as `magnitude` is.
-        pub negative: Signal<Out, Bit>,
+        out negative;
         /// `tlast` was early or missing since the last `reported`.
-        pub framing: Signal<Out, Bit>,
+        out framing;
         /// Clears `framing`.
-        pub reported: Signal<In, Bit>,
+        in reported;
     }
 }
 
-impl ReceivePorts {
-    /// For frames that are read in the layout of any of `cases`, and a noise floor of `floor_bits` bits.
-    pub(super) fn new(cases: &[CasePlan], floor_bits: u32) -> Self {
-        let bits = cases[0].formats.input_bits as usize;
-        let parts: Vec<usize> = cases.iter().map(|case| case.parts.len()).collect();
-        ReceivePorts {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            accept: Default::default(),
-            taken_word: Wire::new(bits),
-            row_end: Default::default(),
-            dropped: Default::default(),
-            full: Default::default(),
-            free: Default::default(),
-            which: Wire::new(count_bits(cases.len())),
-            quad_address: Wire::new(count_bits(frame_quads(cases))),
-            quad: Wire::new(4 * bits),
-            part: Wire::new(count_bits(largest(&parts))),
-            floor: Wire::new(floor_bits as usize),
-            magnitude: Wire::new(bits - 1),
-            positive: Default::default(),
-            negative: Default::default(),
-            framing: Default::default(),
-            reported: Default::default(),
-        }
-    }
+/// Where frames are stored.
+enum Buffers {
+    /// In the layout of one case.
+    One(Box<Buffer>),
+    /// In those of several cases, one of which is chosen per frame.
+    Several(Choose, Vec<Receive>),
 }
 
-has_ports!(Receive: ReceivePorts);
+/// The parts of a frame buffer.
+struct Buffer {
+    scan: Scan,
+    input_mask: InputMask,
+    frame: Ram,
+    stats: FrameStats,
+}
 
 impl Receive {
+    /// For the frames of `model`.
+    pub fn new(model: &Model) -> Self {
+        if !model.chooses() {
+            return Receive::of_case(model, 0);
+        }
+        let buffers = (0..model.cases().len()).map(|case| Receive::of_case(model, case)).collect();
+        Receive::with(model, model.cases(), Buffers::Several(Choose::new(model), buffers))
+    }
+
     /// For frames in the layout of the case of index `case`.
-    pub fn new(model: &Model, case: usize) -> Self {
-        let own = &model.cases()[case];
-        let bits = own.formats.input_bits as usize;
-        let count = own.parts.len();
-        let quads = count * own.formats.quads;
-        let taxels = model.scene.sensor.taxels();
+    fn of_case(model: &Model, case: usize) -> Self {
+        let cases = std::slice::from_ref(&model.cases()[case]);
+        let (bits, taxels) = (model.formats().input_bits as usize, model.scene.sensor.taxels());
+        let lanes = (0..Quads::LANES).map(|lane| Holds::Frame { case, lane });
+        let buffer = Buffer {
+            scan: Scan::new(cases, Quads::LANES),
+            input_mask: InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar),
+            frame: Ram::new(frame_quads(cases), Quads::LANES, bits).holding(lanes).registered(),
+            stats: FrameStats::new(bits, model.built_in_floor(), cases[0].parts.len()),
+        };
+        Receive::with(model, cases, Buffers::One(Box::new(buffer)))
+    }
+
+    fn with(model: &Model, cases: &[CasePlan], buffers: Buffers) -> Self {
         Receive {
-            ports: ReceivePorts::new(std::slice::from_ref(own), model.floor_bits()),
-            scan: RustHdl::new(Scan::new(std::slice::from_ref(own), Quads::LANES)),
-            input_mask: RustHdl::new(InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar)),
-            broadcast: RustHdl::new(LaneBroadcast::new(bits)),
-            frame: RustHdl::new(
-                Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
-            ),
-            stats: RustHdl::new(FrameStats::new(bits, model.built_in_floor(), count)),
-            stats_enable: RustHdl::new(BitDelay::new(1)),
-            stats_part: RustHdl::new(Delay::new(count_bits(count), 1)),
-            stats_code: RustHdl::new(Delay::new(bits, 1)),
-            stats_address: RustHdl::new(Delay::new(count_bits(quads), 1)),
-            stats_mask: RustHdl::new(Delay::new(4, 1)),
-            clears: Default::default(),
-            whole: Default::default(),
-            complete: Default::default(),
-            broken: Default::default(),
-            taken: Default::default(),
-            early: Default::default(),
+            bits: model.formats().input_bits as usize,
+            cases: cases.len(),
+            quads: frame_quads(cases),
+            parts: cases.iter().map(|case| case.parts.len()).max().unwrap_or(1),
+            floor_bits: model.floor_bits() as usize,
+            buffers,
         }
     }
 }
 
-impl Logic for Receive {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.scan.clk.next = self.clk.val();
-        self.input_mask.clk.next = self.clk.val();
-        self.frame.clk.next = self.clk.val();
-        self.stats.clk.next = self.clk.val();
-        self.stats_enable.clk.next = self.clk.val();
-        self.stats_enable.rst.next = self.rst.val();
-        self.stats_part.clk.next = self.clk.val();
-        self.stats_code.clk.next = self.clk.val();
-        self.stats_address.clk.next = self.clk.val();
-        self.stats_mask.clk.next = self.clk.val();
-        self.clears.clk.next = self.clk.val();
-        self.whole.clk.next = self.clk.val();
-        self.complete.clk.next = self.clk.val();
-        self.broken.clk.next = self.clk.val();
+impl Block for Receive {
+    fn build<'k>(&'k self, k: &'k Builder, io: ReceivePorts<Inside<'k>>) {
+        match &self.buffers {
+            Buffers::One(buffer) => self.build_buffer(k, io, buffer),
+            Buffers::Several(choose, buffers) => build_banks(k, io, choose, buffers),
+        }
+    }
+}
 
-        self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
-        self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();
-        self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.scan.last.val();
-        self.accept.next = self.taken.val();
-        self.row_end.next = self.scan.row_end.val();
-        self.dropped.next = self.early.val();
+impl Receive {
+    fn build_buffer<'k>(&'k self, k: &'k Builder, io: ReceivePorts<Inside<'k>>, buffer: &'k Buffer) {
+        let scan = k.instance("scan", &buffer.scan);
+        let input_mask = k.instance("input_mask", &buffer.input_mask);
+        let broadcast = k.instance("broadcast", LaneBroadcast::new(self.bits));
+        let frame = k.instance("frame", &buffer.frame);
+        let stats = k.instance("stats", &buffer.stats);
+        let stats_enable = k.instance("stats_enable", BitDelay::new(1));
+        let stats_part = k.instance("stats_part", Delay::new(count_bits(self.parts), 1));
+        let stats_code = k.instance("stats_code", Delay::new(self.bits, 1));
+        let stats_address = k.instance("stats_address", Delay::new(count_bits(self.quads), 1));
+        let stats_mask = k.instance("stats_mask", Delay::new(Quads::LANES, 1));
+        let clears = k.instance("clears", Dff {});
+        let whole = k.instance("whole", Dff {});
+        let complete = k.instance("complete", Dff {});
+        let broken = k.instance("broken", Dff {});
 
-        self.which.next = false.into();
-        self.scan.which.next = false.into();
-        self.scan.enable.next = self.taken.val();
-        self.scan.clear.next = self.rst.val() | self.early.val();
-        self.input_mask.enable.next = self.taken.val();
-        self.input_mask.clear.next = self.rst.val() | self.early.val();
-        self.input_mask.word.next = self.s_axis_tdata.val();
-        self.taken_word.next = self.input_mask.kept.val();
-        self.stats_code.d.next = self.input_mask.kept.val();
-        self.stats_mask.d.next = self.scan.mask.val();
-        self.stats_address.d.next = self.scan.address.val();
-        self.broadcast.word.next = self.stats_code.q.val();
-        self.broadcast.mask.next = self.stats_mask.q.val();
-        self.broadcast.enable.next = self.stats_enable.q.val();
-        self.frame.write_address.next = self.stats_address.q.val();
-        self.frame.write_data.next = self.broadcast.quad.val();
-        self.frame.write.next = self.broadcast.write.val();
-        self.frame.read.next = true;
-        self.frame.read_address.next = self.quad_address.val();
-        self.quad.next = self.frame.read_data.val();
+        io.s_axis_tready.set(!whole.q & !io.rst);
+        let taken = k.wire("taken", io.s_axis_tvalid & !whole.q & !io.rst);
+        let early = k.wire("early", taken & io.s_axis_tlast & !scan.last);
+        io.accept.set(taken);
+        io.row_end.set(scan.row_end);
+        io.dropped.set(early);
 
-        self.stats_enable.d.next = self.taken.val() & !self.early.val();
-        self.stats_part.d.next = self.scan.part.val();
-        self.stats.accept.next = self.stats_enable.q.val();
-        self.clears.d.next = self.rst.val() | self.free.val() | self.early.val();
-        self.stats.clear.next = self.clears.q.val();
-        self.stats.part.next = self.stats_part.q.val();
-        self.stats.floor.next = self.floor.val();
-        self.stats.select.next = self.part.val();
-        self.stats.code.next = self.stats_code.q.val();
-        self.magnitude.next = self.stats.magnitude.val();
-        self.positive.next = self.stats.positive.val();
-        self.negative.next = self.stats.negative.val();
+        io.which.set(k.constant(1, 0));
+        scan.which.set(k.constant(1, 0));
+        scan.enable.set(taken);
+        scan.clear.set(io.rst | early);
+        input_mask.enable.set(taken);
+        input_mask.clear.set(io.rst | early);
+        input_mask.word.set(io.s_axis_tdata);
+        io.taken_word.set(input_mask.kept);
+        stats_code.d.set(input_mask.kept);
+        stats_mask.d.set(scan.mask);
+        stats_address.d.set(scan.address);
+        broadcast.word.set(stats_code.q);
+        broadcast.mask.set(stats_mask.q);
+        broadcast.enable.set(stats_enable.q);
+        frame.write_address.set(stats_address.q);
+        frame.write_data.set(broadcast.quad);
+        frame.write.set(broadcast.write);
+        frame.read.set(k.constant(1, 1));
+        frame.read_address.set(io.quad_address);
+        io.quad.set(frame.read_data);
 
-        self.full.next = self.complete.q.val();
-        self.complete.d.next = self.whole.q.val() & !self.free.val() & !self.rst.val();
-        self.whole.d.next =
-            (self.whole.q.val() | (self.taken.val() & self.scan.last.val())) & !self.free.val() & !self.rst.val();
-        self.framing.next = self.broken.q.val();
-        self.broken.d.next = ((self.broken.q.val() & !self.reported.val())
-            | self.early.val()
-            | (self.taken.val() & self.scan.last.val() & !self.s_axis_tlast.val()))
-            & !self.rst.val();
+        stats_enable.d.set(taken & !early);
+        stats_part.d.set(scan.part);
+        stats.accept.set(stats_enable.q);
+        clears.d.set(io.rst | io.free | early);
+        stats.clear.set(clears.q);
+        stats.part.set(stats_part.q);
+        stats.floor.set(io.floor);
+        stats.select.set(io.part);
+        stats.code.set(stats_code.q);
+        io.magnitude.set(stats.magnitude);
+        io.positive.set(stats.positive);
+        io.negative.set(stats.negative);
+
+        io.full.set(complete.q);
+        complete.d.set(whole.q & !io.free & !io.rst);
+        whole.d.set((whole.q | (taken & scan.last)) & !io.free & !io.rst);
+        io.framing.set(broken.q);
+        broken.d.set(((broken.q & !io.reported)
+            | early
+            | (taken & scan.last & !io.s_axis_tlast))
+            & !io.rst);
     }
 }
 
@@ -236,7 +216,7 @@ pub(crate) mod tests {
     use dermis_golden::fixed::stages::receive::receive;
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, MemoryReference, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, MemoryReference, Reference};
     use crate::language::Change;
     use crate::scenes::{model, Place};
     use crate::wire::Word;
@@ -299,8 +279,8 @@ pub(crate) mod tests {
         }
     }
 
-    struct Buffer {
-        reception: Reception,
+    pub(crate) struct FrameBuffer {
+        pub(crate) reception: Reception,
         /// Index of the case in whose layout frames are stored.
         case: usize,
         /// The whole frame is in the buffer.
@@ -310,19 +290,19 @@ pub(crate) mod tests {
         lanes: [MemoryReference<i32>; 4],
     }
 
-    impl Buffer {
+    impl FrameBuffer {
         fn case(&self) -> &CasePlan {
             &self.reception.model.cases()[self.case]
         }
 
-        fn new(model: &Model, case: usize) -> Self {
+        pub(crate) fn new(model: &Model, case: usize) -> Self {
             let quads = frame_quads(&model.cases()[case..][..1]);
             let lanes = [(); 4].map(|()| MemoryReference::new(quads, 2));
-            Buffer { reception: Reception::new(model), case, full: false, taxel: None, lanes }
+            FrameBuffer { reception: Reception::new(model), case, full: false, taxel: None, lanes }
         }
     }
 
-    impl Reference for Buffer {
+    impl Reference for FrameBuffer {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let (model, taken) = (&self.reception.model, self.reception.accepted(inputs));
             let bits = model.formats().input_bits as usize;
@@ -380,7 +360,7 @@ pub(crate) mod tests {
             (dead, 0, Change::value("", "input_mask__clear", |k| k.named("rst"))),
         ] {
             let mut random = fastrand::Rng::with_seed(7);
-            let mut buffer = Buffer::new(&model, case);
+            let mut buffer = FrameBuffer::new(&model, case);
             let count = buffer.case().parts.len();
             let quads = count * buffer.case().formats.quads;
             let floor = Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64);
@@ -394,8 +374,8 @@ pub(crate) mod tests {
             };
             let stimulus: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
             let subject = |changes: &[Change]| {
-                block_subject!(
-                    Receive::new(&model, case),
+                subject_of!(
+                    Receive::of_case(&model, case),
                     changes,
                     inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported, floor],
                     outputs [
@@ -404,7 +384,7 @@ pub(crate) mod tests {
                     ],
                 )
             };
-            check_with_defects(subject, &stimulus, || Buffer::new(&model, case), &[defect]);
+            check_with_defects(subject, &stimulus, || FrameBuffer::new(&model, case), &[defect]);
         }
     }
 }

@@ -9,21 +9,84 @@
 use dermis_golden::fixed::plan::cycles::{coarse_period, values_delay, SET_UP, SHORTEST_SWEEP};
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
-use crate::ports::{has_ports, ports};
+use super::unsearched::unsearched;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
     count_bits, largest, position_bits, store_latency, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff,
     LaneMask, PolynomialWord, Score, ScoreBias, SearchSequencer, Slice, Store, Sum, Taylor, BUFFER_BITS,
     CANDIDATES_LATENCY, SCORE_LATENCY, TAYLOR_LATENCY,
 };
-use crate::wire::Wire;
 
-/// Polynomials in by coefficient, p(μ*) out by step.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Search {
-    ports: SearchPorts,
+block! {
+    /// Polynomials in by coefficient, p(μ*) out by step.
+    pub struct Search {
+        cases: usize,
+        /// Quads of a subarray.
+        quads: usize,
+        /// Coefficients of a taxel.
+        vectors: usize,
+        /// Width of a coefficient as it is written, and of a value.
+        fill_bits: usize,
+        value_bits: usize,
+        /// Values that are output in a cycle.
+        width: usize,
+        score_bits: usize,
+        /// What finds μ*; without a search μ* is 0, or that of a network.
+        search: Option<Box<Sweeps>>,
+    }
+    ports SearchPorts {
+        clock;
+        reset;
+        /// Index of the case of the frame that is searched; constant until its values have been output.
+        in which: count_bits(*cases);
+        /// Index of the case of the frame that is written; constant until its last coefficient.
+        in fill_which: count_bits(*cases);
+        /// One coefficient of four taxels, signed; valid with `fill`.
+        in fill_quad: 4 * fill_bits;
+        /// `fill_quad` holds a coefficient.
+        in fill;
+        /// Index of the coefficient; valid with `fill`.
+        in fill_index: count_bits(*vectors);
+        /// Address of the quad; valid with `fill`.
+        in fill_address: count_bits(*quads);
+        /// All coefficients have been written: start the search.
+        in start;
+        /// The subarray is searched, else p(0) is the result; valid with `start`.
+        in enabled;
+        /// Values may be output; the last sweep waits for it.
+        in ready;
+        /// The last sweep waits in this cycle.
+        out stalled;
+        /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
+        out values: width * value_bits;
+        /// `values` holds a step: the next ones of a quad, quad by quad.
+        out values_valid;
+        /// μ*, `score` and `found` are final; high for one cycle, before the values.
+        out settled;
+        /// High for one cycle, from which on the values can be read row-major, one a cycle: that of the first values where a
+        /// step is a quad.
+        out values_begin;
+        /// All values have been output; high for one cycle.
+        out done;
+        /// Best position, x, in grid steps of the level, signed; valid with `compared` and `settled`.
+        out best_x: position_bits();
+        /// Best position, y, in grid steps of the level, signed; valid with `compared` and `settled`.
+        out best_y: position_bits();
+        /// Score of the best candidate, signed, 2^−6; valid with `compared` and `settled`.
+        out score: score_bits;
+        /// A candidate was found; valid with `settled`.
+        out found;
+        /// The candidates of a sweep have been compared; high for one cycle.
+        out compared;
+        /// A candidate was taken at this level; valid with `compared`.
+        out taken;
+    }
+}
+
+/// The parts of a search.
+struct Sweeps {
     sequencer: SearchSequencer,
     bias: ScoreBias,
     best: BestCandidate,
@@ -31,134 +94,58 @@ pub struct Search {
     taylor: Taylor,
     candidates: Candidates,
     scores: Score,
-    lane_mask: RustHdl<LaneMask>,
+    lane_mask: LaneMask,
     sum: Sum,
     sum_taylor: Taylor,
     sum_candidates: Candidates,
-    fill_mask: RustHdl<LaneMask>,
-    constants: RustHdl<Slice>,
-    quads: RustHdl<CaseCounter>,
-    period: RustHdl<CaseCounter>,
-    counting: RustHdl<Dff>,
-    began: RustHdl<BitDelay>,
-    compared_later: RustHdl<BitDelay>,
-    go: RustHdl<BitDelay>,
-    moved: RustHdl<BitDelay>,
-    sum_moved: RustHdl<BitDelay>,
-    trial: RustHdl<BitDelay>,
-    outcome: RustHdl<BitDelay>,
-    sum_outcome: RustHdl<BitDelay>,
-    scored: RustHdl<BitDelay>,
-    first: RustHdl<BitDelay>,
-    bias_start: RustHdl<BitDelay>,
-    totals: RustHdl<BitDelay>,
-    finish: RustHdl<BitDelay>,
-    step: RustHdl<Delay>,
-    target: RustHdl<Delay>,
-    moved_address: RustHdl<Delay>,
-    scored_address: RustHdl<Delay>,
-    set_up: RustHdl<Dff>,
-    stalled_before: RustHdl<Dff>,
-    due: Signal<Local, Bit>,
-    stall: Signal<Local, Bit>,
-    quad_end: Signal<Local, Bit>,
+    fill_mask: LaneMask,
+    constants: Slice,
+    quads: CaseCounter,
+    period: CaseCounter,
+    began: BitDelay,
+    compared_later: BitDelay,
+    moved: BitDelay,
+    sum_moved: BitDelay,
+    sum_outcome: BitDelay,
+    first: BitDelay,
+    bias_start: BitDelay,
+    totals: BitDelay,
+    finish: BitDelay,
+    step: Delay,
+    target: Delay,
+    moved_address: Delay,
+    scored_address: Delay,
 }
 
-ports! {
-    /// Ports of a stage that finds p(μ*).
-    pub struct SearchPorts {
-        /// Clock; registers change on its rising edge.
-        pub clk: Signal<In, Clock>,
-        /// Synchronous reset, active high.
-        pub rst: Signal<In, Bit>,
-        /// Index of the case of the frame that is searched; constant until its values have been output.
-        pub which: Wire<In>,
-        /// Index of the case of the frame that is written; constant until its last coefficient.
-        pub fill_which: Wire<In>,
-        /// One coefficient of four taxels, signed; valid with `fill`.
-        pub fill_quad: Wire<In>,
-        /// `fill_quad` holds a coefficient.
-        pub fill: Signal<In, Bit>,
-        /// Index of the coefficient; valid with `fill`.
-        pub fill_index: Wire<In>,
-        /// Address of the quad; valid with `fill`.
-        pub fill_address: Wire<In>,
-        /// All coefficients have been written: start the search.
-        pub start: Signal<In, Bit>,
-        /// The subarray is searched, else p(0) is the result; valid with `start`.
-        pub enabled: Signal<In, Bit>,
-        /// Values may be output; the last sweep waits for it.
-        pub ready: Signal<In, Bit>,
-        /// The last sweep waits in this cycle.
-        pub stalled: Signal<Out, Bit>,
-        /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
-        pub values: Wire<Out>,
-        /// `values` holds a step: the next ones of a quad, quad by quad.
-        pub values_valid: Signal<Out, Bit>,
-        /// μ*, `score` and `found` are final; high for one cycle, before the values.
-        pub settled: Signal<Out, Bit>,
-        /// High for one cycle, from which on the values can be read row-major, one a cycle: that of the first values where a
-        /// step is a quad.
-        pub values_begin: Signal<Out, Bit>,
-        /// All values have been output; high for one cycle.
-        pub done: Signal<Out, Bit>,
-        /// Best position, x, in grid steps of the level, signed; valid with `compared` and `settled`.
-        pub best_x: Wire<Out>,
-        /// Best position, y, in grid steps of the level, signed; valid with `compared` and `settled`.
-        pub best_y: Wire<Out>,
-        /// Score of the best candidate, signed, 2^−6; valid with `compared` and `settled`.
-        pub score: Wire<Out>,
-        /// A candidate was found; valid with `settled`.
-        pub found: Signal<Out, Bit>,
-        /// The candidates of a sweep have been compared; high for one cycle.
-        pub compared: Signal<Out, Bit>,
-        /// A candidate was taken at this level; valid with `compared`.
-        pub taken: Signal<Out, Bit>,
-    }
-}
-
-impl SearchPorts {
+impl Search {
     /// With the widths of `model`.
-    pub(super) fn new(model: &Model) -> Self {
+    pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        SearchPorts {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(model.cases().len())),
-            fill_which: Wire::new(count_bits(model.cases().len())),
-            fill_quad: Wire::new(4 * (formats.vector_bits as usize + 2)),
-            fill: Default::default(),
-            fill_index: Wire::new(count_bits(formats.vectors())),
-            fill_address: Wire::new(count_bits(formats.quads)),
-            start: Default::default(),
-            enabled: Default::default(),
-            ready: Default::default(),
-            stalled: Default::default(),
-            values: Wire::new(formats.search_width * formats.search_bits[0] as usize),
-            values_valid: Default::default(),
-            settled: Default::default(),
-            values_begin: Default::default(),
-            done: Default::default(),
-            best_x: Wire::new(position_bits()),
-            best_y: Wire::new(position_bits()),
-            score: Wire::new(formats.score_bits as usize),
-            found: Default::default(),
-            compared: Default::default(),
-            taken: Default::default(),
+        let searches = model.searches();
+        Search {
+            cases: model.cases().len(),
+            quads: formats.quads,
+            vectors: formats.vectors(),
+            fill_bits: formats.vector_bits as usize + 2,
+            value_bits: formats.search_bits[0] as usize,
+            width: if searches { formats.search_width } else { Quads::LANES },
+            score_bits: formats.score_bits as usize,
+            search: searches.then(|| Box::new(Sweeps::new(model))),
         }
     }
 }
 
-has_ports!(Search: SearchPorts);
-
-impl Search {
-    /// Taxels that are computed in a cycle.
-    pub(crate) fn width(&self) -> usize {
-        self.lane_mask.mask.width()
+impl Block for Search {
+    fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
+        match &self.search {
+            Some(search) => search.build(k, io),
+            None => unsearched(k, io, self.vectors),
+        }
     }
+}
 
-    /// With the widths of `model`.
-    pub fn new(model: &Model) -> Self {
+impl Sweeps {
+    fn new(model: &Model) -> Self {
         let formats = model.formats();
         let quads = formats.quads;
         let layouts: Vec<Quads> = model.cases().iter().map(CasePlan::layout).collect();
@@ -176,221 +163,193 @@ impl Search {
         let value = width * formats.search_bits[0] as usize;
         // Cycles from the address of a step to its shifted polynomials.
         let moved = store_latency(formats) + TAYLOR_LATENCY;
-        Search {
-            ports: SearchPorts::new(model),
+        Sweeps {
             sequencer: SearchSequencer::new(quads),
             bias: ScoreBias::new(formats, &taxel_counts),
             best: BestCandidate::new(formats, largest(&taxel_counts)),
-            constants: RustHdl::new(Slice::new(taxels.bits(), value)),
             store: Store::new(taxels.clone(), quads, fill_bits, model.resources.overlaps),
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
-            lane_mask: RustHdl::new(LaneMask::new(&layouts, width)),
+            lane_mask: LaneMask::new(&layouts, width),
             sum: Sum::new(&sums, quads, fill_bits),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
-            fill_mask: RustHdl::new(LaneMask::new(&layouts, Quads::LANES)),
-            quads: RustHdl::new(CaseCounter::new(&limits)),
-            period: RustHdl::new(CaseCounter::new(&periods)),
-            counting: Default::default(),
+            fill_mask: LaneMask::new(&layouts, Quads::LANES),
+            constants: Slice::new(taxels.bits(), value),
+            quads: CaseCounter::new(&limits),
+            period: CaseCounter::new(&periods),
             // The result of a comparison and the move computed from it are registered before a sweep is set up.
             // `set_up` is a register too, because it drives the whole search.
-            began: RustHdl::new(BitDelay::new(SET_UP as usize - 1)),
-            compared_later: RustHdl::new(BitDelay::new(SET_UP as usize - 1)),
-            go: RustHdl::new(BitDelay::new(1)),
-            moved: RustHdl::new(BitDelay::new(moved - 1)),
-            sum_moved: RustHdl::new(BitDelay::new(moved - 1)),
-            trial: RustHdl::new(BitDelay::new(1)),
-            outcome: RustHdl::new(BitDelay::new(1)),
-            sum_outcome: RustHdl::new(BitDelay::of_pulse(1 + values_delay(model.first()))),
-            scored: RustHdl::new(BitDelay::new(CANDIDATES_LATENCY)),
-            first: RustHdl::new(BitDelay::new(moved + CANDIDATES_LATENCY)),
+            began: BitDelay::new(SET_UP as usize - 1),
+            compared_later: BitDelay::new(SET_UP as usize - 1),
+            moved: BitDelay::new(moved - 1),
+            sum_moved: BitDelay::new(moved - 1),
+            sum_outcome: BitDelay::of_pulse(1 + values_delay(model.first())),
+            first: BitDelay::new(moved + CANDIDATES_LATENCY),
             // One cycle after the first step's candidates, so that a sweep is compared before the next is weighted.
-            bias_start: RustHdl::new(BitDelay::new(moved + CANDIDATES_LATENCY + 1)),
-            totals: RustHdl::new(BitDelay::new(moved + CANDIDATES_LATENCY + SCORE_LATENCY + padding)),
-            finish: RustHdl::new(BitDelay::new(moved + 1)),
-            step: RustHdl::new(Delay::new(5, store_latency(formats) - 1)),
+            bias_start: BitDelay::new(moved + CANDIDATES_LATENCY + 1),
+            totals: BitDelay::new(moved + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
+            finish: BitDelay::new(moved + 1),
+            step: Delay::new(5, store_latency(formats) - 1),
             // The target buffer is known one cycle after the set-up and needed one cycle before the write.
-            target: RustHdl::new(Delay::new(BUFFER_BITS, moved - 2)),
-            moved_address: RustHdl::new(Delay::new(step, moved)),
-            scored_address: RustHdl::new(Delay::new(step, CANDIDATES_LATENCY)),
-            set_up: Default::default(),
-            stalled_before: Default::default(),
-            due: Default::default(),
-            stall: Default::default(),
-            quad_end: Default::default(),
+            target: Delay::new(BUFFER_BITS, moved - 2),
+            moved_address: Delay::new(step, moved),
+            scored_address: Delay::new(step, CANDIDATES_LATENCY),
         }
     }
-}
 
-impl Logic for Search {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.sequencer.clk.next = self.clk.val();
-        self.bias.clk.next = self.clk.val();
-        self.best.clk.next = self.clk.val();
-        self.period.clk.next = self.clk.val();
-        self.first.clk.next = self.clk.val();
-        self.bias_start.clk.next = self.clk.val();
-        self.step.clk.next = self.clk.val();
-        self.target.clk.next = self.clk.val();
-        self.store.clk.next = self.clk.val();
-        self.taylor.clk.next = self.clk.val();
-        self.candidates.clk.next = self.clk.val();
-        self.scores.clk.next = self.clk.val();
-        self.sum.clk.next = self.clk.val();
-        self.sum_taylor.clk.next = self.clk.val();
-        self.sum_candidates.clk.next = self.clk.val();
-        self.quads.clk.next = self.clk.val();
-        self.counting.clk.next = self.clk.val();
-        self.set_up.clk.next = self.clk.val();
-        self.stalled_before.clk.next = self.clk.val();
-        self.trial.clk.next = self.clk.val();
-        self.trial.rst.next = self.rst.val();
-        self.outcome.clk.next = self.clk.val();
-        self.outcome.rst.next = self.rst.val();
-        self.sum_outcome.clk.next = self.clk.val();
-        self.sum_outcome.rst.next = self.rst.val();
-        self.began.clk.next = self.clk.val();
-        self.compared_later.clk.next = self.clk.val();
-        self.go.clk.next = self.clk.val();
-        self.moved.clk.next = self.clk.val();
-        self.sum_moved.clk.next = self.clk.val();
-        self.scored.clk.next = self.clk.val();
-        self.totals.clk.next = self.clk.val();
-        self.finish.clk.next = self.clk.val();
-        self.moved_address.clk.next = self.clk.val();
-        self.scored_address.clk.next = self.clk.val();
-        self.sequencer.rst.next = self.rst.val();
-        self.bias.rst.next = self.rst.val();
-        self.best.rst.next = self.rst.val();
-        self.first.rst.next = self.rst.val();
-        self.bias_start.rst.next = self.rst.val();
-        self.began.rst.next = self.rst.val();
-        self.compared_later.rst.next = self.rst.val();
-        self.go.rst.next = self.rst.val();
-        self.moved.rst.next = self.rst.val();
-        self.sum_moved.rst.next = self.rst.val();
-        self.scored.rst.next = self.rst.val();
-        self.totals.rst.next = self.rst.val();
-        self.finish.rst.next = self.rst.val();
+    fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
+        let sequencer = k.instance("sequencer", &self.sequencer);
+        let bias = k.instance("bias", &self.bias);
+        let best = k.instance("best", &self.best);
+        let store = k.instance("store", &self.store);
+        let taylor = k.instance("taylor", &self.taylor);
+        let candidates = k.instance("candidates", &self.candidates);
+        let scores = k.instance("scores", &self.scores);
+        let lane_mask = k.instance("lane_mask", &self.lane_mask);
+        let sum = k.instance("sum", &self.sum);
+        let sum_taylor = k.instance("sum_taylor", &self.sum_taylor);
+        let sum_candidates = k.instance("sum_candidates", &self.sum_candidates);
+        let fill_mask = k.instance("fill_mask", &self.fill_mask);
+        let constants = k.instance("constants", &self.constants);
+        let quads = k.instance("quads", &self.quads);
+        let period = k.instance("period", &self.period);
+        let counting = k.instance("counting", Dff {});
+        let began = k.instance("began", &self.began);
+        let compared_later = k.instance("compared_later", &self.compared_later);
+        let go = k.instance("go", BitDelay::new(1));
+        let moved = k.instance("moved", &self.moved);
+        let sum_moved = k.instance("sum_moved", &self.sum_moved);
+        let trial = k.instance("trial", BitDelay::new(1));
+        let outcome = k.instance("outcome", BitDelay::new(1));
+        let sum_outcome = k.instance("sum_outcome", &self.sum_outcome);
+        let scored = k.instance("scored", BitDelay::new(CANDIDATES_LATENCY));
+        let first = k.instance("first", &self.first);
+        let bias_start = k.instance("bias_start", &self.bias_start);
+        let totals = k.instance("totals", &self.totals);
+        let finish = k.instance("finish", &self.finish);
+        let step = k.instance("step", &self.step);
+        let target = k.instance("target", &self.target);
+        let moved_address = k.instance("moved_address", &self.moved_address);
+        let scored_address = k.instance("scored_address", &self.scored_address);
+        let set_up = k.instance("set_up", Dff {});
+        let stalled_before = k.instance("stalled_before", Dff {});
 
-        self.bias.which.next = self.which.val();
-        self.lane_mask.which.next = self.which.val();
-        self.fill_mask.which.next = self.fill_which.val();
-        self.quads.which.next = self.which.val();
-        self.period.which.next = self.which.val();
+        bias.which.set(io.which);
+        lane_mask.which.set(io.which);
+        fill_mask.which.set(io.fill_which);
+        quads.which.set(io.which);
+        period.which.set(io.which);
 
-        comment!("Coefficients are written");
-        self.store.fill.next = self.fill.val();
-        self.store.fill_index.next = self.fill_index.val();
-        self.store.fill_address.next = self.fill_address.val();
-        self.store.fill_quad.next = self.fill_quad.val();
-        self.fill_mask.address.next = self.fill_address.val();
-        self.sum.fill.next = self.fill.val();
-        self.sum.fill_index.next = self.fill_index.val();
-        self.sum.fill_address.next = self.fill_address.val();
-        self.sum.fill_mask.next = self.fill_mask.mask.val();
-        self.sum.fill_quad.next = self.fill_quad.val();
+        k.comment("Coefficients are written");
+        store.fill.set(io.fill);
+        store.fill_index.set(io.fill_index);
+        store.fill_address.set(io.fill_address);
+        store.fill_quad.set(io.fill_quad);
+        fill_mask.address.set(io.fill_address);
+        sum.fill.set(io.fill);
+        sum.fill_index.set(io.fill_index);
+        sum.fill_address.set(io.fill_address);
+        sum.fill_mask.set(fill_mask.mask);
+        sum.fill_quad.set(io.fill_quad);
 
-        comment!("A sweep is set up and starts one cycle later");
-        self.sequencer.begin_frame.next = self.start.val();
-        self.sequencer.enabled.next = self.enabled.val();
-        self.best.begin_frame.next = self.start.val();
-        self.began.d.next = self.start.val();
-        self.due.next = self.began.q.val() | self.compared_later.q.val() | self.stalled_before.q.val();
-        self.stall.next = self.due.val() & self.sequencer.next_last.val() & !self.ready.val();
-        self.stalled_before.d.next = self.stall.val() & !self.rst.val();
-        self.stalled.next = self.stall.val();
-        self.set_up.d.next = ((self.due.val() & !self.stall.val())
-            | (self.sequencer.chains.val() & self.period.last.val()))
-            & !self.rst.val();
-        self.compared_later.d.next = self.best.done.val() & self.best.closes.val();
-        self.period.clear.next = self.set_up.q.val();
-        self.period.enable.next = true;
-        self.sequencer.set_up.next = self.set_up.q.val();
-        self.sequencer.compared.next = self.best.done.val();
-        self.sequencer.improved.next = self.best.improved.val();
-        self.sequencer.compared_sweep.next = self.best.compared.val();
-        self.sequencer.best_x.next = self.best.best_x.val();
-        self.sequencer.best_y.next = self.best.best_y.val();
-        self.best.halve.next = self.set_up.q.val() & self.sequencer.next_halves.val();
-        self.go.d.next = self.set_up.q.val();
+        k.comment("A sweep is set up and starts one cycle later");
+        sequencer.begin_frame.set(io.start);
+        sequencer.enabled.set(io.enabled);
+        best.begin_frame.set(io.start);
+        began.d.set(io.start);
+        let due = k.wire("due", began.q | compared_later.q | stalled_before.q);
+        let stall = k.wire("stall", due & sequencer.next_last & !io.ready);
+        stalled_before.d.set(stall & !io.rst);
+        io.stalled.set(stall);
+        set_up.d.set(((due & !stall)
+            | (sequencer.chains & period.last))
+            & !io.rst);
+        compared_later.d.set(best.done & best.closes);
+        period.clear.set(set_up.q);
+        period.enable.set(k.constant(1, 1));
+        sequencer.set_up.set(set_up.q);
+        sequencer.compared.set(best.done);
+        sequencer.improved.set(best.improved);
+        sequencer.compared_sweep.set(best.compared);
+        sequencer.best_x.set(best.best_x);
+        sequencer.best_y.set(best.best_y);
+        best.halve.set(set_up.q & sequencer.next_halves);
+        go.d.set(set_up.q);
 
-        comment!("Quads pass memory, Taylor shift and candidates");
-        self.quad_end.next = self.counting.q.val() & self.quads.last.val();
-        self.counting.d.next =
-            (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
-        self.quads.clear.next = self.set_up.q.val();
-        self.quads.enable.next = self.counting.q.val();
-        self.step.d.next = self.sequencer.step.val();
-        self.target.d.next = self.sequencer.target.val();
-        self.store.read_buffer.next = self.sequencer.source.val();
-        self.store.begins.next = self.set_up.q.val();
-        self.store.counts.next = self.counting.q.val();
-        self.store.next_base.next = self.sequencer.next_base.val();
-        self.store.read_address.next = self.quads.value.val();
-        self.taylor.word.next = self.store.read_data.val();
-        self.taylor.step.next = self.step.q.val();
-        self.moved.d.next = self.counting.q.val();
-        self.trial.d.next = self.moved.q.val() & !self.sequencer.last.val();
-        self.outcome.d.next = self.moved.q.val() & self.sequencer.last.val();
-        self.moved_address.d.next = self.quads.value.val();
-        self.store.write.next = self.trial.q.val();
-        self.store.write_buffer.next = self.target.q.val();
-        self.store.write_address.next = self.moved_address.q.val();
-        self.store.write_data.next = self.taylor.moved.val();
-        self.candidates.word.next = self.taylor.moved.val();
+        k.comment("Quads pass memory, Taylor shift and candidates");
+        let quad_end = k.wire("quad_end", counting.q & quads.last);
+        counting.d.set((set_up.q | (counting.q & !quads.last)) & !io.rst);
+        quads.clear.set(set_up.q);
+        quads.enable.set(counting.q);
+        step.d.set(sequencer.step);
+        target.d.set(sequencer.target);
+        store.read_buffer.set(sequencer.source);
+        store.begins.set(set_up.q);
+        store.counts.set(counting.q);
+        store.next_base.set(sequencer.next_base);
+        store.read_address.set(quads.value);
+        taylor.word.set(store.read_data);
+        taylor.step.set(step.q);
+        moved.d.set(counting.q);
+        trial.d.set(moved.q & !sequencer.last);
+        outcome.d.set(moved.q & sequencer.last);
+        moved_address.d.set(quads.value);
+        store.write.set(trial.q);
+        store.write_buffer.set(target.q);
+        store.write_address.set(moved_address.q);
+        store.write_data.set(taylor.moved);
+        candidates.word.set(taylor.moved);
 
-        comment!("The sum polynomial passes the same blocks");
-        self.sum.read.next = self.go.q.val();
-        self.sum.read_buffer.next = self.sequencer.source.val();
-        self.sum_taylor.word.next = self.sum.word.val();
-        self.sum_taylor.step.next = self.step.q.val();
-        self.sum_moved.d.next = self.go.q.val();
-        self.sum_outcome.d.next = self.sum_moved.q.val() & self.sequencer.last.val();
-        self.sum.write.next = self.sum_moved.q.val() & !self.sequencer.last.val();
-        self.sum.write_buffer.next = self.target.q.val();
-        self.sum.write_data.next = self.sum_taylor.moved.val();
-        self.sum_candidates.word.next = self.sum_taylor.moved.val();
+        k.comment("The sum polynomial passes the same blocks");
+        sum.read.set(go.q);
+        sum.read_buffer.set(sequencer.source);
+        sum_taylor.word.set(sum.word);
+        sum_taylor.step.set(step.q);
+        sum_moved.d.set(go.q);
+        sum_outcome.d.set(sum_moved.q & sequencer.last);
+        sum.write.set(sum_moved.q & !sequencer.last);
+        sum.write_buffer.set(target.q);
+        sum.write_data.set(sum_taylor.moved);
+        sum_candidates.word.set(sum_taylor.moved);
 
-        comment!("Scores and their comparison");
-        self.scored.d.next = self.trial.q.val();
-        self.scored_address.d.next = self.moved_address.q.val();
-        self.lane_mask.address.next = self.scored_address.q.val();
-        self.first.d.next = self.go.q.val();
-        self.scores.first.next = self.first.q.val();
-        self.scores.valid.next = self.scored.q.val();
-        self.scores.mask.next = self.lane_mask.mask.val();
-        self.scores.values.next = self.candidates.values.val();
-        self.scores.sums.next = self.sum_candidates.values.val();
-        self.totals.d.next = self.quad_end.val() & !self.sequencer.last.val();
-        self.bias_start.d.next = self.go.q.val() & !self.sequencer.last.val();
-        self.bias.start.next = self.bias_start.q.val();
-        self.bias.sweep.next = self.sequencer.sweep.val();
-        self.bias.radius.next = self.sequencer.radius.val();
-        self.bias.sums.next = self.sum_candidates.values.val();
-        self.best.start.next = self.totals.q.val();
-        self.best.totals.next = self.scores.totals.val();
-        self.best.weights.next = self.bias.weights.val();
-        self.best.eligible.next = self.bias.eligible.val();
-        self.best.sweep.next = self.bias.weighted_sweep.val();
+        k.comment("Scores and their comparison");
+        scored.d.set(trial.q);
+        scored_address.d.set(moved_address.q);
+        lane_mask.address.set(scored_address.q);
+        first.d.set(go.q);
+        scores.first.set(first.q);
+        scores.valid.set(scored.q);
+        scores.mask.set(lane_mask.mask);
+        scores.values.set(candidates.values);
+        scores.sums.set(sum_candidates.values);
+        totals.d.set(quad_end & !sequencer.last);
+        bias_start.d.set(go.q & !sequencer.last);
+        bias.start.set(bias_start.q);
+        bias.sweep.set(sequencer.sweep);
+        bias.radius.set(sequencer.radius);
+        bias.sums.set(sum_candidates.values);
+        best.start.set(totals.q);
+        best.totals.set(scores.totals);
+        best.weights.set(bias.weights);
+        best.eligible.set(bias.eligible);
+        best.sweep.set(bias.weighted_sweep);
 
-        comment!("The constant terms of the last sweep are the values");
-        self.constants.word.next = self.taylor.moved.val();
-        self.values.next = self.constants.low.val();
-        self.values_valid.next = self.outcome.q.val();
-        self.settled.next = self.go.q.val() & self.sequencer.last.val();
-        self.values_begin.next = self.sum_outcome.q.val();
-        self.finish.d.next = self.quad_end.val() & self.sequencer.last.val();
-        self.done.next = self.finish.q.val();
-        self.best_x.next = self.best.best_x.val();
-        self.best_y.next = self.best.best_y.val();
-        self.score.next = self.best.score.val();
-        self.found.next = self.best.found.val();
-        self.compared.next = self.best.done.val();
-        self.taken.next = self.best.taken.val();
+        k.comment("The constant terms of the last sweep are the values");
+        constants.word.set(taylor.moved);
+        io.values.set(constants.low);
+        io.values_valid.set(outcome.q);
+        io.settled.set(go.q & sequencer.last);
+        io.values_begin.set(sum_outcome.q);
+        finish.d.set(quad_end & sequencer.last);
+        io.done.set(finish.q);
+        io.best_x.set(best.best_x);
+        io.best_y.set(best.best_y);
+        io.score.set(best.score);
+        io.found.set(best.found);
+        io.compared.set(best.done);
+        io.taken.set(best.taken);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::simulate::settles;
 use crate::wire::Word;
 
 /// A port: name, width in bits.
-pub(super) type Pin = (String, usize);
+pub(crate) type Pin = (String, usize);
 
 /// Takes ports by their name.
 pub(crate) type Visit<'a> = dyn FnMut(&'static str, &mut dyn Port) + 'a;
@@ -23,7 +23,7 @@ type Cycle<'a> = dyn FnMut(&[Word]) -> Vec<Word> + 'a;
 /// Ports, a simulation inside Rust and the Verilog of the same design.
 pub(crate) struct Subject<'a> {
     pub(super) clock: Option<String>,
-    pub(super) inputs: Vec<Pin>,
+    pub(crate) inputs: Vec<Pin>,
     pub(super) outputs: Vec<Pin>,
     /// With the top module `dut`.
     pub(super) verilog: String,

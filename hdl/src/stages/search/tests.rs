@@ -7,7 +7,7 @@ use dermis_golden::fixed::stages::search::{search, Best, Block, Polynomial, Sear
 use dermis_golden::fixed::words::formats::HALVINGS;
 
 use super::*;
-use crate::language::testbench::{block_subject, check_with_defects, Reference};
+use crate::language::testbench::{subject_of, check_with_defects, Reference};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
@@ -207,7 +207,7 @@ fn sweeps_and_values_are_those_of_the_model() {
     assert_eq!([&several, &narrow].map(|model| model.formats().search_width), [4, 1]);
     for model in [several, narrow] {
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Search::new(&model),
                 changes,
                 inputs [rst, which, fill_which, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
