@@ -76,7 +76,7 @@ pub struct Pass {
     select: OperandSelect,
     scale: OperandScale,
     /// The MAC lanes.
-    pub lanes: Lanes,
+    pub lanes: RustHdl<Lanes>,
     low_address: RustHdl<Slice>,
     coefficient_address: RustHdl<Delay>,
     issue: Signal<Local, Bit>,
@@ -89,7 +89,7 @@ impl Pass {
         let formats = model.formats();
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
-        let lanes = Lanes::new(model);
+        let lanes = RustHdl::new(Lanes::new(model));
         let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
