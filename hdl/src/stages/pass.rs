@@ -76,7 +76,7 @@ pub struct Pass {
     select: RustHdl<OperandSelect>,
     scale: RustHdl<OperandScale>,
     /// The MAC lanes.
-    pub lanes: Lanes,
+    pub lanes: RustHdl<Lanes>,
     low_address: RustHdl<Slice>,
     coefficient_address: RustHdl<Delay>,
     issue: Signal<Local, Bit>,
