@@ -133,7 +133,7 @@ engine! {
         }
         control {
             operand_source: RustHdl<OperandSource>,
-            status_source: StatusSource,
+            status_source: RustHdl<StatusSource>,
             begins: RustHdl<BitDelay>,
             arrival: Arrival,
             computing: RustHdl<Dff>,
@@ -159,7 +159,7 @@ engine! {
             received_frames: RustHdl<EnableRegister>,
             frame_frames: RustHdl<EnableRegister>,
             searched_frames: RustHdl<EnableRegister>,
-            frame_cycles: FrameCycles,
+            frame_cycles: RustHdl<FrameCycles>,
             part: RustHdl<CaseCounter>,
             again: RustHdl<BitDelay>,
             handed: RustHdl<BitDelay>,
@@ -212,7 +212,7 @@ impl Engine {
             label_beats: LabelBeats::new(model, forces.m_axis_tdata.width()),
             shear: Shear::new(model),
             operand_source: RustHdl::new(OperandSource::new(model)),
-            status_source: StatusSource::new(model),
+            status_source: RustHdl::new(StatusSource::new(model)),
             relax: Relax::new(formats),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
