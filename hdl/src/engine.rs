@@ -80,7 +80,7 @@ engine! {
         }
         control {
             operand_source: RustHdl<OperandSource>,
-            status_source: StatusSource,
+            status_source: RustHdl<StatusSource>,
             begins: RustHdl<BitDelay>,
             arrival: RustHdl<Arrival>,
             computing: RustHdl<Dff>,
@@ -106,7 +106,7 @@ engine! {
             received_frames: RustHdl<EnableRegister>,
             frame_frames: RustHdl<EnableRegister>,
             searched_frames: RustHdl<EnableRegister>,
-            frame_cycles: FrameCycles,
+            frame_cycles: RustHdl<FrameCycles>,
             part: RustHdl<CaseCounter>,
             again: RustHdl<BitDelay>,
             handed: RustHdl<BitDelay>,

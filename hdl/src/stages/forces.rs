@@ -100,7 +100,7 @@ impl Forces {
         let formats = model.formats();
         let words = formats.sweep_steps(frame_quads(model.cases()));
         let (address, value) = (count_bits(words), formats.search_width * formats.search_bits[0] as usize);
-        let unit = ForceUnit::new(model);
+        let unit = RustHdl::new(ForceUnit::new(model));
         Forces {
             clk: Default::default(),
             rst: Default::default(),

@@ -46,8 +46,8 @@ pub struct Send {
     scan: RustHdl<Scan>,
     words: RustHdl<Counter>,
     parts: RustHdl<CaseCounter>,
-    code: StatusCode,
-    released: PartsBegun,
+    code: RustHdl<StatusCode>,
+    released: RustHdl<PartsBegun>,
     sending: RustHdl<Dff>,
     status: RustHdl<Dff>,
     out: RustHdl<BitDelay>,
@@ -62,7 +62,7 @@ impl Send {
         let subarrays: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let statuses: Vec<usize> =
             model.cases().iter().map(|case| model.status_beats_of(case) / STATUS_BEATS).collect();
-        let code = StatusCode::new(largest(&statuses), largest(&subarrays), model.formats().by_contact());
+        let code = RustHdl::new(StatusCode::new(largest(&statuses), largest(&subarrays), model.formats().by_contact()));
         let scan = Scan::new(model.cases(), model.formats().search_width);
         Send {
             clk: Default::default(),
@@ -83,7 +83,7 @@ impl Send {
             words: RustHdl::new(Counter::new(STATUS_BEATS)),
             parts: RustHdl::new(CaseCounter::new(&statuses)),
             code,
-            released: PartsBegun::new(largest(&subarrays)),
+            released: RustHdl::new(PartsBegun::new(largest(&subarrays))),
             sending: Default::default(),
             status: Default::default(),
             out: RustHdl::new(BitDelay::new(1)),

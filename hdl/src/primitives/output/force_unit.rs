@@ -7,10 +7,9 @@ use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT};
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::address::quad_address::lane_of;
@@ -23,97 +22,119 @@ use crate::primitives::output::status_bits::status_bits;
 use crate::primitives::pass::raw_length::shift_bits;
 use crate::primitives::search::sweep::position_bits;
 use crate::primitives::stream::queue::LATENCY as LEAVING;
-use crate::wire::Wire;
 
-/// A pipeline without stalls: memory (3 cycles), lane selection, with contacts the μ of the label, products (2), shift, rounding
-/// and saturation, threshold, output.
-///
-/// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, ten cycles after
-/// `offer`, with contacts eleven. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
-/// `begin_frame` clears the counts of the frame.
-///
-/// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for each from 1 on,
-/// and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact. Where a record of each contact is sent,
-/// the label is above the force.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ForceUnit {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears the control pipeline only.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent; constant from its first `offer` to its last beat.
-    pub which: Wire<In>,
-    /// A new frame: clears its counts, the contact flag and the saturations.
-    pub begin_frame: Signal<In, Bit>,
-    /// Stores position, exponents and status of subarray `part` in this cycle.
-    pub start: Signal<In, Bit>,
-    /// Index of the subarray; valid with `start`.
-    pub part: Wire<In>,
-    /// A beat is requested in this cycle.
-    pub offer: Signal<In, Bit>,
-    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
-    pub beat: Wire<In>,
-    /// Index of the beat's subarray; valid with `offer`.
-    pub beat_part: Wire<In>,
-    /// Lane of the taxel in its word; valid with `offer`.
-    pub lane: Wire<In>,
-    /// `search_width` values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
-    pub quad: Wire<In>,
-    /// μ1 in grid steps of the last level, signed; valid with `start`.
-    pub position_x: Wire<In>,
-    /// μ2 in grid steps of the last level, signed; valid with `start`.
-    pub position_y: Wire<In>,
-    /// Left shift of `normalise`; valid with `start`.
-    pub normalise: Wire<In>,
-    /// Right shift of `rescale`; valid with `start`.
-    pub rescale: Wire<In>,
-    /// The subarray meets the scene's condition; valid with `start`.
-    pub condition: Signal<In, Bit>,
-    /// The search found a candidate; valid with `start`.
-    pub found: Signal<In, Bit>,
-    /// `tlast` was early or missing; sampled when the beat with the flags leaves.
-    pub framing: Signal<In, Bit>,
-    /// The coefficient signature is wrong, 1 bit; valid with `start`.
-    pub damaged: Wire<In>,
-    /// Number of frames in a sliding mean, above it whether a running zero is at its limit, without both one bit, 0; valid with
-    /// `start`.
-    pub frames: Wire<In>,
-    /// Score of the best candidate, signed, 2^−6; valid with `start`.
-    pub score: Wire<In>,
-    /// Words saturated by `rescale`; valid with `start`.
-    pub saturations: Wire<In>,
-    /// Cycle counter of the frame; sampled when the first beat leaves.
-    pub cycles: Wire<In>,
-    /// Labels of the taxels of `quad`, with it; one bit each without contacts.
-    pub labels: Wire<In>,
-    /// There are more contacts than get a μ; sampled when the beat with the flags leaves.
-    pub overflow: Signal<In, Bit>,
-    /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
-    pub threshold: Wire<In>,
-    /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
-    pub version: Wire<In>,
-    /// The tables are not whole, where they are written.
-    pub incomplete: Signal<In, Bit>,
-    /// `beat_data` holds a beat in this cycle.
-    pub valid: Signal<Out, Bit>,
-    /// The beat is the frame's last; valid with `valid`.
-    pub last: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or three status words;
-    /// valid with `valid`.
-    pub beat_data: Wire<Out>,
-    kernel: Body,
+block! {
+    /// A pipeline without stalls: memory (3 cycles), lane selection, with contacts the μ of the label, products (2),
+    /// shift, rounding and saturation, threshold, output.
+    ///
+    /// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, ten
+    /// cycles after `offer`, with contacts eleven. `start` stores μ, shift and status of subarray `part`, which are
+    /// usable three cycles later; `begin_frame` clears the counts of the frame.
+    ///
+    /// Where each contact has a μ of its own, the label of a contact stands in the place of a subarray: a status for
+    /// each from 1 on, and the μ of a taxel is that of its label; label 0 is that of the taxels of no contact. Where a
+    /// record of each contact is sent, the label is above the force.
+    pub struct ForceUnit {
+        /// Values p(μ*) in a word.
+        lanes: usize,
+        /// Width of p(μ*) in bits.
+        value_bits: usize,
+        normalise_bits: usize,
+        rescale_bits: usize,
+        score_bits: usize,
+        /// Without a search, fx and fy are zero.
+        searches: bool,
+        /// Fraction bits of a μ word.
+        fraction: usize,
+        /// μ per step of the search.
+        mu_step: i64,
+        /// Right shift for exponents of zero.
+        base_shift: u64,
+        /// Forces with a smaller |fz| are zero; `None` where the threshold is written.
+        threshold: Option<u64>,
+        /// A larger score is that of no clean frame.
+        score_limit: Option<i64>,
+        /// The scene has the coefficient check.
+        checks: bool,
+        /// What goes with a frame.
+        marks: FrameMarks,
+        /// Subarrays, or labels, of each case.
+        counts: Vec<usize>,
+        /// Number of each case.
+        numbers: Vec<usize>,
+        /// Each contact has a μ of its own.
+        contacts: bool,
+        /// Width of a label in bits; 1 without contacts.
+        label_bits: usize,
+        /// A force is sent with its label.
+        tells_labels: bool,
+    }
+    ports ForceUnitPorts {
+        clock;
+        /// Synchronous reset, active high; clears the control pipeline only.
+        in rst;
+        /// Index of the case of the frame being sent; constant from its first `offer` to its last beat.
+        in which: count_bits(counts.len());
+        /// A new frame: clears its counts, the contact flag and the saturations.
+        in begin_frame;
+        /// Stores position, exponents and status of subarray `part` in this cycle.
+        in start;
+        /// Index of the subarray; valid with `start`.
+        in part: count_bits(largest(counts));
+        /// A beat is requested in this cycle.
+        in offer;
+        /// 0: a force, 1 … 3: a status beat; valid with `offer`.
+        in beat: 2;
+        /// Index of the beat's subarray; valid with `offer`.
+        in beat_part: count_bits(largest(counts));
+        /// Lane of the taxel in its word; valid with `offer`.
+        in lane: 2;
+        /// `search_width` values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
+        in quad: lanes * value_bits;
+        /// μ1 in grid steps of the last level, signed; valid with `start`.
+        in position_x: position_bits();
+        /// μ2 in grid steps of the last level, signed; valid with `start`.
+        in position_y: position_bits();
+        /// Left shift of `normalise`; valid with `start`.
+        in normalise: normalise_bits;
+        /// Right shift of `rescale`; valid with `start`.
+        in rescale: rescale_bits;
+        /// The subarray meets the scene's condition; valid with `start`.
+        in condition;
+        /// The search found a candidate; valid with `start`.
+        in found;
+        /// `tlast` was early or missing; sampled when the beat with the flags leaves.
+        in framing;
+        /// The coefficient signature is wrong, 1 bit; valid with `start`.
+        in damaged: 1;
+        /// Number of frames in a sliding mean, above it whether a running zero is at its limit, without both one bit,
+        /// 0; valid with `start`.
+        in frames: marks.bits();
+        /// Score of the best candidate, signed, 2^−6; valid with `start`.
+        in score: score_bits;
+        /// Words saturated by `rescale`; valid with `start`.
+        in saturations: SATURATION_BITS;
+        /// Cycle counter of the frame; sampled when the first beat leaves.
+        in cycles: CYCLE_BITS;
+        /// Labels of the taxels of `quad`, with it; one bit each without contacts.
+        in labels: Quads::LANES * label_bits;
+        /// There are more contacts than get a μ; sampled when the beat with the flags leaves.
+        in overflow;
+        /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
+        in threshold: THRESHOLD_BITS;
+        /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
+        in version: VERSION_WORD_BITS;
+        /// The tables are not whole, where they are written.
+        in incomplete;
+        /// `beat_data` holds a beat in this cycle.
+        out valid;
+        /// The beat is the frame's last; valid with `valid`.
+        out last;
+        /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or three
+        /// status words; valid with `valid`.
+        out beat_data: 3 * WORD + if *tells_labels { *label_bits } else { 0 };
+    }
 }
-
-kernel_block!(
-    ForceUnit,
-    clock clk,
-    inputs [
-        rst, which, begin_frame, start, part, offer, beat, beat_part, lane, quad, position_x, position_y, normalise,
-        rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels, overflow, threshold,
-        version, incomplete,
-    ],
-    outputs [valid, last, beat_data]
-);
 
 /// Cycles from `offer` to `valid`.
 pub const STEPS: usize = 12;
@@ -125,8 +146,8 @@ const SELECT_STEPS: usize = 1;
 const PRODUCT_STEPS: usize = 2;
 /// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
-/// Cycles of a frame outside its counter: before it counts, one cycle and its delay after the frame starts, and from its
-/// sampling to the first beat behind the queue.
+/// Cycles of a frame outside its counter: before it counts, one cycle and its delay after the frame starts, and from
+/// its sampling to the first beat behind the queue.
 const UNCOUNTED: u32 = ACCEPT as u32 + 2 + COUNT_DELAY as u32 - 1 + LEAVING as u32;
 
 /// Width of a word of a beat, in bits.
@@ -136,43 +157,8 @@ const MU_BITS: usize = MULTIPLIER_BITS as usize;
 /// Width of a right shift, in bits.
 const SHIFT_BITS: usize = 6;
 
-/// Widths and constants of the unit.
-#[derive(Clone, Debug)]
-struct Shape {
-    /// Values p(μ*) in a word.
-    lanes: usize,
-    /// Bits of p(μ*), of the exponents, of the score.
-    value_bits: usize,
-    normalise_bits: usize,
-    rescale_bits: usize,
-    score_bits: usize,
-    /// Without a search, fx and fy are zero.
-    searches: bool,
-    /// Fraction bits of a μ word.
-    fraction: usize,
-    /// μ per step of the search.
-    mu_step: i64,
-    /// Right shift for exponents of zero.
-    base_shift: u64,
-    /// Forces with a smaller |fz| are zero; `None` where the threshold is written.
-    threshold: Option<u64>,
-    /// A larger score is that of no clean frame.
-    score_limit: Option<i64>,
-    /// The scene has the coefficient check.
-    checks: bool,
-    /// What goes with a frame.
-    marks: FrameMarks,
-    /// Subarrays, or labels, and number of each case.
-    counts: Vec<usize>,
-    numbers: Vec<usize>,
-    /// Each contact has a μ of its own.
-    contacts: bool,
-    /// A force is sent with its label.
-    tells_labels: bool,
-}
-
-/// Number of subarrays of a case, or where each contact has a μ of its own, of labels: each has a μ, from which all statuses
-/// but that of label 0 are told.
+/// Number of subarrays of a case, or where each contact has a μ of its own, of labels: each has a μ, from which all
+/// statuses but that of label 0 are told.
 fn parts(model: &Model, case: &CasePlan) -> usize {
     match model.contacts() {
         0 => case.parts.len(),
@@ -186,7 +172,8 @@ impl ForceUnit {
         let f = model.formats();
         // The status names the case only where it is chosen per frame.
         let number = |case: &CasePlan| if model.chooses() { case.number() as usize } else { 0 };
-        let shape = Shape {
+        let counts: Vec<usize> = model.cases().iter().map(|case| parts(model, case)).collect();
+        ForceUnit {
             lanes: f.search_width,
             value_bits: f.search_bits[0] as usize,
             normalise_bits: count_bits(f.input_bits as usize),
@@ -200,47 +187,19 @@ impl ForceUnit {
             score_limit: model.score_limit.map(i64::from),
             checks: model.has_coefficient_check(),
             marks: FrameMarks::new(model),
-            counts: model.cases().iter().map(|case| parts(model, case)).collect(),
             contacts: f.by_contact(),
+            label_bits: if f.by_contact() { count_bits(largest(&counts)) } else { 1 },
+            counts,
             tells_labels: model.summed() == Some(Summed::Label),
             numbers: model.cases().iter().map(number).collect(),
-        };
-        let part_bits = count_bits(shape.parts());
-        let block = ForceUnit {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(shape.counts.len())),
-            begin_frame: Default::default(),
-            start: Default::default(),
-            part: Wire::new(part_bits),
-            beat_part: Wire::new(part_bits),
-            offer: Default::default(),
-            beat: Wire::new(2),
-            lane: Wire::new(2),
-            quad: Wire::new(shape.lanes * shape.value_bits),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            normalise: Wire::new(shape.normalise_bits),
-            rescale: Wire::new(shape.rescale_bits),
-            condition: Default::default(),
-            found: Default::default(),
-            framing: Default::default(),
-            damaged: Wire::new(1),
-            frames: Wire::new(shape.marks.bits()),
-            score: Wire::new(shape.score_bits),
-            saturations: Wire::new(SATURATION_BITS),
-            cycles: Wire::new(CYCLE_BITS),
-            labels: Wire::new(Quads::LANES * shape.label_bits()),
-            overflow: Default::default(),
-            threshold: Wire::new(THRESHOLD_BITS),
-            version: Wire::new(VERSION_WORD_BITS),
-            incomplete: Default::default(),
-            valid: Default::default(),
-            last: Default::default(),
-            beat_data: Wire::new(shape.beat_bits()),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
+        }
+    }
+
+    /// The μ word of a position, two cycles later.
+    fn mu_word<'k>(&self, k: &'k Builder, position: Expr<'k>) -> Expr<'k> {
+        let position = k.delay("position", position);
+        let scaled = k.delay("scaled", position * k.signed_constant(MU_BITS, self.mu_step));
+        scaled.round_shift(MU_ROUND as usize).resize(MU_BITS).unsigned()
     }
 }
 
@@ -280,64 +239,31 @@ impl<'k> Kept<'k> {
     }
 }
 
-impl Shape {
-    /// Most subarrays of a case.
-    fn parts(&self) -> usize {
-        largest(&self.counts)
-    }
-
-    /// Width of a label.
-    fn label_bits(&self) -> usize {
-        if self.contacts {
-            count_bits(self.parts())
-        } else {
-            1
-        }
-    }
-
-    /// Width of a beat.
-    fn beat_bits(&self) -> usize {
-        3 * WORD + if self.tells_labels { self.label_bits() } else { 0 }
-    }
-
-    fn kernel(&self) -> Kernel {
-        let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
+impl Block for ForceUnit {
+    fn build<'k>(&self, k: &'k Builder, io: ForceUnitPorts<Inside<'k>>) {
+        let (v, part_bits, bit) = (self.value_bits, io.part.bits(), Type::unsigned(1));
+        let (start, part) = (io.start, io.part);
+        let (found, score) = (io.found, io.score.signed());
+        let (position_x, position_y) = (io.position_x.signed(), io.position_y.signed());
         let asked = STEPS - 1;
-        let k = Builder::new("force_unit");
-        let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.counts.len())));
-        let (begin_frame, start) = (k.input("begin_frame", 1), k.input("start", 1));
-        let (part, offer, beat) = (k.input("part", part_bits), k.input("offer", 1), k.input("beat", 2));
-        let (beat_part, lane) = (k.input("beat_part", part_bits), k.input("lane", 2));
-        let quad = k.input("quad", self.lanes * v);
-        let [position_x, position_y] = ["position_x", "position_y"].map(|name| k.input(name, position_bits()).signed());
-        let normalise = k.input("normalise", self.normalise_bits);
-        let rescale = k.input("rescale", self.rescale_bits);
-        let (condition, found) = (k.input("condition", 1), k.input("found", 1));
-        let (framing, damaged) = (k.input("framing", 1), k.input("damaged", 1));
-        let frames = k.input("frames", self.marks.bits());
-        let score = k.input("score", self.score_bits).signed();
-        let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
-        let (labels, overflow) = (k.input("labels", Quads::LANES * self.label_bits()), k.input("overflow", 1));
-        let (threshold, version) = (k.input("threshold", THRESHOLD_BITS), k.input("version", VERSION_WORD_BITS));
-        let incomplete = k.input("incomplete", 1);
 
         k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
-        let offers = k.state("offers", Type::unsigned(asked), rst, 0);
-        offers.set(offers.low(asked - 1).concat(offer));
+        let offers = k.state("offers", Type::unsigned(asked), io.rst, 0);
+        offers.set(offers.low(asked - 1).concat(io.offer));
         let leaves = k.wire("leaves", offers.top());
-        let beats = travel(&k, "beats", beat, asked);
-        let lanes = travel(&k, "lanes", lane, READ_STEPS);
-        let parts = travel(&k, "parts", beat_part, asked);
+        let beats = travel(k, "beats", io.beat, asked);
+        let lanes = travel(k, "lanes", io.lane, READ_STEPS);
+        let parts = travel(k, "parts", io.beat_part, asked);
         let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
         let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
         let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
         let at_out = k.wire("at_out", part_after(asked));
-        let kept = Kept { k: &k, start, part, parts: self.parts(), at_out };
+        let kept = Kept { k, start, part, parts: largest(&self.counts), at_out };
 
         k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
         let (start_2, part_2) =
             (k.delay("start_2", k.delay("start_1", start)), k.delay("part_2", k.delay("part_1", part)));
-        let exponents = [("normalise_held", normalise), ("rescale_held", rescale)];
+        let exponents = [("normalise_held", io.normalise), ("rescale_held", io.rescale)];
         let [normalise_held, rescale_held] = exponents.map(|(name, value)| k.delay(name, value));
         let raw_shift = k.wire("raw_shift", (k.constant(8, self.base_shift) + normalise_held - rescale_held).low(8));
         let most = k.constant(SHIFT_BITS, FORCE_SHIFT_MAX.into());
@@ -347,14 +273,14 @@ impl Shape {
         shifts.write(start_2, part_2, shift);
         let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS)));
 
-        let label = lane_of(labels, Quads::LANES, lane_value);
+        let label = lane_of(io.labels, Quads::LANES, lane_value);
         // Two registers: block RAM and multiplier are far apart, and so are the selection of a label and its μ.
-        let value = k.delay("selected", lane_of(quad, self.lanes, lane_value).signed());
+        let value = k.delay("selected", lane_of(io.quad, self.lanes, lane_value).signed());
         let value = k.delay("value", value);
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let shift = Shift { by: shift, rest: k.delay("shift_rest", shift.low(FINE)) };
-        let z = shift.moved(&k, "moved_z", doubled);
+        let z = shift.moved(k, "moved_z", doubled);
         let (x, y) = match self.searches {
             false => (None, None),
             true => {
@@ -363,24 +289,24 @@ impl Shape {
                 let shear = |name: &str, position| {
                     k.scope(name, || {
                         let words = kept.memory("mu", MU_BITS);
-                        words.write(start_2, part_2, self.mu_word(&k, position));
+                        words.write(start_2, part_2, self.mu_word(k, position));
                         let mu = k.delay("mu_value", words.read(at_value).signed());
-                        shift.moved(&k, "moved", product(&k, value, mu).shift_left(1))
+                        shift.moved(k, "moved", product(k, value, mu).shift_left(1))
                     })
                 };
                 (Some(shear("x", position_x)), Some(shear("y", position_y)))
             }
         };
         let round = |name: &str, moved: Option<_>| {
-            let rounded = |moved| k.scope(name, || Component::new(&k, moved));
+            let rounded = |moved| k.scope(name, || Component::new(k, moved));
             moved.map(rounded)
         };
-        let z = k.scope("z", || Component::new(&k, z));
+        let z = k.scope("z", || Component::new(k, z));
         let [x, y] = [round("x", x), round("y", y)];
         let all = [Some(z), y, x];
         let force = concat(&all.map(|one| one.map_or(k.constant(WORD, 0), |one| one.force)));
         let limit = match self.threshold {
-            None => Some(threshold.extend(WORD + 1)),
+            None => Some(io.threshold.extend(WORD + 1)),
             Some(0) => None,
             Some(own) => Some(k.constant(WORD + 1, own)),
         };
@@ -399,7 +325,7 @@ impl Shape {
         let start_count = force_saturations.extend(SATURATION_BITS + 1);
         let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
         let count = k.wire("count", count);
-        let case = |below: u32| value_by_case(&k, which, &self.numbers, (below - CASE.low) as usize);
+        let case = |below: u32| value_by_case(k, io.which, &self.numbers, (below - CASE.low) as usize);
         let low = self.score_limit.map(|limit| {
             let low = found & k.signed_constant(self.score_bits, limit).less(score);
             kept.status("scores_low", low)
@@ -416,7 +342,7 @@ impl Shape {
         let case = match self.marks == FrameMarks::default() {
             true => between(FORCE_BITS),
             false => {
-                let marks = kept.status("frames_held", frames);
+                let marks = kept.status("frames_held", io.frames);
                 let low = match limited {
                     false => between(FRAMES.low),
                     true => {
@@ -430,29 +356,29 @@ impl Shape {
             }
         };
         let mut bits = Vec::new();
-        bits.extend(self.threshold.is_none().then_some((TABLES, incomplete)));
-        bits.extend(self.contacts.then_some((MORE_CONTACTS, overflow)));
-        bits.extend(self.checks.then(|| (COEFFICIENTS, kept.status("damages", damaged))));
+        bits.extend(self.threshold.is_none().then_some((TABLES, io.incomplete)));
+        bits.extend(self.contacts.then_some((MORE_CONTACTS, io.overflow)));
+        bits.extend(self.checks.then(|| (COEFFICIENTS, kept.status("damages", io.damaged))));
         bits.extend([
-            (FRAMING, framing),
+            (FRAMING, io.framing),
             (NO_CONTACT, !*contact),
             (FOUND, kept.status("founds", found)),
-            (CONDITION, kept.status("conditions", condition)),
+            (CONDITION, kept.status("conditions", io.condition)),
         ]);
-        let flags = [vec![case], status_bits(&k, &bits, CASE.low)].concat();
+        let flags = [vec![case], status_bits(k, &bits, CASE.low)].concat();
         let position = |name: &str, position| match self.searches {
             true => word(kept.status(name, position).signed()),
             false => k.constant(WORD, 0),
         };
         let score = found.mux(score.extend(WORD), k.signed_constant(WORD, 0));
         let [x, y] = [position("positions_x", position_x), position("positions_y", position_y)];
-        let [normalise, rescale] = [kept.status("normalises", normalise), kept.status("rescales", rescale)];
-        let rescale_saturations = kept.status("rescale_saturations", saturations);
+        let [normalise, rescale] = [kept.status("normalises", io.normalise), kept.status("rescales", io.rescale)];
+        let rescale_saturations = kept.status("rescale_saturations", io.saturations);
         let first = concat(&[concat(&flags), y, x]);
         let normalise = match self.threshold {
             None => {
                 let low = TABLES_VERSION.low as usize;
-                version.extend(WORD - low).concat(normalise.extend(low))
+                io.version.extend(WORD - low).concat(normalise.extend(low))
             }
             Some(_) => word(normalise),
         };
@@ -465,41 +391,33 @@ impl Shape {
             false => words,
             true => {
                 let steps = asked - READ_STEPS;
-                travel(&k, "labels_sent", label, steps)
-                    .slice(self.label_bits() * (steps - 1), self.label_bits())
+                travel(k, "labels_sent", label, steps)
+                    .slice(self.label_bits * (steps - 1), self.label_bits)
                     .concat(words)
             }
         };
-        k.delay("beat_data", words);
-        let valid = k.state("valid", bit, rst, 0);
+        io.beat_data.delay(words);
+        let valid = io.valid.state(io.rst, 0);
         valid.set(leaves);
         let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();
-        let last = k.state("last", bit, rst, 0);
-        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(&k, which, &ends, part_bits)));
+        let last = io.last.state(io.rst, 0);
+        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(k, io.which, &ends, part_bits)));
 
         let (zero, one) = (k.constant(1, 0), k.constant(1, 1));
         k.when(leaves, || {
             counting.set(zero);
-            k.when(*counting & !begin_frame, || cycles_held.set(cycles.plus(UNCOUNTED.into())));
+            k.when(*counting & !io.begin_frame, || cycles_held.set(io.cycles.plus(UNCOUNTED.into())));
             k.when(beat_out.is(0), || {
                 let most = one.repeat(SATURATION_BITS);
                 force_saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
                 k.when(below.map_or(presses, |below| presses & !below), || contact.set(one));
             });
         });
-        k.when(begin_frame, || {
+        k.when(io.begin_frame, || {
             counting.set(one);
             contact.set(zero);
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
-        k.finish()
-    }
-
-    /// The μ word of a position, two cycles later.
-    fn mu_word<'k>(&self, k: &'k Builder, position: Expr<'k>) -> Expr<'k> {
-        let position = k.delay("position", position);
-        let scaled = k.delay("scaled", position * k.signed_constant(MU_BITS, self.mu_step));
-        scaled.round_shift(MU_ROUND as usize).resize(MU_BITS).unsigned()
     }
 }
 

@@ -1,82 +1,64 @@
 //! Cycle counts of the frame whose passes run and of the frame that is searched and sent.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
-
-/// Counts from `begin_frame`; at `hand_over`, when the frame's first subarray leaves the passes, the count moves to `cycles`
-/// and goes on there, so that the next frame can begin. Cycles in which a frame waits for the one before it are not counted.
-///
-/// All inputs take effect `COUNT_DELAY` cycles later: the first beat of the frame before has been sent by then.
-#[derive(dermis_hdl_derive::Block)]
-pub struct FrameCycles {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears what is on its way.
-    pub rst: Signal<In, Bit>,
-    /// A frame begins.
-    pub begin_frame: Signal<In, Bit>,
-    /// The frame in the passes waits for the one before.
-    pub waits: Signal<In, Bit>,
-    /// The first subarray of the frame goes to the search.
-    pub hand_over: Signal<In, Bit>,
-    /// The frame that is searched waits for the one before.
-    pub stalled: Signal<In, Bit>,
-    /// Cycles of the frame that is searched and sent, without the constant number that the force unit adds, unsigned;
-    /// from `COUNT_DELAY` cycles after `hand_over` until that of the next frame.
-    pub cycles: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Counts from `begin_frame`; at `hand_over`, when the frame's first subarray leaves the passes, the count moves to
+    /// `cycles` and goes on there, so that the next frame can begin. Cycles in which a frame waits for the one before
+    /// it are not counted.
+    ///
+    /// All inputs take effect `COUNT_DELAY` cycles later: the first beat of the frame before has been sent by then. The
+    /// counts are modulo 2^[`CYCLE_BITS`].
+    #[derive(Default)]
+    pub struct FrameCycles {}
+    ports FrameCyclesPorts {
+        clock;
+        /// Synchronous reset, active high; clears what is on its way.
+        in rst;
+        /// A frame begins.
+        in begin_frame;
+        /// The frame in the passes waits for the one before.
+        in waits;
+        /// The first subarray of the frame goes to the search.
+        in hand_over;
+        /// The frame that is searched waits for the one before.
+        in stalled;
+        /// Cycles of the frame that is searched and sent, without the constant number that the force unit adds,
+        /// unsigned; from `COUNT_DELAY` cycles after `hand_over` until that of the next frame.
+        out cycles: CYCLE_BITS;
+    }
 }
-
-kernel_block!(FrameCycles, clock clk, inputs [rst, begin_frame, waits, hand_over, stalled], outputs [cycles]);
 
 /// Width of the cycle counts, in bits.
 pub const CYCLE_BITS: usize = 24;
 /// Cycles from an event to its effect on the counts.
 pub const COUNT_DELAY: usize = 12;
 
-impl Default for FrameCycles {
-    /// Counts modulo 2^[`CYCLE_BITS`].
-    fn default() -> Self {
-        let block = FrameCycles {
-            clk: Default::default(),
-            rst: Default::default(),
-            begin_frame: Default::default(),
-            waits: Default::default(),
-            hand_over: Default::default(),
-            stalled: Default::default(),
-            cycles: Wire::new(CYCLE_BITS),
-            kernel: Body::default(),
+impl Block for FrameCycles {
+    fn build<'k>(&self, k: &'k Builder, io: FrameCyclesPorts<Inside<'k>>) {
+        let later = |name: &str, event| {
+            (1..COUNT_DELAY).fold(event, |value, number| {
+                let register = k.state(&format!("{name}_{number}"), Type::unsigned(1), io.rst, 0);
+                register.set(value);
+                *register
+            })
         };
-        block.bind(kernel())
+        let (begin_frame, waits) = (later("begin_frame", io.begin_frame), later("waits", io.waits));
+        let (hand_over, stalled) = (later("hand_over", io.hand_over), later("stalled", io.stalled));
+        let passing = k.state("passing", Type::unsigned(CYCLE_BITS), begin_frame, 0);
+        let next = k.wire("next", waits.mux(*passing, passing.plus(1)));
+        passing.set(next);
+        let cycles = io.cycles.register();
+        k.when(!stalled, || cycles.set(cycles.plus(1)));
+        k.when(hand_over, || cycles.set(next));
     }
-}
-
-fn kernel() -> Kernel {
-    let k = Builder::new("frame_cycles");
-    let rst = k.input("rst", 1);
-    let later = |name: &str| {
-        (1..COUNT_DELAY).fold(k.input(name, 1), |value, number| {
-            let register = k.state(&format!("{name}_{number}"), Type::unsigned(1), rst, 0);
-            register.set(value);
-            *register
-        })
-    };
-    let [begin_frame, waits, hand_over, stalled] = ["begin_frame", "waits", "hand_over", "stalled"].map(later);
-    let passing = k.state("passing", Type::unsigned(CYCLE_BITS), begin_frame, 0);
-    let next = k.wire("next", waits.mux(*passing, passing.plus(1)));
-    passing.set(next);
-    let cycles = k.register("cycles", Type::unsigned(CYCLE_BITS));
-    k.when(!stalled, || cycles.set(cycles.plus(1)));
-    k.when(hand_over, || cycles.set(next));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -113,6 +95,6 @@ mod tests {
         let mut stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
         stimulus[1500][0] = true.into();
         let pipe = vec![[false; 4]; COUNT_DELAY - 1];
-        check(FrameCycles::default().kernel.kernel(), &stimulus, &mut Counts { pipe, passing: None, cycles: None });
+        check(&kernel_of(&FrameCycles {}), &stimulus, &mut Counts { pipe, passing: None, cycles: None });
     }
 }

@@ -1,64 +1,54 @@
 //! Whether the values of a taxel's subarray have begun to arrive.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// Counts the subarrays of a frame whose values have begun; `open` where `part` is one of them, combinational from `part`.
-/// The values are written in an order and at a rate in which each is there when `send` requests it row-major, from then on.
-#[derive(dermis_hdl_derive::Block)]
-pub struct PartsBegun {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// The values of a subarray begin.
-    pub begins: Signal<In, Bit>,
-    /// It is the frame's first; valid with `begins`.
-    pub first: Signal<In, Bit>,
-    /// Index of a subarray; taken in the same cycle.
-    pub part: Wire<In>,
-    /// Its values have begun in an earlier cycle.
-    pub open: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Counts the subarrays of a frame whose values have begun; `open` where `part` is one of them, combinational from
+    /// `part`. The values are written in an order and at a rate in which each is there when `send` requests it
+    /// row-major, from then on.
+    pub struct PartsBegun {
+        /// Subarrays of the largest frame.
+        parts: usize,
+    }
+    ports PartsBegunPorts {
+        clock;
+        /// The values of a subarray begin.
+        in begins;
+        /// It is the frame's first; valid with `begins`.
+        in first;
+        /// Index of a subarray; taken in the same cycle.
+        in part: count_bits(*parts);
+        /// Its values have begun in an earlier cycle.
+        out open;
+    }
 }
-
-kernel_block!(PartsBegun, clock clk, inputs [begins, first, part], outputs [open]);
 
 impl PartsBegun {
     /// For frames of at most `parts` subarrays.
     pub fn new(parts: usize) -> Self {
-        let block = PartsBegun {
-            clk: Default::default(),
-            begins: Default::default(),
-            first: Default::default(),
-            part: Wire::new(count_bits(parts)),
-            open: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(parts))
+        PartsBegun { parts }
     }
 }
 
-fn kernel(parts: usize) -> Kernel {
-    let k = Builder::new("parts_begun");
-    let (begins, first) = (k.input("begins", 1), k.input("first", 1));
-    let part = k.input("part", count_bits(parts));
-    if parts == 1 {
-        k.comment("With one subarray nothing is sent before its values.");
-        k.wire("open", k.constant(1, 1));
-        return k.finish();
+impl Block for PartsBegun {
+    fn build<'k>(&self, k: &'k Builder, io: PartsBegunPorts<Inside<'k>>) {
+        if self.parts == 1 {
+            k.comment("With one subarray nothing is sent before its values.");
+            io.open.set(k.constant(1, 1));
+            return;
+        }
+        let begun = k.register("begun", Type::unsigned(count_bits(self.parts + 1)));
+        k.when(io.begins, || begun.set(io.first.mux(k.constant(begun.bits(), 1), begun.plus(1))));
+        io.open.set(io.part.resize(begun.bits()).less(*begun));
     }
-    let begun = k.register("begun", Type::unsigned(count_bits(parts + 1)));
-    k.when(begins, || begun.set(first.mux(k.constant(begun.bits(), 1), begun.plus(1))));
-    k.wire("open", part.resize(begun.bits()).less(*begun));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -94,6 +84,6 @@ mod tests {
             vec![begins.into(), first.into(), random.u64(..PARTS).into()]
         });
         let stimulus: Vec<Vec<Word>> = stimulus.collect();
-        check(PartsBegun::new(PARTS as usize).kernel.kernel(), &stimulus, &mut Count(None));
+        check(&kernel_of(&PartsBegun::new(PARTS as usize)), &stimulus, &mut Count(None));
     }
 }

@@ -6,8 +6,8 @@ use crate::block;
 use crate::language::{concat, Block, Builder, Inside};
 
 block! {
-    /// Adds the rows of the high limbs, shifted left by `limb_align`, to those of the low limbs, which have been written to
-    /// a memory. Until `clear` is followed by the `last` row of the low limbs, rows pass unchanged.
+    /// Adds the rows of the high limbs, shifted left by `limb_align`, to those of the low limbs, which have been
+    /// written to a memory. Until `clear` is followed by the `last` row of the low limbs, rows pass unchanged.
     ///
     /// Where neither factor of v_00 has a low limb, all rows pass unchanged and all are `complete`.
     #[derive(Clone, Copy)]

@@ -10,8 +10,8 @@ use crate::primitives::search::sweep::position_bits;
 
 block! {
     /// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
-    /// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the operands pass on
-    /// wires.
+    /// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the
+    /// operands pass on wires.
     pub struct OperandScale {
         /// A network gives one μ.
         wanted: bool,

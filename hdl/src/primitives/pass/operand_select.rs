@@ -26,8 +26,9 @@ block! {
         in input_quad: 4 * fold;
         /// Four parities of a v_ij, `operand_bits` each, signed; taken in every cycle.
         in vector_quad: 4 * data;
-        /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, 3 = one, with a network, bits 3:2 flip,
-        /// lane group t gets parity t XOR flip, bit 4 parities 1 and 2 (x and y) are exchanged first; valid with the quads.
+        /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, 3 = one, with a network, bits
+        /// 3:2 flip, lane group t gets parity t XOR flip, bit 4 parities 1 and 2 (x and y) are exchanged first; valid
+        /// with the quads.
         in source: SOURCE_BITS;
         /// Operand of each lane group, four times 18 bits, signed; one cycle after the quads.
         out operands: 4 * M;

@@ -17,7 +17,7 @@ block! {
     /// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
     ///
     /// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
-    #[derive(Clone, Copy, Debug)]
+    #[derive(Clone, Copy)]
     pub struct OperandSource {
         data: usize,
         /// Width of an operand.

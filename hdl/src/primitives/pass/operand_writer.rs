@@ -6,8 +6,9 @@ use crate::primitives::address::case_counter::{expression_by_case, value_by_case
 use crate::primitives::address::counter::count_bits;
 
 block! {
-    /// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
-    /// later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`, begun.
+    /// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of
+    /// a later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`,
+    /// begun.
     pub struct OperandWriter {
         lengths: Vec<Vec<usize>>,
         streamed: bool,
@@ -24,15 +25,15 @@ block! {
         out address: count_bits(words(lengths));
         /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
         out keep;
-        /// Number of operand vectors of this subarray that can be read; includes a vector from the cycle after the `valid`
-        /// that makes it readable.
+        /// Number of operand vectors of this subarray that can be read; includes a vector from the cycle after the
+        /// `valid` that makes it readable.
         out finished: count_bits(most_vectors(lengths) + 1);
     }
 }
 
 impl OperandWriter {
-    /// `lengths[case]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is read from its
-    /// first quad on, one quad per cycle, while one quad per cycle is written.
+    /// `lengths[case]` are the quads of each vector. `streamed`, only with vectors of two quads or more: a vector is
+    /// read from its first quad on, one quad per cycle, while one quad per cycle is written.
     pub fn new(lengths: &[Vec<usize>], streamed: bool) -> Self {
         OperandWriter { lengths: lengths.to_vec(), streamed }
     }

@@ -79,11 +79,12 @@ pub fn longest(model: &Model) -> usize {
 }
 
 block! {
-    /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
+    /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is
+    /// read.
     ///
-    /// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge. `ready` (the
-    /// step's operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
-    /// of the section, after which the first follows) are combinational.
+    /// `start` loads the first step of section `which` ([`programs`]), `advance` the next one, both at the clock edge.
+    /// `ready` (the step's operand can be read, and the pause after an accumulation is over), `last` (its last column)
+    /// and `ends` (the last step of the section, after which the first follows) are combinational.
     ///
     /// The current instruction is in a register. The table is always read at the next instruction, because `advance`
     /// settles late in the cycle.
@@ -126,14 +127,14 @@ block! {
         out ends;
         /// Address in the coefficient memory; [`latency`](PassProgram::latency) cycles after `column`.
         out coefficient_address: count_bits(*words);
-        /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency) cycles after
-        /// `column`.
+        /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency)
+        /// cycles after `column`.
         out operand_address: count_bits(*operands);
-        /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with
-        /// the addresses.
+        /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from
+        /// bit 0; with the addresses.
         out source: SOURCE_BITS;
-        /// Factor of the operand as in [`OperandScale`](super::operand_scale::OperandScale); with the addresses. Constant 0 without
-        /// a network.
+        /// Factor of the operand as in [`OperandScale`](super::operand_scale::OperandScale); with the addresses.
+        /// Constant 0 without a network.
         out factor: FACTOR_BITS;
         /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes), see [`Control`]; with the addresses.
         out control: control.bits();
@@ -142,7 +143,8 @@ block! {
     }
 }
 
-/// The control word of the lanes: bit 0 is the last product of an accumulation; the others are there where they are needed.
+/// The control word of the lanes: bit 0 is the last product of an accumulation; the others are there where they are
+/// needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Control {
     /// Whether a bit says that the accumulation is that of a layer.
@@ -247,8 +249,8 @@ impl PassProgram {
         k.wire("instruction", index.table(bits, &words))
     }
 
-    /// The addresses for `column`, and with them source, factor and control, all to be registered once more: at once, or behind the
-    /// column list.
+    /// The addresses for `column`, and with them source, factor and control, all to be registered once more: at once,
+    /// or behind the column list.
     fn addresses<'k>(
         &self,
         k: &'k Builder,

@@ -44,8 +44,8 @@ block! {
         out closes;
         /// Word of the sweep just compared; valid with `done`.
         out compared: sweep_bits();
-        /// Best position, x, in grid steps of the level, signed; valid with `done` and from then on until the next `done`,
-        /// `halve` or `begin_frame` takes effect.
+        /// Best position, x, in grid steps of the level, signed; valid with `done` and from then on until the next
+        /// `done`, `halve` or `begin_frame` takes effect.
         out best_x: position_bits();
         /// Best position, y, in grid steps of the level, signed; as `best_x`.
         out best_y: position_bits();

@@ -7,9 +7,9 @@ use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::search::polynomial_word::PolynomialWord;
 
 block! {
-    /// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k, as
-    /// wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle: their
-    /// combination over y. 21 adders per lane at degree 3.
+    /// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k,
+    /// as wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle:
+    /// their combination over y. 21 adders per lane at degree 3.
     pub struct Candidates {
         layout: PolynomialWord,
     }

@@ -10,8 +10,8 @@ use crate::primitives::arithmetic::logarithm::{locate, logarithm, LOG_BITS};
 use crate::primitives::search::sweep::{square_bits, sweep_bits, Fields};
 
 block! {
-    /// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, the logarithm in three steps, the
-    /// last with its table, times n.
+    /// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, the logarithm in three steps,
+    /// the last with its table, times n.
     ///
     /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
     /// nine cycles after `start`, until those of the next sweep.

@@ -15,10 +15,10 @@ block! {
     /// `set_up`; `target`, also a field of `sweep`, one cycle later. In the coarse grid `set_up` may coincide with
     /// `compared`; otherwise it comes three cycles after `compared` or `begin_frame`.
     ///
-    /// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads the
-    /// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
-    /// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `compared` with
-    /// `improved` makes the buffer of a coarse sweep the best.
+    /// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads
+    /// the buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three
+    /// buffers are enough as long as a sweep is compared before the next but one is set up. Halvings work in place.
+    /// `compared` with `improved` makes the buffer of a coarse sweep the best.
     pub struct SearchSequencer {
         /// Quads of a buffer.
         quads: usize,
@@ -39,8 +39,8 @@ block! {
         in improved;
         /// Word of that sweep; valid with `compared`.
         in compared_sweep: sweep_bits();
-        /// Best position, x, in grid steps, signed; constant in the two cycles before a halving or the last sweep is set
-        /// up.
+        /// Best position, x, in grid steps, signed; constant in the two cycles before a halving or the last sweep is
+        /// set up.
         in best_x: position_bits();
         /// Best position, y, in grid steps, signed; as `best_x`.
         in best_y: position_bits();

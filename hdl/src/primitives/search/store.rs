@@ -12,20 +12,21 @@ use crate::primitives::search::polynomial_word::PolynomialWord;
 use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
 
 block! {
-    /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes whole
-    /// polynomials into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
-    /// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
+    /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes
+    /// whole polynomials into one of the others. Both take effect one cycle later, through registers beside the memory.
+    /// `read_data` follows its address by three cycles: read register and output register of the memory, and the choice
+    /// of the memory.
     ///
-    /// A step is the part of a quad that the search computes in a cycle: all of it, a half or a quarter. Addresses of steps are
-    /// `{quad, step}`. Where a quad takes several steps, `read_data` has one more cycle of latency, and the memory is written
-    /// with a quad's last step.
+    /// A step is the part of a quad that the search computes in a cycle: all of it, a half or a quarter. Addresses of
+    /// steps are `{quad, step}`. Where a quad takes several steps, `read_data` has one more cycle of latency, and the
+    /// memory is written with a quad's last step.
     ///
-    /// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
-    /// name of buffer 0, and `fill` and `write` never coincide.
+    /// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is
+    /// another name of buffer 0, and `fill` and `write` never coincide.
     ///
     /// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
-    /// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
-    /// old content, so that using it would show as an error.
+    /// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of
+    /// the old content, so that using it would show as an error.
     pub struct Store {
         /// Layout of the polynomials of a step.
         step: PolynomialWord,
@@ -55,8 +56,8 @@ block! {
         in write_data: step.bits();
         /// Buffer to read; valid with `read_address`.
         in read_buffer: BUFFER_BITS;
-        /// Address of the step to read, 0 in the cycle after `begins`, then one more after each cycle with `counts`; taken
-        /// in every cycle.
+        /// Address of the step to read, 0 in the cycle after `begins`, then one more after each cycle with `counts`;
+        /// taken in every cycle.
         in read_address: count_bits(quads * steps(step));
         /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
         in begins;
@@ -88,8 +89,8 @@ pub fn base_bits(quads: usize) -> usize {
 }
 
 impl Store {
-    /// `quads` quads of polynomials, filled with coefficients of `fill_bits` bits; `step` is the layout of the polynomials
-    /// of a step, `apart` says whether one subarray or frame is filled while another is searched.
+    /// `quads` quads of polynomials, filled with coefficients of `fill_bits` bits; `step` is the layout of the
+    /// polynomials of a step, `apart` says whether one subarray or frame is filled while another is searched.
     pub fn new(step: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         Store { step, quads, fill_bits, apart }
     }

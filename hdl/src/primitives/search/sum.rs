@@ -8,8 +8,8 @@ use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
 
 block! {
     /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
-    /// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
-    /// `write` replaces a buffer's sum by the `write_data` of the next cycle.
+    /// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is
+    /// held; `write` replaces a buffer's sum by the `write_data` of the next cycle.
     pub struct Sum {
         layout: PolynomialWord,
         quads: usize,

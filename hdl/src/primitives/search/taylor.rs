@@ -7,16 +7,16 @@ use crate::language::{Block, Builder, Expr, Inside};
 use crate::primitives::search::polynomial_word::PolynomialWord;
 
 block! {
-    /// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
-    /// two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms, one of
-    /// which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
+    /// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for
+    /// x, two for y and the halving. No path has more than one adder: what a coefficient gains comes from two terms,
+    /// one of which needs no sum of its own and is added in the first cycle of an axis, the other in the second.
     pub struct Taylor {
         layout: PolynomialWord,
     }
     ports TaylorPorts {
         clock;
-        /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid one
-        /// cycle before `word`.
+        /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid
+        /// one cycle before `word`.
         in step: STEP_BITS;
         /// Polynomials, one per lane; taken in every cycle.
         in word: layout.bits();

@@ -6,6 +6,7 @@ use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::result::flags::{StatusField, ZERO_LIMIT};
 
 use super::*;
+use crate::language::kernel_of;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::scenes::{learned, model};
 use crate::wire::Word;
@@ -209,7 +210,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
         }
         let offer = (40..280).contains(&at) && random.u8(..4) > 0;
         // Small values are below the threshold or round to zero, large ones saturate.
-        let v = block.quad.width() / 4;
+        let v = block.lanes * block.value_bits / 4;
         let value = |_| random.i64(..) >> random.usize(64 - v..64);
         let quad: Vec<i64> = (0..4).map(value).collect();
         vec![
@@ -226,13 +227,13 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             random_word(&mut random, position_bits()),
             random_word(&mut random, position_bits()),
             random.u64(..u64::from(model.formats().input_bits)).into(),
-            random.u64(..1 << block.rescale.width()).into(),
+            random.u64(..1 << block.rescale_bits).into(),
             random.bool().into(),
             random.bool().into(),
             random.bool().into(),
             random.bool().into(),
-            random_word(&mut random, block.frames.width()),
-            random_word(&mut random, block.score.width()),
+            random_word(&mut random, block.marks.bits()),
+            random_word(&mut random, block.score_bits),
             random_word(&mut random, SATURATION_BITS),
             random_word(&mut random, CYCLE_BITS),
             Word::of_fields(&[(); 4].map(|()| random.i64(0..parts as i64)), label_bits(model)),
@@ -251,7 +252,7 @@ fn is_the_model_s(side: usize, more: &str, threshold: i64) {
 
 fn check_forces(model: Model) {
     let block = ForceUnit::new(&model);
-    check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
+    check(&kernel_of(&block), &stimulus(&model, &block, 6000), &mut Requests::new(model));
 }
 
 #[test]
