@@ -1,167 +1,110 @@
 //! AXI4-Lite in front of the registers.
 
 use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
-/// One access at a time: address and data of a write are taken together; a read and a write that wait take turns. The answer
-/// comes two cycles later and stays until it is taken. A refused access is answered with SLVERR.
-#[derive(dermis_hdl_derive::Block)]
-pub struct AxiLite {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Address of a write in bytes; valid with `s_axil_awvalid`.
-    pub s_axil_awaddr: Wire<In>,
-    /// An address is offered; the sender holds it until `s_axil_awready`.
-    pub s_axil_awvalid: Signal<In, Bit>,
-    /// The address is accepted in this cycle.
-    pub s_axil_awready: Signal<Out, Bit>,
-    /// Data of a write; valid with `s_axil_wvalid`.
-    pub s_axil_wdata: Wire<In>,
-    /// Bytes of a write that count; valid with `s_axil_wvalid`.
-    pub s_axil_wstrb: Wire<In>,
-    /// Data are offered; the sender holds them until `s_axil_wready`.
-    pub s_axil_wvalid: Signal<In, Bit>,
-    /// The data are accepted in this cycle.
-    pub s_axil_wready: Signal<Out, Bit>,
-    /// 0 or SLVERR; valid with `s_axil_bvalid`.
-    pub s_axil_bresp: Wire<Out>,
-    /// The answer of a write; it is held until `s_axil_bready`.
-    pub s_axil_bvalid: Signal<Out, Bit>,
-    /// The answer is accepted in this cycle.
-    pub s_axil_bready: Signal<In, Bit>,
-    /// Address of a read in bytes; valid with `s_axil_arvalid`.
-    pub s_axil_araddr: Wire<In>,
-    /// An address is offered; the sender holds it until `s_axil_arready`.
-    pub s_axil_arvalid: Signal<In, Bit>,
-    /// The address is accepted in this cycle.
-    pub s_axil_arready: Signal<Out, Bit>,
-    /// Content of the register; valid with `s_axil_rvalid`.
-    pub s_axil_rdata: Wire<Out>,
-    /// 0 or SLVERR; valid with `s_axil_rvalid`.
-    pub s_axil_rresp: Wire<Out>,
-    /// The answer of a read; it is held until `s_axil_rready`.
-    pub s_axil_rvalid: Signal<Out, Bit>,
-    /// The answer is accepted in this cycle.
-    pub s_axil_rready: Signal<In, Bit>,
-    /// An access in this cycle.
-    pub select: Signal<Out, Bit>,
-    /// The access is a write; valid with `select`.
-    pub write: Signal<Out, Bit>,
-    /// Address in bytes; valid with `select`.
-    pub address: Wire<Out>,
-    /// Data of a write; valid with `select` and `write`.
-    pub data: Wire<Out>,
-    /// Bytes of a write that count; valid with `select` and `write`.
-    pub strobe: Wire<Out>,
-    /// Content of the register; valid in the cycle after `select`.
-    pub content: Wire<In>,
-    /// The access is an error; valid in the cycle after `select`.
-    pub refused: Signal<In, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(
-    AxiLite,
-    clock clk,
-    inputs [
-        rst, s_axil_awaddr, s_axil_awvalid, s_axil_wdata, s_axil_wstrb, s_axil_wvalid, s_axil_bready, s_axil_araddr,
-        s_axil_arvalid, s_axil_rready, content, refused
-    ],
-    outputs [
-        s_axil_awready, s_axil_wready, s_axil_bresp, s_axil_bvalid, s_axil_arready, s_axil_rdata, s_axil_rresp,
-        s_axil_rvalid, select, write, address, data, strobe
-    ]
-);
-
-impl Default for AxiLite {
-    fn default() -> Self {
-        let strobe = REGISTER_BITS / 8;
-        let block = AxiLite {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axil_awaddr: Wire::new(ADDRESS_BITS),
-            s_axil_awvalid: Default::default(),
-            s_axil_awready: Default::default(),
-            s_axil_wdata: Wire::new(REGISTER_BITS),
-            s_axil_wstrb: Wire::new(strobe),
-            s_axil_wvalid: Default::default(),
-            s_axil_wready: Default::default(),
-            s_axil_bresp: Wire::new(2),
-            s_axil_bvalid: Default::default(),
-            s_axil_bready: Default::default(),
-            s_axil_araddr: Wire::new(ADDRESS_BITS),
-            s_axil_arvalid: Default::default(),
-            s_axil_arready: Default::default(),
-            s_axil_rdata: Wire::new(REGISTER_BITS),
-            s_axil_rresp: Wire::new(2),
-            s_axil_rvalid: Default::default(),
-            s_axil_rready: Default::default(),
-            select: Default::default(),
-            write: Default::default(),
-            address: Wire::new(ADDRESS_BITS),
-            data: Wire::new(REGISTER_BITS),
-            strobe: Wire::new(strobe),
-            content: Wire::new(REGISTER_BITS),
-            refused: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel())
+block! {
+    /// One access at a time: address and data of a write are taken together; a read and a write that wait take turns.
+    /// The answer comes two cycles later and stays until it is taken. A refused access is answered with SLVERR.
+    #[derive(Default)]
+    pub struct AxiLite {}
+    ports AxiLitePorts {
+        clock;
+        reset;
+        /// Address of a write in bytes; valid with `s_axil_awvalid`.
+        in s_axil_awaddr: ADDRESS_BITS;
+        /// An address is offered; the sender holds it until `s_axil_awready`.
+        in s_axil_awvalid;
+        /// The address is accepted in this cycle.
+        out s_axil_awready;
+        /// Data of a write; valid with `s_axil_wvalid`.
+        in s_axil_wdata: REGISTER_BITS;
+        /// Bytes of a write that count; valid with `s_axil_wvalid`.
+        in s_axil_wstrb: REGISTER_BITS / 8;
+        /// Data are offered; the sender holds them until `s_axil_wready`.
+        in s_axil_wvalid;
+        /// The data are accepted in this cycle.
+        out s_axil_wready;
+        /// 0 or SLVERR; valid with `s_axil_bvalid`.
+        out s_axil_bresp: 2;
+        /// The answer of a write; it is held until `s_axil_bready`.
+        out s_axil_bvalid;
+        /// The answer is accepted in this cycle.
+        in s_axil_bready;
+        /// Address of a read in bytes; valid with `s_axil_arvalid`.
+        in s_axil_araddr: ADDRESS_BITS;
+        /// An address is offered; the sender holds it until `s_axil_arready`.
+        in s_axil_arvalid;
+        /// The address is accepted in this cycle.
+        out s_axil_arready;
+        /// Content of the register; valid with `s_axil_rvalid`.
+        out s_axil_rdata: REGISTER_BITS;
+        /// 0 or SLVERR; valid with `s_axil_rvalid`.
+        out s_axil_rresp: 2;
+        /// The answer of a read; it is held until `s_axil_rready`.
+        out s_axil_rvalid;
+        /// The answer is accepted in this cycle.
+        in s_axil_rready;
+        /// An access in this cycle.
+        out select;
+        /// The access is a write; valid with `select`.
+        out write;
+        /// Address in bytes; valid with `select`.
+        out address: ADDRESS_BITS;
+        /// Data of a write; valid with `select` and `write`.
+        out data: REGISTER_BITS;
+        /// Bytes of a write that count; valid with `select` and `write`.
+        out strobe: REGISTER_BITS / 8;
+        /// Content of the register; valid in the cycle after `select`.
+        in content: REGISTER_BITS;
+        /// The access is an error; valid in the cycle after `select`.
+        in refused;
     }
 }
 
-fn kernel() -> Kernel {
-    let k = Builder::new("axi_lite");
-    let bit = Type::unsigned(1);
-    let rst = k.input("rst", 1);
-    let (awaddr, awvalid) = (k.input("s_axil_awaddr", ADDRESS_BITS), k.input("s_axil_awvalid", 1));
-    let wdata = k.input("s_axil_wdata", REGISTER_BITS);
-    let (wstrb, wvalid) = (k.input("s_axil_wstrb", REGISTER_BITS / 8), k.input("s_axil_wvalid", 1));
-    let (bready, araddr) = (k.input("s_axil_bready", 1), k.input("s_axil_araddr", ADDRESS_BITS));
-    let (arvalid, rready) = (k.input("s_axil_arvalid", 1), k.input("s_axil_rready", 1));
-    let (content, refused) = (k.input("content", REGISTER_BITS), k.input("refused", 1));
-    let asked = k.state("asked", bit, rst, 0).comment("An access was made in the last cycle.");
-    let writes = k.register("writes", bit).comment("It was a write.");
-    let read_next = k.state("read_next", bit, rst, 0).comment("The last access was a write.");
-    let [bvalid, rvalid] = ["s_axil_bvalid", "s_axil_rvalid"].map(|name| k.state(name, bit, rst, 0));
-    let rdata = k.register("s_axil_rdata", Type::unsigned(REGISTER_BITS));
-    let error = k.register("error", bit);
+impl Block for AxiLite {
+    fn build<'k>(&self, k: &'k Builder, io: AxiLitePorts<Inside<'k>>) {
+        let bit = Type::unsigned(1);
+        let asked = k.state("asked", bit, io.rst, 0).comment("An access was made in the last cycle.");
+        let writes = k.register("writes", bit).comment("It was a write.");
+        let read_next = k.state("read_next", bit, io.rst, 0).comment("The last access was a write.");
+        let [bvalid, rvalid] = [io.s_axil_bvalid, io.s_axil_rvalid].map(|output| output.state(io.rst, 0));
+        let rdata = io.s_axil_rdata.register();
+        let error = k.register("error", bit);
 
-    let idle = k.wire("idle", !(*asked | *bvalid | *rvalid));
-    let can_write = k.wire("can_write", awvalid & wvalid);
-    let reads = k.wire("s_axil_arready", idle & arvalid & (*read_next | !can_write));
-    let write = k.wire("write", idle & can_write & !(arvalid & *read_next));
-    k.wire("s_axil_awready", write);
-    k.wire("s_axil_wready", write);
-    let select = k.wire("select", reads | write);
-    k.wire("address", write.mux(awaddr, araddr));
-    k.wire("data", wdata);
-    k.wire("strobe", wstrb);
-    asked.set(select);
-    k.when(select, || {
-        writes.set(write);
-        read_next.set(write);
-    });
-    k.when(*asked, || {
-        rdata.set(content);
-        error.set(refused);
-    });
-    bvalid.set((*asked & *writes) | (*bvalid & !bready));
-    rvalid.set((*asked & !*writes) | (*rvalid & !rready));
-    let response = concat(&[*error, k.constant(1, 0)]);
-    k.wire("s_axil_bresp", response);
-    k.wire("s_axil_rresp", response);
-    k.finish()
+        let idle = k.wire("idle", !(*asked | *bvalid | *rvalid));
+        let can_write = k.wire("can_write", io.s_axil_awvalid & io.s_axil_wvalid);
+        let reads = io.s_axil_arready.set(idle & io.s_axil_arvalid & (*read_next | !can_write));
+        let write = io.write.set(idle & can_write & !(io.s_axil_arvalid & *read_next));
+        io.s_axil_awready.set(write);
+        io.s_axil_wready.set(write);
+        let select = io.select.set(reads | write);
+        io.address.set(write.mux(io.s_axil_awaddr, io.s_axil_araddr));
+        io.data.set(io.s_axil_wdata);
+        io.strobe.set(io.s_axil_wstrb);
+        asked.set(select);
+        k.when(select, || {
+            writes.set(write);
+            read_next.set(write);
+        });
+        k.when(*asked, || {
+            rdata.set(io.content);
+            error.set(io.refused);
+        });
+        bvalid.set((*asked & *writes) | (*bvalid & !io.s_axil_bready));
+        rvalid.set((*asked & !*writes) | (*rvalid & !io.s_axil_rready));
+        let response = concat(&[*error, k.constant(1, 0)]);
+        io.s_axil_bresp.set(response);
+        io.s_axil_rresp.set(response);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -265,6 +208,6 @@ mod tests {
             ]
         });
         let stimulus: Vec<_> = stimulus.collect();
-        check(AxiLite::default().kernel.kernel(), &stimulus, &mut Slave::default());
+        check(&kernel_of(&AxiLite::default()), &stimulus, &mut Slave::default());
     }
 }

@@ -78,9 +78,9 @@ macro_rules! core {
             tables_in: TablesIn,
             labels: RustHdl<Queue>,
             engine: $engine,
-            stream_out: StreamOut,
-            registers: Registers,
-            bus: $bus,
+            stream_out: RustHdl<StreamOut>,
+            registers: RustHdl<Registers>,
+            bus: RustHdl<$bus>,
             rst: Signal<Local, Bit>,
             unused: Signal<Local, Bit>,
         }
@@ -88,6 +88,8 @@ macro_rules! core {
         impl $name {
             /// The core of the scene of `model`, with beats of `words` words at its output.
             pub fn new(model: &Model, words: usize) -> Self {
+                let code_bits = model.formats().code_bits as usize;
+                let constants = constants(model, REGISTER_BITS / 8 * words);
                 let mut core = $name {
                     aclk: Default::default(),
                     aresetn: Default::default(),
@@ -113,11 +115,8 @@ macro_rules! core {
                     tables_in: TablesIn::new(model.formats().code_bits as usize, model.has_writable_tables()),
                     labels: RustHdl::new(Queue::new(ID_BITS + 1)),
                     engine: <$engine>::new(model),
-                    stream_out: StreamOut::new(words, model.force_triples()),
-                    registers: Registers::new(
-                        &constants(model, REGISTER_BITS / 8 * words),
-                        model.has_writable_tables(),
-                    ),
+                    stream_out: RustHdl::new(StreamOut::new(words, model.force_triples())),
+                    registers: RustHdl::new(Registers::new(&constants, model.has_writable_tables())),
                     bus: Default::default(),
                     rst: Default::default(),
                     unused: Default::default(),

@@ -2,210 +2,185 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::wire::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS, RESET_CYCLES};
-use rust_hdl::prelude::*;
 
 use super::tables_in::OCTET_BITS;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 
 /// Bytes of a register.
 const BYTES: usize = REGISTER_BITS / 8;
 
-/// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Registers {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// An access in this cycle.
-    pub select: Signal<In, Bit>,
-    /// The access is a write; valid with `select`.
-    pub write: Signal<In, Bit>,
-    /// Address in bytes; valid with `select`.
-    pub address: Wire<In>,
-    /// Data of a write; valid with `select` and `write`.
-    pub data: Wire<In>,
-    /// Bytes of a write that count; valid with `select` and `write`.
-    pub strobe: Wire<In>,
-    /// The last taxel of a frame is received in this cycle.
-    pub complete: Signal<In, Bit>,
-    /// The last beat of a frame is sent in this cycle.
-    pub sent: Signal<In, Bit>,
-    /// A code is clipped in this cycle.
-    pub clipped: Signal<In, Bit>,
-    /// An incomplete beat is received in this cycle.
-    pub partial: Signal<In, Bit>,
-    /// A wrong `tlast` is received in this cycle.
-    pub misframed: Signal<In, Bit>,
-    /// The byte offered is accepted in this cycle.
-    pub octet_taken: Signal<In, Bit>,
-    /// A byte of an image of tables, and above it whether it is the last; valid with `octet_valid`.
-    pub octet: Wire<Out>,
-    /// A byte is offered; it is held until `octet_taken`.
-    pub octet_valid: Signal<Out, Bit>,
-    /// Content of the register; valid in the cycle after `select`.
-    pub content: Wire<Out>,
-    /// The access is an error; valid in the cycle after `select`.
-    pub refused: Signal<Out, Bit>,
-    /// Engine and streams are to be reset.
-    pub restart: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
+    pub struct Registers {
+        /// Content of the constant registers, by name.
+        constants: Vec<(&'static str, u32)>,
+        /// The tables of the engine are writable.
+        writable: bool,
+    }
+    ports RegistersPorts {
+        clock;
+        reset;
+        /// An access in this cycle.
+        in select;
+        /// The access is a write; valid with `select`.
+        in write;
+        /// Address in bytes; valid with `select`.
+        in address: ADDRESS_BITS;
+        /// Data of a write; valid with `select` and `write`.
+        in data: REGISTER_BITS;
+        /// Bytes of a write that count; valid with `select` and `write`.
+        in strobe: BYTES;
+        /// The last taxel of a frame is received in this cycle.
+        in complete;
+        /// The last beat of a frame is sent in this cycle.
+        in sent;
+        /// A code is clipped in this cycle.
+        in clipped;
+        /// An incomplete beat is received in this cycle.
+        in partial;
+        /// A wrong `tlast` is received in this cycle.
+        in misframed;
+        /// The byte offered is accepted in this cycle.
+        in octet_taken;
+        /// A byte of an image of tables, and above it whether it is the last; valid with `octet_valid`.
+        out octet: OCTET_BITS;
+        /// A byte is offered; it is held until `octet_taken`.
+        out octet_valid;
+        /// Content of the register; valid in the cycle after `select`.
+        out content: REGISTER_BITS;
+        /// The access is an error; valid in the cycle after `select`.
+        out refused;
+        /// Engine and streams are to be reset.
+        out restart;
+    }
 }
-
-kernel_block!(
-    Registers,
-    clock clk,
-    inputs [rst, select, write, address, data, strobe, complete, sent, clipped, partial, misframed, octet_taken],
-    outputs [octet, octet_valid, content, refused, restart]
-);
 
 impl Registers {
     /// With the content of the constant registers, by name, for an engine whose tables are `writable` or not.
     pub fn new(constants: &[(&'static str, u32)], writable: bool) -> Self {
-        let block = Registers {
-            clk: Default::default(),
-            rst: Default::default(),
-            select: Default::default(),
-            write: Default::default(),
-            address: Wire::new(ADDRESS_BITS),
-            data: Wire::new(REGISTER_BITS),
-            strobe: Wire::new(BYTES),
-            complete: Default::default(),
-            sent: Default::default(),
-            clipped: Default::default(),
-            partial: Default::default(),
-            misframed: Default::default(),
-            octet_taken: Default::default(),
-            octet: Wire::new(OCTET_BITS),
-            octet_valid: Default::default(),
-            content: Wire::new(REGISTER_BITS),
-            refused: Default::default(),
-            restart: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(constants, writable))
+        Registers { constants: constants.to_vec(), writable }
     }
 }
 
-fn kernel(constants: &[(&'static str, u32)], has_tables: bool) -> Kernel {
-    let k = Builder::new("registers");
-    let (rst, select, write) = (k.input("rst", 1), k.input("select", 1), k.input("write", 1));
-    let address = k.input("address", ADDRESS_BITS);
-    let (data, strobe) = (k.input("data", REGISTER_BITS), k.input("strobe", BYTES));
-    let [complete, sent, clipped, partial, misframed] =
-        ["complete", "sent", "clipped", "partial", "misframed"].map(|name| k.input(name, 1));
-    let octet_taken = k.input("octet_taken", 1);
-    let number = Type::unsigned(REGISTER_BITS);
-    let content = k.register("content", number);
-    let refused = k.register("refused", Type::unsigned(1));
+impl Block for Registers {
+    fn build<'k>(&self, k: &'k Builder, io: RegistersPorts<Inside<'k>>) {
+        let content = io.content.register();
+        let refused = io.refused.register();
 
-    let is = |register: &Register| address.is(register.address as u64);
-    let any = |which: &dyn Fn(&Register) -> bool| {
-        REGISTERS.iter().filter(|own| which(own)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
-    };
-    let known = k.wire("known", any(&|_| true));
-    let waiting = match has_tables {
-        true => Some(k.state("octet_valid", Type::unsigned(1), rst, 0)),
-        false => {
-            k.wire("octet_valid", k.constant(1, 0));
-            None
-        }
-    };
-    let writable = any(&|own| own.access.is_written() && own.access != Access::Push);
-    let room = waiting.map_or(k.constant(1, 0), |waiting| any(&|own| own.access == Access::Push) & !*waiting);
-    let writable = k.wire("writable", writable | room);
-    let wrong = k.wire("wrong", select & !write.mux(writable, known));
-    // What a write does is in the low byte, but for an image's end.
-    let written = k.wire("written", select & write & strobe.at(0));
-    let bits = |name: &str| {
-        let own = REGISTERS.iter().find(|own| own.name == name);
-        let reaches = own.map_or(k.constant(1, 0), |own| written & is(own));
-        move |field: registers::Field| reaches & data.at(field.low)
-    };
-    let control = bits("control");
-    let clear = k.wire("clear", control(registers::CLEAR));
-    let left_bits = count_bits(RESET_CYCLES as usize + 1);
-    let left = k.state("left", Type::unsigned(left_bits), rst, 0).comment("Cycles of reset left.");
-    left.set(left.any().mux(left.minus(1), *left));
-    k.when(control(registers::RESET), || left.set(k.constant(left_bits, RESET_CYCLES)));
-    k.wire("restart", left.any());
+        let is = |register: &Register| io.address.is(register.address as u64);
+        let any = |which: &dyn Fn(&Register) -> bool| {
+            REGISTERS.iter().filter(|own| which(own)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+        };
+        let known = k.wire("known", any(&|_| true));
+        let waiting = match self.writable {
+            true => Some(io.octet_valid.state(io.rst, 0)),
+            false => {
+                io.octet_valid.set(k.constant(1, 0));
+                None
+            }
+        };
+        let writable = any(&|own| own.access.is_written() && own.access != Access::Push);
+        let room = waiting.map_or(k.constant(1, 0), |waiting| any(&|own| own.access == Access::Push) & !*waiting);
+        let writable = k.wire("writable", writable | room);
+        let wrong = k.wire("wrong", io.select & !io.write.mux(writable, known));
+        // What a write does is in the low byte, but for an image's end.
+        let written = k.wire("written", io.select & io.write & io.strobe.at(0));
+        let bits = |name: &str| {
+            let own = REGISTERS.iter().find(|own| own.name == name);
+            let reaches = own.map_or(k.constant(1, 0), |own| written & is(own));
+            move |field: registers::Field| reaches & io.data.at(field.low)
+        };
+        let control = bits("control");
+        let clear = k.wire("clear", control(registers::CLEAR));
+        let left_bits = count_bits(RESET_CYCLES as usize + 1);
+        let left = k.state("left", Type::unsigned(left_bits), io.rst, 0).comment("Cycles of reset left.");
+        left.set(left.any().mux(left.minus(1), *left));
+        k.when(control(registers::RESET), || left.set(k.constant(left_bits, RESET_CYCLES)));
+        io.restart.set(left.any());
 
-    match waiting {
-        None => {
-            k.wire("octet", k.constant(OCTET_BITS, 0));
+        match waiting {
+            None => {
+                io.octet.set(k.constant(OCTET_BITS, 0));
+            }
+            Some(waiting) => {
+                let octet = io.octet.register();
+                let last = io.strobe.at(registers::LAST.low / 8) & io.data.at(registers::LAST.low);
+                let pushed = k.wire("pushed", written & room);
+                k.when(io.octet_taken, || waiting.set(k.constant(1, 0)));
+                k.when(pushed, || {
+                    waiting.set(k.constant(1, 1));
+                    octet.set(last.concat(io.data.low(registers::OCTET.bits)));
+                });
+            }
         }
-        Some(waiting) => {
-            let octet = k.register("octet", Type::unsigned(OCTET_BITS));
-            let last = strobe.at(registers::LAST.low / 8) & data.at(registers::LAST.low);
-            let pushed = k.wire("pushed", written & room);
-            k.when(octet_taken, || waiting.set(k.constant(1, 0)));
-            k.when(pushed, || {
-                waiting.set(k.constant(1, 1));
-                octet.set(last.concat(data.low(registers::OCTET.bits)));
-            });
-        }
+
+        let cleared = bits("errors");
+        let events = [
+            (registers::CLIPPED, io.clipped),
+            (registers::PARTIAL, io.partial),
+            (registers::FRAMING, io.misframed),
+            (registers::ACCESS, wrong),
+        ];
+        let errors: Vec<Expr> = events
+            .iter()
+            .rev()
+            .map(|&(field, event)| {
+                let own = k.state(&format!("error_{}", field.name), Type::unsigned(1), io.rst, 0);
+                own.set(event | (*own & !cleared(field)));
+                *own
+            })
+            .collect();
+        let counters = counters(k, &io, wrong, clear);
+        let value = |register: &Register| match register.access {
+            Access::Constant => {
+                let own = self.constants.iter().find(|(name, _)| *name == register.name);
+                own.map(|(_, content)| k.constant(REGISTER_BITS, u64::from(*content)))
+            }
+            Access::ReadOnly => counters.iter().find(|(name, _)| *name == register.name).map(|(_, own)| *own),
+            Access::ClearedByOne => Some(concat(&errors).extend(REGISTER_BITS)),
+            Access::Push => waiting.map(|waiting| {
+                let below = k.constant(registers::WAITING.low, 0);
+                k.constant(1, 1).concat(*waiting).concat(below).extend(REGISTER_BITS)
+            }),
+            Access::Pulse => None,
+        };
+        let arms: Vec<(u64, Expr)> =
+            REGISTERS.iter().filter_map(|own| Some((own.address as u64, value(own)?))).collect();
+        k.when(io.select, || {
+            content.set(io.address.case(&arms, k.constant(REGISTER_BITS, 0)));
+            refused.set(wrong);
+        });
     }
+}
 
-    let cleared = bits("errors");
+/// Counters of events by the names of their registers, `wrong` that of refused accesses; `clear` sets them to 0.
+fn counters<'k>(
+    k: &'k Builder,
+    io: &RegistersPorts<Inside<'k>>,
+    wrong: Expr<'k>,
+    clear: Expr<'k>,
+) -> [(&'static str, Expr<'k>); 7] {
     let events = [
-        (registers::CLIPPED, clipped),
-        (registers::PARTIAL, partial),
-        (registers::FRAMING, misframed),
-        (registers::ACCESS, wrong),
-    ];
-    let errors: Vec<Expr> = events
-        .iter()
-        .rev()
-        .map(|&(field, event)| {
-            let own = k.state(&format!("error_{}", field.name), Type::unsigned(1), rst, 0);
-            own.set(event | (*own & !cleared(field)));
-            *own
-        })
-        .collect();
-    let counts = [
-        ("frames_in", complete),
-        ("frames_out", sent),
-        ("codes_clipped", clipped),
-        ("beats_partial", partial),
-        ("frames_misframed", misframed),
+        ("frames_in", io.complete),
+        ("frames_out", io.sent),
+        ("codes_clipped", io.clipped),
+        ("beats_partial", io.partial),
+        ("frames_misframed", io.misframed),
         ("accesses_refused", wrong),
         ("cycles", k.constant(1, 1)),
     ];
-    let counters: Vec<(&str, Expr)> = counts
-        .iter()
-        .map(|&(name, event)| {
-            let own = k.state(name, number, rst, 0);
-            own.set(clear.mux(k.constant(REGISTER_BITS, 0), (*own + event).low(REGISTER_BITS)));
-            (name, *own)
-        })
-        .collect();
-
-    let value = |register: &Register| match register.access {
-        Access::Constant => {
-            let own = constants.iter().find(|(name, _)| *name == register.name);
-            own.map(|(_, content)| k.constant(REGISTER_BITS, u64::from(*content)))
-        }
-        Access::ReadOnly => counters.iter().find(|(name, _)| *name == register.name).map(|(_, own)| *own),
-        Access::ClearedByOne => Some(concat(&errors).extend(REGISTER_BITS)),
-        Access::Push => waiting.map(|waiting| {
-            let below = k.constant(registers::WAITING.low, 0);
-            k.constant(1, 1).concat(*waiting).concat(below).extend(REGISTER_BITS)
-        }),
-        Access::Pulse => None,
-    };
-    let arms: Vec<(u64, Expr)> = REGISTERS.iter().filter_map(|own| Some((own.address as u64, value(own)?))).collect();
-    k.when(select, || {
-        content.set(address.case(&arms, k.constant(REGISTER_BITS, 0)));
-        refused.set(wrong);
-    });
-    k.finish()
+    events.map(|(name, event)| {
+        let own = k.state(name, Type::unsigned(REGISTER_BITS), io.rst, 0);
+        own.set(clear.mux(k.constant(REGISTER_BITS, 0), (*own + event).low(REGISTER_BITS)));
+        (name, *own)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -314,7 +289,7 @@ mod tests {
         let stimulus: Vec<_> = stimulus.collect();
         for writable in [false, true] {
             let block = Registers::new(&CONSTANTS, writable);
-            check(block.kernel.kernel(), &stimulus, &mut Map { writable, ..Map::default() });
+            check(&kernel_of(&block), &stimulus, &mut Map { writable, ..Map::default() });
         }
     }
 }

@@ -1,141 +1,113 @@
 //! Codes from a stream of 32-bit words.
 
 use dermis_golden::fixed::plan::resources::count_bits;
-use rust_hdl::prelude::*;
 
 use super::ID_BITS;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
 /// Bytes of a word of the input.
 pub const WORD_BYTES: usize = 4;
 
-/// Takes one taxel's code from each beat, as a signed number of 32 bits, into a register. A code that the engine's codes
-/// cannot hold is clipped. With the last taxel the label of the frame is given away: its identifier and whether a code was
-/// clipped or a beat was incomplete. A `tlast` that comes early begins the count anew, as in the engine; the next frame is then
-/// the engine's next one too.
-#[derive(dermis_hdl_derive::Block)]
-pub struct StreamIn {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, 32 bits signed; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
-    pub s_axis_tkeep: Wire<In>,
-    /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
-    pub s_axis_tid: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// There is room for one more label.
-    pub room: Signal<In, Bit>,
-    /// The taxel's code, `code_bits` wide, signed; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame, as the sender says; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// Label of the frame: its identifier, and above it whether it is spoiled; valid with `complete`.
-    pub label: Wire<Out>,
-    /// The last taxel of a frame is accepted in this cycle.
-    pub complete: Signal<Out, Bit>,
-    /// A code is clipped in this cycle.
-    pub clipped: Signal<Out, Bit>,
-    /// An incomplete beat is accepted in this cycle.
-    pub partial: Signal<Out, Bit>,
-    /// A `tlast` too early, or none where it should be, is accepted in this cycle.
-    pub misframed: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Takes one taxel's code from each beat, as a signed number of 32 bits, into a register. A code that the engine's
+    /// codes cannot hold is clipped. With the last taxel the label of the frame is given away: its identifier and
+    /// whether a code was clipped or a beat was incomplete. A `tlast` that comes early begins the count anew, as in the
+    /// engine; the next frame is then the engine's next one too.
+    pub struct StreamIn {
+        /// Codes of a frame.
+        taxels: usize,
+        /// Width of a code, 2 to 32.
+        code_bits: usize,
+    }
+    ports StreamInPorts {
+        clock;
+        reset;
+        /// A taxel's code, 32 bits signed; valid with `s_axis_tvalid`.
+        in s_axis_tdata: 8 * WORD_BYTES;
+        /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
+        in s_axis_tkeep: WORD_BYTES;
+        /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
+        in s_axis_tid: ID_BITS;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// There is room for one more label.
+        in room;
+        /// The taxel's code, `code_bits` wide, signed; valid with `m_axis_tvalid`.
+        out m_axis_tdata: code_bits;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame, as the sender says; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// Label of the frame: its identifier, and above it whether it is spoiled; valid with `complete`.
+        out label: ID_BITS + 1;
+        /// The last taxel of a frame is accepted in this cycle.
+        out complete;
+        /// A code is clipped in this cycle.
+        out clipped;
+        /// An incomplete beat is accepted in this cycle.
+        out partial;
+        /// A `tlast` too early, or none where it should be, is accepted in this cycle.
+        out misframed;
+    }
 }
-
-kernel_block!(
-    StreamIn,
-    clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tkeep, s_axis_tid, s_axis_tvalid, s_axis_tlast, room, m_axis_tready],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, label, complete, clipped, partial, misframed]
-);
 
 impl StreamIn {
     /// For frames of `taxels` codes of `code_bits` bits, 2 to 32.
     pub fn new(taxels: usize, code_bits: usize) -> Self {
-        let block = StreamIn {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(8 * WORD_BYTES),
-            s_axis_tkeep: Wire::new(WORD_BYTES),
-            s_axis_tid: Wire::new(ID_BITS),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            room: Default::default(),
-            m_axis_tdata: Wire::new(code_bits),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            label: Wire::new(ID_BITS + 1),
-            complete: Default::default(),
-            clipped: Default::default(),
-            partial: Default::default(),
-            misframed: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(taxels, code_bits))
+        StreamIn { taxels, code_bits }
     }
 }
 
-fn kernel(taxels: usize, code_bits: usize) -> Kernel {
-    let k = Builder::new("stream_in");
-    let (rst, data, keep) =
-        (k.input("rst", 1), k.input("s_axis_tdata", 8 * WORD_BYTES), k.input("s_axis_tkeep", WORD_BYTES));
-    let (id, given, last) = (k.input("s_axis_tid", ID_BITS), k.input("s_axis_tvalid", 1), k.input("s_axis_tlast", 1));
-    let (room, ready) = (k.input("room", 1), k.input("m_axis_tready", 1));
-    let bit = Type::unsigned(1);
-    let count = k.state("count", Type::unsigned(count_bits(taxels)), rst, 0);
-    let spoiled = k.state("spoiled", bit, rst, 0);
-    let frame = k.register("frame", Type::unsigned(ID_BITS));
-    let code = k.register("m_axis_tdata", Type::unsigned(code_bits));
-    let valid = k.state("m_axis_tvalid", bit, rst, 0);
-    let tlast = k.register("m_axis_tlast", bit);
+impl Block for StreamIn {
+    fn build<'k>(&self, k: &'k Builder, io: StreamInPorts<Inside<'k>>) {
+        let StreamIn { taxels, code_bits } = *self;
+        let bit = Type::unsigned(1);
+        let count = k.state("count", Type::unsigned(count_bits(taxels)), io.rst, 0);
+        let spoiled = k.state("spoiled", bit, io.rst, 0);
+        let frame = k.register("frame", Type::unsigned(ID_BITS));
+        let code = io.m_axis_tdata.register();
+        let valid = io.m_axis_tvalid.state(io.rst, 0);
+        let tlast = io.m_axis_tlast.register();
 
-    let moves = k.wire("moves", !*valid | ready);
-    let takes = k.wire("s_axis_tready", moves & room);
-    let taken = k.wire("taken", given & takes);
-    let begins = k.wire("begins", count.is(0));
-    let ends = k.wire("ends", count.is(taxels as u64 - 1));
-    // A code fits if all bits above its sign are copies of it.
-    let above = data.slice(code_bits - 1, 8 * WORD_BYTES + 1 - code_bits);
-    let fits = k.wire("fits", above.all() | !above.any());
-    let limit = concat(&[data.top(), (!data.top()).repeat(code_bits - 1)]);
-    let clipped = k.wire("clipped", taken & !fits);
-    let partial = k.wire("partial", taken & !keep.all());
-    k.wire("misframed", taken & last.differs(ends));
-    k.wire("complete", taken & ends);
-    let now_spoiled = k.wire("now_spoiled", clipped | partial | (*spoiled & !begins));
-    k.wire("label", now_spoiled.concat(begins.mux(id, *frame)));
-    k.when(moves, || {
-        code.set(fits.mux(data.low(code_bits), limit));
-        tlast.set(last);
-        valid.set(given & room);
-    });
-    k.when(taken, || {
-        count.set((last | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
-        spoiled.set(now_spoiled);
-    });
-    k.when(taken & begins, || frame.set(id));
-    k.finish()
+        let moves = k.wire("moves", !*valid | io.m_axis_tready);
+        let takes = io.s_axis_tready.set(moves & io.room);
+        let taken = k.wire("taken", io.s_axis_tvalid & takes);
+        let begins = k.wire("begins", count.is(0));
+        let ends = k.wire("ends", count.is(taxels as u64 - 1));
+        // A code fits if all bits above its sign are copies of it.
+        let above = io.s_axis_tdata.slice(code_bits - 1, 8 * WORD_BYTES + 1 - code_bits);
+        let fits = k.wire("fits", above.all() | !above.any());
+        let limit = concat(&[io.s_axis_tdata.top(), (!io.s_axis_tdata.top()).repeat(code_bits - 1)]);
+        let clipped = io.clipped.set(taken & !fits);
+        let partial = io.partial.set(taken & !io.s_axis_tkeep.all());
+        io.misframed.set(taken & io.s_axis_tlast.differs(ends));
+        io.complete.set(taken & ends);
+        let now_spoiled = k.wire("now_spoiled", clipped | partial | (*spoiled & !begins));
+        io.label.set(now_spoiled.concat(begins.mux(io.s_axis_tid, *frame)));
+        k.when(moves, || {
+            code.set(fits.mux(io.s_axis_tdata.low(code_bits), limit));
+            tlast.set(io.s_axis_tlast);
+            valid.set(io.s_axis_tvalid & io.room);
+        });
+        k.when(taken, || {
+            count.set((io.s_axis_tlast | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
+            spoiled.set(now_spoiled);
+        });
+        k.when(taken & begins, || frame.set(io.s_axis_tid));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
@@ -241,6 +213,6 @@ mod tests {
             ]
         });
         let stimulus: Vec<_> = stimulus.collect();
-        check(StreamIn::new(TAXELS, CODE_BITS).kernel.kernel(), &stimulus, &mut Frames::default());
+        check(&kernel_of(&StreamIn::new(TAXELS, CODE_BITS)), &stimulus, &mut Frames::default());
     }
 }

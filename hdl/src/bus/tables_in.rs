@@ -1,55 +1,49 @@
 //! Puts the bytes of images of tables, which come from a register, between the frames of the engine's input.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::table_beat;
-use crate::wire::Wire;
 
-/// ```text
-/// s_axis (frames) --+--> m_axis (engine)
-/// octet  -----------'
-/// ```
-/// A byte waits for the end of the frame under way; from an image's first byte to its last the next frame waits. Without
-/// writable tables the stream passes through.
-#[derive(dermis_hdl_derive::Block)]
-pub struct TablesIn {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `code_bits` wide, signed; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A byte, and above it whether it is the last of its image; valid with `octet_valid`.
-    pub octet: Wire<In>,
-    /// A byte is offered; it is held until `octet_taken`.
-    pub octet_valid: Signal<In, Bit>,
-    /// The byte is accepted in this cycle.
-    pub octet_taken: Signal<Out, Bit>,
-    /// A code, or a byte of an image; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// s_axis (frames) --+--> m_axis (engine)
+    /// octet  -----------'
+    /// ```
+    /// A byte waits for the end of the frame under way; from an image's first byte to its last the next frame waits.
+    /// Without writable tables the stream passes through.
+    pub struct TablesIn {
+        /// Width of a code.
+        code_bits: usize,
+        /// The tables of the engine are writable.
+        writable: bool,
+    }
+    ports TablesInPorts {
+        clock;
+        reset;
+        /// A taxel's code, `code_bits` wide, signed; valid with `s_axis_tvalid`.
+        in s_axis_tdata: code_bits;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A byte, and above it whether it is the last of its image; valid with `octet_valid`.
+        in octet: OCTET_BITS;
+        /// A byte is offered; it is held until `octet_taken`.
+        in octet_valid;
+        /// The byte is accepted in this cycle.
+        out octet_taken;
+        /// A code, or a byte of an image; valid with `m_axis_tvalid`.
+        out m_axis_tdata: code_bits + usize::from(*writable);
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+    }
 }
-
-kernel_block!(
-    TablesIn,
-    clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, octet, octet_valid, m_axis_tready],
-    outputs [s_axis_tready, octet_taken, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
-);
 
 /// Bits of a byte with the mark of an image's last.
 pub(super) const OCTET_BITS: usize = 9;
@@ -57,58 +51,38 @@ pub(super) const OCTET_BITS: usize = 9;
 impl TablesIn {
     /// For codes of `code_bits` bits, with bytes between them if the tables are `writable`.
     pub fn new(code_bits: usize, writable: bool) -> Self {
-        let block = TablesIn {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(code_bits),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            octet: Wire::new(OCTET_BITS),
-            octet_valid: Default::default(),
-            octet_taken: Default::default(),
-            m_axis_tdata: Wire::new(code_bits + usize::from(writable)),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(code_bits, writable))
+        TablesIn { code_bits, writable }
     }
 }
 
-fn kernel(code_bits: usize, writable: bool) -> Kernel {
-    let k = Builder::new("tables_in");
-    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", code_bits));
-    let [given, last] = ["s_axis_tvalid", "s_axis_tlast"].map(|name| k.input(name, 1));
-    let (octet, octet_valid) = (k.input("octet", OCTET_BITS), k.input("octet_valid", 1));
-    let ready = k.input("m_axis_tready", 1);
-    if !writable {
-        k.comment("The tables are in the bitstream.");
-        k.wire("s_axis_tready", ready);
-        k.wire("octet_taken", k.constant(1, 0));
-        k.wire("m_axis_tdata", data);
-        k.wire("m_axis_tvalid", given);
-        k.wire("m_axis_tlast", last);
-        return k.finish();
+impl Block for TablesIn {
+    fn build<'k>(&self, k: &'k Builder, io: TablesInPorts<Inside<'k>>) {
+        if !self.writable {
+            k.comment("The tables are in the bitstream.");
+            io.s_axis_tready.set(io.m_axis_tready);
+            io.octet_taken.set(k.constant(1, 0));
+            io.m_axis_tdata.set(io.s_axis_tdata);
+            io.m_axis_tvalid.set(io.s_axis_tvalid);
+            io.m_axis_tlast.set(io.s_axis_tlast);
+            return;
+        }
+        let bit = Type::unsigned(1);
+        let in_frame = k.state("in_frame", bit, io.rst, 0).comment("A frame has begun and not ended.");
+        let in_image = k.state("in_image", bit, io.rst, 0).comment("An image has begun and not ended.");
+        let held = k.state("held", bit, io.rst, 0).comment("A code was offered and not accepted.");
+        let is_byte = k.wire("is_byte", *in_image | (io.octet_valid & !*in_frame & !*held));
+        let code_taken = io.s_axis_tready.set(io.m_axis_tready & !is_byte);
+        let octet_taken = io.octet_taken.set(io.m_axis_tready & is_byte & io.octet_valid);
+        let offered = io.m_axis_tvalid.set(is_byte.mux(io.octet_valid, io.s_axis_tvalid));
+        io.m_axis_tdata.set(is_byte.mux(
+            table_beat(k, io.octet.low(8), self.code_bits),
+            io.s_axis_tdata.signed().extend(io.m_axis_tdata.bits()).unsigned(),
+        ));
+        io.m_axis_tlast.set(is_byte.mux(io.octet.top(), io.s_axis_tlast));
+        held.set(offered & !is_byte & !io.m_axis_tready);
+        k.when(io.s_axis_tvalid & code_taken, || in_frame.set(!io.s_axis_tlast));
+        k.when(octet_taken, || in_image.set(!io.octet.top()));
     }
-    let bit = Type::unsigned(1);
-    let in_frame = k.state("in_frame", bit, rst, 0).comment("A frame has begun and not ended.");
-    let in_image = k.state("in_image", bit, rst, 0).comment("An image has begun and not ended.");
-    let held = k.state("held", bit, rst, 0).comment("A code was offered and not accepted.");
-    let is_byte = k.wire("is_byte", *in_image | (octet_valid & !*in_frame & !*held));
-    let code_taken = k.wire("s_axis_tready", ready & !is_byte);
-    let octet_taken = k.wire("octet_taken", ready & is_byte & octet_valid);
-    let offered = k.wire("m_axis_tvalid", is_byte.mux(octet_valid, given));
-    k.wire(
-        "m_axis_tdata",
-        is_byte.mux(table_beat(&k, octet.low(8), code_bits), data.signed().extend(code_bits + 1).unsigned()),
-    );
-    k.wire("m_axis_tlast", is_byte.mux(octet.top(), last));
-    held.set(offered & !is_byte & !ready);
-    k.when(given & code_taken, || in_frame.set(!last));
-    k.when(octet_taken, || in_image.set(!octet.top()));
-    k.finish()
 }
 
 #[cfg(test)]
@@ -116,6 +90,7 @@ mod tests {
     use dermis_golden::fixed::stages::load;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, random_words, Pipeline, Reference};
     use crate::wire::Word;
 
@@ -187,13 +162,13 @@ mod tests {
                 ]
             })
             .collect();
-        check(TablesIn::new(BITS, true).kernel.kernel(), &stimulus, &mut Turns::default());
+        check(&kernel_of(&TablesIn::new(BITS, true)), &stimulus, &mut Turns::default());
     }
 
     #[test]
     fn without_writable_tables_the_stream_passes() {
         let stimulus = random_words(300, &[1, BITS, 1, 1, OCTET_BITS, 1, 1]);
         let of = |inputs: &[Word]| [inputs[6], Word::default(), inputs[1], inputs[2], inputs[3]].map(Some).into();
-        check(TablesIn::new(BITS, false).kernel.kernel(), &stimulus, &mut Pipeline::new(0, 5, of));
+        check(&kernel_of(&TablesIn::new(BITS, false)), &stimulus, &mut Pipeline::new(0, 5, of));
     }
 }

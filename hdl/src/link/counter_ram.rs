@@ -7,12 +7,12 @@ use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::count_bits;
 
 block! {
-    /// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
-    /// counters, in the order of [`Counters`], from 16.
+    /// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8,
+    /// the counters, in the order of [`Counters`], from 16.
     ///
-    /// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory and adder
-    /// in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is not valid
-    /// meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
+    /// An event of a packet is counted in the three cycles after it (read, add, write), with a register between memory
+    /// and adder in four; while `hold` is high it waits, because the two bytes of a counter are being read. `entry` is
+    /// not valid meanwhile. Counters wrap. Reset clears one counter per cycle and has to last at least eight cycles.
     pub struct CounterRam {
         /// The identity by entry, the first byte of each in the low bits.
         words: Vec<(usize, u64)>,
@@ -25,8 +25,8 @@ block! {
         in rst;
         /// A packet was accepted in this cycle.
         in taken;
-        /// One bit per cause for which a packet is dropped: framing, CRC, unknown type, length; each high for the cycle of
-        /// its event.
+        /// One bit per cause for which a packet is dropped: framing, CRC, unknown type, length; each high for the cycle
+        /// of its event.
         in fault: EVENTS - 2;
         /// A packet was dropped in this cycle because earlier ones are not answered yet.
         in overrun;

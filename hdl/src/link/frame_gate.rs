@@ -4,11 +4,12 @@ use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
 
 block! {
-    /// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose first beat
-    /// comes while a request waits passes; the others are dropped, so that the engine never waits for the link.
+    /// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose
+    /// first beat comes while a request waits passes; the others are dropped, so that the engine never waits for the
+    /// link.
     ///
-    /// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the array's rows
-    /// driven meanwhile, and be old when they are sent.
+    /// While a frame passes, `busy` is high and no scan should begin: its codes would wait for the link, with the
+    /// array's rows driven meanwhile, and be old when they are sent.
     #[derive(Default)]
     pub struct FrameGate {}
     ports FrameGatePorts {

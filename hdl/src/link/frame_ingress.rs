@@ -8,18 +8,18 @@ use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, table_beat};
 
 block! {
-    /// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
-    /// packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine drops the
-    /// frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that is already
-    /// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
-    /// it.
+    /// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A
+    /// good packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine
+    /// drops the frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that
+    /// is already offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early
+    /// `tlast` follows it.
     ///
-    /// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their packet's end as
-    /// well: an image that is not whole ends early.
+    /// The bytes of an image of tables are beats like codes ([`Load`](crate::primitives::Load)), and wait for their
+    /// packet's end as well: an image that is not whole ends early.
     ///
-    /// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses a code
-    /// or byte because of that, or starts while the frame or image before is still held, is dropped too, and counts as an
-    /// `overrun` if its packet is good.
+    /// The engine accepts no code while its buffer is full, and no byte of an image while it solves a frame. What loses
+    /// a code or byte because of that, or starts while the frame or image before is still held, is dropped too, and
+    /// counts as an `overrun` if its packet is good.
     pub struct FrameIngress {
         /// Codes of a frame.
         taxels: usize,

@@ -4,8 +4,8 @@ use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
 
 block! {
-    /// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period after
-    /// their event.
+    /// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period
+    /// after their event.
     pub struct Lamps {
         /// `alive` has a period of 2^`bits` cycles.
         bits: usize,

@@ -8,10 +8,10 @@ use crate::language::{Block, Builder, Inside, Type};
 block! {
     /// Sends SLIP END, header, words of twelve bytes up to the last, CRC, SLIP END.
     ///
-    /// An answer starts when one is offered and none is being sent; its source and number are stored. The sources select
-    /// each byte themselves, so that no word register is needed here: `index` is the byte of the word that is needed, and
-    /// `taken` says that the word has been sent. An offered byte stays until it is accepted; the next one waits until the
-    /// CRC has processed it.
+    /// An answer starts when one is offered and none is being sent; its source and number are stored. The sources
+    /// select each byte themselves, so that no word register is needed here: `index` is the byte of the word that is
+    /// needed, and `taken` says that the word has been sent. An offered byte stays until it is accepted; the next one
+    /// waits until the CRC has processed it.
     pub struct Packer {
         /// Bytes of the payload, by source.
         lengths: [usize; 4],

@@ -11,8 +11,8 @@ block! {
     /// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
     /// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
     ///
-    /// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header is complete
-    /// and correct, then `payload` with each byte, in the same cycle.
+    /// The payload of a frame, or of an image of tables, is passed on while it arrives: `frame_begin` when its header
+    /// is complete and correct, then `payload` with each byte, in the same cycle.
     pub struct Parser {
         /// Bytes of the payload of a frame.
         frame_bytes: usize,

@@ -4,8 +4,8 @@ use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
 
 block! {
-    /// `rst` is high for seventeen cycles after configuration, and while the button is held. Relies on the register values
-    /// after configuration.
+    /// `rst` is high for seventeen cycles after configuration, and while the button is held. Relies on the register
+    /// values after configuration.
     #[derive(Default)]
     pub struct PowerOn {}
     ports PowerOnPorts {

@@ -8,16 +8,16 @@ use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::count_bits;
 
 block! {
-    /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
-    /// the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one that comes
-    /// before such a reading is answered has no answer of its own.
+    /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames
+    /// in the engine, in order. An image of tables that is in the engine is answered as a reading of the counters; one
+    /// that comes before such a reading is answered has no answer of its own.
     ///
     /// `offer` is high when a request can be answered, with the number of the request and the source of the
     /// answer; `begun` removes it.
     ///
     /// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
-    /// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a payload, and
-    /// the request is dropped while the queue is full.
+    /// never overflows; the serial one holds two. Where the hardware scans its array, a frame is requested without a
+    /// payload, and the request is dropped while the queue is full.
     pub struct Requests {
         /// Frames in the queue, a power of two.
         depth: usize,
@@ -39,7 +39,8 @@ block! {
         in taken;
         /// A request without payload is accepted; with `good`.
         out noted;
-        /// A request without payload is dropped, because one of its type is not answered yet, or the queue is full; with `good`.
+        /// A request without payload is dropped, because one of its type is not answered yet, or the queue is full;
+        /// with `good`.
         out overrun;
         /// The engine offers a beat of an answer.
         in answered;

@@ -7,9 +7,9 @@ use crate::primitives::count_bits;
 
 block! {
     /// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With
-    /// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is needed: for
-    /// Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times,
-    /// once per cycle; likewise for rows.
+    /// `summarise`, the forces are added up, and four words of sums go out before the status beats. No multiplier is
+    /// needed: for Σ column · fz, the sum of the fz to the left of each taxel is subtracted, and at the end Σ fz is
+    /// added columns − 1 times, once per cycle; likewise for rows.
     pub struct Resultants {
         /// Rows and columns of the array whose forces are added up; none where all beats pass.
         sides: Option<[usize; 2]>,
@@ -29,8 +29,8 @@ block! {
         in beat_valid;
         /// The beat is its frame's last; valid with `beat_valid`.
         in beat_last;
-        /// The beat is accepted in this cycle. Registered where sums are computed, so that the packer's logic is not in the
-        /// path of a fast engine: a beat that is a word then stays for two cycles after its word was accepted.
+        /// The beat is accepted in this cycle. Registered where sums are computed, so that the packer's logic is not in
+        /// the path of a fast engine: a beat that is a word then stays for two cycles after its word was accepted.
         out beat_ready;
         /// A word of the payload, 96 bits; valid with `word_valid`.
         out word: 96;

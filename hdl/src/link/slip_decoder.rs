@@ -9,8 +9,8 @@ use crate::language::{Block, Builder, Inside, Type};
 const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 2..=3]));
 
 block! {
-    /// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the next
-    /// END.
+    /// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the
+    /// next END.
     #[derive(Default)]
     pub struct SlipDecoder {}
     ports SlipDecoderPorts {

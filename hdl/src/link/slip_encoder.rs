@@ -9,7 +9,8 @@ block! {
     /// Escapes bytes as SLIP requires; with `border`, an END between packets is sent unescaped.
     ///
     /// With many lanes the block has two extra registers, because the link's pins may be far from the packer: whether a
-    /// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted it.
+    /// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted
+    /// it.
     pub struct SlipEncoder {
         /// There are the two extra registers.
         registered: bool,

@@ -6,9 +6,9 @@ use crate::language::{concat, Block, Builder, Inside, Output, Type};
 block! {
     /// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
     ///
-    /// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five cycles
-    /// after it asked for it.
-    /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
+    /// With many lanes it has four register stages, that of the index first: the packer uses a byte no sooner than five
+    /// cycles after it asked for it. A link whose bit rate is close to the clock has no cycle to spare, but a smaller
+    /// multiplexer.
     pub struct Sources {
         /// There are the four register stages.
         registered: bool,

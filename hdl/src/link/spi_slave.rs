@@ -14,13 +14,14 @@ block! {
     ///  miso <-----------------'   ^------ sclk_kept <--(offer, 2 registers)------------ offered <- send_data
     ///                                          '-------(sclk_taken, 2 registers)------> send_ready
     /// ```
-    /// Receiving: the eighth rising edge stores the byte and flips a toggle. `clk` sees the toggle at its third edge after
-    /// that at the latest; the byte stays unchanged for eight periods of `spi_sclk`. An incomplete byte is dropped.
+    /// Receiving: the eighth rising edge stores the byte and flips a toggle. `clk` sees the toggle at its third edge
+    /// after that at the latest; the byte stays unchanged for eight periods of `spi_sclk`. An incomplete byte is
+    /// dropped.
     ///
-    /// Sending: the bits change on falling edges. The eighth rising edge of a byte stores the next one if `clk` offers one,
-    /// and acknowledges it; the falling edge then loads it, or IDLE. The stored byte is released only when the controller
-    /// has sampled all eight of its bits: if a transaction ends earlier, the next one sends that byte again from its first
-    /// bit. The first byte of a transaction is IDLE.
+    /// Sending: the bits change on falling edges. The eighth rising edge of a byte stores the next one if `clk` offers
+    /// one, and acknowledges it; the falling edge then loads it, or IDLE. The stored byte is released only when the
+    /// controller has sampled all eight of its bits: if a transaction ends earlier, the next one sends that byte again
+    /// from its first bit. The first byte of a transaction is IDLE.
     ///
     /// While `spi_cs_n` is high, edges of `spi_sclk` have no effect: they are for another slave.
     #[derive(Default)]

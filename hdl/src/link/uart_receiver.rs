@@ -5,9 +5,9 @@ use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
 
 block! {
-    /// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are sampled
-    /// in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop bit. A byte
-    /// without stop bit is `broken`; the next one starts only after the line has been idle again.
+    /// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are
+    /// sampled in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop
+    /// bit. A byte without stop bit is `broken`; the next one starts only after the line has been idle again.
     ///
     /// `valid` and `broken` are pulses of one cycle; `data` is stable until the first data bit of the next byte.
     pub struct UartReceiver {
