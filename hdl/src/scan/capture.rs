@@ -2,187 +2,155 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::stages::scan::{alignment, rail};
-use rust_hdl::prelude::*;
 
 use super::Shape;
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{concat, Block, Builder, Inside, Type};
 
-/// ```text
-/// miso ─> 2 registers ─> shift ─(done)─> sum of a channel's samples ─(closes)─> code of each converter ─> m_axis
-/// ```
-/// Of each converter the end of its frame is tag and result. Codes, marks of samples at an end of the range and of tags
-/// that name another channel are those of [`dermis_golden::fixed::stages::scan`]. The codes of one channel of all converters
-/// leave one after the other, beginning three cycles after `done`; the frames before the next channel's last must leave
-/// them time for it: `clear`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScanCapture {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Outputs of the converters, one bit each; pins, asynchronous to the clock.
-    pub miso: Wire<In>,
-    /// The pins were to be sampled one cycle ago.
-    pub take: Signal<In, Bit>,
-    /// A frame ended one cycle ago.
-    pub done: Signal<In, Bit>,
-    /// The frame has a result; valid with `done`, as what follows, and held until the next.
-    pub result: Signal<In, Bit>,
-    /// It is the first sample of its channel.
-    pub opens: Signal<In, Bit>,
-    /// It is the last sample of its channel.
-    pub closes: Signal<In, Bit>,
-    /// It is in the last channel of the last row.
-    pub ends: Signal<In, Bit>,
-    /// Its channel, unsigned; valid with `done`.
-    pub channel: Wire<In>,
-    /// For each converter whether its taxel is not dead; valid with `done`.
-    pub alive: Wire<In>,
-    /// A taxel's code, two's complement; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A code is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a code in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The code is the last of its scan; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// The last code of a scan is accepted in this cycle.
-    pub complete: Signal<Out, Bit>,
-    /// A sample of the scan was at an end of the range; valid with `complete`.
-    pub rail: Signal<Out, Bit>,
-    /// A sample of the scan named another channel; valid with `complete`.
-    pub other: Signal<Out, Bit>,
-    /// No code waits.
-    pub clear: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// miso ─> 2 registers ─> shift ─(done)─> sum of a channel's samples ─(closes)─> code of each converter ─> m_axis
+    /// ```
+    /// Of each converter the end of its frame is tag and result. Codes, marks of samples at an end of the range and of
+    /// tags that name another channel are those of [`dermis_golden::fixed::stages::scan`]. The codes of one channel of
+    /// all converters leave one after the other, beginning three cycles after `done`; the frames before the next
+    /// channel's last must leave them time for it: `clear`.
+    pub struct ScanCapture {
+        shape: Shape,
+    }
+    ports ScanCapturePorts {
+        clock;
+        reset;
+        /// Outputs of the converters, one bit each; pins, asynchronous to the clock.
+        in miso: shape.scan.converters;
+        /// The pins were to be sampled one cycle ago.
+        in take;
+        /// A frame ended one cycle ago.
+        in done;
+        /// The frame has a result; valid with `done`, as what follows, and held until the next.
+        in result;
+        /// It is the first sample of its channel.
+        in opens;
+        /// It is the last sample of its channel.
+        in closes;
+        /// It is in the last channel of the last row.
+        in ends;
+        /// Its channel, unsigned; valid with `done`.
+        in channel: count_bits(shape.scan.channels);
+        /// For each converter whether its taxel is not dead; valid with `done`.
+        in alive: shape.scan.converters;
+        /// A taxel's code, two's complement; valid with `m_axis_tvalid`.
+        out m_axis_tdata: shape.code_bits as usize;
+        /// A code is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a code in this cycle.
+        in m_axis_tready;
+        /// The code is the last of its scan; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// The last code of a scan is accepted in this cycle.
+        out complete;
+        /// A sample of the scan was at an end of the range; valid with `complete`.
+        out rail;
+        /// A sample of the scan named another channel; valid with `complete`.
+        out other;
+        /// No code waits.
+        out clear;
+    }
 }
-
-kernel_block!(
-    ScanCapture,
-    clock clk,
-    inputs [rst, miso, take, done, result, opens, closes, ends, channel, alive, m_axis_tready],
-    outputs [m_axis_tdata, m_axis_tvalid, m_axis_tlast, complete, rail, other, clear]
-);
 
 impl ScanCapture {
     /// For the scan of this shape.
     pub fn new(shape: &Shape) -> Self {
-        let block = ScanCapture {
-            clk: Default::default(),
-            rst: Default::default(),
-            miso: Wire::new(shape.scan.converters),
-            take: Default::default(),
-            done: Default::default(),
-            result: Default::default(),
-            opens: Default::default(),
-            closes: Default::default(),
-            ends: Default::default(),
-            channel: Wire::new(count_bits(shape.scan.channels)),
-            alive: Wire::new(shape.scan.converters),
-            m_axis_tdata: Wire::new(shape.code_bits as usize),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            complete: Default::default(),
-            rail: Default::default(),
-            other: Default::default(),
-            clear: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(shape))
+        ScanCapture { shape: shape.clone() }
     }
 }
 
-fn kernel(shape: &Shape) -> Kernel {
-    let Shape { scan, code_bits, .. } = shape;
-    let (converter, count, power) = (&scan.converter, scan.converters, scan.average as usize);
-    let (bits, tag_bits, code) = (converter.bits as usize, converter.tag_bits as usize, *code_bits as usize);
-    // One bit more than a result, for the sign of a unipolar one.
-    let (value_bits, sum_bits) = (bits + 1, bits + 1 + power);
-    let shift = alignment(converter, *code_bits) as usize;
-    let k = Builder::new("scan_capture");
-    let (rst, miso) = (k.input("rst", 1), k.input("miso", count));
-    let [take, done, result, opens, closes, ends] =
-        ["take", "done", "result", "opens", "closes", "ends"].map(|name| k.input(name, 1));
-    let channel = k.input("channel", count_bits(scan.channels));
-    let (alive, ready) = (k.input("alive", count), k.input("m_axis_tready", 1));
-    let bit = Type::unsigned(1);
+impl Block for ScanCapture {
+    fn build<'k>(&self, k: &'k Builder, io: ScanCapturePorts<Inside<'k>>) {
+        let Shape { scan, code_bits, .. } = &self.shape;
+        let (converter, count, power) = (&scan.converter, scan.converters, scan.average as usize);
+        let (bits, tag_bits, code) = (converter.bits as usize, converter.tag_bits as usize, *code_bits as usize);
+        // One bit more than a result, for the sign of a unipolar one.
+        let (value_bits, sum_bits) = (bits + 1, bits + 1 + power);
+        let shift = alignment(converter, *code_bits) as usize;
+        let bit = Type::unsigned(1);
 
-    let first = k.delay("miso_1", miso);
-    let pins = k.delay("miso_2", first);
-    let [taken, ended, closing] = ["taken", "ended", "closing"].map(|name| k.state(name, bit, rst, 0));
-    taken.set(take);
-    ended.set(done & result);
-    closing.set(*ended & closes);
+        let first = k.delay("miso_1", io.miso);
+        let pins = k.delay("miso_2", first);
+        let [taken, ended, closing] = ["taken", "ended", "closing"].map(|name| k.state(name, bit, io.rst, 0));
+        taken.set(io.take);
+        ended.set(io.done & io.result);
+        closing.set(*ended & io.closes);
 
-    let waiting = k.state("waiting", Type::unsigned(count_bits(count + 1)), rst, 0).comment("Codes that wait.");
-    let is_last = k.register("is_last", bit);
-    let held: Vec<_> = (0..count).map(|own| k.register(&format!("held_{own}"), Type::unsigned(code))).collect();
-    let offered = k.wire("m_axis_tvalid", waiting.any());
-    let moves = k.wire("moves", offered & ready);
-    k.when(moves, || {
-        waiting.set(waiting.minus(1));
-        held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
-    });
-    let (mut at_end, mut at_other) = (Vec::new(), Vec::new());
-    for (own, to) in held.iter().enumerate() {
-        let name = |of: &str| format!("{of}_{own}");
-        let answer = k.register(&name("answer"), Type::unsigned(bits + tag_bits));
-        k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(own))));
-        let raw = answer.low(bits);
-        let value = match converter.bipolar {
-            // Less the middle of the range.
-            true => (!raw.top()).concat(raw.low(bits - 1)).signed().extend(value_bits),
-            false => raw.extend(value_bits).signed(),
-        };
-        let sum = k.register(&name("sum"), Type::signed(sum_bits));
-        let zero = k.constant(1, 0);
-        let marks = [
-            ("high", raw.all()),
-            ("low", if converter.bipolar { !raw.any() } else { zero }),
-            ("wrong", if tag_bits > 0 { answer.slice(bits, tag_bits).differs(channel.extend(tag_bits)) } else { zero }),
-        ];
-        let [high, low, wrong] = marks.map(|(of, now)| {
-            if now.is_same(zero) {
-                return zero;
-            }
-            let mark = k.register(&name(of), bit);
-            k.when(*ended, || mark.set(now | (*mark & !opens)));
-            *mark
+        let waiting = k.state("waiting", Type::unsigned(count_bits(count + 1)), io.rst, 0).comment("Codes that wait.");
+        let is_last = k.register("is_last", bit);
+        let held: Vec<_> = (0..count).map(|own| k.register(&format!("held_{own}"), Type::unsigned(code))).collect();
+        let offered = io.m_axis_tvalid.set(waiting.any());
+        let moves = k.wire("moves", offered & io.m_axis_tready);
+        k.when(moves, || {
+            waiting.set(waiting.minus(1));
+            held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
         });
-        let before = opens.mux(k.signed_constant(sum_bits, 0), *sum);
-        k.when(*ended, || sum.set((before + value.extend(sum_bits)).resize(sum_bits)));
-        let mean = sum.shift_left(shift).round_shift(power).low(code);
-        let [top, bottom] =
-            [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
-        let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
-        k.when(*closing, || to.set(own_code));
-        at_end.push((high | low) & alive.at(own));
-        at_other.push(wrong & alive.at(own));
+        let (mut at_end, mut at_other) = (Vec::new(), Vec::new());
+        for (own, to) in held.iter().enumerate() {
+            let name = |of: &str| format!("{of}_{own}");
+            let answer = k.register(&name("answer"), Type::unsigned(bits + tag_bits));
+            k.when(*taken, || answer.set(answer.low(answer.bits() - 1).concat(pins.at(own))));
+            let raw = answer.low(bits);
+            let value = match converter.bipolar {
+                // Less the middle of the range.
+                true => (!raw.top()).concat(raw.low(bits - 1)).signed().extend(value_bits),
+                false => raw.extend(value_bits).signed(),
+            };
+            let sum = k.register(&name("sum"), Type::signed(sum_bits));
+            let zero = k.constant(1, 0);
+            let marks = [
+                ("high", raw.all()),
+                ("low", if converter.bipolar { !raw.any() } else { zero }),
+                (
+                    "wrong",
+                    if tag_bits > 0 { answer.slice(bits, tag_bits).differs(io.channel.extend(tag_bits)) } else { zero },
+                ),
+            ];
+            let [high, low, wrong] = marks.map(|(of, now)| {
+                if now.is_same(zero) {
+                    return zero;
+                }
+                let mark = k.register(&name(of), bit);
+                k.when(*ended, || mark.set(now | (*mark & !io.opens)));
+                *mark
+            });
+            let before = io.opens.mux(k.signed_constant(sum_bits, 0), *sum);
+            k.when(*ended, || sum.set((before + value.extend(sum_bits)).resize(sum_bits)));
+            let mean = sum.shift_left(shift).round_shift(power).low(code);
+            let [top, bottom] =
+                [rail(*code_bits), -rail(*code_bits)].map(|end| k.signed_constant(code, end.into()).unsigned());
+            let own_code = k.wire(&name("code"), (high | wrong).mux(top, low.mux(bottom, mean)));
+            k.when(*closing, || to.set(own_code));
+            at_end.push((high | low) & io.alive.at(own));
+            at_other.push(wrong & io.alive.at(own));
+        }
+        k.when(*closing, || {
+            waiting.set(k.constant(waiting.bits(), count as u64));
+            is_last.set(io.ends);
+        });
+        io.m_axis_tdata.set(*held[0]);
+        let last = io.m_axis_tlast.set(*is_last & waiting.is(1));
+        let complete = io.complete.set(moves & last);
+        io.clear.set(!offered);
+        for (mark, marks) in [(io.rail, at_end), (io.other, at_other)] {
+            let seen = mark.state(io.rst, 0);
+            k.when(complete, || seen.set(k.constant(1, 0)));
+            k.when(*closing, || seen.set(*seen | concat(&marks).any()));
+        }
     }
-    k.when(*closing, || {
-        waiting.set(k.constant(waiting.bits(), count as u64));
-        is_last.set(ends);
-    });
-    k.wire("m_axis_tdata", *held[0]);
-    let last = k.wire("m_axis_tlast", *is_last & waiting.is(1));
-    let complete = k.wire("complete", moves & last);
-    k.wire("clear", !offered);
-    for (name, marks) in [("rail", at_end), ("other", at_other)] {
-        let seen = k.state(name, bit, rst, 0);
-        k.when(complete, || seen.set(k.constant(1, 0)));
-        k.when(*closing, || seen.set(*seen | concat(&marks).any()));
-    }
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::sequencer::tests::shape;
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::wire::Word;
     use dermis_golden::fixed::stages::scan::code;
@@ -352,7 +320,7 @@ mod tests {
     fn codes_and_marks_are_those_of_the_stage() {
         for shape in [shape(0, 3, 2, &[]), shape(0, 1, 0, &[]), shape(1, 2, 3, &[]), shape(1, 8, 0, &[])] {
             let subject = |changes: &[Change]| {
-                block_subject!(
+                subject_of!(
                     ScanCapture::new(&shape),
                     changes,
                     inputs [rst, miso, take, done, result, opens, closes, ends, channel, alive, m_axis_tready],

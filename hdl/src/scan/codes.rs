@@ -1,60 +1,53 @@
 //! Codes of a scan at the end of its frame.
 
 use dermis_golden::fixed::stages::scan::CODES_PER_BEAT;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// The codes that the engine takes are kept until the frame's forces and status have left, and follow them, as
-/// [`dermis_golden::fixed::stages::scan::beats`] says: a host can compare the forces with the model's for these codes, and
-/// calibrate the array from them.
-///
-/// Each scan has a slot of its own; one that is broken off leaves its slot to the next. There are slots for those in the
-/// engine, for one that is taken, and for one more, whose scan has begun.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScanCodes {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, two's complement; valid with `passed`.
-    pub code: Wire<In>,
-    /// The engine takes the code in this cycle.
-    pub passed: Signal<In, Bit>,
-    /// It is the last of its scan; with `passed`.
-    pub complete: Signal<In, Bit>,
-    /// The scan is broken off: its codes are forgotten.
-    pub broken: Signal<In, Bit>,
-    /// There is a slot for one more scan.
-    pub room: Signal<Out, Bit>,
-    /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of the engine's frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A beat of the engine, or three codes; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// The codes that the engine takes are kept until the frame's forces and status have left, and follow them, as
+    /// [`dermis_golden::fixed::stages::scan::beats`] says: a host can compare the forces with the model's for these
+    /// codes, and calibrate the array from them.
+    ///
+    /// Each scan has a slot of its own; one that is broken off leaves its slot to the next. There are slots for those
+    /// in the engine, for one that is taken, and for one more, whose scan has begun.
+    pub struct ScanCodes {
+        taxels: usize,
+        code_bits: usize,
+    }
+    ports ScanCodesPorts {
+        clock;
+        reset;
+        /// A taxel's code, two's complement; valid with `passed`.
+        in code: code_bits;
+        /// The engine takes the code in this cycle.
+        in passed;
+        /// It is the last of its scan; with `passed`.
+        in complete;
+        /// The scan is broken off: its codes are forgotten.
+        in broken;
+        /// There is a slot for one more scan.
+        out room;
+        /// A beat of the engine, three words; valid with `s_axis_tvalid`.
+        in s_axis_tdata: BEAT;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of the engine's frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A beat of the engine, or three codes; valid with `m_axis_tvalid`.
+        out m_axis_tdata: BEAT;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+    }
 }
-
-kernel_block!(
-    ScanCodes,
-    clock clk,
-    inputs [rst, code, passed, complete, broken, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [room, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
-);
 
 /// Width of a word of a beat, and of a beat.
 const WORD: usize = 32;
@@ -67,90 +60,69 @@ const MOST_WAITING: u64 = SLOTS as u64 - 3;
 impl ScanCodes {
     /// For scans of so many taxels with codes of `code_bits`.
     pub fn new(taxels: usize, code_bits: usize) -> Self {
-        let block = ScanCodes {
-            clk: Default::default(),
-            rst: Default::default(),
-            code: Wire::new(code_bits),
-            passed: Default::default(),
-            complete: Default::default(),
-            broken: Default::default(),
-            room: Default::default(),
-            s_axis_tdata: Wire::new(BEAT),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(BEAT),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(taxels, code_bits))
+        ScanCodes { taxels, code_bits }
     }
 }
 
-fn kernel(taxels: usize, code_bits: usize) -> Kernel {
-    let k = Builder::new("scan_codes");
-    let (rst, code) = (k.input("rst", 1), k.input("code", code_bits));
-    let [passed, complete, broken] = ["passed", "complete", "broken"].map(|name| k.input(name, 1));
-    let (data, given) = (k.input("s_axis_tdata", BEAT), k.input("s_axis_tvalid", 1));
-    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-    // Beyond the last taxel there may be two places of a beat.
-    let (t, s) = (count_bits(taxels + CODES_PER_BEAT), count_bits(SLOTS));
-    let state = |name: &str, bits: usize| k.state(name, Type::unsigned(bits), rst, 0);
-    let zero = |bits: usize| k.constant(bits, 0);
+impl Block for ScanCodes {
+    fn build<'k>(&self, k: &'k Builder, io: ScanCodesPorts<Inside<'k>>) {
+        let ScanCodes { taxels, code_bits } = *self;
+        // Beyond the last taxel there may be two places of a beat.
+        let (t, s) = (count_bits(taxels + CODES_PER_BEAT), count_bits(SLOTS));
+        let state = |name: &str, bits: usize| k.state(name, Type::unsigned(bits), io.rst, 0);
+        let zero = |bits: usize| k.constant(bits, 0);
 
-    let kept = k.memory("kept", SLOTS << t, code_bits, Contents::Undefined).unchecked();
-    let (slot, place) = (state("slot", s), state("place", t).comment("Codes of the scan that is taken, so far."));
-    let (waiting, from) = (state("waiting", s + 1), state("from", s));
-    kept.write(passed, slot.concat(*place), code);
-    k.when(passed, || place.set(place.plus(1)));
-    k.when(complete | broken, || place.set(zero(t)));
-    k.when(complete, || slot.set(slot.plus(1)));
+        let kept = k.memory("kept", SLOTS << t, code_bits, Contents::Undefined).unchecked();
+        let (slot, place) = (state("slot", s), state("place", t).comment("Codes of the scan that is taken, so far."));
+        let (waiting, from) = (state("waiting", s + 1), state("from", s));
+        kept.write(io.passed, slot.concat(*place), io.code);
+        k.when(io.passed, || place.set(place.plus(1)));
+        k.when(io.complete | io.broken, || place.set(zero(t)));
+        k.when(io.complete, || slot.set(slot.plus(1)));
 
-    let sends = state("sends", 1).comment("The engine's last beat has left, and codes follow.");
-    let next = state("next", t).comment("Codes that have been read.");
-    let asked = state("asked", 2).comment("Codes of the beat that have been read, and that have come.");
-    let held = state("held", 2);
-    let word = k.register("word", Type::unsigned(BEAT));
-    let whole = CODES_PER_BEAT as u64;
-    let reads = k.wire("reads", *sends & !asked.is(whole));
-    let beyond = k.wire("beyond", !next.less(k.constant(t, taxels as u64)));
-    let came = k.delay("came", kept.read(from.concat(*next)));
-    let pads = k.delay("pads", beyond);
-    let comes = state("comes", 1);
-    comes.set(reads);
-    k.when(reads, || {
-        next.set(next.plus(1));
-        asked.set(asked.plus(1));
-    });
-    let own = pads.mux(zero(WORD), came.signed().extend(WORD).unsigned());
-    k.when(*comes, || {
-        held.set(held.plus(1));
-        word.set(own.concat(word.slice(WORD, BEAT - WORD)));
-    });
-    let offered = k.wire("offered", held.is(whole));
-    let moves = k.wire("moves", offered & ready);
-    let leaves = k.wire("leaves", moves & beyond);
-    k.when(moves, || [&asked, &held].iter().for_each(|count| count.set(zero(2))));
-    k.when(leaves, || {
-        next.set(zero(t));
-        from.set(from.plus(1));
-    });
-    let accepted = k.wire("s_axis_tready", ready & !*sends);
-    sends.set((*sends & !leaves) | (accepted & given & last));
-    waiting.set((*waiting + complete.extend(s + 1) - leaves.extend(s + 1)).low(s + 1));
-    k.wire("room", waiting.less(k.constant(s + 1, MOST_WAITING + 1)));
-    k.wire("m_axis_tvalid", sends.mux(offered, given));
-    k.wire("m_axis_tdata", sends.mux(*word, data));
-    k.wire("m_axis_tlast", offered & beyond);
-    k.finish()
+        let sends = state("sends", 1).comment("The engine's last beat has left, and codes follow.");
+        let next = state("next", t).comment("Codes that have been read.");
+        let asked = state("asked", 2).comment("Codes of the beat that have been read, and that have come.");
+        let held = state("held", 2);
+        let word = k.register("word", Type::unsigned(BEAT));
+        let whole = CODES_PER_BEAT as u64;
+        let reads = k.wire("reads", *sends & !asked.is(whole));
+        let beyond = k.wire("beyond", !next.less(k.constant(t, taxels as u64)));
+        let came = k.delay("came", kept.read(from.concat(*next)));
+        let pads = k.delay("pads", beyond);
+        let comes = state("comes", 1);
+        comes.set(reads);
+        k.when(reads, || {
+            next.set(next.plus(1));
+            asked.set(asked.plus(1));
+        });
+        let own = pads.mux(zero(WORD), came.signed().extend(WORD).unsigned());
+        k.when(*comes, || {
+            held.set(held.plus(1));
+            word.set(own.concat(word.slice(WORD, BEAT - WORD)));
+        });
+        let offered = k.wire("offered", held.is(whole));
+        let moves = k.wire("moves", offered & io.m_axis_tready);
+        let leaves = k.wire("leaves", moves & beyond);
+        k.when(moves, || [&asked, &held].iter().for_each(|count| count.set(zero(2))));
+        k.when(leaves, || {
+            next.set(zero(t));
+            from.set(from.plus(1));
+        });
+        let accepted = io.s_axis_tready.set(io.m_axis_tready & !*sends);
+        sends.set((*sends & !leaves) | (accepted & io.s_axis_tvalid & io.s_axis_tlast));
+        waiting.set((*waiting + io.complete.extend(s + 1) - leaves.extend(s + 1)).low(s + 1));
+        io.room.set(waiting.less(k.constant(s + 1, MOST_WAITING + 1)));
+        io.m_axis_tvalid.set(sends.mux(offered, io.s_axis_tvalid));
+        io.m_axis_tdata.set(sends.mux(*word, io.s_axis_tdata));
+        io.m_axis_tlast.set(offered & beyond);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::wire::Word;
     use dermis_golden::fixed::stages::scan::beats;
@@ -265,7 +237,7 @@ mod tests {
     #[test]
     fn codes_follow_their_frame() {
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 ScanCodes::new(TAXELS, CODE_BITS),
                 changes,
                 inputs [rst, code, passed, complete, broken, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],

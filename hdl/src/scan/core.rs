@@ -42,8 +42,8 @@ macro_rules! scan_core {
                 pub s_axis_tready: Signal<Out, Bit>,
                 /// The beat is the last of its image; valid with `s_axis_tvalid`.
                 pub s_axis_tlast: Signal<In, Bit>,
-                $tables: ScanTables,
-                $codes: ScanCodes,
+                $tables: RustHdl<ScanTables>,
+                $codes: RustHdl<ScanCodes>,
                 $unused: Signal<Local, Bit>,
             )?
             /// Address of the row that is driven, unsigned; valid after the reset.
@@ -66,10 +66,10 @@ macro_rules! scan_core {
             pub m_axis_tlast: Signal<Out, Bit>,
             // Registered, because the engine is large and its reset has a long route.
             restart: RustHdl<Dff>,
-            sequencer: ScanSequencer,
-            capture: ScanCapture,
+            sequencer: RustHdl<ScanSequencer>,
+            capture: RustHdl<ScanCapture>,
             engine: $engine,
-            told: ScanStatus,
+            told: RustHdl<ScanStatus>,
         }
 
         impl $name {
@@ -88,8 +88,8 @@ macro_rules! scan_core {
                         s_axis_tvalid: Default::default(),
                         s_axis_tready: Default::default(),
                         s_axis_tlast: Default::default(),
-                        $tables: ScanTables::new(shape.code_bits as usize),
-                        $codes: ScanCodes::new(model.scene.sensor.taxels(), shape.code_bits as usize),
+                        $tables: RustHdl::new(ScanTables::new(shape.code_bits as usize)),
+                        $codes: RustHdl::new(ScanCodes::new(model.scene.sensor.taxels(), shape.code_bits as usize)),
                         $unused: Default::default(),
                     )?
                     row: Wire::new(count_bits(shape.rows)),
@@ -102,10 +102,10 @@ macro_rules! scan_core {
                     m_axis_tready: Default::default(),
                     m_axis_tlast: Default::default(),
                     restart: Default::default(),
-                    sequencer: ScanSequencer::new(&shape),
-                    capture: ScanCapture::new(&shape),
+                    sequencer: RustHdl::new(ScanSequencer::new(&shape)),
+                    capture: RustHdl::new(ScanCapture::new(&shape)),
                     engine: <$engine>::new(model),
-                    told: ScanStatus::new(model.force_beats()),
+                    told: RustHdl::new(ScanStatus::new(model.force_beats())),
                 };
                 core.connect_all();
                 Ok(core)

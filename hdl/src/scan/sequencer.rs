@@ -2,88 +2,62 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::spec::adc::timing::Timing;
-use rust_hdl::prelude::*;
 
 use super::Shape;
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Type};
 
-/// Every period it scans the array: row by row, of a row channel by channel, of a channel sample by sample, as
-/// [`Timing`] says. The first frame of a row chooses channel 0, and its result is none.
-///
-/// A scan begins while `room`, a frame while `clear`: where the engine holds codes up, the scan waits, and no code is
-/// lost. A scan that is due while the one before still runs follows it at once.
-///
-/// `take` and `done` are one cycle after the edge of the pin: the input registers of `scan_capture` have the sample then.
-/// What belongs to `done` is held until the next.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScanSequencer {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; the first scan follows it.
-    pub rst: Signal<In, Bit>,
-    /// No code waits for the engine.
-    pub clear: Signal<In, Bit>,
-    /// There is room for the flags of one more scan.
-    pub room: Signal<In, Bit>,
-    /// Address of the row that is driven, unsigned; pins of the array.
-    pub row: Wire<Out>,
-    /// Serial clock; pin of all converters.
-    pub sclk: Signal<Out, Bit>,
-    /// Chip select, active low; pin of all converters.
-    pub cs_n: Signal<Out, Bit>,
-    /// Commands, most significant bit first; pin of all converters.
-    pub mosi: Signal<Out, Bit>,
-    /// The converters' outputs were sampled one cycle ago.
-    pub take: Signal<Out, Bit>,
-    /// A frame ended one cycle ago.
-    pub done: Signal<Out, Bit>,
-    /// The frame has a result; valid with `done`, as what follows.
-    pub result: Signal<Out, Bit>,
-    /// It is the first sample of its channel.
-    pub opens: Signal<Out, Bit>,
-    /// It is the last sample of its channel.
-    pub closes: Signal<Out, Bit>,
-    /// It is in the last channel of the last row.
-    pub ends: Signal<Out, Bit>,
-    /// Its channel, unsigned; valid with `done`.
-    pub channel: Wire<Out>,
-    /// For each converter whether its taxel is not dead; valid with `done`.
-    pub alive: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Every period it scans the array: row by row, of a row channel by channel, of a channel sample by sample, as
+    /// [`Timing`] says. The first frame of a row chooses channel 0, and its result is none.
+    ///
+    /// A scan begins while `room`, a frame while `clear`: where the engine holds codes up, the scan waits, and no code
+    /// is lost. A scan that is due while the one before still runs follows it at once.
+    ///
+    /// `take` and `done` are one cycle after the edge of the pin: the input registers of `scan_capture` have the sample
+    /// then. What belongs to `done` is held until the next.
+    pub struct ScanSequencer {
+        shape: Shape,
+    }
+    ports ScanSequencerPorts {
+        clock;
+        /// Synchronous reset, active high; the first scan follows it.
+        in rst;
+        /// No code waits for the engine.
+        in clear;
+        /// There is room for the flags of one more scan.
+        in room;
+        /// Address of the row that is driven, unsigned; pins of the array.
+        out row: count_bits(shape.rows);
+        /// Serial clock; pin of all converters.
+        out sclk;
+        /// Chip select, active low; pin of all converters.
+        out cs_n;
+        /// Commands, most significant bit first; pin of all converters.
+        out mosi;
+        /// The converters' outputs were sampled one cycle ago.
+        out take;
+        /// A frame ended one cycle ago.
+        out done;
+        /// The frame has a result; valid with `done`, as what follows.
+        out result;
+        /// It is the first sample of its channel.
+        out opens;
+        /// It is the last sample of its channel.
+        out closes;
+        /// It is in the last channel of the last row.
+        out ends;
+        /// Its channel, unsigned; valid with `done`.
+        out channel: count_bits(shape.scan.channels);
+        /// For each converter whether its taxel is not dead; valid with `done`.
+        out alive: shape.scan.converters;
+    }
 }
-
-kernel_block!(
-    ScanSequencer,
-    clock clk,
-    inputs [rst, clear, room],
-    outputs [row, sclk, cs_n, mosi, take, done, result, opens, closes, ends, channel, alive]
-);
 
 impl ScanSequencer {
     /// For the scan of this shape.
     pub fn new(shape: &Shape) -> Self {
-        let block = ScanSequencer {
-            clk: Default::default(),
-            rst: Default::default(),
-            clear: Default::default(),
-            room: Default::default(),
-            row: Wire::new(count_bits(shape.rows)),
-            sclk: Default::default(),
-            cs_n: Default::default(),
-            mosi: Default::default(),
-            take: Default::default(),
-            done: Default::default(),
-            result: Default::default(),
-            opens: Default::default(),
-            closes: Default::default(),
-            ends: Default::default(),
-            channel: Wire::new(count_bits(shape.scan.channels)),
-            alive: Wire::new(shape.scan.converters),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(shape))
+        ScanSequencer { shape: shape.clone() }
     }
 }
 
@@ -105,109 +79,109 @@ fn alive<'k>(k: &'k Builder, shape: &Shape, row: Expr<'k>, channel: Expr<'k>) ->
     place.table(count, &masks)
 }
 
-fn kernel(shape: &Shape) -> Kernel {
-    let Shape { scan, timing, rows, .. } = shape;
-    let Timing { half, gap, channel_gap, row_gap, period, .. } = *timing;
-    let converter = &scan.converter;
-    let steps = 2 * u64::from(converter.frame_bits);
-    let bits = |limit: u64| count_bits(limit as usize);
-    let k = Builder::new("scan_sequencer");
-    let (rst, clear, room) = (k.input("rst", 1), k.input("clear", 1), k.input("room", 1));
-    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
-    let state = |name: &str, bits: usize, value: u64| k.state(name, Type::unsigned(bits), rst, value);
+impl Block for ScanSequencer {
+    fn build<'k>(&self, k: &'k Builder, io: ScanSequencerPorts<Inside<'k>>) {
+        let Shape { scan, timing, rows, dead, .. } = &self.shape;
+        let Timing { half, gap, channel_gap, row_gap, period, .. } = *timing;
+        let converter = &scan.converter;
+        let steps = 2 * u64::from(converter.frame_bits);
+        let bits = |limit: u64| count_bits(limit as usize);
+        let (one, zero) = (k.constant(1, 1), k.constant(1, 0));
+        let state = |name: &str, bits: usize, value: u64| k.state(name, Type::unsigned(bits), io.rst, value);
 
-    let (timer, due) = (state("timer", bits(period), 0), state("due", 1, 1));
-    let running = state("running", 1, 0).comment("A scan is under way.");
-    let rest = state("rest", bits(row_gap.max(channel_gap)), 0).comment("Cycles with CS high that are left, less one.");
-    let active = state("active", 1, 0).comment("A frame is under way: CS is low.");
-    let slot = state("slot", bits(half), half - 1).comment("Cycles of the half period that are left, less one.");
-    let step = state("step", bits(steps + 1), 0).comment("Half periods of the frame so far.");
-    let clocked = state("clocked", 1, 0).comment("SCLK is not at its idle level.");
-    let command = state("command", converter.frame_bits as usize, 0);
-    let primed = state("primed", 1, 0).comment("Channel 0 of the row has been chosen.");
-    let row = state("row", count_bits(*rows), 0);
-    let asked = state("asked", count_bits(scan.channels), 0).comment("Channel that the frame converts.");
-    let sample = state("sample", count_bits(scan.samples()), 0);
+        let (timer, due) = (state("timer", bits(period), 0), state("due", 1, 1));
+        let running = state("running", 1, 0).comment("A scan is under way.");
+        let rest =
+            state("rest", bits(row_gap.max(channel_gap)), 0).comment("Cycles with CS high that are left, less one.");
+        let active = state("active", 1, 0).comment("A frame is under way: CS is low.");
+        let slot = state("slot", bits(half), half - 1).comment("Cycles of the half period that are left, less one.");
+        let step = state("step", bits(steps + 1), 0).comment("Half periods of the frame so far.");
+        let clocked = state("clocked", 1, 0).comment("SCLK is not at its idle level.");
+        let command = state("command", converter.frame_bits as usize, 0);
+        let primed = state("primed", 1, 0).comment("Channel 0 of the row has been chosen.");
+        let row = io.row.state(io.rst, 0);
+        let asked = state("asked", count_bits(scan.channels), 0).comment("Channel that the frame converts.");
+        let sample = state("sample", count_bits(scan.samples()), 0);
 
-    let wraps = k.wire("wraps", timer.is(period - 1));
-    let start = k.wire("start", *due & !*running & room);
-    let begins = k.wire("begins", *running & !*active & rest.is(0) & clear);
-    let slot_ends = k.wire("slot_ends", slot.is(0));
-    let advance = k.wire("advance", *active & slot_ends);
-    let last_step = k.wire("last_step", step.is(steps));
-    let leaves = k.wire("leaves", advance & last_step);
-    let last_sample = k.wire("last_sample", sample.is(scan.samples() as u64 - 1));
-    let last_channel = k.wire("last_channel", asked.is(scan.channels as u64 - 1));
-    let last_row = k.wire("last_row", row.is(*rows as u64 - 1));
-    let row_ends = k.wire("row_ends", *primed & last_sample & last_channel);
-    let following = last_channel.mux(k.constant(asked.bits(), 0), asked.plus(1));
-    let next = k.wire("next", (*primed & last_sample).mux(following, *asked));
+        let wraps = k.wire("wraps", timer.is(period - 1));
+        let start = k.wire("start", *due & !*running & io.room);
+        let begins = k.wire("begins", *running & !*active & rest.is(0) & io.clear);
+        let slot_ends = k.wire("slot_ends", slot.is(0));
+        let advance = k.wire("advance", *active & slot_ends);
+        let last_step = k.wire("last_step", step.is(steps));
+        let leaves = k.wire("leaves", advance & last_step);
+        let last_sample = k.wire("last_sample", sample.is(scan.samples() as u64 - 1));
+        let last_channel = k.wire("last_channel", asked.is(scan.channels as u64 - 1));
+        let last_row = k.wire("last_row", row.is(*rows as u64 - 1));
+        let row_ends = k.wire("row_ends", *primed & last_sample & last_channel);
+        let following = last_channel.mux(k.constant(asked.bits(), 0), asked.plus(1));
+        let next = k.wire("next", (*primed & last_sample).mux(following, *asked));
 
-    timer.set(wraps.mux(k.constant(timer.bits(), 0), timer.plus(1)));
-    due.set(wraps | (*due & !start));
-    let cycles = |number: u64| k.constant(rest.bits(), number - 1);
-    k.when(*running & !*active & rest.any(), || rest.set(rest.minus(1)));
-    k.when(start, || {
-        running.set(one);
-        rest.set(cycles(gap));
-    });
-    k.when(begins, || {
-        active.set(one);
-        let shift = converter.channel_shift as usize;
-        let width = converter.frame_bits as usize;
-        let choice = next.extend(width - shift).shift_left(shift);
-        command.set(k.constant(width, u64::from(converter.command)) | choice);
-    });
-    k.when(*active, || slot.set(slot_ends.mux(k.constant(slot.bits(), half - 1), slot.minus(1))));
-    k.when(advance, || {
-        step.set(last_step.mux(k.constant(step.bits(), 0), step.plus(1)));
-        clocked.set(!*clocked & !last_step);
-    });
-    k.when(advance & !*clocked & step.any(), || command.set(command.shift_left(1).low(command.bits())));
-    k.when(leaves, || {
-        active.set(zero);
-        primed.set(!row_ends);
-        let sampled = (last_sample & !last_channel).mux(cycles(channel_gap), cycles(gap));
-        rest.set(primed.mux(sampled, cycles(row_gap)));
-        k.when(*primed, || {
-            sample.set(last_sample.mux(k.constant(sample.bits(), 0), sample.plus(1)));
-            asked.set(next);
+        timer.set(wraps.mux(k.constant(timer.bits(), 0), timer.plus(1)));
+        due.set(wraps | (*due & !start));
+        let cycles = |number: u64| k.constant(rest.bits(), number - 1);
+        k.when(*running & !*active & rest.any(), || rest.set(rest.minus(1)));
+        k.when(start, || {
+            running.set(one);
+            rest.set(cycles(gap));
         });
-        k.when(row_ends, || {
-            row.set(last_row.mux(k.constant(row.bits(), 0), row.plus(1)));
-            running.set(!last_row);
+        k.when(begins, || {
+            active.set(one);
+            let shift = converter.channel_shift as usize;
+            let width = converter.frame_bits as usize;
+            let choice = next.extend(width - shift).shift_left(shift);
+            command.set(k.constant(width, u64::from(converter.command)) | choice);
         });
-    });
+        k.when(*active, || slot.set(slot_ends.mux(k.constant(slot.bits(), half - 1), slot.minus(1))));
+        k.when(advance, || {
+            step.set(last_step.mux(k.constant(step.bits(), 0), step.plus(1)));
+            clocked.set(!*clocked & !last_step);
+        });
+        k.when(advance & !*clocked & step.any(), || command.set(command.shift_left(1).low(command.bits())));
+        k.when(leaves, || {
+            active.set(zero);
+            primed.set(!row_ends);
+            let sampled = (last_sample & !last_channel).mux(cycles(channel_gap), cycles(gap));
+            rest.set(primed.mux(sampled, cycles(row_gap)));
+            k.when(*primed, || {
+                sample.set(last_sample.mux(k.constant(sample.bits(), 0), sample.plus(1)));
+                asked.set(next);
+            });
+            k.when(row_ends, || {
+                row.set(last_row.mux(k.constant(row.bits(), 0), row.plus(1)));
+                running.set(!last_row);
+            });
+        });
 
-    k.wire("sclk", if converter.idle_high { !*clocked } else { *clocked });
-    k.wire("cs_n", !*active);
-    k.wire("mosi", command.top());
-    let [take, done] = ["take", "done"].map(|name| k.state(name, bit, rst, 0));
-    take.set(advance & *clocked);
-    done.set(leaves);
-    let [result, opens, closes, ends] = ["result", "opens", "closes", "ends"].map(|name| k.register(name, bit));
-    let channel = k.register("channel", Type::unsigned(asked.bits()));
-    k.when(leaves, || {
-        result.set(*primed);
-        opens.set(sample.is(0));
-        closes.set(last_sample);
-        ends.set(last_channel & last_row);
-        channel.set(*asked);
-    });
-    let mask = alive(&k, shape, *row, *asked);
-    if shape.dead.is_empty() {
-        k.wire("alive", mask);
-    } else {
-        let held = k.register("alive", Type::unsigned(scan.converters));
-        k.when(leaves, || held.set(mask));
+        io.sclk.set(if converter.idle_high { !*clocked } else { *clocked });
+        io.cs_n.set(!*active);
+        io.mosi.set(command.top());
+        let [take, done] = [io.take, io.done].map(|output| output.state(io.rst, 0));
+        take.set(advance & *clocked);
+        done.set(leaves);
+        let [result, opens, closes, ends] = [io.result, io.opens, io.closes, io.ends].map(|output| output.register());
+        let channel = io.channel.register();
+        k.when(leaves, || {
+            result.set(*primed);
+            opens.set(sample.is(0));
+            closes.set(last_sample);
+            ends.set(last_channel & last_row);
+            channel.set(*asked);
+        });
+        let mask = alive(k, &self.shape, *row, *asked);
+        if dead.is_empty() {
+            io.alive.set(mask);
+        } else {
+            let held = io.alive.register();
+            k.when(leaves, || held.set(mask));
+        }
     }
-    k.finish()
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check, check_with_defects, Reference, Subject};
+    use crate::language::testbench::{check, check_with_defects, subject_of, Reference, Subject};
     use crate::language::Change;
     use crate::wire::Word;
     use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
@@ -350,7 +324,7 @@ pub(super) mod tests {
     }
 
     fn subject<'a>(shape: &Shape, changes: &[Change]) -> Subject<'a> {
-        block_subject!(
+        subject_of!(
             ScanSequencer::new(shape),
             changes,
             inputs [rst, clear, room],

@@ -1,54 +1,47 @@
 //! Marks of a scan in the status of its frame.
 
 use dermis_golden::result::flags::{StatusField, RAIL, STATUS_BEATS, WRONG_CHANNEL};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
-use crate::wire::Wire;
 
-/// The engine's beats pass through; in the first beat of every status the flags word gets the marks of its scan, which
-/// wait in a queue while the engine computes. Frames leave in the order in which they came.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScanStatus {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A scan has given its last code to the engine in this cycle.
-    pub complete: Signal<In, Bit>,
-    /// A sample of it was at an end of the range; valid with `complete`.
-    pub rail: Signal<In, Bit>,
-    /// A sample of it named another channel; valid with `complete`.
-    pub other: Signal<In, Bit>,
-    /// There is room for the marks of one more scan.
-    pub room: Signal<Out, Bit>,
-    /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// The beat with its marks; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// The engine's beats pass through; in the first beat of every status the flags word gets the marks of its scan,
+    /// which wait in a queue while the engine computes. Frames leave in the order in which they came.
+    pub struct ScanStatus {
+        /// Beats of a frame before its status.
+        forces: usize,
+    }
+    ports ScanStatusPorts {
+        clock;
+        reset;
+        /// A scan has given its last code to the engine in this cycle.
+        in complete;
+        /// A sample of it was at an end of the range; valid with `complete`.
+        in rail;
+        /// A sample of it named another channel; valid with `complete`.
+        in other;
+        /// There is room for the marks of one more scan.
+        out room;
+        /// A beat of the engine, three words; valid with `s_axis_tvalid`.
+        in s_axis_tdata: BEAT;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// The beat with its marks; valid with `m_axis_tvalid`.
+        out m_axis_tdata: BEAT;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+    }
 }
-
-kernel_block!(
-    ScanStatus,
-    clock clk,
-    inputs [rst, complete, rail, other, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [room, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
-);
 
 /// Width of a word of a beat, and of a beat.
 const WORD: usize = 32;
@@ -61,78 +54,59 @@ const MARKS: usize = 2;
 impl ScanStatus {
     /// For frames of `forces` beats before the status.
     pub fn new(forces: usize) -> Self {
-        let block = ScanStatus {
-            clk: Default::default(),
-            rst: Default::default(),
-            complete: Default::default(),
-            rail: Default::default(),
-            other: Default::default(),
-            room: Default::default(),
-            s_axis_tdata: Wire::new(BEAT),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(BEAT),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(forces))
+        ScanStatus { forces }
     }
 }
 
-fn kernel(forces: usize) -> Kernel {
-    let k = Builder::new("scan_status");
-    let [rst, complete, rail, other] = ["rst", "complete", "rail", "other"].map(|name| k.input(name, 1));
-    let (data, given) = (k.input("s_axis_tdata", BEAT), k.input("s_axis_tvalid", 1));
-    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-    let marks =
-        k.state("marks", Type::unsigned(MARKS * PLACES), rst, 0).comment("Marks that wait, the next in the low bits.");
-    let waiting = k.state("waiting", Type::unsigned(count_bits(PLACES + 1)), rst, 0);
-    let beat = k.state("beat", Type::unsigned(count_bits(forces + 1)), rst, 0);
-    let word = k.state("word", Type::unsigned(count_bits(STATUS_BEATS)), rst, 0);
+impl Block for ScanStatus {
+    fn build<'k>(&self, k: &'k Builder, io: ScanStatusPorts<Inside<'k>>) {
+        let marks = k
+            .state("marks", Type::unsigned(MARKS * PLACES), io.rst, 0)
+            .comment("Marks that wait, the next in the low bits.");
+        let waiting = k.state("waiting", Type::unsigned(count_bits(PLACES + 1)), io.rst, 0);
+        let beat = k.state("beat", Type::unsigned(count_bits(self.forces + 1)), io.rst, 0);
+        let word = k.state("word", Type::unsigned(count_bits(STATUS_BEATS)), io.rst, 0);
 
-    k.wire("room", !waiting.is(PLACES as u64));
-    k.wire("s_axis_tready", ready);
-    k.wire("m_axis_tvalid", given);
-    k.wire("m_axis_tlast", last);
-    let moves = k.wire("moves", given & ready);
-    let leaves = k.wire("leaves", moves & last);
-    let in_status = k.wire("in_status", beat.is(forces as u64));
-    let marked = k.wire("marked", in_status & word.is(0));
-    k.when(moves, || {
-        k.when(!in_status, || beat.set(beat.plus(1)));
-        let at_end = word.is(STATUS_BEATS as u64 - 1);
-        k.when(in_status, || word.set(at_end.mux(k.constant(word.bits(), 0), word.plus(1))));
-        k.when(last, || {
-            beat.set(k.constant(beat.bits(), 0));
-            word.set(k.constant(word.bits(), 0));
+        io.room.set(!waiting.is(PLACES as u64));
+        io.s_axis_tready.set(io.m_axis_tready);
+        io.m_axis_tvalid.set(io.s_axis_tvalid);
+        io.m_axis_tlast.set(io.s_axis_tlast);
+        let moves = k.wire("moves", io.s_axis_tvalid & io.m_axis_tready);
+        let leaves = k.wire("leaves", moves & io.s_axis_tlast);
+        let in_status = k.wire("in_status", beat.is(self.forces as u64));
+        let marked = k.wire("marked", in_status & word.is(0));
+        k.when(moves, || {
+            k.when(!in_status, || beat.set(beat.plus(1)));
+            let at_end = word.is(STATUS_BEATS as u64 - 1);
+            k.when(in_status, || word.set(at_end.mux(k.constant(word.bits(), 0), word.plus(1))));
+            k.when(io.s_axis_tlast, || {
+                beat.set(k.constant(beat.bits(), 0));
+                word.set(k.constant(word.bits(), 0));
+            });
         });
-    });
-    let rest = k.wire("rest", leaves.mux(marks.shift_right(MARKS).extend(marks.bits()), *marks));
-    let place = k.wire("place", (*waiting - leaves.extend(waiting.bits())).low(waiting.bits()));
-    let added = other.concat(rail).extend(marks.bits()).shift_left_by(place.concat(k.constant(1, 0)));
-    marks.set(complete.mux(rest | added, rest));
-    waiting.set((place + complete.extend(place.bits())).low(place.bits()));
+        let rest = k.wire("rest", leaves.mux(marks.shift_right(MARKS).extend(marks.bits()), *marks));
+        let place = k.wire("place", (*waiting - leaves.extend(waiting.bits())).low(waiting.bits()));
+        let added = io.other.concat(io.rail).extend(marks.bits()).shift_left_by(place.concat(k.constant(1, 0)));
+        marks.set(io.complete.mux(rest | added, rest));
+        waiting.set((place + io.complete.extend(place.bits())).low(place.bits()));
 
-    let flag = |at: usize| -> Expr {
-        let of = |field: StatusField| at == field.word * WORD + field.low as usize;
-        match at {
-            _ if of(RAIL) => marked & marks.at(0),
-            _ if of(WRONG_CHANNEL) => marked & marks.at(1),
-            _ => k.constant(1, 0),
-        }
-    };
-    let flags: Vec<Expr> = (0..BEAT).rev().map(flag).collect();
-    k.wire("m_axis_tdata", data | concat(&flags));
-    k.finish()
+        let flag = |at: usize| -> Expr {
+            let of = |field: StatusField| at == field.word * WORD + field.low as usize;
+            match at {
+                _ if of(RAIL) => marked & marks.at(0),
+                _ if of(WRONG_CHANNEL) => marked & marks.at(1),
+                _ => k.constant(1, 0),
+            }
+        };
+        let flags: Vec<Expr> = (0..BEAT).rev().map(flag).collect();
+        io.m_axis_tdata.set(io.s_axis_tdata | concat(&flags));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::wire::Word;
     use std::collections::VecDeque;
@@ -209,7 +183,7 @@ mod tests {
     #[test]
     fn marks_come_with_their_frame() {
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 ScanStatus::new(FORCES),
                 changes,
                 inputs [rst, complete, rail, other, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],

@@ -1,130 +1,97 @@
 //! Images of tables between the codes of scans.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-use crate::wire::Wire;
-
-/// The engine takes an image between frames only, and a scan takes much longer than a frame does otherwise: an image does not
-/// wait for the end of a scan. It breaks the scan off: the frame ends early, at which the engine drops it, and the rest of
-/// the scan's codes are taken and dropped, as those of scans that begin while the image comes. The sequencer goes on.
-#[derive(dermis_hdl_derive::Block)]
-pub struct ScanTables {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, two's complement; valid with `code_valid`.
-    pub code: Wire<In>,
-    /// A code is offered; it is held until `code_ready`.
-    pub code_valid: Signal<In, Bit>,
-    /// The code is taken in this cycle.
-    pub code_ready: Signal<Out, Bit>,
-    /// The code is the last of its scan; valid with `code_valid`.
-    pub code_last: Signal<In, Bit>,
-    /// A byte of an image, as a beat of the engine's stream; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A byte is offered; it is held until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The byte is taken in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The byte is the last of its image; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A code, sign-extended, or a byte; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered to the engine; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The engine takes a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// The engine takes a code in this cycle.
-    pub passed: Signal<Out, Bit>,
-    /// It is the last of a whole scan; with `passed`.
-    pub complete: Signal<Out, Bit>,
-    /// The engine takes the early end of a frame in this cycle.
-    pub broken: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// The engine takes an image between frames only, and a scan takes much longer than a frame does otherwise: an
+    /// image does not wait for the end of a scan. It breaks the scan off: the frame ends early, at which the engine
+    /// drops it, and the rest of the scan's codes are taken and dropped, as those of scans that begin while the image
+    /// comes. The sequencer goes on.
+    pub struct ScanTables {
+        code_bits: usize,
+    }
+    ports ScanTablesPorts {
+        clock;
+        reset;
+        /// A taxel's code, two's complement; valid with `code_valid`.
+        in code: code_bits;
+        /// A code is offered; it is held until `code_ready`.
+        in code_valid;
+        /// The code is taken in this cycle.
+        out code_ready;
+        /// The code is the last of its scan; valid with `code_valid`.
+        in code_last;
+        /// A byte of an image, as a beat of the engine's stream; valid with `s_axis_tvalid`.
+        in s_axis_tdata: code_bits + 1;
+        /// A byte is offered; it is held until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The byte is taken in this cycle.
+        out s_axis_tready;
+        /// The byte is the last of its image; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A code, sign-extended, or a byte; valid with `m_axis_tvalid`.
+        out m_axis_tdata: code_bits + 1;
+        /// A beat is offered to the engine; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The engine takes a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// The engine takes a code in this cycle.
+        out passed;
+        /// It is the last of a whole scan; with `passed`.
+        out complete;
+        /// The engine takes the early end of a frame in this cycle.
+        out broken;
+    }
 }
-
-kernel_block!(
-    ScanTables,
-    clock clk,
-    inputs [rst, code, code_valid, code_last, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [code_ready, s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, passed, complete, broken]
-);
 
 impl ScanTables {
     /// For codes of `code_bits`.
     pub fn new(code_bits: usize) -> Self {
-        let block = ScanTables {
-            clk: Default::default(),
-            rst: Default::default(),
-            code: Wire::new(code_bits),
-            code_valid: Default::default(),
-            code_ready: Default::default(),
-            code_last: Default::default(),
-            s_axis_tdata: Wire::new(code_bits + 1),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(code_bits + 1),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            passed: Default::default(),
-            complete: Default::default(),
-            broken: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(code_bits))
+        ScanTables { code_bits }
     }
 }
 
-fn kernel(code_bits: usize) -> Kernel {
-    let beat_bits = code_bits + 1;
-    let k = Builder::new("scan_tables");
-    let (rst, code) = (k.input("rst", 1), k.input("code", code_bits));
-    let (code_valid, code_last) = (k.input("code_valid", 1), k.input("code_last", 1));
-    let (byte, byte_valid) = (k.input("s_axis_tdata", beat_bits), k.input("s_axis_tvalid", 1));
-    let (byte_last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
-    let flag = |name, about| k.state(name, Type::unsigned(1), rst, 0).comment(about);
-    let image = flag("image", "Between the first and the last byte of an image.");
-    let offered = flag("offered", "A code is offered to the engine, which has not taken it yet.");
-    let begun = flag("begun", "Codes of this scan have been taken.");
-    let dropped = flag("dropped", "This scan is not passed on, or no further.");
-    let open = flag("open", "The engine has got codes of a frame, and not its last beat.");
+impl Block for ScanTables {
+    fn build<'k>(&self, k: &'k Builder, io: ScanTablesPorts<Inside<'k>>) {
+        let flag = |name, about| k.state(name, Type::unsigned(1), io.rst, 0).comment(about);
+        let image = flag("image", "Between the first and the last byte of an image.");
+        let offered = flag("offered", "A code is offered to the engine, which has not taken it yet.");
+        let begun = flag("begun", "Codes of this scan have been taken.");
+        let dropped = flag("dropped", "This scan is not passed on, or no further.");
+        let open = flag("open", "The engine has got codes of a frame, and not its last beat.");
 
-    let in_image = k.wire("in_image", *image | (byte_valid & !*offered));
-    let passes = k.wire("passes", code_valid & !in_image & !*dropped);
-    k.comment("The early end of a frame goes before the image.");
-    let ends_early = k.wire("ends_early", in_image & *open);
-    let byte_passes = k.wire("byte_passes", in_image & !*open & byte_valid);
-    k.wire("m_axis_tvalid", passes | ends_early | byte_passes);
-    let of_code = code.signed().extend(beat_bits).unsigned();
-    k.wire("m_axis_tdata", byte_passes.mux(byte, of_code));
-    k.wire("m_axis_tlast", ends_early | byte_passes.mux(byte_last, code_last));
-    let byte_ready = k.wire("s_axis_tready", byte_passes & ready);
-    let code_ready = k.wire("code_ready", ready | !passes);
-    let passed = k.wire("passed", passes & ready);
-    let complete = k.wire("complete", passed & code_last);
-    let broken = k.wire("broken", ends_early & ready);
+        let in_image = k.wire("in_image", *image | (io.s_axis_tvalid & !*offered));
+        let passes = k.wire("passes", io.code_valid & !in_image & !*dropped);
+        k.comment("The early end of a frame goes before the image.");
+        let ends_early = k.wire("ends_early", in_image & *open);
+        let byte_passes = k.wire("byte_passes", in_image & !*open & io.s_axis_tvalid);
+        io.m_axis_tvalid.set(passes | ends_early | byte_passes);
+        let of_code = io.code.signed().extend(self.code_bits + 1).unsigned();
+        io.m_axis_tdata.set(byte_passes.mux(io.s_axis_tdata, of_code));
+        io.m_axis_tlast.set(ends_early | byte_passes.mux(io.s_axis_tlast, io.code_last));
+        let byte_ready = io.s_axis_tready.set(byte_passes & io.m_axis_tready);
+        let code_taken = io.code_ready.set(io.m_axis_tready | !passes);
+        let passed = io.passed.set(passes & io.m_axis_tready);
+        let complete = io.complete.set(passed & io.code_last);
+        let broken = io.broken.set(ends_early & io.m_axis_tready);
 
-    image.set(byte_ready.mux(!byte_last, *image));
-    offered.set(passes & !ready);
-    let taken = k.wire("taken", code_valid & code_ready);
-    begun.set(taken.mux(!code_last, *begun));
-    let breaks = k.wire("breaks", in_image & (*begun | code_valid));
-    dropped.set((*dropped | breaks) & !(taken & code_last));
-    open.set((*open | passed) & !(complete | broken));
-    k.finish()
+        image.set(byte_ready.mux(!io.s_axis_tlast, *image));
+        offered.set(passes & !io.m_axis_tready);
+        let taken = k.wire("taken", io.code_valid & code_taken);
+        begun.set(taken.mux(!io.code_last, *begun));
+        let breaks = k.wire("breaks", in_image & (*begun | io.code_valid));
+        dropped.set((*dropped | breaks) & !(taken & io.code_last));
+        open.set((*open | passed) & !(complete | broken));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::wire::Word;
 
@@ -261,7 +228,7 @@ mod tests {
     #[test]
     fn an_image_breaks_a_scan_off_and_the_next_whole_one_passes() {
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 ScanTables::new(CODE_BITS),
                 changes,
                 inputs [rst, code, code_valid, code_last, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],

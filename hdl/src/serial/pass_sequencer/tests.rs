@@ -8,6 +8,7 @@ use dermis_golden::physics::symmetry::parity::FLIP_X;
 use dermis_golden::spec::scene::Scene;
 
 use super::*;
+use crate::language::kernel_of;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
@@ -279,7 +280,7 @@ fn check_with(more: &str) {
     let (acc, code) = (formats.acc_bits as usize, formats.input_bits as usize);
     let rounded = formats.input_bits.max(formats.vector_bits) as usize;
     let block = PassSequencer::new(&formats, acc.max(2 * code), rounded);
-    let kernel = block.kernel.kernel();
+    let kernel = kernel_of(&block);
     let outputs = kernel.signals.iter().filter(|signal| signal.output);
     let mut machine = Machine {
         program: program(&formats),
@@ -302,7 +303,7 @@ fn check_with(more: &str) {
             inputs
         })
         .collect();
-    check(kernel, &stimulus, &mut machine);
+    check(&kernel, &stimulus, &mut machine);
 }
 
 #[test]

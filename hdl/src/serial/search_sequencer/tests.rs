@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::language::kernel_of;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
@@ -266,7 +267,7 @@ fn sweeps_and_comparisons_are_those_of_the_state_machine() {
     let scene = dermis_golden::spec::scene::Scene::parse(scene, "walk.toml").unwrap();
     let formats = dermis_golden::fixed::Model::new(&scene).unwrap().formats().clone();
     let block = SearchSequencer::new(&formats);
-    let kernel = block.kernel.kernel();
+    let kernel = kernel_of(&block);
     let score_bits = formats.score_bits as usize;
     let outputs = kernel.signals.iter().filter(|signal| signal.output);
     let mut machine = Machine {
@@ -294,5 +295,5 @@ fn sweeps_and_comparisons_are_those_of_the_state_machine() {
             inputs
         })
         .collect();
-    check(kernel, &stimulus, &mut machine);
+    check(&kernel, &stimulus, &mut machine);
 }
