@@ -1,22 +1,17 @@
 //! The blocks of the parallel engine that the guide describes: ports, kernels, recordings of a run.
 //!
-//! Name, direction and width of a port come from a walk over the built engine, its meaning from the comment of the
-//! field in the block's source. A comment reads `MEANING; WHEN.`: behind the first semicolon it says when the port is
-//! valid. A single bit without it is a control signal, valid in every cycle.
-
-use std::collections::BTreeMap;
+//! All that is said of a port comes from its declaration. Its comment reads `MEANING; WHEN.`: behind the first semicolon it
+//! says when the port is valid. A single bit without it is a control signal, valid in every cycle.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::EngineKind;
-use rust_hdl::core::probe::Probe;
-use rust_hdl::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::error::HdlError;
-use crate::language::{Attributes, Hierarchy, SEPARATOR};
-use crate::simulate::{design, stages, Design};
-use crate::stage_list::PORTS;
+use crate::engine::stages;
+use crate::language::{Attributes, Hierarchy, Kernel, Slot, SEPARATOR};
+use crate::simulate::{design, Running};
 use crate::wire::Word;
 
 /// What a single bit says about its validity when its comment does not.
@@ -45,14 +40,10 @@ const INSIDE: [Entry; 2] = [
     Entry { instance: "fold__butterfly", source: include_str!("primitives/arithmetic/butterfly.rs") },
 ];
 
-/// The blocks of an engine whose ports have comments: the stages in the order of the data flow, then those inside.
-fn entries(engine: EngineKind) -> Vec<Entry> {
-    let stages = stages(engine).iter().map(|stage| Entry { instance: stage.name, source: stage.source });
-    let inside: &[Entry] = match engine {
-        EngineKind::Parallel => &INSIDE,
-        EngineKind::Serial => &[],
-    };
-    stages.chain(inside.iter().copied()).collect()
+/// The described blocks: the stages in the order of the data flow, then those inside.
+fn entries() -> Vec<Entry> {
+    let stages = stages(EngineKind::Parallel).iter();
+    stages.map(|stage| Entry { instance: stage.name, source: stage.source }).chain(INSIDE).collect()
 }
 
 /// Why a block cannot be described.
@@ -109,65 +100,12 @@ pub struct BlockText {
     pub ports: Vec<PortText>,
 }
 
-/// Ports of the described blocks at one moment.
-struct Ports<'a> {
-    entries: &'a [Entry],
-    path: Vec<String>,
-    /// By instance: name, direction, width, value.
-    found: BTreeMap<&'static str, Vec<(String, bool, usize, Word)>>,
-}
-
-impl<'a> Ports<'a> {
-    /// Of the blocks `entries` of `engine`.
-    fn of(engine: &dyn Design, entries: &'a [Entry]) -> Self {
-        let mut ports = Ports { entries, path: Vec::new(), found: BTreeMap::new() };
-        engine.accept("top", &mut ports);
-        ports
-    }
-}
-
-impl Probe for Ports<'_> {
-    fn visit_start_scope(&mut self, name: &str, _node: &dyn Block) {
-        self.path.push(name.to_owned());
-    }
-
-    fn visit_end_scope(&mut self, _name: &str, _node: &dyn Block) {
-        self.path.pop();
-    }
-
-    fn visit_atom(&mut self, name: &str, signal: &dyn Atom) {
-        let output = match signal.kind() {
-            AtomKind::InputParameter => false,
-            AtomKind::OutputParameter => true,
-            _ => return,
-        };
-        let instance = self.path.get(1..).unwrap_or_default().join(SEPARATOR);
-        let Some(entry) = self.entries.iter().find(|entry| entry.instance == instance) else { return };
-        let port = (name.to_owned(), output, signal.bits(), value(signal));
-        self.found.entry(entry.instance).or_default().push(port);
-    }
-}
-
-/// The signal's value.
-fn value(signal: &dyn Atom) -> Word {
-    let mut word = Word::default();
-    match signal.vcd() {
-        VCDValue::Single(bit) => word.set(0, 1, u64::from(bit == vcd::Value::V1)),
-        VCDValue::Vector(bits) => {
-            let ones = bits.iter().rev().enumerate().filter(|(_, bit)| **bit == vcd::Value::V1);
-            ones.for_each(|(at, _)| word.set(at, 1, 1));
-        }
-        VCDValue::String(_) | VCDValue::Composite(_) => {}
-    }
-    word
-}
-
 /// The described blocks of the engine of `model`, in the order of the data flow.
 ///
 /// # Errors
 /// [`DescribeError::Serial`]; an engine that cannot be built.
 pub fn blocks(model: &Model) -> Result<Vec<BlockText>, DescribeError> {
-    Ok(describe(Ports::of(&*engine(model)?, &entries(EngineKind::Parallel))))
+    Ok(describe(&engine(model)?))
 }
 
 /// The block `name` of the engine of `model`.
@@ -187,21 +125,8 @@ pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
 /// As [`fn@block`].
 pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError> {
     let block = block(model, name)?;
-    let hierarchy = Hierarchy::of(&*engine(model)?);
-    let text = hierarchy
-        .module(block.instance, ENGINE, &Attributes::new(), &port_comments(EngineKind::Parallel))
-        .unwrap_or_default();
+    let text = engine(model)?.module(block.instance, ENGINE, &Attributes::new()).unwrap_or_default();
     Ok(format!("// {}\n{text}", block.purpose))
-}
-
-/// What the Verilog says of a port by the path of its block in the engine, and by its name: meaning, and when it is valid.
-/// The engine's own path is empty.
-pub(crate) fn port_comments(engine: EngineKind) -> impl Fn(&str, &str) -> Option<String> {
-    let entries = entries(engine);
-    move |path, port| {
-        let own = || entries.iter().find(|entry| entry.instance == path).map(|entry| entry.source);
-        comments(if path.is_empty() { Some(PORTS) } else { own() }?).remove(port)
-    }
 }
 
 /// The Rust source of a block, its test included.
@@ -210,13 +135,10 @@ pub(crate) fn port_comments(engine: EngineKind) -> impl Fn(&str, &str) -> Option
 /// As [`fn@block`].
 pub fn block_source(model: &Model, name: &str) -> Result<&'static str, DescribeError> {
     let block = block(model, name)?;
-    Ok(entries(EngineKind::Parallel)
-        .iter()
-        .find(|entry| entry.instance == block.instance)
-        .map_or("", |entry| entry.source))
+    Ok(entries().iter().find(|entry| entry.instance == block.instance).map_or("", |entry| entry.source))
 }
 
-fn engine(model: &Model) -> Result<Box<dyn Design>, DescribeError> {
+fn engine(model: &Model) -> Result<Hierarchy, DescribeError> {
     match model.board.engine {
         EngineKind::Parallel => Ok(design(model)?),
         EngineKind::Serial => {
@@ -225,49 +147,29 @@ fn engine(model: &Model) -> Result<Box<dyn Design>, DescribeError> {
     }
 }
 
-fn describe(mut ports: Ports) -> Vec<BlockText> {
+/// The described blocks that an engine has.
+fn describe(engine: &Hierarchy) -> Vec<BlockText> {
     let described = |entry: &Entry| {
-        let comments = comments(entry.source);
-        let text = |(name, output, bits, _): (String, bool, usize, Word)| {
-            let comment = comments.get(name.as_str()).map(String::as_str).unwrap_or_default();
-            let (meaning, valid) = comment.split_once("; ").unwrap_or((comment, if bits == 1 { ALWAYS } else { "" }));
-            let tidy = |text: &str| text.trim_start_matches("valid ").trim_end_matches('.').to_owned();
-            PortText { name, output, bits, meaning: tidy(meaning), valid: tidy(valid) }
-        };
-        let ports = ports.found.remove(entry.instance)?.into_iter().map(text).collect();
+        let (_, kernel) = engine.kernels().find(|(path, _)| *path == entry.instance)?;
         let purpose = entry.source.lines().next().and_then(|line| line.strip_prefix("//! ")).unwrap_or_default();
-        Some(BlockText { name: entry.name(), instance: entry.instance, purpose: purpose.to_owned(), ports })
+        Some(BlockText {
+            name: entry.name(),
+            instance: entry.instance,
+            purpose: purpose.to_owned(),
+            ports: ports(kernel),
+        })
     };
-    ports.entries.iter().filter_map(described).collect()
+    entries().iter().filter_map(described).collect()
 }
 
-/// The comments of the public fields of a source that are signals, by name.
-pub(crate) fn comments(source: &str) -> BTreeMap<&str, String> {
-    let mut found = BTreeMap::new();
-    let mut comment = String::new();
-    for line in source.lines().map(str::trim) {
-        if let Some(text) = line.strip_prefix("/// ") {
-            comment.push_str(if comment.is_empty() { "" } else { " " });
-            comment.push_str(text);
-            continue;
-        }
-        let field = line.strip_prefix("pub ").and_then(|field| field.split_once(": "));
-        if let Some((name, _)) = field.filter(|(_, ty)| ty.starts_with("Signal<") || ty.starts_with("Wire<")) {
-            found.insert(name, without_links(&comment));
-        }
-        comment.clear();
-    }
-    found
-}
-
-/// A comment without the targets of its links, which mean nothing outside the docs of the crate.
-fn without_links(comment: &str) -> String {
-    let mut parts = comment.split("](");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        text.push_str(part.split_once(')').map_or(part, |(_, behind)| behind));
-    }
-    text.replace("[`", "`")
+/// The ports of a block, the clock first.
+fn ports(kernel: &Kernel) -> Vec<PortText> {
+    let text = |(name, output, bits, doc): (&str, bool, usize, &str)| {
+        let (meaning, valid) = doc.split_once("; ").unwrap_or((doc, if bits == 1 { ALWAYS } else { "" }));
+        let tidy = |text: &str| text.trim_start_matches("valid ").trim_end_matches('.').to_owned();
+        PortText { name: name.to_owned(), output, bits, meaning: tidy(meaning), valid: tidy(valid) }
+    };
+    kernel.port_list().map(text).collect()
 }
 
 /// A run's values of a block's ports.
@@ -279,10 +181,11 @@ pub struct Trace {
     pub cycles: Vec<Vec<Word>>,
 }
 
-/// The engine in rust-hdl's simulation, with the ports of the described blocks recorded in every cycle.
+/// The engine in kernel simulation, with the ports of the described blocks recorded in every cycle.
 pub struct Recorder {
-    engine: Box<dyn Design>,
-    entries: Vec<Entry>,
+    engine: Running,
+    /// The ports of each block.
+    slots: Vec<Vec<Slot>>,
     traces: Vec<Trace>,
 }
 
@@ -292,11 +195,16 @@ impl Recorder {
     /// # Errors
     /// As [`blocks`].
     pub fn new(model: &Model) -> Result<Self, DescribeError> {
-        let engine = engine(model)?;
-        let entries = entries(EngineKind::Parallel);
-        let blocks = describe(Ports::of(&*engine, &entries));
+        let hierarchy = engine(model)?;
+        let blocks = describe(&hierarchy);
+        let ports = blocks.iter().flat_map(|block| block.ports.iter().map(|port| (block.instance, port.name.as_str())));
+        let engine = Running::new(&hierarchy, &ports.collect::<Vec<_>>());
+        let slot = |block: &BlockText| {
+            block.ports.iter().map(|port| engine.run().slot(block.instance, &port.name)).collect()
+        };
+        let slots = blocks.iter().map(slot).collect();
         let traces = blocks.into_iter().map(|block| Trace { block, cycles: Vec::new() }).collect();
-        Ok(Recorder { engine, entries, traces })
+        Ok(Recorder { engine, slots, traces })
     }
 
     /// What was recorded, one trace per block.
@@ -307,12 +215,10 @@ impl Recorder {
 
 impl crate::device::Device for Recorder {
     fn cycle(&mut self, inputs: &crate::device::Inputs) -> crate::device::Outputs {
-        let Recorder { engine, entries, traces } = self;
-        crate::simulate::cycle(&mut **engine, inputs, |engine| {
-            let mut ports = Ports::of(engine, entries);
-            for trace in traces {
-                let values = ports.found.remove(trace.block.instance).unwrap_or_default();
-                trace.cycles.push(values.into_iter().map(|(.., value)| value).collect());
+        let Recorder { engine, slots, traces } = self;
+        engine.cycle(inputs, |run| {
+            for (trace, slots) in traces.iter_mut().zip(slots) {
+                trace.cycles.push(slots.iter().map(|&slot| run.get(slot)).collect());
             }
         })
     }
@@ -335,19 +241,13 @@ mod tests {
     #[test]
     fn every_port_has_its_meaning_and_says_when_it_is_valid() {
         let all = blocks(&model(true)).unwrap();
-        assert_eq!(all.len(), entries(EngineKind::Parallel).len());
+        assert_eq!(all.len(), entries().len());
         for block in &all {
             assert!(!block.purpose.is_empty() && block.ports.len() >= 3, "{block:?}");
             for port in &block.ports {
                 assert!(!port.meaning.is_empty() && !port.valid.is_empty(), "{}: {port:?}", block.name);
             }
         }
-    }
-
-    #[test]
-    fn comments_have_no_links() {
-        let source = "/// As `a` of\n/// [`Ram`](super::Ram), or [`b`](B); then.\npub port: Wire<Out>,\n";
-        assert_eq!(comments(source)["port"], "As `a` of `Ram`, or `b`; then.");
     }
 
     #[test]
@@ -359,33 +259,6 @@ mod tests {
         assert!(port("folded").output && !port("normalised").output);
         let error = block(&model, "choose").unwrap_err().to_string();
         assert!(error.contains("no block \"choose\"; its blocks: prepare, receive, normalise, fold"), "{error}");
-    }
-
-    #[test]
-    fn ports_of_either_engine_have_the_comments_of_its_own_blocks() {
-        for engine in [EngineKind::Parallel, EngineKind::Serial] {
-            let mut model = model(true);
-            if engine == EngineKind::Serial {
-                let mut scene = Scene::builtin("eight-by-eight").unwrap();
-                scene.hardware.board = "icebreaker".into();
-                model = Model::new(&scene).unwrap();
-            }
-            let entries = entries(engine);
-            let (comment, ports) = (port_comments(engine), Ports::of(&*design(&model).unwrap(), &entries));
-            for entry in &entries {
-                for (name, ..) in &ports.found[entry.instance] {
-                    assert!(
-                        comment(entry.instance, name).is_some_and(|text| !text.is_empty()),
-                        "{} {name}",
-                        entry.instance
-                    );
-                }
-            }
-        }
-        // The same instance and port, in different words.
-        let [parallel, serial] =
-            [EngineKind::Parallel, EngineKind::Serial].map(|e| port_comments(e)("unfold", "address"));
-        assert!(parallel.is_some() && serial.is_some() && parallel != serial, "{parallel:?} {serial:?}");
     }
 
     #[test]

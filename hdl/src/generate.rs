@@ -13,13 +13,13 @@ use dermis_golden::wire::link::c_header;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::describe::{comments, port_comments};
 use crate::device::Tap;
 use crate::error::HdlError;
 use crate::language::{self, Attributes, Change, Hierarchy};
 use crate::manifest::{seal, GeneratedFile, MANIFEST, MANIFEST_VERSION};
 use crate::primitives::MEMORY_FILE;
-use crate::simulate::{design, stages};
+use crate::engine::stages;
+use crate::simulate::design;
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
 use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Surrounding, Usage};
@@ -81,8 +81,7 @@ impl Generated {
 /// # Errors
 /// As [`generate`].
 pub(crate) fn usage(model: &Model) -> Result<StageUsage, HdlError> {
-    let engine = design(model)?;
-    let hierarchy = Hierarchy::of(&*engine);
+    let hierarchy = design(model)?;
     Ok(by_stage(model, &hierarchy, &placed(&hierarchy, model)?, None))
 }
 
@@ -99,17 +98,15 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
 /// # Errors
 /// As [`generate()`]; a change that does not apply to the hardware.
 pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
-    let engine = design(model)?;
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let hierarchy = Hierarchy::of(&*engine).changed(changes)?;
+    let hierarchy = design(model)?.changed(changes)?;
     let memories = placed(&hierarchy, model)?;
-    let verilog =
-        header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comments(model.board.engine));
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories));
     let usage = by_stage(model, &hierarchy, &memories, None);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);
-    let taps = taps(&*engine);
+    let taps = taps(model, &hierarchy);
     let state = state_elements(&hierarchy, stages(model.board.engine), &memories);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
@@ -128,34 +125,26 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
 const ENGINE: &str = "engine";
 
 /// A module around the engine: a board's top, or a core for a SoC.
-pub(crate) struct Around<'a> {
+pub(crate) struct Around {
     /// Its name.
     pub top: String,
     /// All its modules.
     pub hierarchy: Hierarchy,
-    /// Rust sources with the comments of its ports.
-    pub sources: &'a [&'a str],
     /// Comment at the head of the file.
     pub header: String,
     /// Row of its own blocks in the table of resources.
     pub row: &'static str,
 }
 
-impl Around<'_> {
+impl Around {
     /// The files of `engine` with this module's Verilog in the place of the engine's, without taps; not sealed.
     ///
     /// # Errors
     /// [`HdlError::Check`] if a planned memory is missing.
     pub(crate) fn generated(self, model: &Model, mut engine: Generated) -> Result<Generated, HdlError> {
-        let Around { top, hierarchy, sources, header, row } = self;
+        let Around { top, hierarchy, header, row } = self;
         let memories = placed(&hierarchy, model)?;
-        let of_engine = port_comments(model.board.engine);
-        let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
-            ("", _) => sources.iter().find_map(|source| comments(source).remove(port)),
-            (ENGINE, _) => of_engine("", port),
-            (_, own) => of_engine(own?, port),
-        };
-        let text = header + &hierarchy.verilog(&top, &attributes(&memories), &comment);
+        let text = header + &hierarchy.verilog(&top, &attributes(&memories));
         let (engine_file, waivers) = (format!("{}.v", engine.top), format!("{}.vlt", engine.top));
         for file in &mut engine.files {
             if file.name == waivers {

@@ -21,12 +21,6 @@
 //!   the fields ([`describe`]).
 #![deny(missing_docs)]
 
-/// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a
-/// long one.
-macro_rules! comment {
-    ($text:literal) => {};
-}
-
 pub mod bus;
 pub mod describe;
 pub mod device;
@@ -50,8 +44,8 @@ mod generate;
 mod integration;
 #[cfg(test)]
 mod scenes;
+mod parallel;
 mod simulate;
-mod stage_list;
 mod taps;
 mod testbench;
 mod vivado;

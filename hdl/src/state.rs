@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::language::Hierarchy;
-use crate::stage_list::Stage;
+use crate::engine::Stage;
 use crate::usage::{stage, PlacedMemory};
 
 /// Kind of storage that holds a bit.

@@ -1,12 +1,12 @@
-//! The observed streams between the stages. One declaration per stream: the names of its signals in the Verilog and the
-//! reading of the same signals in rust-hdl's simulation both follow from it, all widths from the built engine.
+//! The observed streams between the stages. One declaration per stream: the names of its signals in the top module, from
+//! which its signals in the Verilog and in the kernel simulation both follow; all widths from the built engine.
 
-use rust_hdl::prelude::*;
+use dermis_golden::fixed::Model;
+use dermis_golden::spec::board::EngineKind;
+use dermis_golden::spec::quads::Quads;
 
 use crate::device::{Tap, TapSignal};
-use crate::language::SEPARATOR;
-use crate::wire::{Wire, Word};
-use crate::{engine, serial};
+use crate::language::{Hierarchy, Run, Slot};
 
 /// Field width of the tap of `search`, in bits: at least that of each of its signals.
 const SEARCH_FIELD: u32 = 32;
@@ -23,69 +23,51 @@ const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_rig
 /// Fields of a quad of parities, along the rows and along the columns.
 const PARITIES: [&str; 4] = ["even_even", "even_odd", "odd_even", "odd_odd"];
 
-/// A signal whose width and value can be read.
-pub(crate) trait Signalled: Atom {
-    /// The current value, zero beyond the width.
-    fn word(&self) -> Word;
-}
-
-impl<D: Direction> Signalled for Wire<D> {
-    fn word(&self) -> Word {
-        self.val().word()
-    }
-}
-
-impl Signalled for Signal<Out, Bit> {
-    fn word(&self) -> Word {
-        self.val().into()
-    }
-}
-
-/// Names that lead to a signal from the engine: the block's instance, the port; or one of the engine's own signals.
-type Path = [&'static str];
-
-/// The name of the signal at `path` in the top module.
-fn name(path: &Path) -> String {
-    path.join(SEPARATOR)
-}
-
-/// A signal of a stream's word.
-pub(crate) struct Part<'a> {
-    path: &'a Path,
-    signed: bool,
-    signal: &'a dyn Signalled,
-}
-
-/// A stream in the current cycle.
-pub(crate) struct Stream<'a> {
+/// A signal of a stream's word: its name in the top module, whether its fields are two's complement.
+#[derive(Clone, Copy, Debug)]
+struct Part {
     name: &'static str,
-    /// Signals that are all 1 in a cycle in which a word passes: path, value.
-    valid: &'a [(&'a Path, bool)],
+    signed: bool,
+}
+
+fn signed(name: &'static str) -> Part {
+    Part { name, signed: true }
+}
+
+fn unsigned(name: &'static str) -> Part {
+    Part { name, signed: false }
+}
+
+/// An observed stream.
+#[derive(Clone, Debug)]
+pub(crate) struct Stream {
+    name: &'static str,
+    /// Signals that are all 1 in a cycle in which a word passes.
+    valid: &'static [&'static str],
     /// Signals of the word, the first fields first.
-    parts: &'a [Part<'a>],
-    /// Names of the fields in each of `parts`; none if each is one field of the signal's own name.
-    fields: &'a [&'static str],
+    parts: Vec<Part>,
+    /// Names of the fields in each of `parts`; none if each is one field, called after its signal.
+    fields: &'static [&'static str],
     /// Width of a field in bits, if not that of the signal's fields.
     field_bits: Option<u32>,
 }
 
-impl Stream<'_> {
-    /// Names and widths.
-    fn tap(&self) -> Tap {
-        let signal = |part: &Part| {
-            let Part { path, signed, signal } = *part;
-            TapSignal { name: name(path), bits: signal.bits() as u32, signed }
-        };
-        let word: Vec<TapSignal> = self.parts.iter().map(signal).collect();
-        let own = self.parts.iter().filter_map(|part| part.path.last().copied());
-        let fields: Vec<&str> = if self.fields.is_empty() { own.collect() } else { self.fields.to_vec() };
-        Tap {
-            name: self.name,
-            valid: self.valid.iter().map(|(path, _)| name(path)).collect(),
-            field_bits: self.field_bits.unwrap_or(word[0].bits / self.count() as u32),
-            fields,
-            word,
-        }
+impl Stream {
+    fn of(name: &'static str, valid: &'static [&'static str], parts: &[Part]) -> Self {
+        Stream { name, valid, parts: parts.to_vec(), fields: &[], field_bits: None }
+    }
+
+    fn fields(self, fields: &'static [&'static str]) -> Self {
+        Stream { fields, ..self }
+    }
+
+    fn field_bits(self, bits: u32) -> Self {
+        Stream { field_bits: Some(bits), ..self }
+    }
+
+    /// Names of its signals in the top module.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = &'static str> + '_ {
+        self.valid.iter().copied().chain(self.parts.iter().map(|part| part.name))
     }
 
     /// Fields in each signal of the word.
@@ -93,121 +75,140 @@ impl Stream<'_> {
         self.fields.len().max(1)
     }
 
+    /// Names and widths; `bits` gives the width of a signal.
+    fn tap(&self, bits: impl Fn(&str) -> usize) -> Tap {
+        let signal = |part: &Part| TapSignal {
+            name: part.name.to_owned(),
+            bits: bits(part.name) as u32,
+            signed: part.signed,
+        };
+        let word: Vec<TapSignal> = self.parts.iter().map(signal).collect();
+        let port = |part: &Part| part.name.rsplit("__").next().unwrap_or(part.name);
+        let fields = match self.fields {
+            [] => self.parts.iter().map(port).collect(),
+            fields => fields.to_vec(),
+        };
+        Tap {
+            name: self.name,
+            valid: self.valid.iter().map(|&name| name.to_owned()).collect(),
+            field_bits: self.field_bits.unwrap_or(word[0].bits / self.count() as u32),
+            fields,
+            word,
+        }
+    }
+}
+
+/// The streams of the engine of `model`, in pipeline order.
+pub(crate) fn streams(model: &Model) -> Vec<Stream> {
+    match model.board.engine {
+        EngineKind::Parallel => parallel(model),
+        EngineKind::Serial => serial(),
+    }
+}
+
+fn parallel(model: &Model) -> Vec<Stream> {
+    let (network, contacts) = (model.formats().has_network(), model.contacts() > 0);
+    let width = if model.searches() { model.formats().search_width } else { Quads::LANES };
+    let of = Stream::of;
+    let all = [
+        (true, of("receive", &["receive__accept"], &[signed("receive__taken_word")])),
+        (model.chooses(), of("choose", &["begin_frame"], &[unsigned("receive__which")]).field_bits(CHOICE_FIELD)),
+        (true, of("normalise", &["fold__normalised_valid"], &[signed("normalise__shifted")]).fields(&TAXELS)),
+        (true, of("fold", &["fold__folded_valid"], &[signed("fold__folded")]).fields(&PARITIES)),
+        (
+            true,
+            of("instruction", &["pass__issued"], &[unsigned("pass__which"), unsigned("pass__step")])
+                .field_bits(INSTRUCTION_FIELD),
+        ),
+        (true, of("pass", &["pass__quad_valid"], &[signed("pass__quad")]).fields(&PARITIES)),
+        (contacts, of("segment", &["segment__labelled"], &[signed("segment__labelled_quad")]).fields(&TAXELS)),
+        (contacts, of("window", &["operand_source__of_window"], &[signed("operand_source__quad")]).fields(&PARITIES)),
+        (network, of("estimate", &["estimate__operands_valid"], &[signed("estimate__operands")]).fields(&PARITIES)),
+        (contacts, of("shear", &["shear__sheared_valid"], &[signed("shear__sheared")]).fields(&PARITIES)),
+        (true, of("rescale", &["rescale__words_valid"], &[signed("rescale__words")]).fields(&PARITIES)),
+        (network, of("relax", &["relax__sums_valid"], &[signed("relax__sums")]).fields(&PARITIES)),
+        (true, of("unfold", &["unfold__taxels_valid"], &[signed("unfold__taxels")]).fields(&TAXELS)),
+        (
+            true,
+            of(
+                "search",
+                &["search__compared"],
+                &[
+                    signed("search__best_x"),
+                    signed("search__best_y"),
+                    signed("search__score"),
+                    unsigned("search__taken"),
+                ],
+            )
+            .field_bits(SEARCH_FIELD),
+        ),
+        (true, of("forces", &["search__values_valid"], &[signed("search__values")]).fields(&TAXELS[..width])),
+    ];
+    all.into_iter().filter(|(present, _)| *present).map(|(_, stream)| stream).collect()
+}
+
+fn serial() -> Vec<Stream> {
+    let of = Stream::of;
+    vec![
+        of("receive", &["receive__accept"], &[signed("receive__s_axis_tdata")]),
+        of("normalise", &["pass_sequencer__normalised_valid"], &[signed("rounder__rounded")]),
+        of("fold", &["butterfly__quad_valid", "pass_sequencer__folding"], &[signed("butterfly__quad")])
+            .fields(&PARITIES),
+        of("pass", &["pass__quad_valid"], &[signed("pass__quad")]).fields(&PARITIES),
+        of("rescale", &["pass_sequencer__rescaled_valid"], &[signed("rounder__rounded")]),
+        of("unfold", &["unfold__taxel_valid"], &[signed("unfold__taxel")]),
+        of(
+            "search",
+            &["search_sequencer__compared"],
+            &[
+                signed("search_sequencer__best_x"),
+                signed("search_sequencer__best_y"),
+                signed("search_sequencer__score"),
+                unsigned("search_sequencer__taken"),
+            ],
+        )
+        .field_bits(SEARCH_FIELD),
+        of("forces", &["search_sequencer__value_valid"], &[signed("coefficient_shift__value")]),
+    ]
+}
+
+/// The taps of the engine of `model`, in pipeline order; `hierarchy` is its blocks.
+pub(crate) fn taps(model: &Model, hierarchy: &Hierarchy) -> Vec<Tap> {
+    let top = hierarchy.top();
+    let bits = |name: &str| top.and_then(|top| top.width_of(name)).unwrap_or(1);
+    streams(model).iter().map(|stream| stream.tap(bits)).collect()
+}
+
+/// A stream of a running engine.
+pub(crate) struct Tapped {
+    valid: Vec<Slot>,
+    parts: Vec<(Slot, bool)>,
+    count: usize,
+}
+
+impl Tapped {
+    /// `stream` in `run`, which observes its signals.
+    pub(crate) fn new(stream: &Stream, run: &Run) -> Self {
+        Tapped {
+            valid: stream.valid.iter().map(|name| run.slot("", name)).collect(),
+            parts: stream.parts.iter().map(|part| (run.slot("", part.name), part.signed)).collect(),
+            count: stream.count(),
+        }
+    }
+
     /// The fields of the word that passes in this cycle.
-    fn sample(&self) -> Option<Vec<i64>> {
-        let fields = |part: &Part| {
-            let (word, bits, signed) = (part.signal.word(), part.signal.bits() / self.count(), part.signed);
+    pub(crate) fn word(&self, run: &Run) -> Option<Vec<i64>> {
+        let fields = |&(slot, signed): &(Slot, bool)| {
+            let (word, bits) = (run.get(slot), slot.bits() / self.count);
             let field = move |index| match signed {
                 true => word.signed(index, bits),
                 false => word.field(index * bits, bits) as i64,
             };
-            (0..self.count()).map(field)
+            (0..self.count).map(field)
         };
-        self.valid.iter().all(|(_, high)| *high).then(|| self.parts.iter().flat_map(fields).collect())
+        self.valid.iter().all(|&slot| run.is_high(slot)).then(|| self.parts.iter().flat_map(fields).collect())
     }
 }
-
-/// A design with observed streams.
-pub(crate) trait Observed {
-    /// Calls `visit` with each stream in pipeline order; the same streams in every cycle.
-    fn streams(&self, visit: &mut dyn FnMut(&Stream));
-}
-
-/// The taps of `design`, in pipeline order.
-pub(crate) fn taps(design: &dyn Observed) -> Vec<Tap> {
-    let mut taps = Vec::new();
-    design.streams(&mut |stream| taps.push(stream.tap()));
-    taps
-}
-
-/// The words that pass in the current cycle, one entry per tap, in the order of [`taps`].
-pub(crate) fn words(design: &dyn Observed) -> Vec<Option<Vec<i64>>> {
-    let mut words = Vec::new();
-    design.streams(&mut |stream| words.push(stream.sample()));
-    words
-}
-
-/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; names of the fields in
-/// each]`. `as` gives the fields a width other than that of their signals; `if` names the method that says whether the
-/// engine has the stream, and `by` the method that says how many of the fields there are.
-macro_rules! streams {
-    ($engine:ty {$(
-        $name:ident $(if $($chosen:ident).+)?: $($($valid:ident).+)&+
-            => [$($sign:ident $($part:ident).+),+ $(; $fields:ident $(by $($counted:ident).+)?)?] $(as $bits:ident)?,
-    )+}) => {
-        impl Observed for $engine {
-            fn streams(&self, visit: &mut dyn FnMut(&Stream)) {
-                $($(if self.$($chosen).+())? {
-                    visit(&Stream {
-                        name: stringify!($name),
-                        valid: &[$((&[$(stringify!($valid)),+], self.$($valid).+.val())),+],
-                        parts: &[$(Part {
-                            path: &[$(stringify!($part)),+],
-                            signed: is_signed!($sign),
-                            signal: &self.$($part).+,
-                        }),+],
-                        fields: fields!(self $($fields $($($counted).+)?)?),
-                        field_bits: [$($bits)?].first().copied(),
-                    });
-                })+
-            }
-        }
-    };
-}
-
-/// Names of the fields in each signal of a word.
-macro_rules! fields {
-    ($engine:ident) => {
-        &[]
-    };
-    ($engine:ident $fields:ident) => {
-        &$fields
-    };
-    ($engine:ident $fields:ident $($counted:ident).+) => {
-        &$fields[..$engine.$($counted).+()]
-    };
-}
-
-/// Whether the fields of a signal are two's complement.
-macro_rules! is_signed {
-    (signed) => {
-        true
-    };
-    (unsigned) => {
-        false
-    };
-}
-
-streams!(engine::Engine {
-    receive: receive.accept => [signed receive.taken_word],
-    choose if chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
-    normalise: fold.normalised_valid => [signed normalise.shifted; TAXELS],
-    fold: fold.folded_valid => [signed fold.folded; PARITIES],
-    instruction: pass.issued => [unsigned pass.which, unsigned pass.step] as INSTRUCTION_FIELD,
-    pass: pass.quad_valid => [signed pass.quad; PARITIES],
-    segment if has_contacts: segment.labelled => [signed segment.labelled_quad; TAXELS],
-    window if has_contacts: operand_source.of_window => [signed operand_source.quad; PARITIES],
-    estimate if has_network: estimate.operands_valid => [signed estimate.operands; PARITIES],
-    shear if has_contacts: shear.sheared_valid => [signed shear.sheared; PARITIES],
-    rescale: rescale.words_valid => [signed rescale.words; PARITIES],
-    relax if has_network: relax.sums_valid => [signed relax.sums; PARITIES],
-    unfold: unfold.taxels_valid => [signed unfold.taxels; TAXELS],
-    search: search.compared
-        => [signed search.best_x, signed search.best_y, signed search.score, unsigned search.taken] as SEARCH_FIELD,
-    forces: search.values_valid => [signed search.values; TAXELS by width],
-});
-
-streams!(serial::Engine {
-    receive: receive.accept => [signed receive.s_axis_tdata],
-    normalise: pass_sequencer.normalised_valid => [signed rounder.rounded],
-    fold: butterfly.quad_valid & pass_sequencer.folding => [signed butterfly.quad; PARITIES],
-    pass: pass.quad_valid => [signed pass.quad; PARITIES],
-    rescale: pass_sequencer.rescaled_valid => [signed rounder.rounded],
-    unfold: unfold.taxel_valid => [signed unfold.taxel],
-    search: search_sequencer.compared
-        => [signed search_sequencer.best_x, signed search_sequencer.best_y, signed search_sequencer.score, unsigned search_sequencer.taken] as SEARCH_FIELD,
-    forces: search_sequencer.value_valid => [signed coefficient_shift.value],
-});
 
 #[cfg(test)]
 mod tests {
@@ -217,7 +218,6 @@ mod tests {
     use dermis_golden::spec::scene::Scene;
 
     use super::*;
-    use crate::language::Hierarchy;
     use crate::simulate::design;
 
     fn model(change: impl Fn(&mut Scene)) -> Model {
@@ -228,8 +228,8 @@ mod tests {
 
     /// The taps of the engine of `model`, after a check that their signals are in the top module, with their widths.
     fn checked(model: &Model) -> Vec<Tap> {
-        let engine = design(model).unwrap();
-        let (hierarchy, taps) = (Hierarchy::of(&*engine), taps(&*engine));
+        let hierarchy = design(model).unwrap();
+        let taps = taps(model, &hierarchy);
         let (_, top) = hierarchy.kernels().find(|(path, _)| path.is_empty()).unwrap();
         let bits = |name: &str| top.signal_of(name).map(|id| top.signals[id].ty.bits as u32);
         for tap in &taps {
@@ -242,7 +242,6 @@ mod tests {
                 assert!(needed == each * tap.field_bits || each == 1 && needed < tap.field_bits, "{tap:?}");
             }
         }
-        assert_eq!(words(&*engine).len(), taps.len());
         taps
     }
 

@@ -6,8 +6,7 @@ use dermis_golden::spec::board::{Board, EngineKind};
 use serde::Serialize;
 
 use crate::language::{distributed_luts, Hierarchy, Memory, SEPARATOR};
-use crate::simulate;
-use crate::stage_list::{Stage, CONTROL};
+use crate::engine::{stages, Stage, CONTROL};
 
 /// Resources of a part of the design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -55,7 +54,7 @@ impl PlacedMemory {
 
     /// Pipeline stage of the block in an engine of this kind; `engine` if it belongs to none.
     pub fn stage(&self, engine: EngineKind) -> &'static str {
-        stage(simulate::stages(engine), &self.block)
+        stage(stages(engine), &self.block)
     }
 }
 
@@ -92,7 +91,7 @@ pub(crate) fn by_stage(
     memories: &[PlacedMemory],
     around: Option<Surrounding>,
 ) -> StageUsage {
-    let list = simulate::stages(model.board.engine);
+    let list = stages(model.board.engine);
     let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(around.map(|around| around.row));
     let mut all: StageUsage = names.map(|name| (name, Usage::default())).collect();
     let row_of = |block: &str| match around.map(|around| (block.strip_prefix(around.engine), around.row)) {

@@ -1,239 +1,243 @@
 //! A core's top module: an engine between its streams, and its registers behind a bus.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::spec::board::EngineKind;
 use dermis_golden::wire::registers::{constants, ADDRESS_BITS, REGISTER_BITS};
-use rust_hdl::prelude::*;
 
 use super::stream_in::WORD_BYTES;
 use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, Wishbone, ID_BITS};
+use crate::block;
+use crate::engine::Engine;
 use crate::error::HdlError;
-use crate::language::Hierarchy;
-use crate::language::RustHdl;
+use crate::language::{kernel_of, Block, Builder, Hierarchy, Inside};
 use crate::primitives::{Dff, Queue};
 use crate::scan::require_stream;
-use crate::wire::Wire;
-use crate::{engine, serial};
 
-/// Core `$name` with engine `$engine` and bus block `$bus`, whose pins are named as in that block. A macro, because rust-hdl
-/// connects blocks by their fields and does not support type parameters for them.
-macro_rules! core {
-    (
-        $name:ident, $engine:ty, $bus:ty,
-        in [$($bit_in:ident),+], wide in [$($wire_in:ident: $in_bits:expr),+],
-        out [$($bit_out:ident),+], wide out [$($wire_out:ident: $out_bits:expr),+]
-    ) => {
-        /// An engine with streams of whole words and registers on a bus; all ports change on the rising edge of `aclk`.
-        #[derive(dermis_hdl_derive::Block)]
-        pub struct $name {
-            /// Clock of core and engine.
-            pub aclk: Signal<In, Clock>,
-            /// Synchronous reset, active low.
-            pub aresetn: Signal<In, Bit>,
-            /// A taxel's code, 32 bits signed, row-major; valid with `s_axis_tvalid`.
-            pub s_axis_tdata: Wire<In>,
-            /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
-            pub s_axis_tkeep: Wire<In>,
-            /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
-            pub s_axis_tid: Wire<In>,
-            /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-            pub s_axis_tvalid: Signal<In, Bit>,
-            /// The core accepts a beat in this cycle.
-            pub s_axis_tready: Signal<Out, Bit>,
-            /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-            pub s_axis_tlast: Signal<In, Bit>,
-            /// Words of 32 bits, fx, fy, fz of a taxel after the other, then status; valid with `m_axis_tvalid`.
-            pub m_axis_tdata: Wire<Out>,
-            /// Bytes of the beat that are there; valid with `m_axis_tvalid`.
-            pub m_axis_tkeep: Wire<Out>,
-            /// A bit per word that is no force, and above them whether the frame is spoiled; valid with `m_axis_tvalid`.
-            pub m_axis_tuser: Wire<Out>,
-            /// Identifier of the frame; valid with `m_axis_tvalid`.
-            pub m_axis_tid: Wire<Out>,
-            /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-            pub m_axis_tvalid: Signal<Out, Bit>,
-            /// The receiver accepts a beat in this cycle.
-            pub m_axis_tready: Signal<In, Bit>,
-            /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-            pub m_axis_tlast: Signal<Out, Bit>,
-            $(
-                /// Pin of the bus.
-                pub $bit_in: Signal<In, Bit>,
-            )+
-            $(
-                /// Pins of the bus.
-                pub $wire_in: Wire<In>,
-            )+
-            $(
-                /// Pin of the bus.
-                pub $bit_out: Signal<Out, Bit>,
-            )+
-            $(
-                /// Pins of the bus.
-                pub $wire_out: Wire<Out>,
-            )+
-            // Registered, because the engine is large and its reset has a long route.
-            restart: RustHdl<Dff>,
-            stream_in: StreamIn,
-            tables_in: TablesIn,
-            labels: RustHdl<Queue>,
-            engine: $engine,
-            stream_out: RustHdl<StreamOut>,
-            registers: RustHdl<Registers>,
-            bus: RustHdl<$bus>,
-            rst: Signal<Local, Bit>,
-            unused: Signal<Local, Bit>,
+block! {
+    /// An engine with streams of whole words and registers on a bus; all ports change on the rising edge of `aclk`.
+    pub struct Core {
+        shape: CoreShape,
+        stream_in: StreamIn,
+        tables_in: TablesIn,
+        engine: Engine,
+        stream_out: StreamOut,
+        registers: Registers,
+    }
+    ports CorePorts {
+        clock aclk;
+        /// Synchronous reset, active low.
+        in aresetn;
+        /// A taxel's code, 32 bits signed, row-major; valid with `s_axis_tvalid`.
+        in s_axis_tdata: 8 * WORD_BYTES;
+        /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
+        in s_axis_tkeep: WORD_BYTES;
+        /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
+        in s_axis_tid: ID_BITS;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The core accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// Words of 32 bits, fx, fy, fz of a taxel after the other, then status; valid with `m_axis_tvalid`.
+        out m_axis_tdata: REGISTER_BITS * shape.words;
+        /// Bytes of the beat that are there; valid with `m_axis_tvalid`.
+        out m_axis_tkeep: REGISTER_BITS / 8 * shape.words;
+        /// A bit per word that is no force, and above them whether the frame is spoiled; valid with `m_axis_tvalid`.
+        out m_axis_tuser: shape.words + 1;
+        /// Identifier of the frame; valid with `m_axis_tvalid`.
+        out m_axis_tid: ID_BITS;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// Address of a write in bytes; valid with `s_axil_awvalid`.
+        in s_axil_awaddr: shape.bus.bits(Bus::AxiLite, ADDRESS_BITS);
+        /// An address is offered; the sender holds it until `s_axil_awready`.
+        in s_axil_awvalid: shape.bus.bits(Bus::AxiLite, 1);
+        /// The address is accepted in this cycle.
+        out s_axil_awready: shape.bus.bits(Bus::AxiLite, 1);
+        /// Data of a write; valid with `s_axil_wvalid`.
+        in s_axil_wdata: shape.bus.bits(Bus::AxiLite, REGISTER_BITS);
+        /// Bytes of a write that count; valid with `s_axil_wvalid`.
+        in s_axil_wstrb: shape.bus.bits(Bus::AxiLite, REGISTER_BITS / 8);
+        /// Data are offered; the sender holds them until `s_axil_wready`.
+        in s_axil_wvalid: shape.bus.bits(Bus::AxiLite, 1);
+        /// The data are accepted in this cycle.
+        out s_axil_wready: shape.bus.bits(Bus::AxiLite, 1);
+        /// 0 or SLVERR; valid with `s_axil_bvalid`.
+        out s_axil_bresp: shape.bus.bits(Bus::AxiLite, 2);
+        /// The answer of a write; it is held until `s_axil_bready`.
+        out s_axil_bvalid: shape.bus.bits(Bus::AxiLite, 1);
+        /// The answer is accepted in this cycle.
+        in s_axil_bready: shape.bus.bits(Bus::AxiLite, 1);
+        /// Address of a read in bytes; valid with `s_axil_arvalid`.
+        in s_axil_araddr: shape.bus.bits(Bus::AxiLite, ADDRESS_BITS);
+        /// An address is offered; the sender holds it until `s_axil_arready`.
+        in s_axil_arvalid: shape.bus.bits(Bus::AxiLite, 1);
+        /// The address is accepted in this cycle.
+        out s_axil_arready: shape.bus.bits(Bus::AxiLite, 1);
+        /// Content of the register; valid with `s_axil_rvalid`.
+        out s_axil_rdata: shape.bus.bits(Bus::AxiLite, REGISTER_BITS);
+        /// 0 or SLVERR; valid with `s_axil_rvalid`.
+        out s_axil_rresp: shape.bus.bits(Bus::AxiLite, 2);
+        /// The answer of a read; it is held until `s_axil_rready`.
+        out s_axil_rvalid: shape.bus.bits(Bus::AxiLite, 1);
+        /// The answer is accepted in this cycle.
+        in s_axil_rready: shape.bus.bits(Bus::AxiLite, 1);
+        /// A cycle of the bus.
+        in wb_cyc: shape.bus.bits(Bus::Wishbone, 1);
+        /// An access, held with all that belongs to it until the answer; valid with `wb_cyc`.
+        in wb_stb: shape.bus.bits(Bus::Wishbone, 1);
+        /// The access is a write; valid with `wb_stb`.
+        in wb_we: shape.bus.bits(Bus::Wishbone, 1);
+        /// Number of the register; valid with `wb_stb`.
+        in wb_adr: shape.bus.bits(Bus::Wishbone, ADDRESS_BITS - 2);
+        /// Data of a write; valid with `wb_stb` and `wb_we`.
+        in wb_dat_w: shape.bus.bits(Bus::Wishbone, REGISTER_BITS);
+        /// Bytes of a write that count; valid with `wb_stb` and `wb_we`.
+        in wb_sel: shape.bus.bits(Bus::Wishbone, REGISTER_BITS / 8);
+        /// Content of the register; valid with `wb_ack`.
+        out wb_dat_r: shape.bus.bits(Bus::Wishbone, REGISTER_BITS);
+        /// The access is done.
+        out wb_ack: shape.bus.bits(Bus::Wishbone, 1);
+        /// The access is refused.
+        out wb_err: shape.bus.bits(Bus::Wishbone, 1);
+    }
+}
+
+impl Bus {
+    /// The width of a pin of `bits` bits of the bus `other`: 0 with this one.
+    fn bits(self, other: Bus, bits: usize) -> usize {
+        if self == other {
+            bits
+        } else {
+            0
         }
+    }
+}
 
-        impl $name {
-            /// The core of the scene of `model`, with beats of `words` words at its output.
-            pub fn new(model: &Model, words: usize) -> Self {
-                let code_bits = model.formats().code_bits as usize;
-                let constants = constants(model, REGISTER_BITS / 8 * words);
-                let mut core = $name {
-                    aclk: Default::default(),
-                    aresetn: Default::default(),
-                    s_axis_tdata: Wire::new(8 * WORD_BYTES),
-                    s_axis_tkeep: Wire::new(WORD_BYTES),
-                    s_axis_tid: Wire::new(ID_BITS),
-                    s_axis_tvalid: Default::default(),
-                    s_axis_tready: Default::default(),
-                    s_axis_tlast: Default::default(),
-                    m_axis_tdata: Wire::new(REGISTER_BITS * words),
-                    m_axis_tkeep: Wire::new(REGISTER_BITS / 8 * words),
-                    m_axis_tuser: Wire::new(words + 1),
-                    m_axis_tid: Wire::new(ID_BITS),
-                    m_axis_tvalid: Default::default(),
-                    m_axis_tready: Default::default(),
-                    m_axis_tlast: Default::default(),
-                    $($bit_in: Default::default(),)+
-                    $($wire_in: Wire::new($in_bits),)+
-                    $($bit_out: Default::default(),)+
-                    $($wire_out: Wire::new($out_bits),)+
-                    restart: Default::default(),
-                    stream_in: StreamIn::new(model.scene.sensor.taxels(), model.formats().code_bits as usize),
-                    tables_in: TablesIn::new(model.formats().code_bits as usize, model.has_writable_tables()),
-                    labels: RustHdl::new(Queue::new(ID_BITS + 1)),
-                    engine: <$engine>::new(model),
-                    stream_out: RustHdl::new(StreamOut::new(words, model.force_triples())),
-                    registers: RustHdl::new(Registers::new(&constants, model.has_writable_tables())),
-                    bus: Default::default(),
-                    rst: Default::default(),
-                    unused: Default::default(),
-                };
-                core.connect_all();
-                core
-            }
+impl Core {
+    /// The core of the scene of `model`.
+    pub fn new(model: &Model, shape: CoreShape) -> Self {
+        let (code_bits, writable) = (model.formats().code_bits as usize, model.has_writable_tables());
+        let constants = constants(model, REGISTER_BITS / 8 * shape.words);
+        Core {
+            shape,
+            stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits),
+            tables_in: TablesIn::new(code_bits, writable),
+            engine: Engine::new(model),
+            stream_out: StreamOut::new(shape.words, model.force_triples()),
+            registers: Registers::new(&constants, writable),
         }
+    }
+}
 
-        impl Logic for $name {
-            #[hdl_gen]
-            fn update(&mut self) {
-                self.restart.clk.next = self.aclk.val();
-                self.stream_in.clk.next = self.aclk.val();
-                self.tables_in.clk.next = self.aclk.val();
-                self.labels.clk.next = self.aclk.val();
-                self.engine.clk.next = self.aclk.val();
-                self.stream_out.clk.next = self.aclk.val();
-                self.registers.clk.next = self.aclk.val();
-                self.bus.clk.next = self.aclk.val();
-                self.rst.next = !self.aresetn.val();
-                self.restart.d.next = self.rst.val() | self.registers.restart.val();
-                self.bus.rst.next = self.rst.val();
-                self.registers.rst.next = self.rst.val();
-                self.stream_in.rst.next = self.restart.q.val();
-                self.tables_in.rst.next = self.restart.q.val();
-                self.labels.rst.next = self.restart.q.val();
-                self.engine.rst.next = self.restart.q.val();
-                self.stream_out.rst.next = self.restart.q.val();
-
-                self.stream_in.s_axis_tdata.next = self.s_axis_tdata.val();
-                self.stream_in.s_axis_tkeep.next = self.s_axis_tkeep.val();
-                self.stream_in.s_axis_tid.next = self.s_axis_tid.val();
-                self.stream_in.s_axis_tvalid.next = self.s_axis_tvalid.val() & !self.restart.q.val();
-                self.stream_in.s_axis_tlast.next = self.s_axis_tlast.val();
-                self.s_axis_tready.next = self.stream_in.s_axis_tready.val() & !self.restart.q.val();
-                self.tables_in.s_axis_tdata.next = self.stream_in.m_axis_tdata.val();
-                self.tables_in.s_axis_tvalid.next = self.stream_in.m_axis_tvalid.val();
-                self.tables_in.s_axis_tlast.next = self.stream_in.m_axis_tlast.val();
-                self.stream_in.m_axis_tready.next = self.tables_in.s_axis_tready.val();
-                self.tables_in.octet.next = self.registers.octet.val();
-                self.tables_in.octet_valid.next = self.registers.octet_valid.val();
-                self.registers.octet_taken.next = self.tables_in.octet_taken.val();
-                self.engine.s_axis_tdata.next = self.tables_in.m_axis_tdata.val();
-                self.engine.s_axis_tvalid.next = self.tables_in.m_axis_tvalid.val();
-                self.engine.s_axis_tlast.next = self.tables_in.m_axis_tlast.val();
-                self.tables_in.m_axis_tready.next = self.engine.s_axis_tready.val();
-
-                self.stream_in.room.next = self.labels.room.val();
-                self.labels.reserve.next = self.stream_in.complete.val();
-                self.labels.write.next = self.stream_in.complete.val();
-                self.labels.last.next = self.stream_in.complete.val();
-                self.labels.word.next = self.stream_in.label.val();
-                self.labels.m_axis_tready.next = self.stream_out.sent.val();
-                self.unused.next = self.labels.m_axis_tlast.val() | self.labels.m_axis_tvalid.val();
-
-                self.stream_out.s_axis_tdata.next = self.engine.m_axis_tdata.val();
-                self.stream_out.s_axis_tvalid.next = self.engine.m_axis_tvalid.val();
-                self.stream_out.s_axis_tlast.next = self.engine.m_axis_tlast.val();
-                self.engine.m_axis_tready.next = self.stream_out.s_axis_tready.val();
-                self.stream_out.label.next = self.labels.m_axis_tdata.val();
-                self.m_axis_tdata.next = self.stream_out.m_axis_tdata.val();
-                self.m_axis_tkeep.next = self.stream_out.m_axis_tkeep.val();
-                self.m_axis_tuser.next = self.stream_out.m_axis_tuser.val();
-                self.m_axis_tid.next = self.stream_out.m_axis_tid.val();
-                self.m_axis_tvalid.next = self.stream_out.m_axis_tvalid.val();
-                self.stream_out.m_axis_tready.next = self.m_axis_tready.val();
-                self.m_axis_tlast.next = self.stream_out.m_axis_tlast.val();
-
-                $(self.bus.$bit_in.next = self.$bit_in.val();)+
-                $(self.bus.$wire_in.next = self.$wire_in.val();)+
-                $(self.$bit_out.next = self.bus.$bit_out.val();)+
-                $(self.$wire_out.next = self.bus.$wire_out.val();)+
-                self.registers.select.next = self.bus.select.val();
-                self.registers.write.next = self.bus.write.val();
-                self.registers.address.next = self.bus.address.val();
-                self.registers.data.next = self.bus.data.val();
-                self.registers.strobe.next = self.bus.strobe.val();
-                self.bus.content.next = self.registers.content.val();
-                self.bus.refused.next = self.registers.refused.val();
-                self.registers.complete.next = self.stream_in.complete.val();
-                self.registers.clipped.next = self.stream_in.clipped.val();
-                self.registers.partial.next = self.stream_in.partial.val();
-                self.registers.misframed.next = self.stream_in.misframed.val();
-                self.registers.sent.next = self.stream_out.sent.val();
-            }
-        }
+/// Connects the instance `$bus` of a bus: its pins, and registers behind it.
+macro_rules! connect {
+    ($bus:ident, $io:ident, $registers:ident, in [$($input:ident),+], out [$($output:ident),+]) => {
+        $($bus.$input.set($io.$input);)+
+        $($io.$output.set($bus.$output);)+
+        $registers.select.set($bus.select);
+        $registers.write.set($bus.write);
+        $registers.address.set($bus.address);
+        $registers.data.set($bus.data);
+        $registers.strobe.set($bus.strobe);
+        $bus.content.set($registers.content);
+        $bus.refused.set($registers.refused);
+        $bus.rst.set(!$io.aresetn);
     };
 }
 
-/// Cores for the two buses of an engine.
-macro_rules! cores {
-    ($axi:ident, $wishbone:ident, $engine:ty) => {
-        core!(
-            $axi, $engine, AxiLite,
-            in [s_axil_awvalid, s_axil_wvalid, s_axil_bready, s_axil_arvalid, s_axil_rready],
-            wide in [
-                s_axil_awaddr: ADDRESS_BITS, s_axil_wdata: REGISTER_BITS, s_axil_wstrb: REGISTER_BITS / 8,
-                s_axil_araddr: ADDRESS_BITS
-            ],
-            out [s_axil_awready, s_axil_wready, s_axil_bvalid, s_axil_arready, s_axil_rvalid],
-            wide out [s_axil_bresp: 2, s_axil_rdata: REGISTER_BITS, s_axil_rresp: 2]
-        );
-        core!(
-            $wishbone, $engine, Wishbone,
-            in [wb_cyc, wb_stb, wb_we],
-            wide in [wb_adr: ADDRESS_BITS - 2, wb_dat_w: REGISTER_BITS, wb_sel: REGISTER_BITS / 8],
-            out [wb_ack, wb_err],
-            wide out [wb_dat_r: REGISTER_BITS]
-        );
-    };
+impl Block for Core {
+    fn build<'k>(&'k self, k: &'k Builder, io: CorePorts<Inside<'k>>) {
+        let restart = k.instance("restart", Dff {});
+        let stream_in = k.instance("stream_in", &self.stream_in);
+        let tables_in = k.instance("tables_in", &self.tables_in);
+        let labels = k.instance("labels", Queue::new(ID_BITS + 1));
+        let engine = k.instance("engine", &self.engine);
+        let stream_out = k.instance("stream_out", &self.stream_out);
+        let registers = k.instance("registers", &self.registers);
+        let rst = k.wire("rst", !io.aresetn);
+        k.comment("Registered, because the engine is large and its reset has a long route.");
+        restart.d.set(rst | registers.restart);
+        registers.rst.set(rst);
+        [&stream_in.rst, &tables_in.rst, &labels.rst, &engine.rst, &stream_out.rst]
+            .iter()
+            .for_each(|rst| rst.set(restart.q));
+
+        stream_in.s_axis_tdata.set(io.s_axis_tdata);
+        stream_in.s_axis_tkeep.set(io.s_axis_tkeep);
+        stream_in.s_axis_tid.set(io.s_axis_tid);
+        stream_in.s_axis_tvalid.set(io.s_axis_tvalid & !restart.q);
+        stream_in.s_axis_tlast.set(io.s_axis_tlast);
+        io.s_axis_tready.set(stream_in.s_axis_tready & !restart.q);
+        tables_in.s_axis_tdata.set(stream_in.m_axis_tdata);
+        tables_in.s_axis_tvalid.set(stream_in.m_axis_tvalid);
+        tables_in.s_axis_tlast.set(stream_in.m_axis_tlast);
+        stream_in.m_axis_tready.set(tables_in.s_axis_tready);
+        tables_in.octet.set(registers.octet);
+        tables_in.octet_valid.set(registers.octet_valid);
+        registers.octet_taken.set(tables_in.octet_taken);
+        engine.s_axis_tdata.set(tables_in.m_axis_tdata);
+        engine.s_axis_tvalid.set(tables_in.m_axis_tvalid);
+        engine.s_axis_tlast.set(tables_in.m_axis_tlast);
+        tables_in.m_axis_tready.set(engine.s_axis_tready);
+
+        stream_in.room.set(labels.room);
+        labels.reserve.set(stream_in.complete);
+        labels.write.set(stream_in.complete);
+        labels.last.set(stream_in.complete);
+        labels.word.set(stream_in.label);
+        labels.m_axis_tready.set(stream_out.sent);
+        k.wire("unused", labels.m_axis_tlast | labels.m_axis_tvalid);
+
+        stream_out.s_axis_tdata.set(engine.m_axis_tdata);
+        stream_out.s_axis_tvalid.set(engine.m_axis_tvalid);
+        stream_out.s_axis_tlast.set(engine.m_axis_tlast);
+        engine.m_axis_tready.set(stream_out.s_axis_tready);
+        stream_out.label.set(labels.m_axis_tdata);
+        io.m_axis_tdata.set(stream_out.m_axis_tdata);
+        io.m_axis_tkeep.set(stream_out.m_axis_tkeep);
+        io.m_axis_tuser.set(stream_out.m_axis_tuser);
+        io.m_axis_tid.set(stream_out.m_axis_tid);
+        io.m_axis_tvalid.set(stream_out.m_axis_tvalid);
+        stream_out.m_axis_tready.set(io.m_axis_tready);
+        io.m_axis_tlast.set(stream_out.m_axis_tlast);
+
+        match self.shape.bus {
+            Bus::AxiLite => {
+                let bus = k.instance("bus", AxiLite::default());
+                connect!(
+                    bus, io, registers,
+                    in [
+                        s_axil_awaddr, s_axil_awvalid, s_axil_wdata, s_axil_wstrb, s_axil_wvalid, s_axil_bready,
+                        s_axil_araddr, s_axil_arvalid, s_axil_rready
+                    ],
+                    out [
+                        s_axil_awready, s_axil_wready, s_axil_bresp, s_axil_bvalid, s_axil_arready, s_axil_rdata,
+                        s_axil_rresp, s_axil_rvalid
+                    ]
+                );
+            }
+            Bus::Wishbone => {
+                let bus = k.instance("bus", Wishbone::default());
+                connect!(
+                    bus, io, registers,
+                    in [wb_cyc, wb_stb, wb_we, wb_adr, wb_dat_w, wb_sel], out [wb_dat_r, wb_ack, wb_err]
+                );
+            }
+        }
+        registers.complete.set(stream_in.complete);
+        registers.clipped.set(stream_in.clipped);
+        registers.partial.set(stream_in.partial);
+        registers.misframed.set(stream_in.misframed);
+        registers.sent.set(stream_out.sent);
+    }
 }
 
-cores!(AxiCore, WishboneCore, engine::Engine);
-cores!(SerialAxiCore, SerialWishboneCore, serial::Engine);
-
-/// The hierarchy of the core of `model`, after rust-hdl's checks.
+/// The hierarchy of the core of `model`, checked.
 ///
 /// # Errors
 /// [`HdlError::Unsupported`]: a scene with several frames per result; [`HdlError::Check`].
@@ -247,18 +251,7 @@ pub(super) fn hierarchy(model: &Model, shape: CoreShape) -> Result<Hierarchy, Hd
             what: "a core with several frames per result",
         });
     }
-    let words = shape.words;
-    match (model.board.engine, shape.bus) {
-        (EngineKind::Parallel, Bus::AxiLite) => checked(&AxiCore::new(model, words)),
-        (EngineKind::Parallel, Bus::Wishbone) => checked(&WishboneCore::new(model, words)),
-        (EngineKind::Serial, Bus::AxiLite) => checked(&SerialAxiCore::new(model, words)),
-        (EngineKind::Serial, Bus::Wishbone) => checked(&SerialWishboneCore::new(model, words)),
-    }
-}
-
-fn checked(core: &dyn Block) -> Result<Hierarchy, HdlError> {
-    let hierarchy = Hierarchy::of(core);
+    let hierarchy = Hierarchy::of_kernel(kernel_of(&Core::new(model, shape)));
     hierarchy.check()?;
-    check_all(core).map_err(|error| HdlError::Check(format!("{error:?}")))?;
     Ok(hierarchy)
 }

@@ -31,9 +31,9 @@ pub fn generate_core(model: &Model, shape: CoreShape) -> Result<Generated, HdlEr
 pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]) -> Result<Generated, HdlError> {
     let hierarchy = hierarchy(model, shape)?.changed(changes)?;
     let engine = crate::generate(model)?;
-    let (suffix, bus_source) = match shape.bus {
-        Bus::AxiLite => ("axi", include_str!("axi_lite.rs")),
-        Bus::Wishbone => ("wishbone", include_str!("wishbone.rs")),
+    let suffix = match shape.bus {
+        Bus::AxiLite => "axi",
+        Bus::Wishbone => "wishbone",
     };
     let top = format!("{}_{suffix}", top_name(&model.scene.name));
     let (scene, bytes) = (&model.scene, 4 * shape.words);
@@ -65,7 +65,7 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     let own =
         [("dermis_registers.h", c_header()), ("registers.json", format!("{map:#}\n")), ("registers.rdl", system_rdl())];
     let own = own.map(|(name, text)| GeneratedFile { name: name.into(), text });
-    let around = Around { top, hierarchy, sources: &[bus_source, include_str!("core.rs")], header, row: "bus" };
+    let around = Around { top, hierarchy, header, row: "bus" };
     let mut core = around.generated(model, engine)?;
     core.files.extend(own);
     core.add_core_file(model, testbench(model, &core.top, shape, command));

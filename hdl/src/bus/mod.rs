@@ -19,7 +19,7 @@ mod testbench;
 mod wishbone;
 
 pub use axi_lite::AxiLite;
-pub use core::{AxiCore, SerialAxiCore, SerialWishboneCore, WishboneCore};
+pub use core::Core;
 pub use generate::{generate_core, generate_core_changed};
 pub use registers::Registers;
 pub use stream_in::StreamIn;

@@ -75,7 +75,7 @@ impl Reference for Frames {
 /// An engine as the subject of a test, its ports in the order of [`Frames`].
 macro_rules! engine_subject {
     ($engine:expr, $changes:expr) => {
-        $crate::language::testbench::block_subject!(
+        $crate::language::testbench::subject_of!(
             $engine,
             $changes,
             inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],

@@ -7,8 +7,9 @@ use super::kernel::{Domain, Kernel, Memory, Node, NodeId, Register, Role, Signal
 
 impl Hierarchy {
     /// All blocks as one kernel. Its ports are those of the top; a signal of a block inside is called by path and name, with a
-    /// dot between. Signals of the top in `observed` are outputs too, so that a simulation shows them.
-    pub(crate) fn flat(&self, observed: &[&str]) -> Kernel {
+    /// dot between. Signals in `observed`, each given by the path of its block and its name, are outputs too, so that a simulation
+    /// shows them.
+    pub(crate) fn flat(&self, observed: &[(&str, &str)]) -> Kernel {
         let mut flat = Flattener::default();
         for (path, kernel) in self.kernels() {
             flat.declare(self, path, kernel);
@@ -24,12 +25,24 @@ impl Hierarchy {
         kernel.block = top.map(|top| top.block.clone()).unwrap_or_default();
         kernel.clock = top.and_then(|top| top.clock.clone());
         let outputs = top.into_iter().flat_map(|top| top.signals.iter().filter(|signal| signal.output));
-        for name in outputs.map(|signal| signal.name.as_str()).chain(observed.iter().copied()) {
-            if let Some(&id) = flat.signals.get(&self.net("", name)) {
+        for (path, name) in outputs.map(|signal| ("", signal.name.as_str())).chain(observed.iter().copied()) {
+            if let Some(&id) = flat.signals.get(&self.net(path, name)) {
                 kernel.signals[id].output = true;
             }
         }
         kernel
+    }
+
+    /// Name in the flat kernel of the signal `name` of the block at `path`.
+    pub(super) fn flat_name(&self, path: &str, name: &str) -> String {
+        flat_name(self.net(path, name))
+    }
+}
+
+fn flat_name((path, name): Net) -> String {
+    match path.as_str() {
+        "" => name,
+        path => format!("{path}.{name}"),
     }
 }
 
@@ -45,10 +58,7 @@ impl Flattener {
     fn declare(&mut self, hierarchy: &Hierarchy, path: &str, kernel: &Kernel) {
         for signal in &kernel.signals {
             let net = hierarchy.net(path, &signal.name);
-            let name = match net.0.as_str() {
-                "" => net.1.clone(),
-                path => format!("{path}.{}", net.1),
-            };
+            let name = flat_name(net.clone());
             let own = || Signal {
                 name,
                 ty: signal.ty,

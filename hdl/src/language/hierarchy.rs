@@ -124,7 +124,7 @@ impl Hierarchy {
     }
 
     /// The kernel of the top.
-    pub(super) fn top(&self) -> Option<&Kernel> {
+    pub(crate) fn top(&self) -> Option<&Kernel> {
         self.modules.get("").and_then(|module| module.kernel.as_deref())
     }
 
@@ -236,15 +236,14 @@ impl Hierarchy {
         Ok(())
     }
 
-    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories. `comment` gives the
-    /// comment of a port by the path of its block and its name.
-    pub fn verilog(&self, top: &str, attributes: &Attributes, comment: &Comment) -> String {
-        let texts = self.modules.keys().filter_map(|path| self.module(path, top, attributes, comment));
+    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories.
+    pub fn verilog(&self, top: &str, attributes: &Attributes) -> String {
+        let texts = self.modules.keys().filter_map(|path| self.module(path, top, attributes));
         texts.map(|text| text + "\n").collect()
     }
 
     /// The Verilog of the block `path`.
-    pub fn module(&self, path: &str, top: &str, attributes: &Attributes, comment: &Comment) -> Option<String> {
+    pub fn module(&self, path: &str, top: &str, attributes: &Attributes) -> Option<String> {
         let module = self.modules.get(path)?;
         let kernel = module.kernel.as_ref()?;
         let name = |path: &str| match path {
@@ -260,15 +259,16 @@ impl Hierarchy {
         lines.extend(body.lines().map(str::to_owned));
         for (instance, ports) in &module.children {
             let child = [module.path.clone(), vec![instance.clone()]].concat().join(SEPARATOR);
-            let connect = |port: &String| match kernel.clock.as_ref() == Some(port) && !kernel.has_net(instance, port) {
-                true => format!("    .{port}({port})"),
-                false => format!("    .{port}({instance}{SEPARATOR}{port})"),
+            let clock = kernel.instances.iter().find(|own| own.name == *instance).and_then(|own| own.kernel.clock.as_ref());
+            let connect = |port: &String| match (&kernel.clock, clock == Some(port)) {
+                (Some(clock), true) => format!("    .{port}({clock})"),
+                _ => format!("    .{port}({instance}{SEPARATOR}{port})"),
             };
             lines.push(format!("{} {instance} (", name(&child)));
             lines.push(format!("{}\n);", ports.iter().map(connect).collect::<Vec<_>>().join(",\n")));
         }
         let ports = module.ports.iter().map(|pin| &*pin.name);
-        let mut text = kernel.header(&name(path), ports, &|port| kernel.meaning(port).or_else(|| comment(path, port)));
+        let mut text = kernel.header(&name(path), ports, &|port| kernel.meaning(port));
         for line in lines.iter().flat_map(|line| line.lines()) {
             let _ = write!(text, "\n{}", format!("    {line}").trim_end());
         }
@@ -276,19 +276,11 @@ impl Hierarchy {
     }
 }
 
-/// The comment of a port: path of its block, its name.
-pub type Comment<'a> = dyn Fn(&str, &str) -> Option<String> + 'a;
-
 impl Kernel {
-    /// Whether the port of an instance is a signal of its own here, as that of a block in rust-hdl is.
-    fn has_net(&self, instance: &str, port: &str) -> bool {
-        self.signal_of(&called(instance, port)).is_some()
-    }
-
-    /// What the declaration says of a port.
+    /// What the declaration says of a port; empty if it says nothing.
     fn meaning(&self, port: &str) -> Option<String> {
-        let port = self.ports.iter().find(|own| own.name == port)?;
-        Some(port.doc.clone())
+        let (.., doc) = self.port_list().find(|(name, ..)| *name == port)?;
+        (!doc.is_empty()).then(|| doc.to_owned())
     }
 
     /// The head of a module of this name with these ports, in this order.

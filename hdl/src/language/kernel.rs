@@ -244,6 +244,9 @@ pub(crate) struct Instance {
     pub(crate) kernel: Arc<Kernel>,
 }
 
+/// What a clock port means.
+const CLOCK: &str = "Clock; registers change on its rising edge.";
+
 /// What is wrong with an expression.
 #[derive(Clone, Debug)]
 pub(crate) enum Defect {
@@ -397,6 +400,17 @@ impl Kernel {
         let is_read = |id: SignalId| read.iter().any(|&node| self.nodes[node].0 == Node::Signal(id));
         let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role.is_driven_outside());
         inputs.filter(|(id, _)| !is_read(*id)).map(|(_, signal)| signal.name.as_str()).collect()
+    }
+
+    /// Its ports, the clock first: name, whether it is an output, width in bits, meaning.
+    pub(crate) fn port_list(&self) -> impl Iterator<Item = (&str, bool, usize, &str)> {
+        let clock = self.clock.iter().map(|clock| (clock.as_str(), false, 1, CLOCK));
+        clock.chain(self.ports.iter().map(|port| (port.name.as_str(), port.output, port.bits, port.doc.as_str())))
+    }
+
+    /// Width in bits of the signal of this name.
+    pub(crate) fn width_of(&self, name: &str) -> Option<usize> {
+        self.signal_of(name).map(|id| self.signals[id].ty.bits)
     }
 
     pub(crate) fn signal_of(&self, name: &str) -> Option<SignalId> {

@@ -8,6 +8,7 @@
 //! | [`Inside`], in [`Block::build`] | an expression | an [`Output`], to be driven once |
 //! | [`Outside`], from [`Builder::instance`] | a [`Net`], to be assigned | an expression |
 //! | [`Signals`](super::Signals), in rust-hdl | a signal | a signal |
+//! | [`Widths`], from [`Interface::widths`] | its width in bits | its width in bits |
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -32,11 +33,16 @@ pub trait Interface {
     /// Name of the block in messages.
     const NAME: &'static str;
 
-    /// Whether it has a clock port, `clk`.
-    const CLOCKED: bool;
+    /// Its clock port; none of a combinational block.
+    const CLOCK: Option<&'static str>;
 
     /// The ports, made by `make` in the order of their declaration.
     fn ports<V: View>(&self, make: &mut dyn Make<V>) -> Self::Ports<V>;
+
+    /// The widths of the ports in bits.
+    fn widths(&self) -> Self::Ports<Widths> {
+        self.ports(&mut MakeWidths)
+    }
 
     /// Shows `visit` the ports of a block in rust-hdl, in the order of their declaration: name, whether it is an output.
     fn visit(ports: &Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &dyn SignalPort));
@@ -50,7 +56,7 @@ impl<B: Interface> Interface for &B {
 
     const NAME: &'static str = B::NAME;
 
-    const CLOCKED: bool = B::CLOCKED;
+    const CLOCK: Option<&'static str> = B::CLOCK;
 
     fn ports<V: View>(&self, make: &mut dyn Make<V>) -> Self::Ports<V> {
         (**self).ports(make)
@@ -117,6 +123,17 @@ impl<'k> View for Outside<'k> {
     type Out = Expr<'k>;
 }
 
+/// The width of each port in bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Widths;
+
+impl View for Widths {
+    type InBit = usize;
+    type OutBit = usize;
+    type In = usize;
+    type Out = usize;
+}
+
 /// An output as its block sees it: it is driven once, by a wire or a register of its name.
 #[derive(Clone, Copy, Debug)]
 pub struct Output<'k> {
@@ -126,8 +143,11 @@ pub struct Output<'k> {
 }
 
 impl<'k> Output<'k> {
-    /// Drives the output by a wire with this value. A narrower value is extended.
+    /// Drives the output by a wire with this value. A narrower value is extended. An output that is left out is not driven.
     pub fn set(self, value: Expr<'k>) -> Expr<'k> {
+        if self.bits == 0 {
+            return value;
+        }
         let value = if value.bits() < self.bits { value.extend(self.bits) } else { value };
         self.builder.unscoped(|| self.builder.wire(self.name, value))
     }
@@ -176,9 +196,16 @@ impl From<&usize> for Width {
     }
 }
 
-/// The text of a doc comment: its lines, of which each begins with a space.
+/// The text of a doc comment: its lines, of which each begins with a space, without the targets of its links, which mean
+/// nothing outside the docs of the crate.
 fn text(doc: &[&str]) -> String {
-    doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
+    let doc = doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ");
+    let mut parts = doc.split("](");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text.push_str(part.split_once(')').map_or(part, |(_, behind)| behind));
+    }
+    text.replace("[`", "`")
 }
 
 struct MakeInside<'k>(&'k Builder);
@@ -193,12 +220,17 @@ impl<'k> Make<Inside<'k>> for MakeInside<'k> {
     }
 
     fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Expr<'k> {
+        if bits == 0 {
+            return self.0.constant(1, 0);
+        }
         self.0.port(Port { name: name.to_owned(), bits, output: false, doc: text(doc) });
         self.0.input(name, bits)
     }
 
     fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Output<'k> {
-        self.0.port(Port { name: name.to_owned(), bits, output: true, doc: text(doc) });
+        if bits > 0 {
+            self.0.port(Port { name: name.to_owned(), bits, output: true, doc: text(doc) });
+        }
         Output { builder: self.0, name, bits }
     }
 }
@@ -232,11 +264,32 @@ impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
     }
 }
 
+struct MakeWidths;
+
+impl Make<Widths> for MakeWidths {
+    fn in_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> usize {
+        1
+    }
+
+    fn out_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> usize {
+        1
+    }
+
+    fn input(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> usize {
+        bits
+    }
+
+    fn output(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> usize {
+        bits
+    }
+}
+
 /// The kernel of a block.
 pub fn kernel_of<B: Block>(block: &B) -> Kernel {
-    let k = match B::CLOCKED {
-        true => Builder::new(B::NAME),
-        false => Builder::combinational(B::NAME),
+    let k = Builder::combinational(B::NAME);
+    let k = match B::CLOCK {
+        Some(clock) => k.clocked(clock),
+        None => k,
     };
     let io = block.ports(&mut MakeInside(&k));
     block.build(&k, io);
@@ -280,7 +333,9 @@ impl Builder {
 /// }
 /// ```
 /// A port without a width is one bit wide; a width is an expression of the parameters, which are in scope by their names.
-/// `clock` is the port `clk`, `reset` the port `rst`. A block without `clock` is combinational.
+/// A port of width 0 is left out: inside, such an input is 0 and such an output goes nowhere.
+/// `clock` is the port `clk`, `clock aclk` one of another name, `reset` the port `rst`. A block without `clock` is
+/// combinational.
 #[macro_export]
 macro_rules! block {
     (
@@ -289,7 +344,7 @@ macro_rules! block {
         ports $ports:ident { clock; reset; $($port:tt)* }
     ) => {
         $crate::block! {
-            @ true, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*]
+            @ Some("clk"), [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*]
             { #[doc = " Synchronous reset, active high."] in rst; $($port)* }
         }
     };
@@ -299,7 +354,18 @@ macro_rules! block {
         ports $ports:ident { clock; $($port:tt)* }
     ) => {
         $crate::block! {
-            @ true, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
+            @ Some("clk"), [$(#[$meta])*] $vis $block, $ports,
+            [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
+        }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
+        ports $ports:ident { clock $clock:ident; $($port:tt)* }
+    ) => {
+        $crate::block! {
+            @ Some(stringify!($clock)), [$(#[$meta])*] $vis $block, $ports,
+            [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
         }
     };
     (
@@ -308,11 +374,11 @@ macro_rules! block {
         ports $ports:ident { $($port:tt)* }
     ) => {
         $crate::block! {
-            @ false, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
+            @ None, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
         }
     };
     (
-        @ $clocked:literal, [$($meta:tt)*] $vis:vis $block:ident, $ports:ident,
+        @ $clock:expr, [$($meta:tt)*] $vis:vis $block:ident, $ports:ident,
         [$($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty,)*]
         { $($(#[doc = $doc:literal])+ $direction:ident $port:ident $(: $width:expr)?;)* }
     ) => {
@@ -329,10 +395,12 @@ macro_rules! block {
 
             const NAME: &'static str = stringify!($block);
 
-            const CLOCKED: bool = $clocked;
+            const CLOCK: Option<&'static str> = $clock;
 
             #[allow(unused_variables)]
             fn ports<V: $crate::language::View>(&self, make: &mut dyn $crate::language::Make<V>) -> $ports<V> {
+                #[allow(unused_imports)]
+                use $crate::language::Interface as _;
                 let $block { $($field,)* } = self;
                 $ports { $($port: $crate::block!(@make $direction make, stringify!($port), [$($doc),+] $(, $width)?),)* }
             }
@@ -366,4 +434,15 @@ macro_rules! block {
     };
     (@is_output in) => { false };
     (@is_output out) => { true };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn docs_of_ports_have_no_links() {
+        let doc = [" As `a` of", " [`Ram`](super::Ram), or [`b`](B); then."];
+        assert_eq!(text(&doc), "As `a` of `Ram`, or `b`; then.");
+    }
 }

@@ -101,7 +101,7 @@ impl<B: Interface> Logic for RustHdl<B> {
         let RustHdl { clk, ports, kernel } = self;
         let mut changed = false;
         B::visit(ports, &mut |_, is_output, port| changed |= !is_output && port.has_new_value());
-        let edge = B::CLOCKED && clk.pos_edge();
+        let edge = B::CLOCK.is_some() && clk.pos_edge();
         let inputs = |set: &mut dyn FnMut(usize, &dyn Port), ports: &B::Ports<Signals>| {
             let mut index = 0;
             B::visit(ports, &mut |_, is_output, port| {
@@ -160,8 +160,8 @@ impl<B: Interface> RustHdlBlock for RustHdl<B> {
 
     fn accept(&self, name: &str, probe: &mut dyn Probe) {
         probe.visit_start_scope(name, self);
-        if B::CLOCKED {
-            self.clk.accept("clk", probe);
+        if let Some(clock) = B::CLOCK {
+            self.clk.accept(clock, probe);
         }
         B::visit(&self.ports, &mut |name, _, port| port.accept(name, probe));
         self.kernel.accept("kernel", probe);

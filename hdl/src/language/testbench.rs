@@ -145,25 +145,3 @@ macro_rules! subject_of {
     };
 }
 pub(crate) use subject_of;
-
-/// A block with the blocks inside it as a [`Subject`], its Verilog with seeded defects; `clk` is its clock.
-///
-/// ```text
-/// block_subject!(Queue::new(8), &[], inputs [rst, write, word], outputs [room, m_axis_tvalid])
-/// ```
-macro_rules! block_subject {
-    ($block:expr, $changes:expr, inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?] $(,)?) => {
-        $crate::language::testbench::Subject::of_block(
-            $block,
-            $changes,
-            |block| &mut block.clk,
-            |block, visit| {
-                $(visit(stringify!($input), &mut block.$input);)*
-            },
-            |block, visit| {
-                $(visit(stringify!($output), &mut block.$output);)*
-            },
-        )
-    };
-}
-pub(crate) use block_subject;

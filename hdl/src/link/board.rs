@@ -2,8 +2,6 @@
 
 #[cfg(doc)]
 use dermis_golden::spec::link_kind::LinkKind;
-use rust_hdl::prelude::*;
-
 use crate::scan::ScanPins;
 
 /// A board's output pins.
@@ -34,12 +32,4 @@ pub trait BoardDevice: Send {
         self.settle(inputs, true);
         outputs
     }
-}
-
-/// Operations on a board top that simulation and generation need, the same for all engines and links.
-pub trait Board: Block + Send {
-    /// Applies the link's inputs and the clock level to the pins.
-    fn drive(&mut self, inputs: u64, clock: bool);
-    /// Samples the output pins.
-    fn outputs(&self) -> BoardOutputs;
 }

@@ -7,7 +7,7 @@ use dermis_golden::wire::link::slip::IDLE;
 use super::board_top::board_top;
 use crate::error::HdlError;
 use crate::generate::{top_name, Around, Generated};
-use crate::language::{Change, Hierarchy};
+use crate::language::Change;
 use crate::scan::pins_text;
 
 /// The link in the header comment of the top module: its name, and its pins.
@@ -48,10 +48,9 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
 /// # Errors
 /// As [`generate_board`]; a change that does not apply to the hardware.
 pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
-    let board = board_top(model)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
-    let hierarchy = Hierarchy::of(&*board).changed(changes)?;
+    let hierarchy = board_top(model)?.changed(changes)?;
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
     let header = format!(
@@ -72,7 +71,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         clock = model.board.clock_MHz,
         scan = pins_text(model),
     );
-    let around = Around { top, hierarchy, sources: &[include_str!("board_top.rs")], header, row: "link" };
+    let around = Around { top, hierarchy, header, row: "link" };
     let mut board = around.generated(model, engine)?;
     board.seal();
     Ok(board)

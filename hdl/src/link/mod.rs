@@ -39,8 +39,8 @@ mod uart;
 mod uart_receiver;
 mod uart_transmitter;
 
-pub use board::{Board, BoardDevice, BoardOutputs};
-pub use board_top::{BoardTop, ScanBoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop, SpiScanBoardTop};
+pub use board::{BoardDevice, BoardOutputs};
+pub use board_top::BoardTop;
 pub use counter_ram::CounterRam;
 pub use crc::Crc;
 pub use frame_gate::FrameGate;

@@ -7,7 +7,7 @@ use super::core::scanner;
 use super::Shape;
 use crate::error::HdlError;
 use crate::generate::{top_name, Around, Generated};
-use crate::language::{Change, Hierarchy};
+use crate::language::Change;
 
 /// The stream of images in the header comment of the top module.
 const TABLES: &str = "\
@@ -43,7 +43,7 @@ pub fn generate_scan(model: &Model) -> Result<Generated, HdlError> {
 /// As [`generate_scan`]; a change that does not apply to the hardware.
 pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
     let Shape { scan, timing, .. } = Shape::of(model)?;
-    let hierarchy = Hierarchy::of(&*scanner(model)?).changed(changes)?;
+    let hierarchy = scanner(model)?.changed(changes)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_scan", top_name(&model.scene.name));
     let clock = model.board.clock_MHz;
@@ -72,7 +72,7 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
         scan = us(timing.scan),
         period = us(timing.period),
     );
-    let around = Around { top, hierarchy, sources: &[include_str!("core.rs")], header, row: "scan" };
+    let around = Around { top, hierarchy, header, row: "scan" };
     let mut generated = around.generated(model, engine)?;
     generated.manifest["scan"] = json!({
         "converter": scan.converter.name,

@@ -20,7 +20,7 @@ mod simulate;
 mod status;
 mod tables;
 
-pub use self::core::{ScanCore, SerialScanCore, WritableScanCore};
+pub use self::core::ScanCore;
 pub use capture::ScanCapture;
 pub use codes::ScanCodes;
 pub(crate) use generate::pins_text;

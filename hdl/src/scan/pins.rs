@@ -1,7 +1,5 @@
 //! The pins of a scan, independent of the simulator.
 
-use rust_hdl::prelude::*;
-
 /// Input pins of a scan in one clock cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanInputs {
@@ -64,12 +62,4 @@ pub struct ScanOutputs {
 pub trait ScanDevice {
     /// Applies `inputs`, samples the outputs before the rising edge, then clocks.
     fn cycle(&mut self, inputs: &ScanInputs) -> ScanOutputs;
-}
-
-/// Operations on a top module that simulation and generation need, the same for all engines.
-pub(super) trait Scanner: Block {
-    /// Applies `inputs` and the clock level to the pins.
-    fn drive(&mut self, inputs: &ScanInputs, clock: bool);
-    /// Samples the output pins.
-    fn pins(&self) -> ScanOutputs;
 }

@@ -4,296 +4,259 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::plan::serial::{floor_bits, product_bits, word_bits, SLOT};
-use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
-use rust_hdl::prelude::*;
 
 use super::{
     Banks, Candidates, CoefficientShift, Forces, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
     SerialButterfly, TaxelReorder, Unfold,
 };
-use crate::language::RustHdl;
+use crate::engine::{stage_list, EnginePorts};
+use crate::language::{Builder, Inside};
 use crate::primitives::{Dff, Ram, Slice};
-use crate::stage_list::engine;
-use crate::wire::Wire;
 
-engine! {
-    /// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
-    pub struct Engine {
-        stages {
-            receive: Receive => "receive.rs",
-            reorder: RustHdl<TaxelReorder> => "taxel_reorder.rs",
-            pass_sequencer: RustHdl<PassSequencer> => "pass_sequencer.rs",
-            rounder: RustHdl<Rounder> => "rounder.rs",
-            butterfly: RustHdl<SerialButterfly> => "serial_butterfly.rs",
-            pass: RustHdl<Pass> => "pass.rs",
-            raw: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            unfold: RustHdl<Unfold> => "unfold.rs",
-            banks: RustHdl<Banks> => "banks.rs",
-            search_sequencer: RustHdl<SearchSequencer> => "search_sequencer.rs",
-            along_x: RustHdl<Horner> => "horner.rs",
-            transposed: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            along_y: RustHdl<Horner> => "horner.rs",
-            coefficient_shift: RustHdl<CoefficientShift> => "coefficient_shift.rs",
-            candidates: RustHdl<Candidates> => "candidates.rs",
-            score: RustHdl<Score> => "score.rs",
-            floors: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            totals: RustHdl<Ram> => "../primitives/memory/ram.rs",
-            forces: RustHdl<Forces> => "forces.rs",
-        }
-        control {
-            shifted: RustHdl<Slice>,
-            computing: RustHdl<Dff>,
-            condition: RustHdl<Dff>,
-            framing: RustHdl<Dff>,
-            both_signs: Constant<Bit>,
-            begin_frame: Signal<Local, Bit>,
-        }
-    }
+/// The parts of the engine that follow from the scene.
+pub(crate) struct Serial {
+    receive: Receive,
+    reorder: TaxelReorder,
+    pass_sequencer: PassSequencer,
+    rounder: Rounder,
+    butterfly: SerialButterfly,
+    pass: Pass,
+    raw: Ram,
+    unfold: Unfold,
+    banks: Banks,
+    search_sequencer: SearchSequencer,
+    along_x: Horner,
+    transposed: Ram,
+    along_y: Horner,
+    coefficient_shift: CoefficientShift,
+    candidates: Candidates,
+    score: Score,
+    floors: Ram,
+    totals: Ram,
+    forces: Forces,
+    shifted: Slice,
+    both_signs: bool,
 }
 
-impl Engine {
+impl Serial {
+    stage_list! {
+        receive: "receive.rs",
+        reorder: "taxel_reorder.rs",
+        pass_sequencer: "pass_sequencer.rs",
+        rounder: "rounder.rs",
+        butterfly: "serial_butterfly.rs",
+        pass: "pass.rs",
+        raw: "../primitives/memory/ram.rs",
+        unfold: "unfold.rs",
+        banks: "banks.rs",
+        search_sequencer: "search_sequencer.rs",
+        along_x: "horner.rs",
+        transposed: "../primitives/memory/ram.rs",
+        along_y: "horner.rs",
+        coefficient_shift: "coefficient_shift.rs",
+        candidates: "candidates.rs",
+        score: "score.rs",
+        floors: "../primitives/memory/ram.rs",
+        totals: "../primitives/memory/ram.rs",
+        forces: "forces.rs",
+    }
+
     /// The serial engine of `model`.
-    pub fn new(model: &Model) -> Self {
+    pub(crate) fn new(model: &Model) -> Self {
         let f = model.formats();
         let word = word_bits(f);
         let code = f.input_bits as usize;
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
-        let mut engine = Engine {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(f.code_bits as usize),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(3 * FORCE_BITS as usize),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
+        Serial {
             receive: Receive::new(f, model.noise_floor),
-            reorder: RustHdl::new(TaxelReorder::new(model.layout())),
-            pass_sequencer: RustHdl::new(PassSequencer::new(f, unrounded, rounded)),
-            rounder: RustHdl::new(Rounder::new(unrounded, rounded)),
-            shifted: RustHdl::new(Slice::new(32, rounded)),
-            butterfly: RustHdl::new(SerialButterfly::new(rounded)),
-            pass: RustHdl::new(Pass::new(model)),
-            raw: RustHdl::new(Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw])),
-            unfold: RustHdl::new(Unfold::new(f, rounded + 2)),
-            banks: RustHdl::new(Banks::new(f)),
-            search_sequencer: RustHdl::new(SearchSequencer::new(f)),
-            along_x: RustHdl::new(Horner::new(word)),
-            transposed: RustHdl::new(Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed])),
-            along_y: RustHdl::new(Horner::new(word)),
-            coefficient_shift: RustHdl::new(CoefficientShift::new(word, f.search_bits[0] as usize)),
-            candidates: RustHdl::new(Candidates::new(f)),
-            score: RustHdl::new(Score::new(f)),
-            floors: RustHdl::new(Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors])),
-            totals: RustHdl::new(Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals])),
-            forces: RustHdl::new(Forces::new(model, unrounded)),
-            computing: Default::default(),
-            condition: Default::default(),
-            framing: Default::default(),
-            both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
-            begin_frame: Default::default(),
-        };
-        engine.connect_all();
-        engine
+            reorder: TaxelReorder::new(model.layout()),
+            pass_sequencer: PassSequencer::new(f, unrounded, rounded),
+            rounder: Rounder::new(unrounded, rounded),
+            butterfly: SerialButterfly::new(rounded),
+            pass: Pass::new(model),
+            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw]),
+            unfold: Unfold::new(f, rounded + 2),
+            banks: Banks::new(f),
+            search_sequencer: SearchSequencer::new(f),
+            along_x: Horner::new(word),
+            transposed: Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed]),
+            along_y: Horner::new(word),
+            coefficient_shift: CoefficientShift::new(word, f.search_bits[0] as usize),
+            candidates: Candidates::new(f),
+            score: Score::new(f),
+            floors: Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]),
+            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
+            forces: Forces::new(model, unrounded),
+            shifted: Slice::new(32, rounded),
+            both_signs: model.scene.partition.condition == Condition::BothSigns,
+        }
     }
-}
 
-impl Logic for Engine {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.receive.clk.next = self.clk.val();
-        self.reorder.clk.next = self.clk.val();
-        self.pass_sequencer.clk.next = self.clk.val();
-        self.rounder.clk.next = self.clk.val();
-        self.butterfly.clk.next = self.clk.val();
-        self.pass.clk.next = self.clk.val();
-        self.raw.clk.next = self.clk.val();
-        self.unfold.clk.next = self.clk.val();
-        self.banks.clk.next = self.clk.val();
-        self.search_sequencer.clk.next = self.clk.val();
-        self.along_x.clk.next = self.clk.val();
-        self.transposed.clk.next = self.clk.val();
-        self.along_y.clk.next = self.clk.val();
-        self.coefficient_shift.clk.next = self.clk.val();
-        self.candidates.clk.next = self.clk.val();
-        self.score.clk.next = self.clk.val();
-        self.floors.clk.next = self.clk.val();
-        self.totals.clk.next = self.clk.val();
-        self.forces.clk.next = self.clk.val();
-        self.computing.clk.next = self.clk.val();
-        self.condition.clk.next = self.clk.val();
-        self.framing.clk.next = self.clk.val();
-        self.receive.rst.next = self.rst.val();
-        self.pass_sequencer.rst.next = self.rst.val();
-        self.butterfly.rst.next = self.rst.val();
-        self.pass.rst.next = self.rst.val();
-        self.unfold.rst.next = self.rst.val();
-        self.search_sequencer.rst.next = self.rst.val();
-        self.score.rst.next = self.rst.val();
-        self.forces.rst.next = self.rst.val();
+    /// Connects the stages.
+    pub(crate) fn build<'k>(&'k self, k: &'k Builder, io: EnginePorts<Inside<'k>>) {
+        let receive = k.instance("receive", &self.receive);
+        let reorder = k.instance("reorder", &self.reorder);
+        let pass_sequencer = k.instance("pass_sequencer", &self.pass_sequencer);
+        let rounder = k.instance("rounder", &self.rounder);
+        let butterfly = k.instance("butterfly", &self.butterfly);
+        let pass = k.instance("pass", &self.pass);
+        let raw = k.instance("raw", &self.raw);
+        let unfold = k.instance("unfold", &self.unfold);
+        let banks = k.instance("banks", &self.banks);
+        let search_sequencer = k.instance("search_sequencer", &self.search_sequencer);
+        let along_x = k.instance("along_x", &self.along_x);
+        let transposed = k.instance("transposed", &self.transposed);
+        let along_y = k.instance("along_y", &self.along_y);
+        let coefficient_shift = k.instance("coefficient_shift", &self.coefficient_shift);
+        let candidates = k.instance("candidates", &self.candidates);
+        let score = k.instance("score", &self.score);
+        let floors = k.instance("floors", &self.floors);
+        let totals = k.instance("totals", &self.totals);
+        let forces = k.instance("forces", &self.forces);
+        let shifted = k.instance("shifted", &self.shifted);
+        let computing = k.instance("computing", Dff {});
+        let condition = k.instance("condition", Dff {});
+        let framing = k.instance("framing", Dff {});
 
-        comment!("A frame starts when the buffer is full and the engine idle");
-        self.begin_frame.next = self.receive.full.val() & !self.computing.q.val() & !self.rst.val();
-        self.computing.d.next =
-            (self.begin_frame.val() | (self.computing.q.val() & !self.forces.done.val())) & !self.rst.val();
-        self.condition.d.next = self.condition.q.val();
-        self.framing.d.next = self.framing.q.val();
-        if self.begin_frame.val() {
-            self.framing.d.next = self.receive.framing.val();
-            self.condition.d.next = self.receive.positive.val() | self.receive.negative.val();
-            if self.both_signs.val() {
-                self.condition.d.next = self.receive.positive.val() & self.receive.negative.val();
-            }
-        }
-        self.receive.s_axis_tdata.next = self.s_axis_tdata.val();
-        self.receive.s_axis_tvalid.next = self.s_axis_tvalid.val();
-        self.receive.s_axis_tlast.next = self.s_axis_tlast.val();
-        self.s_axis_tready.next = self.receive.s_axis_tready.val();
-        self.receive.free.next = self.pass_sequencer.free.val();
-        self.receive.reported.next = self.begin_frame.val();
+        k.comment("A frame starts when the buffer is full and the engine idle");
+        let begin_frame = k.wire("begin_frame", receive.full & !computing.q & !io.rst);
+        computing.d.set((begin_frame | (computing.q & !forces.done)) & !io.rst);
+        let signs = [receive.positive, receive.negative];
+        let meets = if self.both_signs { signs[0] & signs[1] } else { signs[0] | signs[1] };
+        condition.d.set(begin_frame.mux(meets, condition.q));
+        framing.d.set(begin_frame.mux(receive.framing, framing.q));
+        receive.s_axis_tdata.set(io.s_axis_tdata);
+        receive.s_axis_tvalid.set(io.s_axis_tvalid);
+        receive.s_axis_tlast.set(io.s_axis_tlast);
+        io.s_axis_tready.set(receive.s_axis_tready);
+        receive.free.set(pass_sequencer.free);
+        receive.reported.set(begin_frame);
 
-        comment!("Taxel reorder: row-major or by quads");
-        self.reorder.back.next = !self.pass_sequencer.busy.val();
-        self.reorder.index.next = self.forces.index.val();
-        if self.pass_sequencer.busy.val() {
-            self.reorder.index.next = self.pass_sequencer.index.val();
-        }
-        self.receive.read_address.next = self.reorder.place.val();
+        k.comment("Taxel reorder: row-major or by quads");
+        reorder.back.set(!pass_sequencer.busy);
+        reorder.index.set(pass_sequencer.busy.mux(pass_sequencer.index, forces.index));
+        receive.read_address.set(reorder.place);
 
-        comment!("Rounder, shared by normalise, rescale and forces");
-        self.pass_sequencer.start.next = self.begin_frame.val();
-        self.pass_sequencer.magnitude.next = self.receive.magnitude.val();
-        self.pass_sequencer.code.next = self.receive.word.val();
-        self.rounder.word.next = self.forces.product.val();
-        self.rounder.shift.next = self.forces.round_shift.val();
-        if self.pass_sequencer.busy.val() {
-            self.rounder.word.next = self.pass_sequencer.unrounded.val();
-            self.rounder.shift.next = self.pass_sequencer.round_shift.val();
-        }
-        self.rounder.valid.next = self.pass_sequencer.round.val();
-        self.rounder.wide.next = !self.pass_sequencer.busy.val();
-        self.shifted.word.next = self.rounder.rounded.val();
-        self.pass_sequencer.rounded.next = self.shifted.low.val();
-        self.pass_sequencer.clipped.next = self.rounder.clipped.val();
-        self.pass_sequencer.round_done.next = self.rounder.done.val();
+        k.comment("Rounder, shared by normalise, rescale and forces");
+        pass_sequencer.start.set(begin_frame);
+        pass_sequencer.magnitude.set(receive.magnitude);
+        pass_sequencer.code.set(receive.word);
+        rounder.word.set(pass_sequencer.busy.mux(pass_sequencer.unrounded, forces.product));
+        rounder.shift.set(pass_sequencer.busy.mux(pass_sequencer.round_shift, forces.round_shift));
+        rounder.valid.set(pass_sequencer.round);
+        rounder.wide.set(!pass_sequencer.busy);
+        shifted.word.set(rounder.rounded);
+        pass_sequencer.rounded.set(shifted.low);
+        pass_sequencer.clipped.set(rounder.clipped);
+        pass_sequencer.round_done.set(rounder.done);
 
-        comment!("Butterfly, shared by fold and unfold");
-        self.butterfly.word.next = self.shifted.low.val();
-        self.butterfly.valid.next = self.pass_sequencer.transform.val();
-        self.pass_sequencer.transformed.next = self.butterfly.transformed.val();
-        self.pass_sequencer.transformed_valid.next = self.butterfly.transformed_valid.val();
+        k.comment("Butterfly, shared by fold and unfold");
+        butterfly.word.set(shifted.low);
+        butterfly.valid.set(pass_sequencer.transform);
+        pass_sequencer.transformed.set(butterfly.transformed);
+        pass_sequencer.transformed_valid.set(butterfly.transformed_valid);
 
-        comment!("Matrix passes");
-        self.pass.valid.next = self.pass_sequencer.issue.val();
-        self.pass.last.next = self.pass_sequencer.last.val();
-        self.pass.address.next = self.pass_sequencer.address.val();
-        self.pass.low.next = self.pass_sequencer.low.val();
-        self.pass.operand_address.next = self.pass_sequencer.operand_address.val();
-        self.pass.flip.next = self.pass_sequencer.flip.val();
-        self.pass.align.next = self.pass_sequencer.align.val();
-        self.pass.write.next = self.pass_sequencer.write.val();
-        self.pass.write_address.next = self.pass_sequencer.write_address.val();
-        self.pass.write_lane.next = self.pass_sequencer.write_lane.val();
-        self.pass.write_data.next = self.pass_sequencer.write_data.val();
-        self.pass_sequencer.row_word.next = self.pass.word.val();
-        self.pass_sequencer.row_valid.next = self.pass.word_valid.val();
-        self.raw.write.next = self.pass_sequencer.raw_write.val().into();
-        self.raw.write_address.next = self.pass_sequencer.raw_write_address.val();
-        self.raw.write_data.next = self.pass.word.val();
-        self.raw.read.next = true;
-        self.raw.read_address.next = self.pass_sequencer.raw_read_address.val();
-        self.pass_sequencer.raw_word.next = self.raw.read_data.val();
+        k.comment("Matrix passes");
+        pass.valid.set(pass_sequencer.issue);
+        pass.last.set(pass_sequencer.last);
+        pass.address.set(pass_sequencer.address);
+        pass.low.set(pass_sequencer.low);
+        pass.operand_address.set(pass_sequencer.operand_address);
+        pass.flip.set(pass_sequencer.flip);
+        pass.align.set(pass_sequencer.align);
+        pass.write.set(pass_sequencer.write);
+        pass.write_address.set(pass_sequencer.write_address);
+        pass.write_lane.set(pass_sequencer.write_lane);
+        pass.write_data.set(pass_sequencer.write_data);
+        pass_sequencer.row_word.set(pass.word);
+        pass_sequencer.row_valid.set(pass.word_valid);
+        raw.write.set(pass_sequencer.raw_write);
+        raw.write_address.set(pass_sequencer.raw_write_address);
+        raw.write_data.set(pass.word);
+        raw.read.set(k.constant(1, 1));
+        raw.read_address.set(pass_sequencer.raw_read_address);
+        pass_sequencer.raw_word.set(raw.read_data);
 
-        comment!("Polynomials: unfold, search, banks");
-        self.unfold.start.next = self.begin_frame.val();
-        self.unfold.transformed.next = self.butterfly.transformed.val();
-        self.unfold.valid.next = self.butterfly.transformed_valid.val() & self.pass_sequencer.unfolding.val();
-        self.search_sequencer.filling.next = self.pass_sequencer.busy.val();
-        self.search_sequencer.start.next = self.pass_sequencer.done.val();
-        self.search_sequencer.enabled.next = self.condition.q.val();
-        self.search_sequencer.wanted.next = self.forces.wanted.val();
-        self.banks.odd.next = self.search_sequencer.odd.val();
-        self.banks.read_address.next = self.search_sequencer.read_address.val();
-        self.banks.write.next = self.search_sequencer.write.val();
-        self.banks.write_address.next = self.search_sequencer.write_address.val();
-        self.banks.data.next = self.coefficient_shift.halved.val();
-        if self.pass_sequencer.busy.val() {
-            self.banks.write.next = self.unfold.write.val();
-            self.banks.write_address.next = self.unfold.address.val();
-            self.banks.data.next = self.unfold.data.val();
-        }
+        k.comment("Polynomials: unfold, search, banks");
+        unfold.start.set(begin_frame);
+        unfold.transformed.set(butterfly.transformed);
+        unfold.valid.set(butterfly.transformed_valid & pass_sequencer.unfolding);
+        search_sequencer.filling.set(pass_sequencer.busy);
+        search_sequencer.start.set(pass_sequencer.done);
+        search_sequencer.enabled.set(condition.q);
+        search_sequencer.wanted.set(forces.wanted);
+        banks.odd.set(search_sequencer.odd);
+        banks.read_address.set(search_sequencer.read_address);
+        banks.write.set(pass_sequencer.busy.mux(unfold.write, search_sequencer.write));
+        banks.write_address.set(pass_sequencer.busy.mux(unfold.address, search_sequencer.write_address));
+        banks.data.set(pass_sequencer.busy.mux(unfold.data, coefficient_shift.halved));
 
-        comment!("Taylor shift along x, then along y");
-        self.along_x.word.next = self.banks.word.val();
-        self.along_x.element.next = self.search_sequencer.x_element.val();
-        self.along_x.top.next = self.search_sequencer.x_top.val();
-        self.along_x.moves.next = self.search_sequencer.x_moves.val();
-        self.along_x.down.next = self.search_sequencer.x_down.val();
-        self.transposed.write.next = true.into();
-        self.transposed.write_address.next = self.search_sequencer.turn_write.val();
-        self.transposed.write_data.next = self.along_x.moved.val();
-        self.transposed.read.next = true;
-        self.transposed.read_address.next = self.search_sequencer.turn_read.val();
-        self.along_y.word.next = self.transposed.read_data.val();
-        self.along_y.element.next = self.search_sequencer.y_element.val();
-        self.along_y.top.next = self.search_sequencer.y_top.val();
-        self.along_y.moves.next = self.search_sequencer.y_moves.val();
-        self.along_y.down.next = self.search_sequencer.y_down.val();
-        self.coefficient_shift.word.next = self.along_y.moved.val();
-        self.coefficient_shift.halvings.next = self.search_sequencer.halvings.val();
+        k.comment("Taylor shift along x, then along y");
+        along_x.word.set(banks.word);
+        along_x.element.set(search_sequencer.x_element);
+        along_x.top.set(search_sequencer.x_top);
+        along_x.moves.set(search_sequencer.x_moves);
+        along_x.down.set(search_sequencer.x_down);
+        transposed.write.set(k.constant(1, 1));
+        transposed.write_address.set(search_sequencer.turn_write);
+        transposed.write_data.set(along_x.moved);
+        transposed.read.set(k.constant(1, 1));
+        transposed.read_address.set(search_sequencer.turn_read);
+        along_y.word.set(transposed.read_data);
+        along_y.element.set(search_sequencer.y_element);
+        along_y.top.set(search_sequencer.y_top);
+        along_y.moves.set(search_sequencer.y_moves);
+        along_y.down.set(search_sequencer.y_down);
+        coefficient_shift.word.set(along_y.moved);
+        coefficient_shift.halvings.set(search_sequencer.halvings);
 
-        comment!("Candidates, scores and their comparison");
-        self.candidates.word.next = self.coefficient_shift.halved.val();
-        self.candidates.cycle.next = self.search_sequencer.cycle.val();
-        self.candidates.present.next = self.search_sequencer.present.val();
-        self.candidates.sums.next = self.search_sequencer.sums.val();
-        self.score.value.next = self.candidates.value.val();
-        self.score.index.next = self.candidates.index.val();
-        self.score.valid.next = self.candidates.valid.val();
-        self.score.sum.next = self.candidates.sum.val();
-        self.floors.read.next = true;
-        self.floors.read_address.next = self.candidates.index.val();
-        self.score.floor.next = self.floors.read_data.val();
-        self.floors.write.next = self.score.floor_write.val().into();
-        self.floors.write_address.next = self.score.floor_index.val();
-        self.floors.write_data.next = self.score.floor_data.val();
-        self.totals.read.next = true;
-        self.totals.read_address.next = self.score.read_index.val();
-        if self.search_sequencer.comparing.val() {
-            self.totals.read_address.next = self.search_sequencer.candidate.val();
-        }
-        self.score.total.next = self.totals.read_data.val();
-        self.search_sequencer.total.next = self.totals.read_data.val();
-        self.totals.write.next = self.score.write.val().into();
-        self.totals.write_address.next = self.score.write_index.val();
-        self.totals.write_data.next = self.score.write_data.val();
+        k.comment("Candidates, scores and their comparison");
+        candidates.word.set(coefficient_shift.halved);
+        candidates.cycle.set(search_sequencer.cycle);
+        candidates.present.set(search_sequencer.present);
+        candidates.sums.set(search_sequencer.sums);
+        score.value.set(candidates.value);
+        score.index.set(candidates.index);
+        score.valid.set(candidates.valid);
+        score.sum.set(candidates.sum);
+        floors.read.set(k.constant(1, 1));
+        floors.read_address.set(candidates.index);
+        score.floor.set(floors.read_data);
+        floors.write.set(score.floor_write);
+        floors.write_address.set(score.floor_index);
+        floors.write_data.set(score.floor_data);
+        totals.read.set(k.constant(1, 1));
+        totals.read_address.set(search_sequencer.comparing.mux(search_sequencer.candidate, score.read_index));
+        score.total.set(totals.read_data);
+        search_sequencer.total.set(totals.read_data);
+        totals.write.set(score.write);
+        totals.write_address.set(score.write_index);
+        totals.write_data.set(score.write_data);
 
-        comment!("Forces");
-        self.forces.start.next = self.search_sequencer.done.val();
-        self.forces.place.next = self.reorder.place.val();
-        self.forces.value.next = self.banks.word.val();
-        self.forces.best_x.next = self.search_sequencer.best_x.val();
-        self.forces.best_y.next = self.search_sequencer.best_y.val();
-        self.forces.score.next = self.search_sequencer.score.val();
-        self.forces.found.next = self.search_sequencer.found.val();
-        self.forces.condition.next = self.condition.q.val();
-        self.forces.framing.next = self.framing.q.val();
-        self.forces.normalise.next = self.pass_sequencer.normalise.val();
-        self.forces.rescale.next = self.pass_sequencer.rescale.val();
-        self.forces.saturations.next = self.pass_sequencer.saturations.val();
-        self.forces.frame_begin.next = self.begin_frame.val();
-        self.forces.rounded.next = self.rounder.rounded.val();
-        self.forces.clipped.next = self.rounder.clipped.val();
-        self.m_axis_tdata.next = self.forces.m_axis_tdata.val();
-        self.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
-        self.m_axis_tlast.next = self.forces.m_axis_tlast.val();
-        self.forces.m_axis_tready.next = self.m_axis_tready.val();
+        k.comment("Forces");
+        forces.start.set(search_sequencer.done);
+        forces.place.set(reorder.place);
+        forces.value.set(banks.word);
+        forces.best_x.set(search_sequencer.best_x);
+        forces.best_y.set(search_sequencer.best_y);
+        forces.score.set(search_sequencer.score);
+        forces.found.set(search_sequencer.found);
+        forces.condition.set(condition.q);
+        forces.framing.set(framing.q);
+        forces.normalise.set(pass_sequencer.normalise);
+        forces.rescale.set(pass_sequencer.rescale);
+        forces.saturations.set(pass_sequencer.saturations);
+        forces.frame_begin.set(begin_frame);
+        forces.rounded.set(rounder.rounded);
+        forces.clipped.set(rounder.clipped);
+        io.m_axis_tdata.set(forces.m_axis_tdata);
+        io.m_axis_tvalid.set(forces.m_axis_tvalid);
+        io.m_axis_tlast.set(forces.m_axis_tlast);
+        forces.m_axis_tready.set(io.m_axis_tready);
     }
 }
 

@@ -32,7 +32,7 @@ mod unfold;
 pub use banks::Banks;
 pub use candidates::Candidates;
 pub use coefficient_shift::CoefficientShift;
-pub use engine::Engine;
+pub(crate) use engine::Serial;
 pub use forces::Forces;
 pub use horner::Horner;
 pub use pass::{Pass, LOW_FILE, WIDE_FILE};

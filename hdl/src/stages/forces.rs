@@ -2,96 +2,97 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
     count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, CYCLE_BITS,
     SATURATION_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
 };
-use crate::wire::Wire;
 
-/// Values in by step, a quad or a part of it; beats out in the order in which `send` requests them.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Forces {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent; constant until its last beat.
-    pub which: Wire<In>,
-    /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
-    pub values: Wire<In>,
-    /// `values` holds a step.
-    pub values_valid: Signal<In, Bit>,
-    /// A new frame: its first values come next.
-    pub begin_frame: Signal<In, Bit>,
-    /// Stores position, exponents and status of subarray `part` in this cycle.
-    pub start: Signal<In, Bit>,
-    /// Index of the subarray; valid with `start`.
-    pub part: Wire<In>,
-    /// A beat may be requested in this cycle.
-    pub room: Signal<Out, Bit>,
-    /// A beat is requested; only with `room`.
-    pub offer: Signal<In, Bit>,
-    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
-    pub beat: Wire<In>,
-    /// Index of the beat's subarray; valid with `offer`.
-    pub beat_part: Wire<In>,
-    /// Address of the memory word with the taxel; valid with `offer`.
-    pub address: Wire<In>,
-    /// Lane of the taxel in the word; valid with `offer`.
-    pub lane: Wire<In>,
-    /// μ1 in grid steps of the last level, signed; valid with `start`.
-    pub position_x: Wire<In>,
-    /// μ2 in grid steps of the last level, signed; valid with `start`.
-    pub position_y: Wire<In>,
-    /// Left shift of `normalise`; valid with `start`.
-    pub normalise: Wire<In>,
-    /// Right shift of `rescale`; valid with `start`.
-    pub rescale: Wire<In>,
-    /// The subarray meets the scene's condition; valid with `start`.
-    pub condition: Signal<In, Bit>,
-    /// The search found a candidate; valid with `start`.
-    pub found: Signal<In, Bit>,
-    /// `tlast` was early or missing; valid while the frame is sent.
-    pub framing: Signal<In, Bit>,
-    /// The coefficient signature is wrong, 1 bit; valid with `start`.
-    pub damaged: Wire<In>,
-    /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
-    pub frames: Wire<In>,
-    /// Score of the best candidate, signed, 2^−6; valid with `start`.
-    pub score: Wire<In>,
-    /// Words saturated by `rescale`; valid with `start`.
-    pub saturations: Wire<In>,
-    /// Cycle counter of the frame; sampled for its first beat.
-    pub cycles: Wire<In>,
-    /// Address of the word whose labels are needed; one cycle after `address`.
-    pub label_address: Wire<Out>,
-    /// Labels of that quad, two cycles after `label_address`; one bit each without contacts.
-    pub labels: Wire<In>,
-    /// There are more contacts than get a μ; constant while the frame is sent.
-    pub overflow: Signal<In, Bit>,
-    /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
-    pub threshold: Wire<In>,
-    /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
-    pub version: Wire<In>,
-    /// The tables are not whole, where they are written.
-    pub incomplete: Signal<In, Bit>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or a status beat; valid
-    /// with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    quads: RustHdl<Counter>,
-    asked: RustHdl<Delay>,
-    store: RustHdl<Ram>,
-    unit: ForceUnit,
-    leaving: RustHdl<Queue>,
+block! {
+    /// Values in by step, a quad or a part of it; beats out in the order in which `send` requests them.
+    pub struct Forces {
+        /// Words of the force memory.
+        words: usize,
+        shift_bits: usize,
+        score_bits: usize,
+        store: Ram,
+        unit: ForceUnit,
+    }
+    ports ForcesPorts {
+        clock;
+        reset;
+        /// Index of the case of the frame being sent; constant until its last beat.
+        in which: unit.widths().which;
+        /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
+        in values: store.widths().write_data;
+        /// `values` holds a step.
+        in values_valid;
+        /// A new frame: its first values come next.
+        in begin_frame;
+        /// Stores position, exponents and status of subarray `part` in this cycle.
+        in start;
+        /// Index of the subarray; valid with `start`.
+        in part: unit.widths().part;
+        /// A beat may be requested in this cycle.
+        out room;
+        /// A beat is requested; only with `room`.
+        in offer;
+        /// 0: a force, 1 … 3: a status beat; valid with `offer`.
+        in beat: 2;
+        /// Index of the beat's subarray; valid with `offer`.
+        in beat_part: unit.widths().part;
+        /// Address of the memory word with the taxel; valid with `offer`.
+        in address: count_bits(*words);
+        /// Lane of the taxel in the word; valid with `offer`.
+        in lane: 2;
+        /// μ1 in grid steps of the last level, signed; valid with `start`.
+        in position_x: position_bits();
+        /// μ2 in grid steps of the last level, signed; valid with `start`.
+        in position_y: position_bits();
+        /// Left shift of `normalise`; valid with `start`.
+        in normalise: unit.widths().normalise;
+        /// Right shift of `rescale`; valid with `start`.
+        in rescale: shift_bits;
+        /// The subarray meets the scene's condition; valid with `start`.
+        in condition;
+        /// The search found a candidate; valid with `start`.
+        in found;
+        /// `tlast` was early or missing; valid while the frame is sent.
+        in framing;
+        /// The coefficient signature is wrong, 1 bit; valid with `start`.
+        in damaged: 1;
+        /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
+        in frames: unit.widths().frames;
+        /// Score of the best candidate, signed, 2^−6; valid with `start`.
+        in score: score_bits;
+        /// Words saturated by `rescale`; valid with `start`.
+        in saturations: SATURATION_BITS;
+        /// Cycle counter of the frame; sampled for its first beat.
+        in cycles: CYCLE_BITS;
+        /// Address of the word whose labels are needed; one cycle after `address`.
+        out label_address: count_bits(*words);
+        /// Labels of that quad, two cycles after `label_address`; one bit each without contacts.
+        in labels: unit.widths().labels;
+        /// There are more contacts than get a μ; constant while the frame is sent.
+        in overflow;
+        /// Threshold in force LSBs, 32 bits, where it is written; constant between resets, valid from one on.
+        in threshold: THRESHOLD_BITS;
+        /// Version of the tables and whether the last were refused, where they are written; valid with `offer`.
+        in version: VERSION_WORD_BITS;
+        /// The tables are not whole, where they are written.
+        in incomplete;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or a status beat; valid
+        /// with `m_axis_tvalid`.
+        out m_axis_tdata: unit.widths().beat_data;
+    }
 }
 
 impl Forces {
@@ -99,117 +100,78 @@ impl Forces {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let words = formats.sweep_steps(frame_quads(model.cases()));
-        let (address, value) = (count_bits(words), formats.search_width * formats.search_bits[0] as usize);
-        let unit = RustHdl::new(ForceUnit::new(model));
+        let value = formats.search_width * formats.search_bits[0] as usize;
         Forces {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(unit.which.width()),
-            values: Wire::new(value),
-            values_valid: Default::default(),
-            begin_frame: Default::default(),
-            start: Default::default(),
-            part: Wire::new(unit.part.width()),
-            beat_part: Wire::new(unit.part.width()),
-            room: Default::default(),
-            offer: Default::default(),
-            beat: Wire::new(2),
-            address: Wire::new(address),
-            lane: Wire::new(2),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            normalise: Wire::new(unit.normalise.width()),
-            rescale: Wire::new(shift_bits(formats)),
-            condition: Default::default(),
-            found: Default::default(),
-            framing: Default::default(),
-            damaged: Wire::new(1),
-            frames: Wire::new(unit.frames.width()),
-            score: Wire::new(formats.score_bits as usize),
-            saturations: Wire::new(SATURATION_BITS),
-            cycles: Wire::new(CYCLE_BITS),
-            label_address: Wire::new(address),
-            labels: Wire::new(unit.labels.width()),
-            overflow: Default::default(),
-            threshold: Wire::new(THRESHOLD_BITS),
-            version: Wire::new(VERSION_WORD_BITS),
-            incomplete: Default::default(),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(unit.beat_data.width()),
-            quads: RustHdl::new(Counter::new(words)),
-            asked: RustHdl::new(Delay::new(address, 1)),
-            store: RustHdl::new(Ram::new(words, 1, value).holding([Holds::Values]).registered()),
-            leaving: RustHdl::new(Queue::new(unit.beat_data.width())),
-            unit,
+            words,
+            shift_bits: shift_bits(formats),
+            score_bits: formats.score_bits as usize,
+            store: Ram::new(words, 1, value).holding([Holds::Values]).registered(),
+            unit: ForceUnit::new(model),
         }
     }
 }
 
-impl Logic for Forces {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.quads.clk.next = self.clk.val();
-        self.asked.clk.next = self.clk.val();
-        self.store.clk.next = self.clk.val();
-        self.unit.clk.next = self.clk.val();
-        self.unit.rst.next = self.rst.val();
-        self.leaving.clk.next = self.clk.val();
-        self.leaving.rst.next = self.rst.val();
-        self.store.write.next = self.values_valid.val().into();
-        self.quads.clear.next = self.begin_frame.val();
-        self.quads.enable.next = self.values_valid.val();
-        self.store.write_address.next = self.quads.value.val();
-        self.store.write_data.next = self.values.val();
-        self.store.read.next = true;
-        self.asked.d.next = self.address.val();
-        self.store.read_address.next = self.asked.q.val();
+impl Block for Forces {
+    fn build<'k>(&self, k: &'k Builder, io: ForcesPorts<Inside<'k>>) {
+        let quads = k.instance("quads", Counter::new(self.words));
+        let asked = k.instance("asked", Delay::new(io.address.bits(), 1));
+        let store = k.instance("store", &self.store);
+        let unit = k.instance("unit", &self.unit);
+        let leaving = k.instance("leaving", Queue::new(unit.beat_data.bits()));
 
-        self.unit.which.next = self.which.val();
-        self.unit.begin_frame.next = self.begin_frame.val();
-        self.unit.part.next = self.part.val();
-        self.unit.beat_part.next = self.beat_part.val();
-        self.unit.start.next = self.start.val();
-        self.unit.offer.next = self.offer.val();
-        self.unit.beat.next = self.beat.val();
-        self.unit.lane.next = self.lane.val();
-        self.unit.quad.next = self.store.read_data.val();
-        self.unit.position_x.next = self.position_x.val();
-        self.unit.position_y.next = self.position_y.val();
-        self.unit.normalise.next = self.normalise.val();
-        self.unit.rescale.next = self.rescale.val();
-        self.unit.condition.next = self.condition.val();
-        self.unit.found.next = self.found.val();
-        self.unit.framing.next = self.framing.val();
-        self.unit.damaged.next = self.damaged.val();
-        self.unit.frames.next = self.frames.val();
-        self.unit.score.next = self.score.val();
-        self.unit.saturations.next = self.saturations.val();
-        self.unit.cycles.next = self.cycles.val();
-        self.label_address.next = self.asked.q.val();
-        self.unit.labels.next = self.labels.val();
-        self.unit.overflow.next = self.overflow.val();
-        self.unit.threshold.next = self.threshold.val();
-        self.unit.version.next = self.version.val();
-        self.unit.incomplete.next = self.incomplete.val();
+        store.write.set(io.values_valid);
+        quads.clear.set(io.begin_frame);
+        quads.enable.set(io.values_valid);
+        store.write_address.set(quads.value);
+        store.write_data.set(io.values);
+        store.read.set(k.constant(1, 1));
+        asked.d.set(io.address);
+        store.read_address.set(asked.q);
 
-        self.leaving.reserve.next = self.offer.val();
-        self.room.next = self.leaving.room.val();
-        self.leaving.write.next = self.unit.valid.val();
-        self.leaving.last.next = self.unit.last.val();
-        self.leaving.word.next = self.unit.beat_data.val();
-        self.leaving.m_axis_tready.next = self.m_axis_tready.val();
-        self.m_axis_tvalid.next = self.leaving.m_axis_tvalid.val();
-        self.m_axis_tlast.next = self.leaving.m_axis_tlast.val();
-        self.m_axis_tdata.next = self.leaving.m_axis_tdata.val();
+        unit.which.set(io.which);
+        unit.begin_frame.set(io.begin_frame);
+        unit.part.set(io.part);
+        unit.beat_part.set(io.beat_part);
+        unit.start.set(io.start);
+        unit.offer.set(io.offer);
+        unit.beat.set(io.beat);
+        unit.lane.set(io.lane);
+        unit.quad.set(store.read_data);
+        unit.position_x.set(io.position_x);
+        unit.position_y.set(io.position_y);
+        unit.normalise.set(io.normalise);
+        unit.rescale.set(io.rescale);
+        unit.condition.set(io.condition);
+        unit.found.set(io.found);
+        unit.framing.set(io.framing);
+        unit.damaged.set(io.damaged);
+        unit.frames.set(io.frames);
+        unit.score.set(io.score);
+        unit.saturations.set(io.saturations);
+        unit.cycles.set(io.cycles);
+        io.label_address.set(asked.q);
+        unit.labels.set(io.labels);
+        unit.overflow.set(io.overflow);
+        unit.threshold.set(io.threshold);
+        unit.version.set(io.version);
+        unit.incomplete.set(io.incomplete);
+
+        leaving.reserve.set(io.offer);
+        io.room.set(leaving.room);
+        leaving.write.set(unit.valid);
+        leaving.last.set(unit.last);
+        leaving.word.set(unit.beat_data);
+        leaving.m_axis_tready.set(io.m_axis_tready);
+        io.m_axis_tvalid.set(leaving.m_axis_tvalid);
+        io.m_axis_tlast.set(leaving.m_axis_tlast);
+        io.m_axis_tdata.set(leaving.m_axis_tdata);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, random_word, MemoryReference, Reference};
+    use crate::language::testbench::{subject_of, check_with_defects, random_word, MemoryReference, Reference};
     use crate::language::Change;
     use crate::primitives::{List, Requests};
     use crate::scenes::model;
@@ -331,7 +293,7 @@ mod tests {
         let model = model.with_changed_plan(|plan| plan.threshold = 1000).unwrap();
         let stimulus = stimulus(&model, 20);
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Forces::new(&model),
                 changes,
                 inputs [

@@ -7,80 +7,78 @@
 
 use dermis_golden::fixed::plan::resources::{operand_words, Holds};
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, longest, position_bits, programs, BitDelay, Control, Counter, Delay, Dff, Lanes, OperandScale,
+    count_bits, longest, position_bits, programs, BitDelay, Counter, Delay, Dff, Lanes, OperandScale,
     OperandSelect, OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
 };
-use crate::wire::Wire;
 
-/// Words of the input memory and finished v_ij in, accumulators of whole rows out.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Pass {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case, constant while a frame is computed; of contacts that of the
-    /// [section](dermis_golden::fixed::words::schedule::sections), constant from `start` until its last row.
-    pub which: Wire<In>,
-    /// The products of a subarray may begin while its input is still being written; of contacts those of a section.
-    pub start: Signal<In, Bit>,
-    /// Address of the quad to read from the input memory; in every cycle of a product with the input.
-    pub input_address: Wire<Out>,
-    /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
-    pub input_quad: Wire<In>,
-    /// Four parities of an operand, of a v_ij, the images of a layer, a window or p, `operand_bits` each, signed, quads in order;
-    /// valid with `vector_valid`.
-    pub vector_quad: Wire<In>,
-    /// `vector_quad` holds a quad.
-    pub vector_valid: Signal<In, Bit>,
-    /// Position of μ1 in mu_max/384, signed, with a network; valid from the quad of operands that says so.
-    pub position_x: Wire<In>,
-    /// Position of μ2 in mu_max/384, signed, with a network; valid as `position_x`.
-    pub position_y: Wire<In>,
-    /// Writes `coefficient_data` to the coefficient memory; only in a reset.
-    pub coefficient_write: Signal<In, Bit>,
-    /// Word of the memory; valid with `coefficient_write`.
-    pub coefficient_word: Wire<In>,
-    /// Pair of lanes; valid with `coefficient_write`.
-    pub coefficient_pair: Wire<In>,
-    /// The coefficients of two lanes; valid with `coefficient_write`.
-    pub coefficient_data: Wire<In>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
-    pub quad: Wire<Out>,
-    /// `quad` holds a row of a layer of a network; `quad_valid` is low.
-    pub layer_valid: Signal<Out, Bit>,
-    /// `quad` holds a row.
-    pub quad_valid: Signal<Out, Bit>,
-    /// `quad` holds a row two cycles later.
-    pub quad_soon: Signal<Out, Bit>,
-    /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
-    pub damaged: Wire<Out>,
-    /// A product's column is issued in this cycle.
-    pub issued: Signal<Out, Bit>,
-    /// Index in its section of the instruction that issues; valid with `issued`.
-    pub step: Wire<Out>,
-    column: RustHdl<Counter>,
-    running: RustHdl<Dff>,
-    /// Schedule of the products.
-    pub pass_program: RustHdl<PassProgram>,
-    vectors: RustHdl<Ram>,
-    operand_writer: RustHdl<OperandWriter>,
-    source: RustHdl<Delay>,
-    factor: RustHdl<Delay>,
-    control: RustHdl<Delay>,
-    valid: RustHdl<BitDelay>,
-    select: RustHdl<OperandSelect>,
-    scale: RustHdl<OperandScale>,
-    /// The MAC lanes.
-    pub lanes: RustHdl<Lanes>,
-    low_address: RustHdl<Slice>,
-    coefficient_address: RustHdl<Delay>,
-    issue: Signal<Local, Bit>,
-    column_end: Signal<Local, Bit>,
+block! {
+    /// Words of the input memory and finished v_ij in, accumulators of whole rows out.
+    pub struct Pass {
+        /// Columns of the longest product.
+        columns: usize,
+        /// Sections of the schedule.
+        sections: usize,
+        /// Quads of a subarray.
+        quads: usize,
+        fold_bits: usize,
+        lane_bits: usize,
+        /// Schedule of the products.
+        pass_program: PassProgram,
+        vectors: Ram,
+        operand_writer: OperandWriter,
+        select: OperandSelect,
+        scale: OperandScale,
+        /// The MAC lanes.
+        lanes: Lanes,
+    }
+    ports PassPorts {
+        clock;
+        reset;
+        /// Index of the case, constant while a frame is computed; of contacts that of the
+        /// [section](dermis_golden::fixed::words::schedule::sections), constant from `start` until its last row.
+        in which: count_bits(*sections);
+        /// The products of a subarray may begin while its input is still being written; of contacts those of a section.
+        in start;
+        /// Address of the quad to read from the input memory; in every cycle of a product with the input.
+        out input_address: count_bits(*quads);
+        /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
+        in input_quad: 4 * fold_bits;
+        /// Four parities of an operand, of a v_ij, the images of a layer, a window or p, `operand_bits` each, signed, quads in order;
+        /// valid with `vector_valid`.
+        in vector_quad: vectors.widths().write_data;
+        /// `vector_quad` holds a quad.
+        in vector_valid;
+        /// Position of μ1 in mu_max/384, signed, with a network; valid from the quad of operands that says so.
+        in position_x: position_bits();
+        /// Position of μ2 in mu_max/384, signed, with a network; valid as `position_x`.
+        in position_y: position_bits();
+        /// Writes `coefficient_data` to the coefficient memory; only in a reset.
+        in coefficient_write;
+        /// Word of the memory; valid with `coefficient_write`.
+        in coefficient_word: lanes.widths().coefficient_word;
+        /// Pair of lanes; valid with `coefficient_write`.
+        in coefficient_pair: lanes.widths().coefficient_pair;
+        /// The coefficients of two lanes; valid with `coefficient_write`.
+        in coefficient_data: lanes.widths().coefficient_data;
+        /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
+        out quad: 4 * lane_bits;
+        /// `quad` holds a row of a layer of a network; `quad_valid` is low.
+        out layer_valid;
+        /// `quad` holds a row.
+        out quad_valid;
+        /// `quad` holds a row two cycles later.
+        out quad_soon;
+        /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
+        out damaged: 1;
+        /// A product's column is issued in this cycle.
+        out issued;
+        /// Index in its section of the instruction that issues; valid with `issued`.
+        out step: pass_program.widths().step;
+    }
 }
 
 impl Pass {
@@ -88,133 +86,97 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let quads = formats.quads;
-        let program = PassProgram::new(model);
-        let program_latency = program.latency();
-        let pass_program = RustHdl::new(program);
-        let lanes = Lanes::new(model);
         let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
-        let scaling = OperandScale::latency(scales);
         let parity_bits = 4 * formats.operand_bits() as usize;
         Pass {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(lengths.len())),
-            start: Default::default(),
-            input_address: Wire::new(count_bits(quads)),
-            input_quad: Wire::new(4 * formats.fold_bits as usize),
-            vector_quad: Wire::new(parity_bits),
-            vector_valid: Default::default(),
-            position_x: Wire::new(position_bits()),
-            position_y: Wire::new(position_bits()),
-            coefficient_write: Default::default(),
-            coefficient_word: Wire::new(lanes.coefficient_word.width()),
-            coefficient_pair: Wire::new(lanes.coefficient_pair.width()),
-            coefficient_data: Wire::new(lanes.coefficient_data.width()),
-            quad: Wire::new(4 * formats.lane_bits as usize),
-            layer_valid: Default::default(),
-            quad_valid: Default::default(),
-            quad_soon: Default::default(),
-            damaged: Wire::new(1),
-            issued: Default::default(),
-            step: Wire::new(pass_program.step.width()),
-            column: RustHdl::new(Counter::new(longest(model))),
-            running: Default::default(),
-            low_address: RustHdl::new(Slice::new(pass_program.operand_address.width(), count_bits(quads))),
-            vectors: RustHdl::new(
-                vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
-            ),
-            operand_writer: RustHdl::new(OperandWriter::new(&lengths, model.first().storage.streamed)),
-            source: RustHdl::new(Delay::new(SOURCE_BITS, 2)),
-            factor: RustHdl::new(Delay::new(FACTOR_BITS, 3)),
-            control: RustHdl::new(Delay::new(Control::new(model).bits(), 3 + scaling)),
-            valid: RustHdl::new(BitDelay::new(3 + scaling + program_latency)),
-            coefficient_address: RustHdl::new(Delay::new(pass_program.coefficient_address.width(), scaling)),
-            select: RustHdl::new(OperandSelect::new(formats)),
-            scale: RustHdl::new(OperandScale::new(scales)),
-            pass_program,
-            lanes,
-            issue: Default::default(),
-            column_end: Default::default(),
+            columns: longest(model),
+            sections: lengths.len(),
+            quads,
+            fold_bits: formats.fold_bits as usize,
+            lane_bits: formats.lane_bits as usize,
+            pass_program: PassProgram::new(model),
+            vectors: vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
+            operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
+            select: OperandSelect::new(formats),
+            scale: OperandScale::new(scales),
+            lanes: Lanes::new(model),
         }
     }
 }
 
-impl Logic for Pass {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.column.clk.next = self.clk.val();
-        self.running.clk.next = self.clk.val();
-        self.pass_program.clk.next = self.clk.val();
-        self.vectors.clk.next = self.clk.val();
-        self.operand_writer.clk.next = self.clk.val();
-        self.source.clk.next = self.clk.val();
-        self.control.clk.next = self.clk.val();
-        self.valid.clk.next = self.clk.val();
-        self.select.clk.next = self.clk.val();
-        self.scale.clk.next = self.clk.val();
-        self.factor.clk.next = self.clk.val();
-        self.coefficient_address.clk.next = self.clk.val();
-        self.lanes.clk.next = self.clk.val();
-        self.valid.rst.next = self.rst.val();
-        self.lanes.rst.next = self.rst.val();
+impl Block for Pass {
+    fn build<'k>(&self, k: &'k Builder, io: PassPorts<Inside<'k>>) {
+        let column = k.instance("column", Counter::new(self.columns));
+        let running = k.instance("running", Dff {});
+        let pass_program = k.instance("pass_program", &self.pass_program);
+        let vectors = k.instance("vectors", &self.vectors);
+        let operand_writer = k.instance("operand_writer", &self.operand_writer);
+        let scaling = self.scale.latency();
+        let source = k.instance("source", Delay::new(SOURCE_BITS, 2));
+        let factor = k.instance("factor", Delay::new(FACTOR_BITS, 3));
+        let control = k.instance("control", Delay::new(pass_program.control.bits(), 3 + scaling));
+        let valid = k.instance("valid", BitDelay::new(3 + scaling + self.pass_program.latency()));
+        let select = k.instance("select", &self.select);
+        let scale = k.instance("scale", &self.scale);
+        let lanes = k.instance("lanes", &self.lanes);
+        let low_address = k.instance("low_address", Slice::new(pass_program.operand_address.bits(), count_bits(self.quads)));
+        let coefficient_address = k.instance("coefficient_address", Delay::new(pass_program.coefficient_address.bits(), scaling));
 
-        self.pass_program.which.next = self.which.val();
-        self.operand_writer.which.next = self.which.val();
-        self.lanes.which.next = self.which.val();
-        self.issue.next = self.running.q.val() & self.pass_program.ready.val();
-        self.column_end.next = self.issue.val() & self.pass_program.last.val();
-        self.running.d.next = (self.start.val()
-            | (self.running.q.val() & !(self.column_end.val() & self.pass_program.ends.val())))
-            & !self.rst.val();
-        self.column.clear.next = self.start.val() | self.column_end.val();
-        self.column.enable.next = self.issue.val();
-        self.pass_program.start.next = self.start.val();
-        self.pass_program.advance.next = self.column_end.val();
-        self.pass_program.column.next = self.column.value.val();
-        self.pass_program.finished.next = self.operand_writer.finished.val();
+        pass_program.which.set(io.which);
+        operand_writer.which.set(io.which);
+        lanes.which.set(io.which);
+        let issue = k.wire("issue", running.q & pass_program.ready);
+        let column_end = k.wire("column_end", issue & pass_program.last);
+        running.d.set((io.start | (running.q & !(column_end & pass_program.ends))) & !io.rst);
+        column.clear.set(io.start | column_end);
+        column.enable.set(issue);
+        pass_program.start.set(io.start);
+        pass_program.advance.set(column_end);
+        pass_program.column.set(column.value);
+        pass_program.finished.set(operand_writer.finished);
 
-        self.low_address.word.next = self.pass_program.operand_address.val();
-        self.input_address.next = self.low_address.low.val();
-        self.vectors.read.next = true;
-        self.vectors.read_address.next = self.pass_program.operand_address.val();
-        self.operand_writer.clear.next = self.start.val();
-        self.operand_writer.valid.next = self.vector_valid.val();
-        self.vectors.write.next = self.operand_writer.keep.val().into();
-        self.vectors.write_address.next = self.operand_writer.address.val();
-        self.vectors.write_data.next = self.vector_quad.val();
+        low_address.word.set(pass_program.operand_address);
+        io.input_address.set(low_address.low);
+        vectors.read.set(k.constant(1, 1));
+        vectors.read_address.set(pass_program.operand_address);
+        operand_writer.clear.set(io.start);
+        operand_writer.valid.set(io.vector_valid);
+        vectors.write.set(operand_writer.keep);
+        vectors.write_address.set(operand_writer.address);
+        vectors.write_data.set(io.vector_quad);
 
-        self.source.d.next = self.pass_program.source.val();
-        self.select.source.next = self.source.q.val();
-        self.select.input_quad.next = self.input_quad.val();
-        self.select.vector_quad.next = self.vectors.read_data.val();
-        self.control.d.next = self.pass_program.control.val();
-        self.valid.d.next = self.issue.val();
+        source.d.set(pass_program.source);
+        select.source.set(source.q);
+        select.input_quad.set(io.input_quad);
+        select.vector_quad.set(vectors.read_data);
+        control.d.set(pass_program.control);
+        valid.d.set(issue);
 
-        self.factor.d.next = self.pass_program.factor.val();
-        self.scale.factor.next = self.factor.q.val();
-        self.scale.operands.next = self.select.operands.val();
-        self.scale.position_x.next = self.position_x.val();
-        self.scale.position_y.next = self.position_y.val();
+        factor.d.set(pass_program.factor);
+        scale.factor.set(factor.q);
+        scale.operands.set(select.operands);
+        scale.position_x.set(io.position_x);
+        scale.position_y.set(io.position_y);
 
-        self.coefficient_address.d.next = self.pass_program.coefficient_address.val();
-        self.lanes.coefficient_write.next = self.coefficient_write.val();
-        self.lanes.coefficient_word.next = self.coefficient_word.val();
-        self.lanes.coefficient_pair.next = self.coefficient_pair.val();
-        self.lanes.coefficient_data.next = self.coefficient_data.val();
-        self.lanes.address.next = self.coefficient_address.q.val();
-        self.lanes.operands.next = self.scale.scaled.val();
-        self.lanes.valid.next = self.valid.q.val();
-        self.lanes.control.next = self.control.q.val();
-        self.quad.next = self.lanes.quad.val();
-        self.quad_valid.next = self.lanes.quad_valid.val();
-        self.quad_soon.next = self.lanes.quad_soon.val();
-        self.layer_valid.next = self.lanes.layer_valid.val();
-        self.damaged.next = self.lanes.damaged.val();
-        self.issued.next = self.issue.val();
-        self.step.next = self.pass_program.step.val();
+        coefficient_address.d.set(pass_program.coefficient_address);
+        lanes.coefficient_write.set(io.coefficient_write);
+        lanes.coefficient_word.set(io.coefficient_word);
+        lanes.coefficient_pair.set(io.coefficient_pair);
+        lanes.coefficient_data.set(io.coefficient_data);
+        lanes.address.set(coefficient_address.q);
+        lanes.operands.set(scale.scaled);
+        lanes.valid.set(valid.q);
+        lanes.control.set(control.q);
+        io.quad.set(lanes.quad);
+        io.quad_valid.set(lanes.quad_valid);
+        io.quad_soon.set(lanes.quad_soon);
+        io.layer_valid.set(lanes.layer_valid);
+        io.damaged.set(lanes.damaged);
+        io.issued.set(issue);
+        io.step.set(pass_program.step);
     }
 }
 
@@ -227,7 +189,7 @@ mod tests {
     use dermis_golden::fixed::CasePlan;
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
+    use crate::language::testbench::{subject_of, check_with_defects, random_word, Reference};
     use crate::language::Change;
     use crate::scenes::{learned, model};
     use crate::wire::Word;
@@ -427,7 +389,7 @@ mod tests {
                 if column.last {
                     let last = if column.layer { usize::MAX } else { own.quads };
                     let count = own.lanes_per_parity.min(last - first);
-                    let leave = self.cycle + self.latency() + 7 + OperandScale::latency(own.scales_operands());
+                    let leave = self.cycle + self.latency() + 7 + OperandScale::new(own.scales_operands()).latency();
                     let rows = (0..count).map(|row| (leave + row, (column.accumulation, first + row)));
                     self.rows.iter_mut().for_each(|all| all.extend(rows.clone()));
                 }
@@ -527,7 +489,7 @@ mod tests {
         let contacts = learned(6, 5, &[13, 7], "mu_max = 0.3\n[partition]\ncase = \"contacts\"\n");
         for model in [several, shared, streamed, network, contacts] {
             let subject = |changes: &[Change]| {
-                block_subject!(
+                subject_of!(
                     Pass::new(&model),
                     changes,
                     inputs [

@@ -3,61 +3,63 @@
 //! Where zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{Average, Calibrate, FrameMarks, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
-use crate::wire::Wire;
 
-/// Codes in, words of the frame buffer out.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Prepare {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// No frame is in the engine behind this stage.
-    pub idle: Signal<In, Bit>,
-    /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's word, `input_bits` wide, two's complement; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The word is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
-    pub frames: Wire<Out>,
-    /// Reset of the engine: `rst`, or tables are written.
-    pub restart: Signal<Out, Bit>,
-    /// Writes `coefficient_data` to lanes `coefficient_pair` of word `coefficient_word` of the coefficient memory; only with `restart`.
-    pub coefficient_write: Signal<Out, Bit>,
-    /// Word of the memory; valid with `coefficient_write`.
-    pub coefficient_word: Wire<Out>,
-    /// Pair of lanes; valid with `coefficient_write`.
-    pub coefficient_pair: Wire<Out>,
-    /// The coefficients of two lanes; valid with `coefficient_write`.
-    pub coefficient_data: Wire<Out>,
-    /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
-    pub noise_floor: Wire<Out>,
-    /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
-    pub threshold: Wire<Out>,
-    /// Version of the tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
-    pub version: Wire<Out>,
-    /// The tables are not whole.
-    pub incomplete: Signal<Out, Bit>,
-    load: RustHdl<Load>,
-    /// Zero and gain of each taxel.
-    pub calibrate: RustHdl<Calibrate>,
-    average: RustHdl<Average>,
+block! {
+    /// Codes in, words of the frame buffer out.
+    pub struct Prepare {
+        input_bits: usize,
+        floor_bits: usize,
+        load: Load,
+        /// Zero and gain of each taxel.
+        calibrate: Calibrate,
+        average: Average,
+    }
+    ports PreparePorts {
+        clock;
+        reset;
+        /// No frame is in the engine behind this stage.
+        in idle;
+        /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
+        in s_axis_tdata: load.widths().s_axis_tdata;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A taxel's word, `input_bits` wide, two's complement; valid with `m_axis_tvalid`.
+        out m_axis_tdata: input_bits;
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The word is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
+        out frames: average.widths().frames;
+        /// Reset of the engine: `rst`, or tables are written.
+        out restart;
+        /// Writes `coefficient_data` to lanes `coefficient_pair` of word `coefficient_word` of the coefficient memory; only with `restart`.
+        out coefficient_write;
+        /// Word of the memory; valid with `coefficient_write`.
+        out coefficient_word: load.widths().coefficient_word;
+        /// Pair of lanes; valid with `coefficient_write`.
+        out coefficient_pair: load.widths().coefficient_pair;
+        /// The coefficients of two lanes; valid with `coefficient_write`.
+        out coefficient_data: load.widths().coefficient_data;
+        /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
+        out noise_floor: floor_bits;
+        /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
+        out threshold: THRESHOLD_BITS;
+        /// Version of the tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
+        out version: VERSION_WORD_BITS;
+        /// The tables are not whole.
+        out incomplete;
+    }
 }
 
 impl Prepare {
@@ -65,78 +67,56 @@ impl Prepare {
     pub fn new(model: &Model) -> Self {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
-        let load = RustHdl::new(Load::new(model));
         let (power, mean) = (model.prepare.average, model.prepare.mean);
-        let average = RustHdl::new(Average::new(taxels, bits, power, mean, FrameMarks::new(model)));
         Prepare {
-            clk: Default::default(),
-            rst: Default::default(),
-            idle: Default::default(),
-            s_axis_tdata: Wire::new(model.stream_bits() as usize),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(formats.input_bits as usize),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            frames: Wire::new(average.frames.width()),
-            restart: Default::default(),
-            coefficient_write: Default::default(),
-            coefficient_word: Wire::new(load.coefficient_word.width()),
-            coefficient_pair: Wire::new(load.coefficient_pair.width()),
-            coefficient_data: Wire::new(load.coefficient_data.width()),
-            noise_floor: Wire::new(model.floor_bits() as usize),
-            threshold: Wire::new(THRESHOLD_BITS),
-            version: Wire::new(VERSION_WORD_BITS),
-            incomplete: Default::default(),
-            load,
-            calibrate: RustHdl::new(Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables())),
-            average,
+            input_bits: formats.input_bits as usize,
+            floor_bits: model.floor_bits() as usize,
+            load: Load::new(model),
+            calibrate: Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables()),
+            average: Average::new(taxels, bits, power, mean, FrameMarks::new(model)),
         }
     }
 }
 
-impl Logic for Prepare {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.load.clk.next = self.clk.val();
-        self.load.rst.next = self.rst.val();
-        self.load.idle.next = self.idle.val();
-        self.restart.next = self.load.restart.val();
-        self.coefficient_write.next = self.load.coefficient_write.val();
-        self.coefficient_word.next = self.load.coefficient_word.val();
-        self.coefficient_pair.next = self.load.coefficient_pair.val();
-        self.coefficient_data.next = self.load.coefficient_data.val();
-        self.noise_floor.next = self.load.noise_floor.val();
-        self.threshold.next = self.load.threshold.val();
-        self.version.next = self.load.version.val();
-        self.incomplete.next = self.load.incomplete.val();
-        self.load.s_axis_tdata.next = self.s_axis_tdata.val();
-        self.load.s_axis_tvalid.next = self.s_axis_tvalid.val();
-        self.load.s_axis_tlast.next = self.s_axis_tlast.val();
-        self.s_axis_tready.next = self.load.s_axis_tready.val();
-        self.calibrate.clk.next = self.clk.val();
-        self.calibrate.rst.next = self.load.restart.val();
-        self.calibrate.write.next = self.load.write.val();
-        self.calibrate.write_taxel.next = self.load.taxel.val();
-        self.calibrate.write_entry.next = self.load.entry.val();
-        self.calibrate.incomplete.next = self.load.incomplete.val();
-        self.average.clk.next = self.clk.val();
-        self.average.rst.next = self.load.restart.val();
-        self.calibrate.s_axis_tdata.next = self.load.m_axis_tdata.val();
-        self.calibrate.s_axis_tvalid.next = self.load.m_axis_tvalid.val();
-        self.calibrate.s_axis_tlast.next = self.load.m_axis_tlast.val();
-        self.load.m_axis_tready.next = self.calibrate.s_axis_tready.val();
-        self.average.s_axis_tdata.next = self.calibrate.m_axis_tdata.val();
-        self.average.s_axis_tvalid.next = self.calibrate.m_axis_tvalid.val();
-        self.average.s_axis_tlast.next = self.calibrate.m_axis_tlast.val();
-        self.calibrate.m_axis_tready.next = self.average.s_axis_tready.val();
-        self.m_axis_tdata.next = self.average.m_axis_tdata.val();
-        self.m_axis_tvalid.next = self.average.m_axis_tvalid.val();
-        self.m_axis_tlast.next = self.average.m_axis_tlast.val();
-        self.average.m_axis_tready.next = self.m_axis_tready.val();
-        self.frames.next = self.average.frames.val();
+impl Block for Prepare {
+    fn build<'k>(&self, k: &'k Builder, io: PreparePorts<Inside<'k>>) {
+        let load = k.instance("load", &self.load);
+        let calibrate = k.instance("calibrate", &self.calibrate);
+        let average = k.instance("average", &self.average);
+
+        load.idle.set(io.idle);
+        io.restart.set(load.restart);
+        io.coefficient_write.set(load.coefficient_write);
+        io.coefficient_word.set(load.coefficient_word);
+        io.coefficient_pair.set(load.coefficient_pair);
+        io.coefficient_data.set(load.coefficient_data);
+        io.noise_floor.set(load.noise_floor);
+        io.threshold.set(load.threshold);
+        io.version.set(load.version);
+        io.incomplete.set(load.incomplete);
+        load.s_axis_tdata.set(io.s_axis_tdata);
+        load.s_axis_tvalid.set(io.s_axis_tvalid);
+        load.s_axis_tlast.set(io.s_axis_tlast);
+        io.s_axis_tready.set(load.s_axis_tready);
+        calibrate.rst.set(load.restart);
+        calibrate.write.set(load.write);
+        calibrate.write_taxel.set(load.taxel);
+        calibrate.write_entry.set(load.entry);
+        calibrate.incomplete.set(load.incomplete);
+        average.rst.set(load.restart);
+        calibrate.s_axis_tdata.set(load.m_axis_tdata);
+        calibrate.s_axis_tvalid.set(load.m_axis_tvalid);
+        calibrate.s_axis_tlast.set(load.m_axis_tlast);
+        load.m_axis_tready.set(calibrate.s_axis_tready);
+        average.s_axis_tdata.set(calibrate.m_axis_tdata);
+        average.s_axis_tvalid.set(calibrate.m_axis_tvalid);
+        average.s_axis_tlast.set(calibrate.m_axis_tlast);
+        calibrate.m_axis_tready.set(average.s_axis_tready);
+        io.m_axis_tdata.set(average.m_axis_tdata);
+        io.m_axis_tvalid.set(average.m_axis_tvalid);
+        io.m_axis_tlast.set(average.m_axis_tlast);
+        average.m_axis_tready.set(io.m_axis_tready);
+        io.frames.set(average.frames);
     }
 }
 
@@ -144,7 +124,7 @@ impl Logic for Prepare {
 mod tests {
     use super::*;
     use crate::language::testbench::{
-        block_subject, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+        subject_of, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
     };
     use crate::language::Change;
     use crate::primitives::{Sums, Table};
@@ -192,7 +172,7 @@ mod tests {
     }
 
     fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
-        block_subject!(
+        subject_of!(
             Prepare::new(model),
             changes,
             inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, idle],

@@ -7,63 +7,51 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, largest, shift_bits, BitDelay, CaseCounter, Delay, Dff, LimbSum, Ram, RawLength, Rescaler,
+    count_bits, largest, BitDelay, CaseCounter, Delay, Dff, LimbSum, Ram, RawLength, Rescaler,
     SATURATION_BITS,
 };
-use crate::wire::Wire;
 
-/// Rows of accumulators in; words three cycles after they enter the rescaler, operands four.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Rescale {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is computed.
-    pub which: Wire<In>,
-    /// A subarray starts: v_00 comes next, and its saturations are counted from 0.
-    pub start: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
-    pub quad: Wire<In>,
-    /// `quad` holds a row.
-    pub quad_valid: Signal<In, Bit>,
-    /// `quad` holds a row two cycles later.
-    pub quad_soon: Signal<In, Bit>,
-    /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
-    pub words: Wire<Out>,
-    /// `words` holds a quad.
-    pub words_valid: Signal<Out, Bit>,
-    /// The same, rounded to `data_bits` each, as operands of later passes; valid with `operands_valid`, a cycle later.
-    pub operands: Wire<Out>,
-    /// `operands` holds a quad.
-    pub operands_valid: Signal<Out, Bit>,
-    /// Measured right shift; valid from the first word until the next subarray.
-    pub shift: Wire<Out>,
-    /// Number of words saturated in this subarray; final two cycles after its last word.
-    pub saturations: Wire<Out>,
-    collecting: RustHdl<Dff>,
-    replaying: RustHdl<Dff>,
-    rows: RustHdl<CaseCounter>,
-    reads: RustHdl<CaseCounter>,
-    raw: RustHdl<Ram>,
-    limb_sum: RustHdl<LimbSum>,
-    length: RustHdl<RawLength>,
-    rescaler: Rescaler,
-    started: RustHdl<BitDelay>,
-    writes: RustHdl<BitDelay>,
-    measures: RustHdl<BitDelay>,
-    ends: RustHdl<BitDelay>,
-    row: RustHdl<Delay>,
-    read: RustHdl<BitDelay>,
-    words_later: RustHdl<BitDelay>,
-    operands_later: RustHdl<BitDelay>,
-    collected: Signal<Local, Bit>,
-    complete: Signal<Local, Bit>,
-    enters: Signal<Local, Bit>,
+block! {
+    /// Rows of accumulators in; words three cycles after they enter the rescaler, operands four.
+    pub struct Rescale {
+        /// Quads of a subarray, by case.
+        quads: Vec<usize>,
+        lane_bits: usize,
+        raw: Ram,
+        limb_sum: LimbSum,
+        length: RawLength,
+        rescaler: Rescaler,
+    }
+    ports RescalePorts {
+        clock;
+        reset;
+        /// Index of the case; constant while a frame is computed.
+        in which: count_bits(quads.len());
+        /// A subarray starts: v_00 comes next, and its saturations are counted from 0.
+        in start;
+        /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
+        in quad: 4 * lane_bits;
+        /// `quad` holds a row.
+        in quad_valid;
+        /// `quad` holds a row two cycles later.
+        in quad_soon;
+        /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
+        out words: rescaler.widths().words;
+        /// `words` holds a quad.
+        out words_valid;
+        /// The same, rounded to `data_bits` each, as operands of later passes; valid with `operands_valid`, a cycle later.
+        out operands: rescaler.widths().operands;
+        /// `operands` holds a quad.
+        out operands_valid;
+        /// Measured right shift; valid from the first word until the next subarray.
+        out shift: length.widths().shift;
+        /// Number of words saturated in this subarray; final two cycles after its last word.
+        out saturations: SATURATION_BITS;
+    }
 }
 
 impl Rescale {
@@ -73,120 +61,83 @@ impl Rescale {
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let acc = 4 * formats.acc_bits as usize;
         Rescale {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(quads.len())),
-            start: Default::default(),
-            quad: Wire::new(4 * formats.lane_bits as usize),
-            quad_valid: Default::default(),
-            quad_soon: Default::default(),
-            words: Wire::new(4 * formats.vector_bits as usize),
-            words_valid: Default::default(),
-            operands: Wire::new(4 * formats.data_bits as usize),
-            operands_valid: Default::default(),
-            shift: Wire::new(shift_bits(formats)),
-            saturations: Wire::new(SATURATION_BITS),
-            collecting: Default::default(),
-            replaying: Default::default(),
-            rows: RustHdl::new(CaseCounter::new(&quads)),
-            reads: RustHdl::new(CaseCounter::new(&quads)),
-            raw: RustHdl::new(Ram::new(largest(&quads), 1, acc).holding([Holds::Raw]).registered()),
-            limb_sum: RustHdl::new(LimbSum::new(formats)),
-            length: RustHdl::new(RawLength::new(formats)),
+            lane_bits: formats.lane_bits as usize,
+            raw: Ram::new(largest(&quads), 1, acc).holding([Holds::Raw]).registered(),
+            limb_sum: LimbSum::new(formats),
+            length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
-            started: RustHdl::new(BitDelay::new(1)),
-            writes: RustHdl::new(BitDelay::new(1)),
-            measures: RustHdl::new(BitDelay::new(1)),
-            ends: RustHdl::new(BitDelay::new(1)),
-            row: RustHdl::new(Delay::new(count_bits(largest(&quads)), 1)),
-            read: RustHdl::new(BitDelay::new(2)),
-            words_later: RustHdl::new(BitDelay::new(3)),
-            operands_later: RustHdl::new(BitDelay::new(1)),
-            collected: Default::default(),
-            complete: Default::default(),
-            enters: Default::default(),
+            quads,
         }
     }
 }
 
-impl Logic for Rescale {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.collecting.clk.next = self.clk.val();
-        self.replaying.clk.next = self.clk.val();
-        self.rows.clk.next = self.clk.val();
-        self.reads.clk.next = self.clk.val();
-        self.raw.clk.next = self.clk.val();
-        self.limb_sum.clk.next = self.clk.val();
-        self.length.clk.next = self.clk.val();
-        self.rescaler.clk.next = self.clk.val();
-        self.read.clk.next = self.clk.val();
-        self.words_later.clk.next = self.clk.val();
-        self.operands_later.clk.next = self.clk.val();
-        self.started.clk.next = self.clk.val();
-        self.started.rst.next = self.rst.val();
-        self.writes.clk.next = self.clk.val();
-        self.writes.rst.next = self.rst.val();
-        self.measures.clk.next = self.clk.val();
-        self.measures.rst.next = self.rst.val();
-        self.ends.clk.next = self.clk.val();
-        self.ends.rst.next = self.rst.val();
-        self.row.clk.next = self.clk.val();
-        self.read.rst.next = self.rst.val();
-        self.words_later.rst.next = self.rst.val();
-        self.operands_later.rst.next = self.rst.val();
+impl Block for Rescale {
+    fn build<'k>(&self, k: &'k Builder, io: RescalePorts<Inside<'k>>) {
+        let collecting = k.instance("collecting", Dff {});
+        let replaying = k.instance("replaying", Dff {});
+        let rows = k.instance("rows", CaseCounter::new(&self.quads));
+        let reads = k.instance("reads", CaseCounter::new(&self.quads));
+        let raw = k.instance("raw", &self.raw);
+        let limb_sum = k.instance("limb_sum", &self.limb_sum);
+        let length = k.instance("length", &self.length);
+        let rescaler = k.instance("rescaler", &self.rescaler);
+        let started = k.instance("started", BitDelay::new(1));
+        let writes = k.instance("writes", BitDelay::new(1));
+        let measures = k.instance("measures", BitDelay::new(1));
+        let ends = k.instance("ends", BitDelay::new(1));
+        let row = k.instance("row", Delay::new(rows.value.bits(), 1));
+        let read = k.instance("read", BitDelay::new(2));
+        let words_later = k.instance("words_later", BitDelay::new(3));
+        let operands_later = k.instance("operands_later", BitDelay::new(1));
 
-        comment!("Registered; the first row comes many cycles later");
-        self.started.d.next = self.start.val();
-        self.collected.next = self.collecting.q.val() & self.quad_valid.val();
-        self.complete.next = self.collected.val() & self.limb_sum.complete.val();
-        self.collecting.d.next = (self.started.q.val()
-            | (self.collecting.q.val() & !(self.complete.val() & self.rows.last.val())))
-            & !self.rst.val();
-        self.rows.which.next = self.which.val();
-        self.reads.which.next = self.which.val();
-        self.rows.clear.next = self.started.q.val();
-        self.rows.enable.next = self.collected.val();
-        comment!("The sum of a row is registered");
-        self.writes.d.next = self.collected.val();
-        self.measures.d.next = self.complete.val();
-        self.ends.d.next = self.complete.val() & self.rows.last.val();
-        self.row.d.next = self.rows.value.val();
-        self.raw.write.next = self.writes.q.val().into();
-        self.raw.write_address.next = self.row.q.val();
-        self.raw.write_data.next = self.limb_sum.sum.val();
-        self.limb_sum.clear.next = self.started.q.val();
-        self.limb_sum.last.next = self.collected.val() & self.rows.last.val();
-        self.limb_sum.quad.next = self.quad.val();
-        self.limb_sum.low.next = self.raw.read_data.val();
-        self.length.clear.next = self.started.q.val();
-        self.length.accept.next = self.measures.q.val();
-        self.length.quad.next = self.limb_sum.sum.val();
+        k.comment("Registered; the first row comes many cycles later");
+        started.d.set(io.start);
+        let collected = k.wire("collected", collecting.q & io.quad_valid);
+        let complete = k.wire("complete", collected & limb_sum.complete);
+        collecting.d.set((started.q | (collecting.q & !(complete & rows.last))) & !io.rst);
+        rows.which.set(io.which);
+        reads.which.set(io.which);
+        rows.clear.set(started.q);
+        rows.enable.set(collected);
+        k.comment("The sum of a row is registered");
+        writes.d.set(collected);
+        measures.d.set(complete);
+        ends.d.set(complete & rows.last);
+        row.d.set(rows.value);
+        raw.write.set(writes.q);
+        raw.write_address.set(row.q);
+        raw.write_data.set(limb_sum.sum);
+        limb_sum.clear.set(started.q);
+        limb_sum.last.set(collected & rows.last);
+        limb_sum.quad.set(io.quad);
+        limb_sum.low.set(raw.read_data);
+        length.clear.set(started.q);
+        length.accept.set(measures.q);
+        length.quad.set(limb_sum.sum);
 
-        self.replaying.d.next =
-            (self.ends.q.val() | (self.replaying.q.val() & !self.reads.last.val())) & !self.rst.val();
-        comment!("Read two cycles before its high limbs come, and again");
-        self.reads.clear.next = self.started.q.val();
-        self.reads.enable.next = self.replaying.q.val() | (self.collecting.q.val() & self.quad_soon.val());
-        self.raw.read.next = true;
-        self.raw.read_address.next = self.reads.value.val();
-        self.read.d.next = self.replaying.q.val();
+        replaying.d.set((ends.q | (replaying.q & !reads.last)) & !io.rst);
+        k.comment("Read two cycles before its high limbs come, and again");
+        reads.clear.set(started.q);
+        reads.enable.set(replaying.q | (collecting.q & io.quad_soon));
+        raw.read.set(k.constant(1, 1));
+        raw.read_address.set(reads.value);
+        read.d.set(replaying.q);
 
-        self.enters.next = self.read.q.val() | (self.quad_valid.val() & !self.collecting.q.val());
-        self.rescaler.clear.next = self.started.q.val();
-        self.rescaler.valid.next = self.enters.val();
-        self.rescaler.measured.next = self.read.q.val();
-        self.rescaler.shift.next = self.length.shift.val();
-        self.rescaler.raw.next = self.raw.read_data.val();
-        self.rescaler.quad.next = self.quad.val();
-        self.words_later.d.next = self.enters.val();
-        self.operands_later.d.next = self.words_later.q.val();
-        self.words.next = self.rescaler.words.val();
-        self.words_valid.next = self.words_later.q.val();
-        self.operands.next = self.rescaler.operands.val();
-        self.operands_valid.next = self.operands_later.q.val();
-        self.shift.next = self.length.shift.val();
-        self.saturations.next = self.rescaler.saturations.val();
+        let enters = k.wire("enters", read.q | (io.quad_valid & !collecting.q));
+        rescaler.clear.set(started.q);
+        rescaler.valid.set(enters);
+        rescaler.measured.set(read.q);
+        rescaler.shift.set(length.shift);
+        rescaler.raw.set(raw.read_data);
+        rescaler.quad.set(io.quad);
+        words_later.d.set(enters);
+        operands_later.d.set(words_later.q);
+        io.words.set(rescaler.words);
+        io.words_valid.set(words_later.q);
+        io.operands.set(rescaler.operands);
+        io.operands_valid.set(operands_later.q);
+        io.shift.set(length.shift);
+        io.saturations.set(rescaler.saturations);
     }
 }
 
@@ -198,7 +149,7 @@ mod tests {
     use dermis_golden::fixed::stages::rescale::{operand, raw_length, rescale, shift};
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{subject_of, check_with_defects, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::wire::Word;
@@ -348,7 +299,7 @@ mod tests {
         assert!(two_limbs.formats().limb_align > 0 && one_limb.formats().limb_align == 0);
         for model in [two_limbs, one_limb] {
             let subject = |changes: &[Change]| {
-                block_subject!(
+                subject_of!(
                     Rescale::new(&model),
                     changes,
                     inputs [rst, which, start, quad, quad_valid, quad_soon],

@@ -4,56 +4,50 @@
 
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, PartsBegun, Scan, StatusCode};
-use crate::wire::Wire;
 
-/// From the first subarray's values on, one beat is requested in each cycle with `room`: all taxels, then the status beats.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Send {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent; constant until its last beat.
-    pub which: Wire<In>,
-    /// The frame's first values are available: start requesting beats.
-    pub start: Signal<In, Bit>,
-    /// The first values of a subarray are available; with `start` those of the first.
-    pub begins: Signal<In, Bit>,
-    /// A beat is offered on the output, monitored for the end of the frame.
-    pub m_axis_tvalid: Signal<In, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The offered beat is the last of its frame.
-    pub m_axis_tlast: Signal<In, Bit>,
-    /// A beat may be requested in this cycle.
-    pub room: Signal<In, Bit>,
-    /// A beat is requested in this cycle.
-    pub offer: Signal<Out, Bit>,
-    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
-    pub beat: Wire<Out>,
-    /// Index of the beat's subarray; valid with `offer`.
-    pub part: Wire<Out>,
-    /// Address of the memory word with the taxel; valid with `offer`.
-    pub address: Wire<Out>,
-    /// Lane of the taxel in the word; valid with `offer`.
-    pub lane: Wire<Out>,
-    /// The frame's last beat was accepted one cycle ago; high for one cycle.
-    pub done: Signal<Out, Bit>,
-    scan: RustHdl<Scan>,
-    words: RustHdl<Counter>,
-    parts: RustHdl<CaseCounter>,
-    code: RustHdl<StatusCode>,
-    released: RustHdl<PartsBegun>,
-    sending: RustHdl<Dff>,
-    status: RustHdl<Dff>,
-    out: RustHdl<BitDelay>,
-    step: Signal<Local, Bit>,
-    at_end: Signal<Local, Bit>,
-    finish: Signal<Local, Bit>,
+block! {
+    /// From the first subarray's values on, one beat is requested in each cycle with `room`: all taxels, then the status beats.
+    pub struct Send {
+        scan: Scan,
+        /// Statuses of a frame and its subarrays, by case.
+        statuses: Vec<usize>,
+        subarrays: Vec<usize>,
+        code: StatusCode,
+    }
+    ports SendPorts {
+        clock;
+        reset;
+        /// Index of the case of the frame being sent; constant until its last beat.
+        in which: count_bits(subarrays.len());
+        /// The frame's first values are available: start requesting beats.
+        in start;
+        /// The first values of a subarray are available; with `start` those of the first.
+        in begins;
+        /// A beat is offered on the output, monitored for the end of the frame.
+        in m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The offered beat is the last of its frame.
+        in m_axis_tlast;
+        /// A beat may be requested in this cycle.
+        in room;
+        /// A beat is requested in this cycle.
+        out offer;
+        /// 0: a force, 1 … 3: a status beat; valid with `offer`.
+        out beat: 2;
+        /// Index of the beat's subarray; valid with `offer`.
+        out part: code.widths().part;
+        /// Address of the memory word with the taxel; valid with `offer`.
+        out address: scan.address_bits();
+        /// Lane of the taxel in the word; valid with `offer`.
+        out lane: 2;
+        /// The frame's last beat was accepted one cycle ago; high for one cycle.
+        out done;
+    }
 }
 
 impl Send {
@@ -62,88 +56,59 @@ impl Send {
         let subarrays: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let statuses: Vec<usize> =
             model.cases().iter().map(|case| model.status_beats_of(case) / STATUS_BEATS).collect();
-        let code = RustHdl::new(StatusCode::new(largest(&statuses), largest(&subarrays), model.formats().by_contact()));
-        let scan = Scan::new(model.cases(), model.formats().search_width);
-        Send {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(subarrays.len())),
-            start: Default::default(),
-            begins: Default::default(),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            room: Default::default(),
-            offer: Default::default(),
-            beat: Wire::new(2),
-            part: Wire::new(code.part.width()),
-            address: Wire::new(scan.address_bits()),
-            lane: Wire::new(2),
-            done: Default::default(),
-            words: RustHdl::new(Counter::new(STATUS_BEATS)),
-            parts: RustHdl::new(CaseCounter::new(&statuses)),
-            code,
-            released: RustHdl::new(PartsBegun::new(largest(&subarrays))),
-            sending: Default::default(),
-            status: Default::default(),
-            out: RustHdl::new(BitDelay::new(1)),
-            step: Default::default(),
-            at_end: Default::default(),
-            finish: Default::default(),
-            scan: RustHdl::new(scan),
-        }
+        let code = StatusCode::new(largest(&statuses), largest(&subarrays), model.formats().by_contact());
+        Send { scan: Scan::new(model.cases(), model.formats().search_width), statuses, subarrays, code }
     }
 }
 
-impl Logic for Send {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.scan.clk.next = self.clk.val();
-        self.words.clk.next = self.clk.val();
-        self.parts.clk.next = self.clk.val();
-        self.sending.clk.next = self.clk.val();
-        self.status.clk.next = self.clk.val();
-        self.released.clk.next = self.clk.val();
+impl Block for Send {
+    fn build<'k>(&self, k: &'k Builder, io: SendPorts<Inside<'k>>) {
+        let scan = k.instance("scan", &self.scan);
+        let words = k.instance("words", Counter::new(STATUS_BEATS));
+        let parts = k.instance("parts", CaseCounter::new(&self.statuses));
+        let code = k.instance("code", &self.code);
+        let released = k.instance("released", PartsBegun::new(largest(&self.subarrays)));
+        let sending = k.instance("sending", Dff {});
+        let status = k.instance("status", Dff {});
+        let out = k.instance("out", BitDelay::new(1));
 
-        self.scan.which.next = self.which.val();
-        self.parts.which.next = self.which.val();
-        self.released.begins.next = self.begins.val();
-        self.released.first.next = self.start.val();
-        self.released.part.next = self.scan.part.val();
-        self.step.next = self.sending.q.val() & self.room.val() & (self.status.q.val() | self.released.open.val());
-        self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();
-        self.finish.next = self.step.val() & self.status.q.val() & self.words.last.val() & self.parts.last.val();
-        self.offer.next = self.step.val();
+        scan.which.set(io.which);
+        parts.which.set(io.which);
+        released.begins.set(io.begins);
+        released.first.set(io.start);
+        released.part.set(scan.part);
+        let step = k.wire("step", sending.q & io.room & (status.q | released.open));
+        let at_end = k.wire("at_end", step & !status.q & scan.last);
+        let finish = k.wire("finish", step & status.q & words.last & parts.last);
+        io.offer.set(step);
 
-        self.scan.clear.next = self.start.val();
-        self.scan.enable.next = self.step.val() & !self.status.q.val();
-        self.words.clear.next = self.start.val();
-        self.words.enable.next = self.step.val() & self.status.q.val();
-        self.parts.clear.next = self.start.val();
-        self.parts.enable.next = self.step.val() & self.status.q.val() & self.words.last.val();
-        self.code.status.next = self.status.q.val();
-        self.code.word.next = self.words.value.val();
-        self.code.status_part.next = self.parts.value.val();
-        self.code.scan_part.next = self.scan.part.val();
-        self.beat.next = self.code.beat.val();
-        self.part.next = self.code.part.val();
-        self.address.next = self.scan.address.val();
-        self.lane.next = self.scan.lane.val();
+        scan.clear.set(io.start);
+        scan.enable.set(step & !status.q);
+        words.clear.set(io.start);
+        words.enable.set(step & status.q);
+        parts.clear.set(io.start);
+        parts.enable.set(step & status.q & words.last);
+        code.status.set(status.q);
+        code.word.set(words.value);
+        code.status_part.set(parts.value);
+        code.scan_part.set(scan.part);
+        io.beat.set(code.beat);
+        io.part.set(code.part);
+        io.address.set(scan.address);
+        io.lane.set(scan.lane);
 
-        self.sending.d.next = (self.start.val() | (self.sending.q.val() & !self.finish.val())) & !self.rst.val();
-        self.status.d.next = (self.at_end.val() | (self.status.q.val() & !self.finish.val())) & !self.rst.val();
-        comment!("Registered once to shorten the route from the output");
-        self.out.clk.next = self.clk.val();
-        self.out.rst.next = self.rst.val();
-        self.out.d.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
-        self.done.next = self.out.q.val();
+        sending.d.set((io.start | (sending.q & !finish)) & !io.rst);
+        status.d.set((at_end | (status.q & !finish)) & !io.rst);
+        k.comment("Registered once to shorten the route from the output");
+        out.d.set(io.m_axis_tvalid & io.m_axis_tready & io.m_axis_tlast);
+        io.done.set(out.q);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{subject_of, check_with_defects, Reference};
     use crate::language::Change;
     use crate::scenes::{learned, model, Place};
     use crate::wire::Word;
@@ -238,7 +203,7 @@ mod tests {
         };
         let stimulus: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Send::new(model),
                 changes,
                 inputs [rst, which, start, begins, m_axis_tvalid, m_axis_tready, m_axis_tlast, room],

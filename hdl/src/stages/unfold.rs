@@ -2,47 +2,45 @@
 
 use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::fixed::Model;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
-use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, TransposedPlace, Unfolder};
-use crate::wire::Wire;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Delay, TransposedPlace, Unfolder};
 
-/// Quads of v_ij in, in order; two cycles later four taxels with coefficient index and quad address.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Unfold {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case; constant while a frame is computed.
-    pub which: Wire<In>,
-    /// A subarray starts: the words of v_00 come next.
-    pub start: Signal<In, Bit>,
-    /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
-    pub words: Wire<In>,
-    /// `words` holds a quad.
-    pub words_valid: Signal<In, Bit>,
-    /// One coefficient of four taxels, two bits wider, signed; valid with `taxels_valid`, three cycles after `words`.
-    pub taxels: Wire<Out>,
-    /// `taxels` holds a quad.
-    pub taxels_valid: Signal<Out, Bit>,
-    /// Index of the coefficient; valid with `taxels_valid`.
-    pub index: Wire<Out>,
-    /// Address of the quad; valid with `taxels_valid`.
-    pub address: Wire<Out>,
-    /// All coefficients of the subarray have been output; high for one cycle.
-    pub done: Signal<Out, Bit>,
-    quads: RustHdl<CaseCounter>,
-    vectors: RustHdl<Counter>,
-    unfolder: RustHdl<Unfolder>,
-    transposed: RustHdl<TransposedPlace>,
-    index_first: RustHdl<Delay>,
-    index_later: RustHdl<Delay>,
-    address_later: RustHdl<Delay>,
-    valid_later: RustHdl<BitDelay>,
-    finish: RustHdl<BitDelay>,
-    quad_end: Signal<Local, Bit>,
+block! {
+    /// Quads of v_ij in, in order; two cycles later four taxels with coefficient index and quad address.
+    pub struct Unfold {
+        /// Quads of a subarray, by case.
+        quads: Vec<usize>,
+        /// Coefficients of a taxel.
+        vectors: usize,
+        /// Width of a word.
+        bits: usize,
+        unfolder: Unfolder,
+        transposed: TransposedPlace,
+    }
+    ports UnfoldPorts {
+        clock;
+        reset;
+        /// Index of the case; constant while a frame is computed.
+        in which: count_bits(quads.len());
+        /// A subarray starts: the words of v_00 come next.
+        in start;
+        /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
+        in words: 4 * bits;
+        /// `words` holds a quad.
+        in words_valid;
+        /// One coefficient of four taxels, two bits wider, signed; valid with `taxels_valid`, three cycles after `words`.
+        out taxels: 4 * (bits + 2);
+        /// `taxels` holds a quad.
+        out taxels_valid;
+        /// Index of the coefficient; valid with `taxels_valid`.
+        out index: count_bits(*vectors);
+        /// Address of the quad; valid with `taxels_valid`.
+        out address: count_bits(largest(quads));
+        /// All coefficients of the subarray have been output; high for one cycle.
+        out done;
+    }
 }
 
 impl Unfold {
@@ -56,69 +54,50 @@ impl Unfold {
         // With a network every vector is p itself.
         let degree = |(i, j): (u32, u32)| if formats.has_network() { 0 } else { i + j };
         let degrees: Vec<u32> = EXPONENTS[..count].iter().map(|&exponents| degree(exponents)).collect();
-        let (index, address) = (count_bits(count), count_bits(formats.quads));
         Unfold {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(quads.len())),
-            start: Default::default(),
-            words: Wire::new(4 * bits),
-            words_valid: Default::default(),
-            taxels: Wire::new(4 * (bits + 2)),
-            taxels_valid: Default::default(),
-            index: Wire::new(index),
-            address: Wire::new(address),
-            done: Default::default(),
-            quads: RustHdl::new(CaseCounter::new(&quads)),
-            vectors: RustHdl::new(Counter::new(count)),
-            unfolder: RustHdl::new(Unfolder::new(bits, &degrees)),
-            transposed: RustHdl::new(TransposedPlace::new(model.layout(), bits + 2, count, across)),
-            index_first: RustHdl::new(Delay::new(index, 2)),
-            index_later: RustHdl::new(Delay::new(index, 1)),
-            address_later: RustHdl::new(Delay::new(address, 3)),
-            valid_later: RustHdl::new(BitDelay::new(3)),
-            finish: RustHdl::new(BitDelay::new(4)),
-            quad_end: Default::default(),
+            quads,
+            vectors: count,
+            bits,
+            unfolder: Unfolder::new(bits, &degrees),
+            transposed: TransposedPlace::new(model.layout(), bits + 2, count, across),
         }
     }
 }
 
-impl Logic for Unfold {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.quads.clk.next = self.clk.val();
-        self.vectors.clk.next = self.clk.val();
-        self.unfolder.clk.next = self.clk.val();
-        self.index_first.clk.next = self.clk.val();
-        self.index_later.clk.next = self.clk.val();
-        self.address_later.clk.next = self.clk.val();
-        self.valid_later.clk.next = self.clk.val();
-        self.finish.clk.next = self.clk.val();
-        self.valid_later.rst.next = self.rst.val();
-        self.finish.rst.next = self.rst.val();
+impl Block for Unfold {
+    fn build<'k>(&self, k: &'k Builder, io: UnfoldPorts<Inside<'k>>) {
+        let quads = k.instance("quads", CaseCounter::new(&self.quads));
+        let vectors = k.instance("vectors", Counter::new(self.vectors));
+        let unfolder = k.instance("unfolder", &self.unfolder);
+        let transposed = k.instance("transposed", &self.transposed);
+        let index_first = k.instance("index_first", Delay::new(io.index.bits(), 2));
+        let index_later = k.instance("index_later", Delay::new(io.index.bits(), 1));
+        let address_later = k.instance("address_later", Delay::new(io.address.bits(), 3));
+        let valid_later = k.instance("valid_later", BitDelay::new(3));
+        let finish = k.instance("finish", BitDelay::new(4));
 
-        self.quad_end.next = self.words_valid.val() & self.quads.last.val();
-        self.quads.which.next = self.which.val();
-        self.quads.clear.next = self.start.val();
-        self.quads.enable.next = self.words_valid.val();
-        self.vectors.clear.next = self.start.val();
-        self.vectors.enable.next = self.quad_end.val();
-        self.unfolder.quad.next = self.words.val();
-        self.index_first.d.next = self.vectors.value.val();
-        self.unfolder.index.next = self.index_first.q.val();
-        self.index_later.d.next = self.index_first.q.val();
-        self.address_later.d.next = self.quads.value.val();
-        self.valid_later.d.next = self.words_valid.val();
+        let quad_end = k.wire("quad_end", io.words_valid & quads.last);
+        quads.which.set(io.which);
+        quads.clear.set(io.start);
+        quads.enable.set(io.words_valid);
+        vectors.clear.set(io.start);
+        vectors.enable.set(quad_end);
+        unfolder.quad.set(io.words);
+        index_first.d.set(vectors.value);
+        unfolder.index.set(index_first.q);
+        index_later.d.set(index_first.q);
+        address_later.d.set(quads.value);
+        valid_later.d.set(io.words_valid);
 
-        self.transposed.index.next = self.index_later.q.val();
-        self.transposed.address.next = self.address_later.q.val();
-        self.transposed.quad.next = self.unfolder.taxels.val();
-        self.taxels.next = self.transposed.taxels.val();
-        self.taxels_valid.next = self.valid_later.q.val();
-        self.index.next = self.index_later.q.val();
-        self.address.next = self.transposed.placed.val();
-        self.finish.d.next = self.quad_end.val() & self.vectors.last.val();
-        self.done.next = self.finish.q.val();
+        transposed.index.set(index_later.q);
+        transposed.address.set(address_later.q);
+        transposed.quad.set(unfolder.taxels);
+        io.taxels.set(transposed.taxels);
+        io.taxels_valid.set(valid_later.q);
+        io.index.set(index_later.q);
+        io.address.set(transposed.placed);
+        finish.d.set(quad_end & vectors.last);
+        io.done.set(finish.q);
     }
 }
 
@@ -129,7 +108,7 @@ mod tests {
     use dermis_golden::fixed::stages::unfold::unfold;
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
+    use crate::language::testbench::{subject_of, check_with_defects, random_word, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::wire::Word;
@@ -220,7 +199,7 @@ mod tests {
             };
             let stimulus: Vec<Vec<Word>> = (0..4000).map(cycle).collect();
             let subject = |changes: &[Change]| {
-                block_subject!(
+                subject_of!(
                     Unfold::new(&model),
                     changes,
                     inputs [rst, which, start, words, words_valid],

@@ -84,7 +84,7 @@ impl Subject<'_> {
             outputs
         };
         Subject {
-            verilog: hierarchy.verilog("dut", &Attributes::new(), &|_, _| None),
+            verilog: hierarchy.verilog("dut", &Attributes::new()),
             files: hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files()).collect(),
             run: Box::new(cycle),
             clock,
@@ -101,53 +101,4 @@ fn word(limbs: &[u64], bits: usize) -> Word {
         word.set(64 * limb, (bits - 64 * limb).min(64), value);
     }
     word
-}
-
-impl<'a> Subject<'a> {
-    /// A block with the blocks inside it, in rust-hdl's simulation; its Verilog with these `changes`. The ports in the order
-    /// in which `inputs` and `outputs` name them. `block_subject!` calls it.
-    pub(crate) fn of_block<B: Block + 'a>(
-        mut block: B,
-        changes: &[Change],
-        clock: fn(&mut B) -> &mut Signal<In, Clock>,
-        inputs: fn(&mut B, &mut Visit),
-        outputs: fn(&mut B, &mut Visit),
-    ) -> Self {
-        block.connect_all();
-        check_all(&block).unwrap();
-        let hierarchy = Hierarchy::of(&block);
-        hierarchy.check().unwrap();
-        let mut pins = |visit: fn(&mut B, &mut Visit)| {
-            let mut pins: Vec<Pin> = Vec::new();
-            visit(&mut block, &mut |name, port| pins.push((name.to_owned(), port.port_bits())));
-            pins
-        };
-        let (in_pins, out_pins) = (pins(inputs), pins(outputs));
-        let hierarchy = hierarchy.changed(changes).unwrap();
-        let files = hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files()).collect();
-        let cycle = move |words: &[Word]| {
-            let mut words = words.iter();
-            inputs(&mut block, &mut |_, port| port.write(words.next().unwrap().limbs()));
-            let settle = |block: &mut B, level: bool| {
-                clock(block).next = level.into();
-                assert!(settles(block));
-            };
-            settle(&mut block, false);
-            let mut values = Vec::new();
-            outputs(&mut block, &mut |_, port| {
-                let bits = port.port_bits();
-                port.read(&mut |limbs| values.push(word(limbs, bits)));
-            });
-            settle(&mut block, true);
-            values
-        };
-        Subject {
-            clock: Some("clk".to_owned()),
-            verilog: hierarchy.verilog("dut", &Attributes::new(), &|_, _| None),
-            files,
-            run: Box::new(cycle),
-            inputs: in_pins,
-            outputs: out_pins,
-        }
-    }
 }

@@ -42,8 +42,8 @@ impl OperandScale {
     }
 
     /// Cycles from `operands` to `scaled`.
-    pub fn latency(wanted: bool) -> usize {
-        if wanted {
+    pub fn latency(&self) -> usize {
+        if self.wanted {
             LATENCY
         } else {
             0
@@ -104,7 +104,7 @@ mod tests {
                 vec![Some(Word::of_fields(&all, M))]
             };
             let block = OperandScale::new(wanted);
-            check(&kernel_of(&block), &stimulus, &mut Pipeline::new(OperandScale::latency(wanted), 1, of));
+            check(&kernel_of(&block), &stimulus, &mut Pipeline::new(block.latency(), 1, of));
         }
     }
 }
