@@ -10,7 +10,7 @@ use super::kernel::{
     Type, Write,
 };
 use super::keywords::is_keyword;
-use super::wiring::SEPARATOR;
+use super::hierarchy::SEPARATOR;
 
 /// The port that resets a block.
 const RESET: &str = "rst";
@@ -469,5 +469,23 @@ impl<'k> MemoryPort<'k> {
     pub fn unchecked(self) -> Self {
         self.builder.kernel.borrow_mut().memories[self.memory].unchecked = true;
         self
+    }
+}
+
+impl Kernel {
+    /// Makes the signal `port` a port.
+    pub(super) fn bind(&mut self, port: &str, bits: usize, is_output: bool) {
+        let found = match self.signal_of(port).map(|id| &mut self.signals[id]) {
+            None => "the kernel has no such signal".to_owned(),
+            Some(signal) if signal.ty.bits != bits => format!("the kernel's signal has {} bits", signal.ty.bits),
+            Some(signal) if (signal.role == Role::Input) == is_output => {
+                "the kernel's signal has another direction".to_owned()
+            }
+            Some(signal) => {
+                signal.output = is_output;
+                return;
+            }
+        };
+        self.errors.push(KernelError::Port { block: self.block.clone(), port: port.to_owned(), bits, found });
     }
 }

@@ -91,16 +91,6 @@ pub enum KernelError {
         /// Why not.
         reason: &'static str,
     },
-    /// A block that connects others says what a connection cannot.
-    #[error("block {block}: `{what}` {reason}")]
-    Wiring {
-        /// Path of the block.
-        block: String,
-        /// Signal or expression.
-        what: String,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
     /// A port of the block that the kernel lacks, or that has another width there.
     #[error("block {block}, port {port} of {bits} bits: {found}")]
     Port {

@@ -22,7 +22,6 @@
 //! | a port that the kernel lacks | [`KernelError::Port`] |
 //! | a name used twice, or none of Verilog | [`KernelError::Name`] |
 
-mod block;
 mod build;
 mod change;
 mod check;
@@ -40,23 +39,20 @@ mod rust_hdl;
 mod simulate;
 mod text;
 mod verilog;
-mod wiring;
 
 #[cfg(test)]
 pub(crate) mod testbench;
 #[cfg(test)]
 mod tests;
 
-pub use block::{Body, Port};
 pub use build::{Builder, MemoryPort, Net};
 pub use change::Change;
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
-pub use hierarchy::{Attributes, Hierarchy};
+pub use hierarchy::{Attributes, Hierarchy, SEPARATOR};
 pub use kernel::{Contents, Kernel, Memory, Type};
 pub use ports::{kernel_of, Block, Inside, Interface, Make, Output, Outside, View, Width, Widths};
 pub(crate) use resources::distributed_luts;
 pub use run::{Run, Slot};
 pub use rust_hdl::{RustHdl, SignalPort, Signals};
 pub use simulate::Simulation;
-pub use wiring::SEPARATOR;

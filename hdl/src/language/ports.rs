@@ -15,9 +15,9 @@ use std::sync::Arc;
 
 use super::build::{Builder, Net};
 use super::expression::Expr;
+use super::hierarchy::SEPARATOR;
 use super::kernel::{Kernel, Port, Type};
 use super::rust_hdl::{SignalPort, Signals};
-use super::wiring::SEPARATOR;
 
 /// A hardware block: its parameters are the fields of a struct, from which its ports and its behaviour follow.
 pub trait Block: Interface {

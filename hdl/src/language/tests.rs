@@ -2,12 +2,23 @@ mod errors;
 
 use super::resources::FLATTENED;
 use super::testbench::{check, random_words, verilated, Reference, Subject};
+use super::kernel::{Port, Role};
 use super::*;
 use crate::wire::Word;
 
 /// Makes all of `names` driven ports of a finished kernel.
 fn bound(kernel: Kernel, outputs: &[(&str, usize)]) -> Kernel {
-    Body::new(kernel, &[], outputs).kernel().clone()
+    let mut kernel = kernel;
+    let inputs = kernel.signals.iter().filter(|signal| signal.role == Role::Input);
+    let inputs: Vec<(String, usize)> = inputs.map(|signal| (signal.name.clone(), signal.ty.bits)).collect();
+    let outputs = outputs.iter().map(|&(name, bits)| (name.to_owned(), bits));
+    for (output, ports) in [(false, inputs), (true, outputs.collect())] {
+        for (name, bits) in ports {
+            kernel.bind(&name, bits, output);
+            kernel.ports.push(Port { name, bits, output, doc: String::new() });
+        }
+    }
+    kernel
 }
 
 /// An operator, its inputs' widths, and the same in integers: operands are unsigned, or signed if so marked.

@@ -110,13 +110,9 @@ impl Block for SpiSlave {
 
 #[cfg(test)]
 mod tests {
-    use rust_hdl::prelude::Block as _;
-
     use super::*;
-    use crate::language::kernel_of;
+    use crate::language::{kernel_of, Hierarchy, Run};
     use crate::language::testbench::{check, Reference};
-    use crate::language::RustHdl;
-    use crate::simulate::settles;
     use crate::wire::Word;
 
     /// The registers of both sides in plain integers.
@@ -225,7 +221,7 @@ mod tests {
 
     /// The block, the bytes that the `clk` side has received, and the bytes it still has to send.
     struct Bench {
-        block: RustHdl<SpiSlave>,
+        block: Run,
         received: Vec<u8>,
         sending: Vec<u8>,
         clock: bool,
@@ -233,58 +229,56 @@ mod tests {
 
     impl Bench {
         fn new(sending: &[u8]) -> Bench {
-            let mut block = RustHdl::<SpiSlave>::default();
-            block.connect_all();
-            block.spi_cs_n.next = true;
+            let block = Run::new(&Hierarchy::of_kernel(kernel_of(&SpiSlave::default())), &[]);
             let mut bench = Bench { block, received: Vec::new(), sending: sending.to_vec(), clock: false };
-            bench.settle();
+            bench.set("spi_cs_n", true);
             bench
         }
 
-        fn settle(&mut self) {
-            assert!(settles(&mut self.block));
+        /// Sets an input, and settles.
+        fn set(&mut self, port: &str, value: impl Into<Word>) {
+            self.block.set(self.block.slot("", port), value.into());
+            self.block.settle();
+        }
+
+        fn get(&self, port: &str) -> u64 {
+            self.block.get(self.block.slot("", port)).number()
         }
 
         /// Half a cycle of `clk`; the `clk` side reads and writes before a rising edge.
         fn half(&mut self) {
-            let block = &mut self.block;
             if !self.clock {
-                if block.valid.val() {
-                    self.received.push(block.data.val().word().number() as u8);
+                if self.get("valid") == 1 {
+                    self.received.push(self.get("data") as u8);
                 }
-                block.send_valid.next = !self.sending.is_empty();
-                block.send_data.next = u64::from(self.sending.first().copied().unwrap_or(0)).into();
-                self.settle();
-                if !self.sending.is_empty() && self.block.send_ready.val() {
+                self.set("send_valid", !self.sending.is_empty());
+                self.set("send_data", u64::from(self.sending.first().copied().unwrap_or(0)));
+                if !self.sending.is_empty() && self.get("send_ready") == 1 {
                     self.sending.remove(0);
                 }
+                self.block.clock();
+                self.block.settle();
             }
             self.clock = !self.clock;
-            self.block.clk.next = self.clock.into();
-            self.settle();
         }
 
         /// A transaction of `edges` edges of the controller's clock, `halves` half cycles of `clk` apart; returns the
         /// complete bytes that the controller has received.
         fn transaction(&mut self, bytes: &[u8], edges: usize, halves: usize) -> Vec<u8> {
-            self.block.spi_cs_n.next = false;
+            self.set("spi_cs_n", false);
             let (mut seen, mut whole) = (0u32, Vec::new());
             for edge in 0..edges {
                 let bit = edge / 2;
                 if edge % 2 == 0 {
-                    self.block.spi_mosi.next = bytes[bit / 8] >> (7 - bit % 8) & 1 == 1;
-                    self.settle();
-                    seen = seen << 1 | u32::from(self.block.spi_miso.val());
+                    self.set("spi_mosi", bytes[bit / 8] >> (7 - bit % 8) & 1 == 1);
+                    seen = seen << 1 | self.get("spi_miso") as u32;
                     whole.extend((bit % 8 == 7).then_some(seen as u8));
                 }
-                self.block.spi_sclk.next = edge % 2 == 0;
-                self.settle();
+                self.set("spi_sclk", edge % 2 == 0);
                 (0..halves).for_each(|_| self.half());
             }
-            self.block.spi_cs_n.next = true;
-            self.settle();
-            self.block.spi_sclk.next = false;
-            self.settle();
+            self.set("spi_cs_n", true);
+            self.set("spi_sclk", false);
             (0..halves).for_each(|_| self.half());
             whole
         }

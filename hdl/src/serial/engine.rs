@@ -262,8 +262,8 @@ impl Serial {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::engine::tests::{engine_subject, stimulus, Frames};
+    use crate::engine::Engine;
     use crate::language::testbench::check_with_defects;
     use crate::language::Change;
     use crate::scenes::model;

@@ -1,98 +1,92 @@
 //! Designs of two blocks: their modules, and what is wrong with them.
 
-use rust_hdl::prelude::*;
-
 use super::*;
-use crate::kernel_block;
-use crate::language::{Body, Builder};
+use crate::block;
+use crate::language::{kernel_of, Block, Builder, Inside};
 
-/// The contrary of a bit.
-#[derive(dermis_hdl_derive::Block)]
-struct Inverter {
-    a: Signal<In, Bit>,
-    b: Signal<Out, Bit>,
-    kernel: Body,
-}
-
-kernel_block!(Inverter, inputs[a], outputs[b]);
-
-impl Default for Inverter {
-    fn default() -> Self {
-        let k = Builder::combinational("inverter");
-        k.wire("b", !k.input("a", 1));
-        Inverter { a: Default::default(), b: Default::default(), kernel: Body::default() }.bind(k.finish())
+block! {
+    /// The contrary of a bit.
+    #[derive(Default)]
+    struct Inverter {}
+    ports InverterPorts {
+        /// A bit.
+        in a;
+        /// Its contrary; combinational.
+        out b;
     }
 }
 
-/// Two inverters, one behind the other.
-#[derive(dermis_hdl_derive::Block, Default)]
-struct Chain {
-    a: Signal<In, Bit>,
-    b: Signal<Out, Bit>,
-    first: Inverter,
-    second: Inverter,
-}
-
-impl Logic for Chain {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.first.a.next = self.a.val();
-        self.second.a.next = self.first.b.val();
-        self.b.next = self.second.b.val();
+impl Block for Inverter {
+    fn build<'k>(&self, _: &'k Builder, io: InverterPorts<Inside<'k>>) {
+        io.b.set(!io.a);
     }
 }
 
-/// Two inverters in a ring while `a` is high.
-#[derive(dermis_hdl_derive::Block, Default)]
-struct Ring {
-    a: Signal<In, Bit>,
-    b: Signal<Out, Bit>,
-    first: Inverter,
-    second: Inverter,
+/// How two inverters are connected.
+#[derive(Clone, Copy)]
+enum Way {
+    /// One behind the other.
+    Chain,
+    /// In a ring while `a` is high.
+    Ring,
+    /// As a chain whose first instance has a name that tools refuse.
+    Named,
+    /// The second has no input.
+    Open,
 }
 
-impl Logic for Ring {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.first.a.next = self.second.b.val() & self.a.val();
-        self.second.a.next = self.first.b.val();
-        self.b.next = self.second.b.val();
+block! {
+    /// Two inverters.
+    struct Two {
+        way: Way,
+    }
+    ports TwoPorts {
+        /// A bit.
+        in a;
+        /// The bit again; combinational.
+        out b;
     }
 }
 
-/// An instance with a name that tools refuse.
-#[derive(dermis_hdl_derive::Block, Default)]
-struct Named {
-    a: Signal<In, Bit>,
-    b: Signal<Out, Bit>,
-    program: Inverter,
+impl Block for Two {
+    fn build<'k>(&self, k: &'k Builder, io: TwoPorts<Inside<'k>>) {
+        let first = k.instance(if matches!(self.way, Way::Named) { "program" } else { "first" }, Inverter {});
+        let second = k.instance("second", Inverter {});
+        first.a.set(if matches!(self.way, Way::Ring) { second.b & io.a } else { io.a });
+        if !matches!(self.way, Way::Open) {
+            second.a.set(first.b);
+        }
+        io.b.set(second.b);
+    }
 }
 
-impl Logic for Named {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.program.a.next = self.a.val();
-        self.b.next = self.program.b.val();
-    }
+fn hierarchy(way: Way) -> Hierarchy {
+    Hierarchy::of_kernel(kernel_of(&Two { way }))
 }
 
 #[test]
 fn an_instance_named_by_a_keyword_is_an_error() {
-    let error = Hierarchy::of(&Named::default()).check().unwrap_err();
+    let error = hierarchy(Way::Named).check().unwrap_err();
     assert!(error.to_string().contains("program"), "{error}");
     assert!(matches!(error, KernelError::Name { .. }));
 }
 
 #[test]
-fn a_block_that_connects_others_is_a_module_with_instances() {
-    let hierarchy = Hierarchy::of(&Chain::default());
+fn an_input_of_an_instance_that_nothing_drives_is_named() {
+    let error = hierarchy(Way::Open).check().unwrap_err().to_string();
+    assert!(error.contains("second__a"), "{error}");
+}
+
+#[test]
+fn a_block_of_blocks_is_a_module_with_instances() {
+    let hierarchy = hierarchy(Way::Chain);
     hierarchy.check().unwrap();
-    let comment = |path: &str, port: &str| (path.is_empty() && port == "a").then(|| "A bit.".to_owned());
-    let text = hierarchy.verilog("chain", &Attributes::new(), &comment);
+    let text = hierarchy.verilog("chain", &Attributes::new());
     let chain = "\
 module chain (
     // A bit.
     input wire a,
+    // The bit again; combinational.
     output wire b
 );
     wire first__a;
@@ -113,15 +107,12 @@ module chain (
 endmodule
 ";
     assert!(text.starts_with(chain), "{text}");
-    assert!(
-        text.contains("module chain__first (\n    input wire a,\n    output wire b\n);\n    assign b = !a;\n"),
-        "{text}"
-    );
+    assert!(text.contains("    output wire b\n);\n    assign b = !a;\n"), "{text}");
 }
 
 #[test]
 fn a_loop_through_several_blocks_is_named() {
-    let error = Hierarchy::of(&Ring::default()).check().unwrap_err().to_string();
+    let error = hierarchy(Way::Ring).check().unwrap_err().to_string();
     let ring = "second__b, second__a, first__b, first__a";
     assert_eq!(error, format!("block second, signal b: combinational loop through {ring}: `~a`"));
 }

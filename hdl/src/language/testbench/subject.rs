@@ -1,21 +1,13 @@
 //! What a test drives: a kernel alone, or a block with the blocks inside it.
 
-use rust_hdl::core::check_error::check_all;
-use rust_hdl::prelude::*;
-
 use crate::language::change::Change;
 use crate::language::hierarchy::{Attributes, Hierarchy};
 use crate::language::kernel::{Kernel, Role, Signal as KernelSignal};
 use crate::language::simulate::Simulation;
-use crate::language::Port;
-use crate::simulate::settles;
 use crate::wire::Word;
 
 /// A port: name, width in bits.
 pub(crate) type Pin = (String, usize);
-
-/// Takes ports by their name.
-pub(crate) type Visit<'a> = dyn FnMut(&'static str, &mut dyn Port) + 'a;
 
 /// One clock cycle with these inputs: the outputs before its rising edge.
 type Cycle<'a> = dyn FnMut(&[Word]) -> Vec<Word> + 'a;

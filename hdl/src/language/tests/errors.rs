@@ -139,8 +139,11 @@ fn names_and_ports_that_do_not_fit_are_errors() {
     }
     let k = Builder::new("b");
     k.input("a", 4);
-    let body = Body::new(k.finish(), &[("a", 5), ("x", 1)], &[("a", 4)]);
-    let errors: Vec<String> = body.kernel().errors().iter().map(ToString::to_string).collect();
+    let mut kernel = k.finish();
+    for (port, bits, output) in [("a", 5, false), ("x", 1, false), ("a", 4, true)] {
+        kernel.bind(port, bits, output);
+    }
+    let errors: Vec<String> = kernel.errors().iter().map(ToString::to_string).collect();
     assert_eq!(
         errors,
         [
