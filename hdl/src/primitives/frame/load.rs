@@ -179,15 +179,6 @@ impl Load {
         let (bits, bit, word_bits) = (self.code_bits, Type::unsigned(1), 8 * WORD_BYTES);
         let (data, offered, tlast, ready) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready);
         let zero = k.constant(1, 0);
-        let kept = |name: &str, bits: usize, value: u64| -> MemoryPort {
-            k.memory(name, 1, bits, Contents::Words(vec![(0, value)]))
-        };
-        k.comment("Memories of one word: a reset leaves them as they are.");
-        let thresholds = kept("thresholds", THRESHOLD_BITS, tables.threshold.into());
-        let floors = kept("noise_floors", self.input_bits, tables.noise_floor as u64);
-        let states = kept("states", 1 + VERSION_BITS as usize, 1 << VERSION_BITS | u64::from(tables.version));
-        let state = k.wire("state", states.read(zero));
-        let whole = state.top();
 
         let image = k.state("image", bit, io.rst, 0);
         let skipping = k.state("skipping", bit, io.rst, 0);
@@ -268,6 +259,37 @@ impl Load {
             skipping.set(fails & *took & !*took_last);
         });
 
+        let [first, after] = [HEAD_WORDS, first_coefficient].map(|number| k.constant(index.bits(), number as u64));
+        io.write.set(ends_word & !index.less(first) & index.less(after));
+        io.taxel.set((*index - first).low(count_bits(self.taxels)));
+        io.entry.set(word.low(bits + GAIN_BITS as usize));
+        self.write_coefficients(k, &io, ends_word & !index.less(after) & !index.is(words as u64 - 1), *image, *word);
+        io.restart.set(io.rst | *writing);
+        self.keep(k, &io, tables, *word, at, [right_head, done, *refused]);
+    }
+
+    /// Threshold, noise floor, version and state of the tables: from word n of an image, which is `word` when `at(n)`. Then
+    /// whether its first word is right, whether it ends whole, whether the last one was refused.
+    fn keep<'k>(
+        &self,
+        k: &'k Builder,
+        io: &LoadPorts<Inside<'k>>,
+        tables: &Tables,
+        word: Expr<'k>,
+        at: impl Fn(usize) -> Expr<'k>,
+        [right_head, done, refused]: [Expr<'k>; 3],
+    ) {
+        let zero = k.constant(1, 0);
+        k.comment("Memories of one word: a reset leaves them as they are.");
+        let kept = |name: &str, bits: usize, value: u64| -> MemoryPort {
+            k.memory(name, 1, bits, Contents::Words(vec![(0, value)]))
+        };
+        let thresholds = kept("thresholds", THRESHOLD_BITS, tables.threshold.into());
+        let floors = kept("noise_floors", self.input_bits, tables.noise_floor as u64);
+        let states = kept("states", 1 + VERSION_BITS as usize, 1 << VERSION_BITS | u64::from(tables.version));
+        let state = k.wire("state", states.read(zero));
+        let whole = state.top();
+
         let new_version = k.register("new_version", Type::unsigned(VERSION_BITS as usize));
         let second = k.wire("second", at(1));
         k.when(second, || new_version.set(word.slice(THRESHOLD_BITS, VERSION_BITS as usize)));
@@ -276,15 +298,9 @@ impl Load {
         let new_state = done.mux(k.constant(1, 1).concat(*new_version), k.constant(1 + VERSION_BITS as usize, 0));
         states.write(done | right_head, zero, new_state);
 
-        let [first, after] = [HEAD_WORDS, first_coefficient].map(|number| k.constant(index.bits(), number as u64));
-        io.write.set(ends_word & !index.less(first) & index.less(after));
-        io.taxel.set((*index - first).low(count_bits(self.taxels)));
-        io.entry.set(word.low(bits + GAIN_BITS as usize));
-        self.write_coefficients(k, &io, ends_word & !index.less(after) & !index.is(words as u64 - 1), *image, *word);
-        io.restart.set(io.rst | *writing);
         io.noise_floor.set(floors.read(zero));
         io.threshold.set(thresholds.read(zero));
-        io.version.set((*refused | !whole).concat(state.low(VERSION_BITS as usize)));
+        io.version.set((refused | !whole).concat(state.low(VERSION_BITS as usize)));
         io.incomplete.set(!whole);
     }
 

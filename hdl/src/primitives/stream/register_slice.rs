@@ -51,8 +51,9 @@ impl Block for RegisterSlice {
             let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
             return pass_through(k, why, from, [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready]);
         }
-        let (tdata, tlast) = (io.m_axis_tdata.register(), io.m_axis_tlast.register());
+        let tdata = io.m_axis_tdata.register();
         let valid = io.m_axis_tvalid.state(io.rst, 0);
+        let tlast = io.m_axis_tlast.register();
         io.s_axis_tready.set(!*valid);
         k.when(!*valid, || {
             tdata.set(io.s_axis_tdata);
