@@ -195,74 +195,9 @@ impl ForceUnit {
         }
     }
 
-    /// The μ word of a position, two cycles later.
-    fn mu_word<'k>(&self, k: &'k Builder, position: Expr<'k>) -> Expr<'k> {
-        let position = k.delay("position", position);
-        let scaled = k.delay("scaled", position * k.signed_constant(MU_BITS, self.mu_step));
-        scaled.round_shift(MU_ROUND as usize).resize(MU_BITS).unsigned()
-    }
-}
-
-/// A register of the last `steps` values of a signal, the latest lowest.
-fn travel<'k>(k: &'k Builder, name: &str, value: Expr<'k>, steps: usize) -> Expr<'k> {
-    let register = k.register(name, Type::unsigned(value.bits() * steps));
-    register.set(register.low(value.bits() * (steps - 1)).concat(value));
-    *register
-}
-
-/// One word of a beat, with the sign of a signed `value`.
-fn word(value: Expr<'_>) -> Expr<'_> {
-    value.extend(WORD).unsigned()
-}
-
-/// What comes with `start`, is stored per subarray and read by the status.
-struct Kept<'k> {
-    k: &'k Builder,
-    start: Expr<'k>,
-    part: Expr<'k>,
-    parts: usize,
-    /// Subarray of the beat that leaves.
-    at_out: Expr<'k>,
-}
-
-impl<'k> Kept<'k> {
-    /// A memory with one word per subarray.
-    fn memory(&self, name: &str, bits: usize) -> MemoryPort<'k> {
-        self.k.memory(name, self.parts, bits, Contents::Undefined)
-    }
-
-    /// `value` at the `start` of the subarray of the beat that leaves.
-    fn status(&self, name: &str, value: Expr<'k>) -> Expr<'k> {
-        let memory = self.memory(name, value.bits());
-        memory.write(self.start, self.part, value.unsigned());
-        memory.read(self.at_out)
-    }
-}
-
-impl Block for ForceUnit {
-    fn build<'k>(&self, k: &'k Builder, io: ForceUnitPorts<Inside<'k>>) {
-        let (v, part_bits, bit) = (self.value_bits, io.part.bits(), Type::unsigned(1));
-        let (start, part) = (io.start, io.part);
-        let (found, score) = (io.found, io.score.signed());
-        let (position_x, position_y) = (io.position_x.signed(), io.position_y.signed());
-        let asked = STEPS - 1;
-
-        k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
-        let offers = k.state("offers", Type::unsigned(asked), io.rst, 0);
-        offers.set(offers.low(asked - 1).concat(io.offer));
-        let leaves = k.wire("leaves", offers.top());
-        let beats = travel(k, "beats", io.beat, asked);
-        let lanes = travel(k, "lanes", io.lane, READ_STEPS);
-        let parts = travel(k, "parts", io.beat_part, asked);
-        let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
-        let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
-        let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
-        let at_out = k.wire("at_out", part_after(asked));
-        let kept = Kept { k, start, part, parts: largest(&self.counts), at_out };
-
-        k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
-        let (start_2, part_2) =
-            (k.delay("start_2", k.delay("start_1", start)), k.delay("part_2", k.delay("part_1", part)));
+    /// The right shift of the subarray `at`, with the value of a taxel.
+    fn shift<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, kept: &Kept<'k>, at: Expr<'k>) -> Shift<'k> {
+        let k = kept.k;
         let exponents = [("normalise_held", io.normalise), ("rescale_held", io.rescale)];
         let [normalise_held, rescale_held] = exponents.map(|(name, value)| k.delay(name, value));
         let raw_shift = k.wire("raw_shift", (k.constant(8, self.base_shift) + normalise_held - rescale_held).low(8));
@@ -270,64 +205,47 @@ impl Block for ForceUnit {
         let limited = most.less(raw_shift).mux(most, raw_shift.low(SHIFT_BITS));
         let shift = k.delay("shift_now", raw_shift.top().mux(k.constant(SHIFT_BITS, 0), limited));
         let shifts = kept.memory("shifts", SHIFT_BITS);
-        shifts.write(start_2, part_2, shift);
-        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS)));
+        shifts.write(kept.start_2, kept.part_2, shift);
+        let shift = k.delay("shift", shifts.read(at));
+        Shift { by: shift, rest: k.delay("shift_rest", shift.low(FINE)) }
+    }
 
-        let label = lane_of(io.labels, Quads::LANES, lane_value);
-        // Two registers: block RAM and multiplier are far apart, and so are the selection of a label and its μ.
-        let value = k.delay("selected", lane_of(io.quad, self.lanes, lane_value).signed());
-        let value = k.delay("value", value);
-        let later = k.delay("value_2", k.delay("value_1", value));
-        let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
-        let shift = Shift { by: shift, rest: k.delay("shift_rest", shift.low(FINE)) };
-        let z = shift.moved(k, "moved_z", doubled);
-        let (x, y) = match self.searches {
-            false => (None, None),
-            true => {
-                let at_value =
-                    if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
-                let shear = |name: &str, position| {
-                    k.scope(name, || {
-                        let words = kept.memory("mu", MU_BITS);
-                        words.write(start_2, part_2, self.mu_word(k, position));
-                        let mu = k.delay("mu_value", words.read(at_value).signed());
-                        shift.moved(k, "moved", product(k, value, mu).shift_left(1))
-                    })
-                };
-                (Some(shear("x", position_x)), Some(shear("y", position_y)))
-            }
-        };
-        let round = |name: &str, moved: Option<_>| {
-            let rounded = |moved| k.scope(name, || Component::new(k, moved));
-            moved.map(rounded)
-        };
-        let z = k.scope("z", || Component::new(k, z));
-        let [x, y] = [round("x", x), round("y", y)];
-        let all = [Some(z), y, x];
-        let force = concat(&all.map(|one| one.map_or(k.constant(WORD, 0), |one| one.force)));
+    /// One component of the shear: `value` times the μ of the subarray or label `at`; `position` is that to store.
+    fn shear<'k>(
+        &self,
+        kept: &Kept<'k>,
+        shift: Shift<'k>,
+        value: Expr<'k>,
+        [position, at]: [Expr<'k>; 2],
+    ) -> Component<'k> {
+        let k = kept.k;
+        let words = kept.memory("mu", MU_BITS);
+        words.write(kept.start_2, kept.part_2, self.mu_word(k, position));
+        let mu = k.delay("mu_value", words.read(at).signed());
+        Component::new(k, shift.moved(k, "moved", product(k, value, mu).shift_left(1)))
+    }
+
+    /// Whether the force word `z` is below the threshold, a cycle later, where there is a threshold.
+    fn below<'k>(&self, k: &'k Builder, io: &ForceUnitPorts<Inside<'k>>, z: Expr<'k>) -> Option<Expr<'k>> {
         let limit = match self.threshold {
             None => Some(io.threshold.extend(WORD + 1)),
             Some(0) => None,
             Some(own) => Some(k.constant(WORD + 1, own)),
         };
-        let below = limit.map(|limit| {
-            let wide = z.word.extend(WORD + 1).unsigned();
+        limit.map(|limit| {
+            let wide = z.extend(WORD + 1).unsigned();
             let magnitude = wide.top().mux((k.constant(WORD + 1, 0) - wide).low(WORD + 1), wide);
             k.comment("The result of the threshold is registered beside the words.");
             k.delay("below", magnitude.less(limit))
-        });
-        let presses = k.delay("presses", z.word.any());
+        })
+    }
 
-        let (contact, counting) = (k.register("contact", bit), k.register("counting", bit));
-        let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
-        let cycles_held = k.register("cycles_held", Type::unsigned(CYCLE_BITS));
-        let clips = all.iter().flatten().map(|one| one.clips);
-        let start_count = force_saturations.extend(SATURATION_BITS + 1);
-        let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
-        let count = k.wire("count", count);
+    /// The word of flags of the beat that leaves.
+    fn flags<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, kept: &Kept<'k>, contact: Expr<'k>) -> Expr<'k> {
+        let k = kept.k;
         let case = |below: u32| value_by_case(k, io.which, &self.numbers, (below - CASE.low) as usize);
         let low = self.score_limit.map(|limit| {
-            let low = found & k.signed_constant(self.score_bits, limit).less(score);
+            let low = io.found & k.signed_constant(self.score_bits, limit).less(io.score.signed());
             kept.status("scores_low", low)
         });
         // Between the number of the case and that of frames.
@@ -361,20 +279,31 @@ impl Block for ForceUnit {
         bits.extend(self.checks.then(|| (COEFFICIENTS, kept.status("damages", io.damaged))));
         bits.extend([
             (FRAMING, io.framing),
-            (NO_CONTACT, !*contact),
-            (FOUND, kept.status("founds", found)),
+            (NO_CONTACT, !contact),
+            (FOUND, kept.status("founds", io.found)),
             (CONDITION, kept.status("conditions", io.condition)),
         ]);
-        let flags = [vec![case], status_bits(k, &bits, CASE.low)].concat();
+        concat(&[vec![case], status_bits(k, &bits, CASE.low)].concat())
+    }
+
+    /// The words of status beat `beat`.
+    fn status<'k>(
+        &self,
+        io: &ForceUnitPorts<Inside<'k>>,
+        kept: &Kept<'k>,
+        beat: Expr<'k>,
+        [flags, cycles, force_saturations]: [Expr<'k>; 3],
+    ) -> Expr<'k> {
+        let k = kept.k;
         let position = |name: &str, position| match self.searches {
             true => word(kept.status(name, position).signed()),
             false => k.constant(WORD, 0),
         };
-        let score = found.mux(score.extend(WORD), k.signed_constant(WORD, 0));
-        let [x, y] = [position("positions_x", position_x), position("positions_y", position_y)];
+        let score = io.found.mux(io.score.signed().extend(WORD), k.signed_constant(WORD, 0));
+        let [x, y] = [position("positions_x", io.position_x), position("positions_y", io.position_y)];
         let [normalise, rescale] = [kept.status("normalises", io.normalise), kept.status("rescales", io.rescale)];
         let rescale_saturations = kept.status("rescale_saturations", io.saturations);
-        let first = concat(&[concat(&flags), y, x]);
+        let first = concat(&[flags, y, x]);
         let normalise = match self.threshold {
             None => {
                 let low = TABLES_VERSION.low as usize;
@@ -383,20 +312,121 @@ impl Block for ForceUnit {
             Some(_) => word(normalise),
         };
         let second = concat(&[normalise, word(rescale), kept.status("scores", score)]);
-        let third = concat(&[word(*cycles_held), word(*force_saturations), word(rescale_saturations)]);
-        let status = k.wire("status", beat_out.case(&[(1, first), (2, second)], third));
-        let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
-        let words = beat_out.is(0).mux(force, status);
-        let words = match self.tells_labels {
-            false => words,
+        let third = concat(&[word(cycles), word(force_saturations), word(rescale_saturations)]);
+        k.wire("status", beat.case(&[(1, first), (2, second)], third))
+    }
+
+    /// The μ word of a position, two cycles later.
+    fn mu_word<'k>(&self, k: &'k Builder, position: Expr<'k>) -> Expr<'k> {
+        let position = k.delay("position", position);
+        let scaled = k.delay("scaled", position * k.signed_constant(MU_BITS, self.mu_step));
+        scaled.round_shift(MU_ROUND as usize).resize(MU_BITS).unsigned()
+    }
+}
+
+/// A register of the last `steps` values of a signal, the latest lowest.
+fn travel<'k>(k: &'k Builder, name: &str, value: Expr<'k>, steps: usize) -> Expr<'k> {
+    let register = k.register(name, Type::unsigned(value.bits() * steps));
+    register.set(register.low(value.bits() * (steps - 1)).concat(value));
+    *register
+}
+
+/// One word of a beat, with the sign of a signed `value`.
+fn word(value: Expr<'_>) -> Expr<'_> {
+    value.extend(WORD).unsigned()
+}
+
+/// What comes with `start` and is stored per subarray.
+struct Kept<'k> {
+    k: &'k Builder,
+    start: Expr<'k>,
+    part: Expr<'k>,
+    /// `start` and `part` two cycles later, with shift and μ.
+    start_2: Expr<'k>,
+    part_2: Expr<'k>,
+    parts: usize,
+    /// Subarray of the beat that leaves.
+    at_out: Expr<'k>,
+}
+
+impl<'k> Kept<'k> {
+    fn new(k: &'k Builder, io: &ForceUnitPorts<Inside<'k>>, parts: usize, at_out: Expr<'k>) -> Self {
+        let ForceUnitPorts { start, part, .. } = *io;
+        k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
+        let start_2 = k.delay("start_2", k.delay("start_1", start));
+        let part_2 = k.delay("part_2", k.delay("part_1", part));
+        Kept { k, start, part, start_2, part_2, parts, at_out }
+    }
+
+    /// A memory with one word per subarray.
+    fn memory(&self, name: &str, bits: usize) -> MemoryPort<'k> {
+        self.k.memory(name, self.parts, bits, Contents::Undefined)
+    }
+
+    /// `value` at the `start` of the subarray of the beat that leaves.
+    fn status(&self, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let memory = self.memory(name, value.bits());
+        memory.write(self.start, self.part, value.unsigned());
+        memory.read(self.at_out)
+    }
+}
+
+impl Block for ForceUnit {
+    fn build<'k>(&self, k: &'k Builder, io: ForceUnitPorts<Inside<'k>>) {
+        let (part_bits, bit, asked) = (io.part.bits(), Type::unsigned(1), STEPS - 1);
+        k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
+        let offers = k.state("offers", Type::unsigned(asked), io.rst, 0);
+        offers.set(offers.low(asked - 1).concat(io.offer));
+        let leaves = k.wire("leaves", offers.top());
+        let beats = travel(k, "beats", io.beat, asked);
+        let lanes = travel(k, "lanes", io.lane, READ_STEPS);
+        let parts = travel(k, "parts", io.beat_part, asked);
+        let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
+        let beat_out = k.wire("beat_out", beats.slice(2 * (asked - 1), 2));
+        let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
+        let at_out = k.wire("at_out", part_after(asked));
+        let kept = Kept::new(k, &io, largest(&self.counts), at_out);
+
+        let shift = self.shift(&io, &kept, part_after(READ_STEPS + SELECT_STEPS + PRODUCT_STEPS));
+        let label = lane_of(io.labels, Quads::LANES, lane_value);
+        // Two registers: block RAM and multiplier are far apart, and so are the selection of a label and its μ.
+        let value = k.delay("selected", lane_of(io.quad, self.lanes, lane_value).signed());
+        let value = k.delay("value", value);
+        let later = k.delay("value_2", k.delay("value_1", value));
+        let doubled = later.shift_left(self.fraction + 1).extend(self.value_bits + MU_BITS + 1);
+        let moved = shift.moved(k, "moved_z", doubled);
+        let z = k.scope("z", || Component::new(k, moved));
+        let [x, y] = match self.searches {
+            false => [None, None],
             true => {
-                let steps = asked - READ_STEPS;
-                travel(k, "labels_sent", label, steps)
-                    .slice(self.label_bits * (steps - 1), self.label_bits)
-                    .concat(words)
+                let at_value =
+                    if self.contacts { k.delay("label", label) } else { part_after(READ_STEPS + SELECT_STEPS) };
+                let shear = |(name, position): (_, Expr<'k>)| {
+                    Some(k.scope(name, || self.shear(&kept, shift, value, [position.signed(), at_value])))
+                };
+                [("x", io.position_x), ("y", io.position_y)].map(shear)
             }
         };
-        io.beat_data.delay(words);
+        let all = [Some(z), y, x];
+        let force = concat(&all.map(|one| one.map_or(k.constant(WORD, 0), |one| one.force)));
+        let below = self.below(k, &io, z.word);
+        let presses = k.delay("presses", z.word.any());
+
+        let (contact, counting) = (k.register("contact", bit), k.register("counting", bit));
+        let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
+        let cycles_held = k.register("cycles_held", Type::unsigned(CYCLE_BITS));
+        let clips = all.iter().flatten().map(|one| one.clips);
+        let start_count = force_saturations.extend(SATURATION_BITS + 1);
+        let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
+        let count = k.wire("count", count);
+        let flags = self.flags(&io, &kept, *contact);
+        let status = self.status(&io, &kept, beat_out, [flags, *cycles_held, *force_saturations]);
+        let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
+        let words = beat_out.is(0).mux(force, status);
+        let steps = asked - READ_STEPS;
+        let sent = self.tells_labels.then(|| travel(k, "labels_sent", label, steps));
+        let sent = sent.map(|sent| sent.slice(self.label_bits * (steps - 1), self.label_bits));
+        io.beat_data.delay(sent.map_or(words, |label| label.concat(words)));
         let valid = io.valid.state(io.rst, 0);
         valid.set(leaves);
         let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();

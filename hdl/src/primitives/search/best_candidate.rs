@@ -194,9 +194,7 @@ impl Block for BestCandidate {
         let centre = centre.map(|(name, value)| k.wire(name, value));
         let coarse = k.wire("own_coarse", fields.coarse);
 
-        k.comment(
-            "The eight around the centre keep their order: four pairs, then the four before and the four after it.",
-        );
+        k.comment("The eight around the centre keep their order: four pairs, then the four before it and after it.");
         let leaf = |n: usize| {
             let (ok, score) = (fits.at(n), scores.slice(n * t, t).signed());
             Candidate { ok, score, index: k.constant(4, n as u64) }
@@ -215,10 +213,8 @@ impl Block for BestCandidate {
         let takes_after = k.delay("takes_after", after_wins);
         let some = k.delay("some", before.ok | central.ok | after.ok);
 
-        k.comment(
-            "All three are compared with the best so far in parallel with the choice among them. The best's distance",
-        );
-        k.comment("from the centre was registered a cycle earlier.");
+        k.comment("All three are compared with the best so far in parallel with the choice among them. The best's");
+        k.comment("distance from the centre was registered a cycle earlier.");
         let ahead = [k.delay("ahead_x", *best_x - centre[0]), k.delay("ahead_y", *best_y - centre[1])];
         let best = Best { score: *score, ahead, centre };
         let against_best = |candidate, name| Compared::new(k, candidate, best, name);

@@ -97,10 +97,8 @@ impl Block for ScoreBias {
         valid.set(valid.low(4).concat(*running));
         let writes = valid.top();
 
-        k.comment(
-            "|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry chain per",
-        );
-        k.comment("cycle, the comparison in a third cycle. Rows in order uy = −1, 0, 1.");
+        k.comment("|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry");
+        k.comment("chain per cycle, the comparison in a third cycle. Rows in order uy = −1, 0, 1.");
         let fields = Fields::of(*own_sweep);
         let twice = [("twice_x", fields.centre[0]), ("twice_y", fields.centre[1])];
         let [twice_x, twice_y] = twice.map(|(name, value)| k.wire(name, value.shift_left(1).resize(q).unsigned()));

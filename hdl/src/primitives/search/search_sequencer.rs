@@ -140,19 +140,16 @@ impl Block for SearchSequencer {
         let closing = k.wire("closing", !*is_coarse | at_last_coarse);
         io.next_halves.set(*is_halving);
         let next_last = io.next_last.set(!*is_coarse & !*is_halving);
-        k.comment(
-        "A coarse sweep set up in the cycle of `compared` already uses its result for the choice of buffers; a halving",
-    );
-        k.comment("is set up later.");
+        k.comment("A coarse sweep set up in the cycle of `compared` already uses its result for the choice of");
+        k.comment("buffers; a halving is set up later.");
         let keeps = k.wire("keeps", io.compared & io.improved & Fields::of(io.compared_sweep).coarse);
         let kept_buffer = k.wire("kept_buffer", Fields::of(*kept).buffer);
         let sweep = io.sweep.set(concat(&[*closes, *coarse, *target, *place]));
         let from = Fields::of(k.wire("from", is_coarse.mux(sweep, *kept)));
 
-        k.comment(
-        "The best position is at most one step from the centre of its polynomials, so two bits of the difference are",
-    );
-        k.comment("the move. Move, starting point and destination are registered before the sweep is set up.");
+        k.comment("The best position is at most one step from the centre of its polynomials, so two bits of the");
+        k.comment("difference are the move. Move, starting point and destination are registered before the sweep is");
+        k.comment("set up.");
         let moves = coarse_moves();
         let axis = |axis: usize, name: &str| {
             let table: Vec<u64> =
@@ -178,13 +175,9 @@ impl Block for SearchSequencer {
         k.comment("The first sweep of a search, halvings and the last one; registered before the sweep is set up.");
         let in_place = k.delay("in_place", !*is_coarse | count.is(0));
 
-        k.comment(
-        "A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after",
-    );
-        k.comment(
-            "the set-up, when a `compared` in the cycle of the set-up has taken effect. The first, which reads START,",
-        );
-        k.comment("writes 1. Other sweeps work in place.");
+        k.comment("A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one");
+        k.comment("cycle after the set-up, when a `compared` in the cycle of the set-up has taken effect. The first,");
+        k.comment("which reads START, writes 1. Other sweeps work in place.");
         let unused = |b: u64| !source.is(b) & !kept_buffer.is(b);
         let other = unused(2).mux(number(2), number(0));
         let free = k.wire("free", (source.is(START as u64) | unused(1)).mux(number(1), other));

@@ -129,10 +129,8 @@ impl Block for Store {
         let write_to = if apart { to_buffer } else { io.fill.mux(io.fill_address, to_buffer) };
         let write_to = k.wire("write_to", write_to);
         let from_start = apart.then(|| k.delay("from_start", k.delay("from_start_1", io.read_buffer.is(START as u64))));
-        k.comment(
-        "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
-    );
-        k.comment("attribute keeps synthesis from merging them.");
+        k.comment("Read and write addresses are registers of each coefficient, because the memories are placed far");
+        k.comment("apart; the attribute keeps synthesis from merging them.");
         let coefficient = |index: usize| {
             let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
             let memory = format!("memory{index}");
