@@ -42,7 +42,7 @@ engine! {
             forces: Forces => "forces.rs",
         }
         control {
-            shifted: Slice,
+            shifted: RustHdl<Slice>,
             computing: RustHdl<Dff>,
             condition: RustHdl<Dff>,
             framing: RustHdl<Dff>,
@@ -77,7 +77,7 @@ impl Engine {
             reorder: TaxelReorder::new(model.layout()),
             pass_sequencer: PassSequencer::new(f, unrounded, rounded),
             rounder: Rounder::new(unrounded, rounded),
-            shifted: Slice::new(32, rounded),
+            shifted: RustHdl::new(Slice::new(32, rounded)),
             butterfly: SerialButterfly::new(rounded),
             pass: Pass::new(model),
             raw: RustHdl::new(Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw])),

@@ -77,7 +77,7 @@ pub struct Pass {
     scale: OperandScale,
     /// The MAC lanes.
     pub lanes: Lanes,
-    low_address: Slice,
+    low_address: RustHdl<Slice>,
     coefficient_address: RustHdl<Delay>,
     issue: Signal<Local, Bit>,
     column_end: Signal<Local, Bit>,
@@ -120,7 +120,7 @@ impl Pass {
             step: Wire::new(pass_program.step.width()),
             column: RustHdl::new(Counter::new(longest(model))),
             running: Default::default(),
-            low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
+            low_address: RustHdl::new(Slice::new(pass_program.operand_address.width(), count_bits(quads))),
             vectors: RustHdl::new(
                 vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
             ),

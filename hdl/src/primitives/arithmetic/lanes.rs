@@ -128,7 +128,7 @@ impl Lanes {
     }
 
     fn of(shape: &Shape) -> Self {
-        let [address_bits, pair_bits] = shape.written.bits();
+        let (address_bits, pair_bits) = (shape.written.word_bits(), shape.written.pair_bits());
         let block = Lanes {
             clk: Default::default(),
             rst: Default::default(),
@@ -201,7 +201,7 @@ impl Shape {
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
         let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
         let (valid, control) = (k.input("valid", 1), k.input("control", self.control.bits()));
-        let [address_bits, pair_bits] = self.written.bits();
+        let (address_bits, pair_bits) = (self.written.word_bits(), self.written.pair_bits());
         let write = [
             ("coefficient_write", 1),
             ("coefficient_word", address_bits),
