@@ -81,7 +81,7 @@ macro_rules! board_top {
             // Registered once more, because the engine is large and its reset has a long route.
             engine_rst: RustHdl<Dff>,
             line: RustHdl<$block>,
-            link: PacketLink,
+            link: RustHdl<PacketLink>,
             engine: $engine,
             lamps: RustHdl<Lamps>,
         }
@@ -116,7 +116,7 @@ macro_rules! board_top {
                     power_on: Default::default(),
                     engine_rst: Default::default(),
                     line: RustHdl::new(line(&identity)),
-                    link: PacketLink::new(&Shape::of(model), &identity),
+                    link: RustHdl::new(PacketLink::new(&Shape::of(model), &identity)),
                     engine,
                     lamps: RustHdl::new(Lamps::new(identity.clock_hz)),
                 };

@@ -1,240 +1,203 @@
 //! Between the bytes of a link and the engine's streams.
 
 use dermis_golden::wire::link::Identity;
-use rust_hdl::prelude::*;
 
+use super::counter_ram::CounterRamPorts;
+use super::packer::PackerPorts;
+use super::requests::RequestsPorts;
 use super::{
     CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
 };
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Outside};
 use crate::primitives::RegisterSlice;
-use crate::wire::Wire;
 
-/// ```text
-/// bytes in  -> slip_decoder -> parser -> ingress -> towards -> s_axis
-///                                 '-> requests -> packer -> slip_encoder -> bytes out
-/// m_axis -> back -> resultants, counters -> sources ---^
-/// ```
-/// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
-/// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct PacketLink {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A received byte; valid with `receive_valid`.
-    pub receive_data: Wire<In>,
-    /// A byte was received in this cycle.
-    pub receive_valid: Signal<In, Bit>,
-    /// A byte was received with an error in this cycle.
-    pub receive_broken: Signal<In, Bit>,
-    /// A byte to send; valid with `send_valid`.
-    pub send_data: Wire<Out>,
-    /// `send_data` is offered; held until `send_ready`.
-    pub send_valid: Signal<Out, Bit>,
-    /// The link accepts the byte in this cycle.
-    pub send_ready: Signal<In, Bit>,
-    /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
-    pub s_axis_tdata: Wire<Out>,
-    /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<Out, Bit>,
-    /// The engine accepts the beat in this cycle.
-    pub s_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame or image; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
-    pub m_axis_tdata: Wire<In>,
-    /// The engine offers a beat.
-    pub m_axis_tvalid: Signal<In, Bit>,
-    /// The beat is accepted in this cycle.
-    pub m_axis_tready: Signal<Out, Bit>,
-    /// The beat is the frame's last; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<In, Bit>,
-    /// A frame is asked for and its answer not begun.
-    pub requested: Signal<Out, Bit>,
-    /// A packet is being received, computed or sent.
-    pub activity: Signal<Out, Bit>,
-    /// A packet is dropped in this cycle.
-    pub dropped: Signal<Out, Bit>,
-    decoder: RustHdl<SlipDecoder>,
-    parser: RustHdl<Parser>,
-    ingress: RustHdl<FrameIngress>,
-    towards: RustHdl<RegisterSlice>,
-    back: RustHdl<RegisterSlice>,
-    requests: RustHdl<Requests>,
-    resultants: RustHdl<Resultants>,
-    sources: RustHdl<Sources>,
-    packer: RustHdl<Packer>,
-    encoder: RustHdl<SlipEncoder>,
-    counters: RustHdl<CounterRam>,
-    arriving: RustHdl<Crc>,
-    leaving: RustHdl<Crc>,
-    unused: Signal<Local, Bit>,
-    unused_low: Wire<Local>,
+block! {
+    /// ```text
+    /// bytes in  -> slip_decoder -> parser -> ingress -> towards -> s_axis
+    ///                                 '-> requests -> packer -> slip_encoder -> bytes out
+    /// m_axis -> back -> resultants, counters -> sources ---^
+    /// ```
+    /// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
+    /// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
+    pub struct PacketLink {
+        /// What the packets depend on.
+        shape: Shape,
+        /// Answer to a request for the identity.
+        identity: Identity,
+    }
+    ports PacketLinkPorts {
+        clock;
+        reset;
+        /// A received byte; valid with `receive_valid`.
+        in receive_data: 8;
+        /// A byte was received in this cycle.
+        in receive_valid;
+        /// A byte was received with an error in this cycle.
+        in receive_broken;
+        /// A byte to send; valid with `send_valid`.
+        out send_data: 8;
+        /// `send_data` is offered; held until `send_ready`.
+        out send_valid;
+        /// The link accepts the byte in this cycle.
+        in send_ready;
+        /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
+        out s_axis_tdata: shape.stream_bits();
+        /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
+        out s_axis_tvalid;
+        /// The engine accepts the beat in this cycle.
+        in s_axis_tready;
+        /// The beat is the last of its frame or image; valid with `s_axis_tvalid`.
+        out s_axis_tlast;
+        /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
+        in m_axis_tdata: 96;
+        /// The engine offers a beat.
+        in m_axis_tvalid;
+        /// The beat is accepted in this cycle.
+        out m_axis_tready;
+        /// The beat is the frame's last; valid with `m_axis_tvalid`.
+        in m_axis_tlast;
+        /// A frame is asked for and its answer not begun.
+        out requested;
+        /// A packet is being received, computed or sent.
+        out activity;
+        /// A packet is dropped in this cycle.
+        out dropped;
+    }
 }
 
 impl PacketLink {
     /// For the packets of `shape`; requests for the identity are answered with `identity`.
     pub fn new(shape: &Shape, identity: &Identity) -> Self {
-        PacketLink {
-            clk: Default::default(),
-            rst: Default::default(),
-            receive_data: Wire::new(8),
-            receive_valid: Default::default(),
-            receive_broken: Default::default(),
-            send_data: Wire::new(8),
-            send_valid: Default::default(),
-            send_ready: Default::default(),
-            s_axis_tdata: Wire::new(shape.stream_bits()),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(96),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            requested: Default::default(),
-            activity: Default::default(),
-            dropped: Default::default(),
-            decoder: Default::default(),
-            parser: RustHdl::new(Parser::new(shape)),
-            ingress: RustHdl::new(FrameIngress::new(shape)),
-            towards: RustHdl::new(RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast())),
-            back: RustHdl::new(RegisterSlice::new(96, shape.answers.are_fast())),
-            requests: RustHdl::new(Requests::new(shape)),
-            resultants: RustHdl::new(Resultants::new(shape)),
-            sources: RustHdl::new(Sources::new(shape.answers.are_fast())),
-            packer: RustHdl::new(Packer::new(shape.payloads())),
-            encoder: RustHdl::new(SlipEncoder::new(shape.answers.are_fast())),
-            counters: RustHdl::new(CounterRam::new(identity, shape.answers.are_fast())),
-            arriving: Default::default(),
-            leaving: Default::default(),
-            unused: Default::default(),
-            unused_low: Wire::new(8),
-        }
+        PacketLink { shape: shape.clone(), identity: *identity }
     }
 }
 
-impl Logic for PacketLink {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.decoder.clk.next = self.clk.val();
-        self.parser.clk.next = self.clk.val();
-        self.ingress.clk.next = self.clk.val();
-        self.towards.clk.next = self.clk.val();
-        self.back.clk.next = self.clk.val();
-        self.requests.clk.next = self.clk.val();
-        self.resultants.clk.next = self.clk.val();
-        self.sources.clk.next = self.clk.val();
-        self.packer.clk.next = self.clk.val();
-        self.encoder.clk.next = self.clk.val();
-        self.counters.clk.next = self.clk.val();
-        self.arriving.clk.next = self.clk.val();
-        self.leaving.clk.next = self.clk.val();
-        self.decoder.rst.next = self.rst.val();
-        self.parser.rst.next = self.rst.val();
-        self.ingress.rst.next = self.rst.val();
-        self.towards.rst.next = self.rst.val();
-        self.back.rst.next = self.rst.val();
-        self.requests.rst.next = self.rst.val();
-        self.resultants.rst.next = self.rst.val();
-        self.packer.rst.next = self.rst.val();
-        self.encoder.rst.next = self.rst.val();
-        self.counters.rst.next = self.rst.val();
+impl Block for PacketLink {
+    fn build<'k>(&self, k: &'k Builder, io: PacketLinkPorts<Inside<'k>>) {
+        let registered = self.shape.answers.are_fast();
+        let decoder = k.instance("decoder", SlipDecoder::default());
+        let parser = k.instance("parser", Parser::new(&self.shape));
+        let ingress = k.instance("ingress", FrameIngress::new(&self.shape));
+        let towards = k.instance("towards", RegisterSlice::new(self.shape.stream_bits(), registered));
+        let requests = k.instance("requests", Requests::new(&self.shape));
+        let packer = k.instance("packer", Packer::new(self.shape.payloads()));
+        let encoder = k.instance("encoder", SlipEncoder::new(registered));
+        let counters = k.instance("counters", CounterRam::new(&self.identity, registered));
+        let arriving = k.instance("arriving", Crc::default());
+        let leaving = k.instance("leaving", Crc::default());
 
-        comment!("Received bytes to packets");
-        self.decoder.data.next = self.receive_data.val();
-        self.decoder.valid.next = self.receive_valid.val();
-        self.decoder.broken.next = self.receive_broken.val();
-        self.parser.content.next = self.decoder.content.val();
-        self.parser.content_valid.next = self.decoder.content_valid.val();
-        self.parser.packet_end.next = self.decoder.packet_end.val();
-        self.parser.spoiled.next = self.decoder.spoiled.val();
-        self.parser.crc_right.next = self.arriving.right.val();
-        self.arriving.restart.next = self.rst.val() | self.decoder.packet_end.val();
-        self.arriving.octet.next = self.decoder.content.val();
-        self.arriving.load.next = self.decoder.content_valid.val();
+        k.comment("Received bytes to packets.");
+        decoder.data.set(io.receive_data);
+        decoder.valid.set(io.receive_valid);
+        decoder.broken.set(io.receive_broken);
+        parser.content.set(decoder.content);
+        parser.content_valid.set(decoder.content_valid);
+        parser.packet_end.set(decoder.packet_end);
+        parser.spoiled.set(decoder.spoiled);
+        parser.crc_right.set(arriving.right);
+        arriving.restart.set(io.rst | decoder.packet_end);
+        arriving.octet.set(decoder.content);
+        arriving.load.set(decoder.content_valid);
 
-        comment!("Packets to the engine");
-        self.ingress.frame_begin.next = self.parser.frame_begin.val();
-        self.ingress.image.next = self.parser.image.val();
-        self.ingress.payload.next = self.parser.payload.val();
-        self.ingress.content.next = self.decoder.content.val();
-        self.ingress.good.next = self.parser.good.val();
-        self.ingress.bad.next = self.parser.bad.val();
-        self.ingress.ready.next = self.towards.s_axis_tready.val();
-        self.towards.s_axis_tdata.next = self.ingress.code.val();
-        self.towards.s_axis_tvalid.next = self.ingress.valid.val();
-        self.towards.s_axis_tlast.next = self.ingress.last.val();
-        self.towards.m_axis_tready.next = self.s_axis_tready.val();
-        self.s_axis_tdata.next = self.towards.m_axis_tdata.val();
-        self.s_axis_tvalid.next = self.towards.m_axis_tvalid.val();
-        self.s_axis_tlast.next = self.towards.m_axis_tlast.val();
+        k.comment("Packets to the engine.");
+        ingress.frame_begin.set(parser.frame_begin);
+        ingress.image.set(parser.image);
+        ingress.payload.set(parser.payload);
+        ingress.content.set(decoder.content);
+        ingress.good.set(parser.good);
+        ingress.bad.set(parser.bad);
+        ingress.ready.set(towards.s_axis_tready);
+        towards.s_axis_tdata.set(ingress.code);
+        towards.s_axis_tvalid.set(ingress.valid);
+        towards.s_axis_tlast.set(ingress.last);
+        towards.m_axis_tready.set(io.s_axis_tready);
+        io.s_axis_tdata.set(towards.m_axis_tdata);
+        io.s_axis_tvalid.set(towards.m_axis_tvalid);
+        io.s_axis_tlast.set(towards.m_axis_tlast);
 
-        comment!("Requests and counters");
-        self.requests.good.next = self.parser.good.val();
-        self.requests.kind.next = self.parser.kind.val();
-        self.requests.number.next = self.parser.number.val();
-        self.requests.taken.next = self.ingress.taken.val();
-        self.requests.answered.next = self.back.m_axis_tvalid.val();
-        self.requests.begun.next = self.packer.begun.val();
-        self.counters.taken.next = self.ingress.taken.val() | self.requests.noted.val();
-        self.counters.fault.next = self.parser.fault.val();
-        self.counters.overrun.next = self.ingress.overrun.val() | self.requests.overrun.val();
+        k.comment("Requests and counters.");
+        requests.good.set(parser.good);
+        requests.kind.set(parser.kind);
+        requests.number.set(parser.number);
+        requests.taken.set(ingress.taken);
+        requests.begun.set(packer.begun);
+        counters.taken.set(ingress.taken | requests.noted);
+        counters.fault.set(parser.fault);
+        counters.overrun.set(ingress.overrun | requests.overrun);
 
-        comment!("Engine to packets");
-        self.resultants.run.next = self.sources.answer_wanted.val();
-        self.resultants.summarise.next = self.sources.summarise.val();
-        self.resultants.taken.next = self.packer.taken.val() & self.sources.answer_wanted.val();
-        self.back.s_axis_tdata.next = self.m_axis_tdata.val();
-        self.back.s_axis_tvalid.next = self.m_axis_tvalid.val();
-        self.back.s_axis_tlast.next = self.m_axis_tlast.val();
-        self.m_axis_tready.next = self.back.s_axis_tready.val();
-        self.resultants.beat.next = self.back.m_axis_tdata.val();
-        self.resultants.beat_valid.next = self.back.m_axis_tvalid.val();
-        self.resultants.beat_last.next = self.back.m_axis_tlast.val();
-        self.back.m_axis_tready.next = self.resultants.beat_ready.val();
-        self.sources.source.next = self.packer.source.val();
-        self.sources.begun.next = self.packer.begun.val();
-        self.sources.wanted.next = self.packer.wanted.val();
-        self.sources.index.next = self.packer.index.val();
-        self.sources.taken.next = self.packer.taken.val();
-        self.counters.address.next = self.sources.address.val();
-        self.counters.hold.next = self.packer.halfway.val();
-        self.sources.entry.next = self.counters.entry.val();
-        self.sources.entry_valid.next = self.counters.entry_valid.val();
-        self.sources.answer.next = self.resultants.word.val();
-        self.sources.answer_valid.next = self.resultants.word_valid.val();
-        self.sources.answer_last.next = self.resultants.word_last.val();
-        self.packer.offer.next = self.requests.offer.val();
-        self.packer.number.next = self.requests.answer_number.val();
-        self.packer.offered_source.next = self.requests.source.val();
-        self.packer.octet.next = self.sources.octet.val();
-        self.packer.word_valid.next = self.sources.word_valid.val();
-        self.packer.word_last.next = self.sources.word_last.val();
-        self.leaving.restart.next = self.packer.crc_restart.val();
-        self.leaving.octet.next = self.packer.crc_octet.val();
-        self.leaving.load.next = self.packer.crc_load.val();
-        self.packer.crc_low.next = self.leaving.low.val();
-        self.packer.crc_busy.next = self.leaving.busy.val();
+        k.comment("Engine to packets.");
+        self.answer(k, &io, &requests, &counters, &packer);
+        leaving.restart.set(packer.crc_restart);
+        leaving.octet.set(packer.crc_octet);
+        leaving.load.set(packer.crc_load);
+        packer.crc_low.set(leaving.low);
+        packer.crc_busy.set(leaving.busy);
 
-        comment!("Outputs used in the other direction only");
-        self.unused.next = self.arriving.busy.val() | self.leaving.right.val();
-        self.unused_low.next = self.arriving.low.val();
+        k.comment("Outputs used in the other direction only.");
+        k.wire("unused", arriving.busy | leaving.right);
+        k.wire("unused_low", arriving.low);
 
-        comment!("Packets to sent bytes");
-        self.encoder.content.next = self.packer.content.val();
-        self.encoder.border.next = self.packer.border.val();
-        self.encoder.content_valid.next = self.packer.valid.val();
-        self.packer.ready.next = self.encoder.content_ready.val();
-        self.encoder.ready.next = self.send_ready.val();
-        self.send_data.next = self.encoder.data.val();
-        self.send_valid.next = self.encoder.valid.val();
+        k.comment("Packets to sent bytes.");
+        encoder.content.set(packer.content);
+        encoder.border.set(packer.border);
+        encoder.content_valid.set(packer.valid);
+        packer.ready.set(encoder.content_ready);
+        encoder.ready.set(io.send_ready);
+        io.send_data.set(encoder.data);
+        io.send_valid.set(encoder.valid);
 
-        self.requested.next = self.requests.waiting.val();
-        self.activity.next = self.receive_valid.val() | self.requests.waiting.val() | self.encoder.valid.val();
-        self.dropped.next = self.parser.bad.val() | self.ingress.overrun.val() | self.requests.overrun.val();
+        io.requested.set(requests.waiting);
+        io.activity.set(io.receive_valid | requests.waiting | encoder.valid);
+        io.dropped.set(parser.bad | ingress.overrun | requests.overrun);
+    }
+}
+
+impl PacketLink {
+    /// From the beats of the engine, identity and counters to the payload of an answer.
+    fn answer<'k>(
+        &self,
+        k: &'k Builder,
+        io: &PacketLinkPorts<Inside<'k>>,
+        requests: &RequestsPorts<Outside<'k>>,
+        counters: &CounterRamPorts<Outside<'k>>,
+        packer: &PackerPorts<Outside<'k>>,
+    ) {
+        let registered = self.shape.answers.are_fast();
+        let back = k.instance("back", RegisterSlice::new(96, registered));
+        let resultants = k.instance("resultants", Resultants::new(&self.shape));
+        let sources = k.instance("sources", Sources::new(registered));
+
+        resultants.run.set(sources.answer_wanted);
+        resultants.summarise.set(sources.summarise);
+        resultants.taken.set(packer.taken & sources.answer_wanted);
+        back.s_axis_tdata.set(io.m_axis_tdata);
+        back.s_axis_tvalid.set(io.m_axis_tvalid);
+        back.s_axis_tlast.set(io.m_axis_tlast);
+        io.m_axis_tready.set(back.s_axis_tready);
+        resultants.beat.set(back.m_axis_tdata);
+        resultants.beat_valid.set(back.m_axis_tvalid);
+        resultants.beat_last.set(back.m_axis_tlast);
+        back.m_axis_tready.set(resultants.beat_ready);
+        requests.answered.set(back.m_axis_tvalid);
+        sources.source.set(packer.source);
+        sources.begun.set(packer.begun);
+        sources.wanted.set(packer.wanted);
+        sources.index.set(packer.index);
+        sources.taken.set(packer.taken);
+        counters.address.set(sources.address);
+        counters.hold.set(packer.halfway);
+        sources.entry.set(counters.entry);
+        sources.entry_valid.set(counters.entry_valid);
+        sources.answer.set(resultants.word);
+        sources.answer_valid.set(resultants.word_valid);
+        sources.answer_last.set(resultants.word_last);
+        packer.offer.set(requests.offer);
+        packer.number.set(requests.answer_number);
+        packer.offered_source.set(requests.source);
+        packer.octet.set(sources.octet);
+        packer.word_valid.set(sources.word_valid);
+        packer.word_last.set(sources.word_last);
     }
 }
 

@@ -7,7 +7,7 @@ use dermis_golden::fixed::stages::load;
 use dermis_golden::wire::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
 
 use super::*;
-use crate::language::testbench::{block_subject, check_with_defects, Reference, Subject};
+use crate::language::testbench::{check_with_defects, subject_of, Reference, Subject};
 use crate::language::Change;
 use crate::link::Answers;
 use crate::wire::Word;
@@ -34,7 +34,7 @@ fn identity() -> Identity {
 }
 
 fn subject(changes: &[Change]) -> Subject<'static> {
-    block_subject!(
+    subject_of!(
         PacketLink::new(&SHAPE, &identity()),
         changes,
         inputs [
