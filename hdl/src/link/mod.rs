@@ -12,8 +12,7 @@
 //! The packets are those of [`dermis_golden::wire::link`]. Any block that carries bytes both ways can replace the UART or the
 //! SPI slave; a board has one of them.
 //!
-//! `board_top` and `packet_link` connect blocks by `#[hdl_gen]`; each other block is a
-//! [`Block`](crate::language::Block) of the language.
+//! `board_top` connects blocks by `#[hdl_gen]`; each other block is a [`Block`](crate::language::Block) of the language.
 
 mod board;
 mod board_top;

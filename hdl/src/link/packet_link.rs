@@ -2,6 +2,9 @@
 
 use dermis_golden::wire::link::Identity;
 
+use super::counter_ram::CounterRamPorts;
+use super::packer::PackerPorts;
+use super::requests::RequestsPorts;
 use super::{
     CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
 };
