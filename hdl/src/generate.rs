@@ -117,7 +117,8 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
         file("dermis_link.h".to_string(), c_header()),
     ];
-    files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
+    let contents = hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files());
+    files.extend(contents.map(|(name, text)| file(name, text)));
     let mut generated = Generated { top, files, memories, taps, state, manifest, usage, dropped };
     generated.seal();
     Ok(generated)

@@ -7,7 +7,6 @@ use rust_hdl::prelude::*;
 use crate::device::{Device, Inputs, Outputs};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
-use crate::primitives::{CALIBRATION_FILE, COLUMN_FILE};
 use crate::stage_list::Stage;
 use crate::taps::{words, Observed};
 use crate::wire::Word;
@@ -35,12 +34,10 @@ pub(crate) trait Design: Block + Observed {
     fn drive(&mut self, inputs: &Inputs, clock: bool);
     /// Samples the output pins; no taps.
     fn pins(&self) -> Outputs;
-    /// Memory files read by the Verilog: name and text.
-    fn memory_files(&self) -> Vec<(&'static str, String)>;
 }
 
 macro_rules! design {
-    ($engine:ty, $files:expr) => {
+    ($engine:ty) => {
         impl Design for $engine {
             fn drive(&mut self, inputs: &Inputs, clock: bool) {
                 self.rst.next = inputs.rst;
@@ -61,21 +58,12 @@ macro_rules! design {
                     taps: Vec::new(),
                 }
             }
-
-            fn memory_files(&self) -> Vec<(&'static str, String)> {
-                $files(self)
-            }
         }
     };
 }
 
-design!(engine::Engine, |engine: &engine::Engine| {
-    let columns = engine.pass.pass_program.column_file().map(|text| (COLUMN_FILE, text));
-    let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
-    engine.pass.lanes.memory_files().into_iter().chain(columns).chain(table).collect()
-});
-
-design!(serial::Engine, |engine: &serial::Engine| serial::Pass::memory_files(engine.pass.kernel()));
+design!(engine::Engine);
+design!(serial::Engine);
 
 /// The stages of an engine in the order of the data flow.
 pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {

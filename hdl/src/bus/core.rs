@@ -76,7 +76,7 @@ macro_rules! core {
             restart: RustHdl<Dff>,
             stream_in: StreamIn,
             tables_in: TablesIn,
-            labels: Queue,
+            labels: RustHdl<Queue>,
             engine: $engine,
             stream_out: StreamOut,
             registers: Registers,
@@ -111,7 +111,7 @@ macro_rules! core {
                     restart: Default::default(),
                     stream_in: StreamIn::new(model.scene.sensor.taxels(), model.formats().code_bits as usize),
                     tables_in: TablesIn::new(model.formats().code_bits as usize, model.has_writable_tables()),
-                    labels: Queue::new(ID_BITS + 1),
+                    labels: RustHdl::new(Queue::new(ID_BITS + 1)),
                     engine: <$engine>::new(model),
                     stream_out: StreamOut::new(words, model.force_triples()),
                     registers: Registers::new(

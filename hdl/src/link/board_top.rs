@@ -73,7 +73,7 @@ macro_rules! board_top {
                 /// Outputs of the converters, one bit each; valid while `adc_cs_n` is low.
                 pub $miso: Wire<In>,
                 // Registers the way back of `ready` from the link's requests to the engine.
-                $slice: RegisterSlice,
+                $slice: RustHdl<RegisterSlice>,
                 $gate: FrameGate,
             )?
             $($unused: Signal<Local, Bit>,)?
@@ -109,7 +109,7 @@ macro_rules! board_top {
                         adc_cs_n: Default::default(),
                         adc_mosi: Default::default(),
                         $miso: Wire::new(engine.adc_miso.width()),
-                        $slice: RegisterSlice::new(BEAT, true),
+                        $slice: RustHdl::new(RegisterSlice::new(BEAT, true)),
                         $gate: FrameGate::default(),
                     )?
                     $($unused: Default::default(),)?

@@ -6,6 +6,7 @@ use rust_hdl::prelude::*;
 use super::{
     CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
 };
+use crate::language::RustHdl;
 use crate::primitives::RegisterSlice;
 use crate::wire::Wire;
 
@@ -59,8 +60,8 @@ pub struct PacketLink {
     decoder: SlipDecoder,
     parser: Parser,
     ingress: FrameIngress,
-    towards: RegisterSlice,
-    back: RegisterSlice,
+    towards: RustHdl<RegisterSlice>,
+    back: RustHdl<RegisterSlice>,
     requests: Requests,
     resultants: Resultants,
     sources: Sources,
@@ -99,8 +100,8 @@ impl PacketLink {
             decoder: SlipDecoder::default(),
             parser: Parser::new(shape),
             ingress: FrameIngress::new(shape),
-            towards: RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast()),
-            back: RegisterSlice::new(96, shape.answers.are_fast()),
+            towards: RustHdl::new(RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast())),
+            back: RustHdl::new(RegisterSlice::new(96, shape.answers.are_fast())),
             requests: Requests::new(shape),
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.answers.are_fast()),

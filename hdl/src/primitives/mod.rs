@@ -2,8 +2,8 @@
 //!
 //! rust-hdl 0.46 reads some signed constructs differently from the Verilog it prints, and has no multiplication beyond
 //! 16×16. So blocks are kernels of the [`language`](crate::language): simulation, Verilog and the estimate of their logic
-//! follow from one graph. `Scan` is an `#[hdl_gen]` kernel that connects others. Co-simulation compares the blocks with
-//! the bit-true model, stage by stage, and proofs cover those that carry a handshake.
+//! follow from one graph. Co-simulation compares the blocks with the bit-true model, stage by stage, and proofs cover those
+//! that carry a handshake.
 //!
 //! The other modules hold what several blocks share: expressions of kernels in `constant_product`, `half_up`,
 //! `leading_one`, `logarithm`, `pass_through`, `polynomial_word`, `sweep`.
@@ -39,7 +39,7 @@ pub(crate) use frame::average::tests::Sums;
 pub use frame::average::{Average, FrameMarks};
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
-pub use frame::calibrate::{Calibrate, CALIBRATION_FILE};
+pub use frame::calibrate::Calibrate;
 pub use frame::frame_stats::FrameStats;
 pub(crate) use frame::frame_stats::{beyond, magnitude_of};
 pub use frame::input_mask::InputMask;

@@ -43,7 +43,7 @@ engine! {
             forces: RustHdl<Forces> => "forces.rs",
         }
         control {
-            shifted: Slice,
+            shifted: RustHdl<Slice>,
             computing: RustHdl<Dff>,
             condition: RustHdl<Dff>,
             framing: RustHdl<Dff>,
@@ -77,7 +77,7 @@ impl Engine {
             reorder: RustHdl::new(TaxelReorder::new(model.layout())),
             pass_sequencer: RustHdl::new(PassSequencer::new(f, unrounded, rounded)),
             rounder: RustHdl::new(Rounder::new(unrounded, rounded)),
-            shifted: Slice::new(32, rounded),
+            shifted: RustHdl::new(Slice::new(32, rounded)),
             butterfly: RustHdl::new(SerialButterfly::new(rounded)),
             pass: RustHdl::new(Pass::new(model)),
             raw: RustHdl::new(Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw])),

@@ -91,7 +91,7 @@ pub struct Forces {
     asked: RustHdl<Delay>,
     store: RustHdl<Ram>,
     unit: ForceUnit,
-    leaving: Queue,
+    leaving: RustHdl<Queue>,
 }
 
 impl Forces {
@@ -141,7 +141,7 @@ impl Forces {
             quads: RustHdl::new(Counter::new(words)),
             asked: RustHdl::new(Delay::new(address, 1)),
             store: RustHdl::new(Ram::new(words, 1, value).holding([Holds::Values]).registered()),
-            leaving: Queue::new(unit.beat_data.width()),
+            leaving: RustHdl::new(Queue::new(unit.beat_data.width())),
             unit,
         }
     }

@@ -76,8 +76,8 @@ pub struct Pass {
     select: OperandSelect,
     scale: OperandScale,
     /// The MAC lanes.
-    pub lanes: Lanes,
-    low_address: Slice,
+    pub lanes: RustHdl<Lanes>,
+    low_address: RustHdl<Slice>,
     coefficient_address: RustHdl<Delay>,
     issue: Signal<Local, Bit>,
     column_end: Signal<Local, Bit>,
@@ -89,7 +89,7 @@ impl Pass {
         let formats = model.formats();
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
-        let lanes = Lanes::new(model);
+        let lanes = RustHdl::new(Lanes::new(model));
         let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
@@ -120,7 +120,7 @@ impl Pass {
             step: Wire::new(pass_program.step.width()),
             column: RustHdl::new(Counter::new(longest(model))),
             running: Default::default(),
-            low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
+            low_address: RustHdl::new(Slice::new(pass_program.operand_address.width(), count_bits(quads))),
             vectors: RustHdl::new(
                 vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
             ),

@@ -5,6 +5,7 @@
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::language::RustHdl;
 use crate::primitives::{Average, Calibrate, FrameMarks, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::wire::Wire;
 
@@ -53,10 +54,10 @@ pub struct Prepare {
     pub version: Wire<Out>,
     /// The tables are not whole.
     pub incomplete: Signal<Out, Bit>,
-    load: Load,
+    load: RustHdl<Load>,
     /// Zero and gain of each taxel.
-    pub calibrate: Calibrate,
-    average: Average,
+    pub calibrate: RustHdl<Calibrate>,
+    average: RustHdl<Average>,
 }
 
 impl Prepare {
@@ -64,8 +65,9 @@ impl Prepare {
     pub fn new(model: &Model) -> Self {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
-        let load = Load::new(model);
-        let average = Average::new(taxels, bits, model.prepare.average, model.prepare.mean, FrameMarks::new(model));
+        let load = RustHdl::new(Load::new(model));
+        let (power, mean) = (model.prepare.average, model.prepare.mean);
+        let average = RustHdl::new(Average::new(taxels, bits, power, mean, FrameMarks::new(model)));
         Prepare {
             clk: Default::default(),
             rst: Default::default(),
@@ -89,7 +91,7 @@ impl Prepare {
             version: Wire::new(VERSION_WORD_BITS),
             incomplete: Default::default(),
             load,
-            calibrate: Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables()),
+            calibrate: RustHdl::new(Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables())),
             average,
         }
     }

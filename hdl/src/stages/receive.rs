@@ -25,11 +25,11 @@ use crate::wire::Wire;
 #[derive(dermis_hdl_derive::Block)]
 pub struct Receive {
     ports: ReceivePorts,
-    scan: Scan,
-    input_mask: InputMask,
-    broadcast: LaneBroadcast,
+    scan: RustHdl<Scan>,
+    input_mask: RustHdl<InputMask>,
+    broadcast: RustHdl<LaneBroadcast>,
     frame: RustHdl<Ram>,
-    stats: FrameStats,
+    stats: RustHdl<FrameStats>,
     stats_enable: RustHdl<BitDelay>,
     stats_part: RustHdl<Delay>,
     stats_code: RustHdl<Delay>,
@@ -138,13 +138,13 @@ impl Receive {
         let taxels = model.scene.sensor.taxels();
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(own), model.floor_bits()),
-            scan: Scan::new(std::slice::from_ref(own), Quads::LANES),
-            input_mask: InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar),
-            broadcast: LaneBroadcast::new(bits),
+            scan: RustHdl::new(Scan::new(std::slice::from_ref(own), Quads::LANES)),
+            input_mask: RustHdl::new(InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar)),
+            broadcast: RustHdl::new(LaneBroadcast::new(bits)),
             frame: RustHdl::new(
                 Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
             ),
-            stats: FrameStats::new(bits, model.built_in_floor(), count),
+            stats: RustHdl::new(FrameStats::new(bits, model.built_in_floor(), count)),
             stats_enable: RustHdl::new(BitDelay::new(1)),
             stats_part: RustHdl::new(Delay::new(count_bits(count), 1)),
             stats_code: RustHdl::new(Delay::new(bits, 1)),

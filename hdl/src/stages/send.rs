@@ -43,7 +43,7 @@ pub struct Send {
     pub lane: Wire<Out>,
     /// The frame's last beat was accepted one cycle ago; high for one cycle.
     pub done: Signal<Out, Bit>,
-    scan: Scan,
+    scan: RustHdl<Scan>,
     words: RustHdl<Counter>,
     parts: RustHdl<CaseCounter>,
     code: StatusCode,
@@ -77,7 +77,7 @@ impl Send {
             offer: Default::default(),
             beat: Wire::new(2),
             part: Wire::new(code.part.width()),
-            address: Wire::new(scan.address.width()),
+            address: Wire::new(scan.address_bits()),
             lane: Wire::new(2),
             done: Default::default(),
             words: RustHdl::new(Counter::new(STATUS_BEATS)),
@@ -90,7 +90,7 @@ impl Send {
             step: Default::default(),
             at_end: Default::default(),
             finish: Default::default(),
-            scan,
+            scan: RustHdl::new(scan),
         }
     }
 }

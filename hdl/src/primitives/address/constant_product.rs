@@ -12,27 +12,42 @@ pub fn times<'k>(k: &'k Builder, value: Expr<'k>, constant: usize, bits: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block;
     use crate::language::testbench::{check, Pipeline};
-    use crate::language::Body;
+    use crate::language::{concat, kernel_of, Block, Inside};
     use crate::wire::Word;
+
+    const BITS: usize = 6;
+    /// Constant and width of the product: wider than it, as wide, narrower.
+    const PRODUCTS: [(usize, usize); 5] = [(0, 4), (1, 6), (5, 12), (12, 10), (127, 8)];
+    /// Width of the widest product.
+    const WIDE: usize = 12;
+
+    block! {
+        struct Products {}
+        ports ProductsPorts {
+            /// The number.
+            in value: BITS;
+            /// Its products, the first lowest.
+            out products: PRODUCTS.len() * WIDE;
+        }
+    }
+
+    impl Block for Products {
+        fn build<'k>(&self, k: &'k Builder, io: ProductsPorts<Inside<'k>>) {
+            let product = |&(constant, bits): &(usize, usize)| times(k, io.value, constant, bits).extend(WIDE);
+            io.products.set(concat(&PRODUCTS.iter().rev().map(product).collect::<Vec<_>>()));
+        }
+    }
 
     #[test]
     fn products_are_exact_modulo_their_width() {
-        const BITS: usize = 6;
-        // Constant and width of the product: wider than it, as wide, narrower.
-        const PRODUCTS: [(usize, usize); 5] = [(0, 4), (1, 6), (5, 12), (12, 10), (127, 8)];
-        let k = Builder::combinational("constant_product");
-        let value = k.input("value", BITS);
-        let names = PRODUCTS.map(|(constant, bits)| (format!("by_{constant}"), bits));
-        for (&(constant, bits), (name, _)) in PRODUCTS.iter().zip(&names) {
-            k.wire(name, times(&k, value, constant, bits));
-        }
-        let outputs = names.each_ref().map(|(name, bits)| (name.as_str(), *bits));
-        let body = Body::new(k.finish(), &[("value", BITS)], &outputs);
         let of = |inputs: &[Word]| {
-            PRODUCTS.map(|(constant, bits)| Some(Word::from(inputs[0].number() * constant as u64 % (1 << bits)))).into()
+            let product =
+                |(constant, bits): (usize, usize)| (inputs[0].number() * constant as u64 % (1 << bits)) as i64;
+            vec![Some(Word::of_fields(&PRODUCTS.map(product), WIDE))]
         };
         let all: Vec<Vec<Word>> = (0..1 << BITS).map(|value: u64| vec![value.into()]).collect();
-        check(body.kernel(), &all, &mut Pipeline::new(0, PRODUCTS.len(), of));
+        check(&kernel_of(&Products {}), &all, &mut Pipeline::new(0, 1, of));
     }
 }

@@ -1,40 +1,44 @@
 //! Lane mask of a quad, or of a part of it: which lanes hold distinct taxels.
 
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel};
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
-/// line of an odd row or column count only one does. Where a quad takes several steps, the address is
-/// `{quad, step}`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct LaneMask {
-    /// Index of the case; valid with `address`.
-    pub which: Wire<In>,
-    /// Address of the step in the subarray; taken in the same cycle.
-    pub address: Wire<In>,
-    /// One bit per lane, which is counted; combinational from `address`.
-    pub mask: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
+    /// line of an odd row or column count only one does. Where a quad takes several steps, the address is
+    /// `{quad, step}`.
+    pub struct LaneMask {
+        /// Quad layout of the subarrays of each case.
+        layouts: Vec<Quads>,
+        /// Lanes of a step.
+        lanes: usize,
+    }
+    ports LaneMaskPorts {
+        /// Index of the case; valid with `address`.
+        in which: count_bits(layouts.len());
+        /// Address of the step in the subarray; taken in the same cycle.
+        in address: count_bits(layouts.iter().map(Quads::len).max().unwrap_or(1) * (Quads::LANES / lanes));
+        /// One bit per lane, which is counted; combinational from `address`.
+        out mask: lanes;
+    }
 }
-
-kernel_block!(LaneMask, inputs [which, address], outputs [mask]);
 
 impl LaneMask {
     /// `layouts[case]` is the quad layout of the subarrays of each case; a step has `lanes` lanes.
     pub fn new(layouts: &[Quads], lanes: usize) -> Self {
-        let steps = layouts.iter().map(Quads::len).max().unwrap_or(1) * (Quads::LANES / lanes);
-        let block = LaneMask {
-            which: Wire::new(count_bits(layouts.len())),
-            address: Wire::new(count_bits(steps)),
-            mask: Wire::new(lanes),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(layouts, lanes, count_bits(steps)))
+        LaneMask { layouts: layouts.to_vec(), lanes }
+    }
+}
+
+impl Block for LaneMask {
+    fn build<'k>(&self, _: &'k Builder, io: LaneMaskPorts<Inside<'k>>) {
+        let steps = 0..1 << io.address.bits();
+        let cases = (0..1 << io.which.bits()).map(|case| self.layouts.get(case));
+        let masks = cases.flat_map(|layout| steps.clone().map(move |step| mask(layout, self.lanes, step)));
+        io.mask.set(io.which.concat(io.address).table(self.lanes, &masks.collect::<Vec<u64>>()));
     }
 }
 
@@ -45,19 +49,10 @@ fn mask(layout: Option<&Quads>, lanes: usize, step: usize) -> u64 {
     layout.map_or(u64::MAX, |layout| u64::from(layout.lane_mask(address)) >> first) & ((1 << lanes) - 1)
 }
 
-/// With an address of `bits` bits.
-fn kernel(layouts: &[Quads], lanes: usize, bits: usize) -> Kernel {
-    let k = Builder::combinational("lane_mask");
-    let (which, address) = (k.input("which", count_bits(layouts.len())), k.input("address", bits));
-    let cases = (0..1 << which.bits()).map(|case| layouts.get(case));
-    let masks = cases.flat_map(|layout| (0..1 << bits).map(move |step| mask(layout, lanes, step)));
-    k.wire("mask", which.concat(address).table(lanes, &masks.collect::<Vec<u64>>()));
-    k.finish()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline};
     use crate::wire::Word;
 
@@ -82,8 +77,9 @@ mod tests {
                     let mask: u64 = (0..lanes).map(|lane| u64::from(counts(lane)) << lane).sum();
                     vec![Some(Word::from(mask))]
                 };
-                let widths = [block.which.width(), block.address.width()];
-                check(block.kernel.kernel(), &random_words(1000, &widths), &mut Pipeline::new(0, 1, of));
+                let steps = layouts.iter().map(Quads::len).max().unwrap() * (Quads::LANES / lanes);
+                let widths = [layouts.len(), steps].map(count_bits);
+                check(&kernel_of(&block), &random_words(1000, &widths), &mut Pipeline::new(0, 1, of));
             }
         }
     }

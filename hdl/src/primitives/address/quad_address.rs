@@ -3,69 +3,100 @@
 use dermis_golden::fixed::CasePlan;
 use dermis_golden::spec::partition::Grid;
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::address::case_counter::{expression_by_case, largest};
 use crate::primitives::address::constant_product::times;
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// Row and column of a taxel in its subarray, and of the subarray in the array, to address, lane and write mask;
-/// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
-/// count is written to several lanes. A memory word holds the four lanes of a quad or, where it holds fewer, the lanes of a
-/// quad follow one another.
-#[derive(dermis_hdl_derive::Block)]
-pub struct QuadAddress {
-    /// Index of the case; valid with `row`.
-    pub which: Wire<In>,
-    /// Row of the taxel in its subarray; taken in the same cycle.
-    pub row: Wire<In>,
-    /// Column of the taxel in its subarray; valid with `row`.
-    pub col: Wire<In>,
-    /// Row of the subarray in the grid of subarrays; valid with `row`.
-    pub part_row: Wire<In>,
-    /// Column of the subarray in the grid; valid with `row`.
-    pub part_col: Wire<In>,
-    /// Address of the word, over all subarrays; combinational.
-    pub address: Wire<Out>,
-    /// Index of the subarray, row-major; combinational.
-    pub part: Wire<Out>,
-    /// Lane of the word that the taxel is read from, 2 bits, of a whole quad `{lower half, right half}`; combinational.
-    pub lane: Wire<Out>,
-    /// Lanes the taxel is written to, one bit each; combinational.
-    pub mask: Wire<Out>,
-    kernel: Body,
+/// How the words of a memory hold the taxels of the array.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    /// Layout and grid of the subarrays, by case.
+    pub cases: Vec<(Quads, Grid)>,
+    /// Quads of the largest frame.
+    frame_quads: usize,
+    /// Lanes of a memory word.
+    lanes: usize,
 }
 
-kernel_block!(QuadAddress, inputs [which, row, col, part_row, part_col], outputs [address, part, lane, mask]);
+impl Places {
+    /// For the subarrays of each of `cases`, with `lanes` lanes in a memory word.
+    pub fn new(cases: &[CasePlan], lanes: usize) -> Self {
+        let places = cases.iter().map(|case| (case.layout(), case.grid())).collect();
+        Places { cases: places, frame_quads: frame_quads(cases), lanes }
+    }
+
+    /// Width of the address of a word.
+    pub fn address_bits(&self) -> usize {
+        count_bits(self.frame_quads * (Quads::LANES / self.lanes))
+    }
+
+    /// Width of the index of a subarray.
+    pub fn part_bits(&self) -> usize {
+        count_bits(largest(&self.each(|(_, grid)| grid.rows * grid.cols)))
+    }
+
+    /// Columns of a subarray, columns of the grid, rows of a subarray, rows of the grid; each by case.
+    pub fn counts(&self) -> [Vec<usize>; 4] {
+        [
+            self.each(|(layout, _)| layout.cols),
+            self.each(|(_, grid)| grid.cols),
+            self.each(|(layout, _)| layout.rows),
+            self.each(|(_, grid)| grid.rows),
+        ]
+    }
+
+    fn each(&self, of: impl Fn(&(Quads, Grid)) -> usize) -> Vec<usize> {
+        self.cases.iter().map(of).collect()
+    }
+
+    fn count_bits(&self, of: impl Fn(&(Quads, Grid)) -> usize) -> usize {
+        count_bits(largest(&self.each(of)))
+    }
+}
+
+block! {
+    /// Row and column of a taxel in its subarray, and of the subarray in the array, to address, lane and write mask;
+    /// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
+    /// count is written to several lanes. A memory word holds the four lanes of a quad or, where it holds fewer, the lanes of a
+    /// quad follow one another.
+    pub struct QuadAddress {
+        places: Places,
+    }
+    ports QuadAddressPorts {
+        /// Index of the case; valid with `row`.
+        in which: count_bits(places.cases.len());
+        /// Row of the taxel in its subarray; taken in the same cycle.
+        in row: places.count_bits(|(layout, _)| layout.rows);
+        /// Column of the taxel in its subarray; valid with `row`.
+        in col: places.count_bits(|(layout, _)| layout.cols);
+        /// Row of the subarray in the grid of subarrays; valid with `row`.
+        in part_row: places.count_bits(|(_, grid)| grid.rows);
+        /// Column of the subarray in the grid; valid with `row`.
+        in part_col: places.count_bits(|(_, grid)| grid.cols);
+        /// Address of the word, over all subarrays; combinational.
+        out address: places.address_bits();
+        /// Index of the subarray, row-major; combinational.
+        out part: places.part_bits();
+        /// Lane of the word that the taxel is read from, 2 bits, of a whole quad `{lower half, right half}`; combinational.
+        out lane: 2;
+        /// Lanes the taxel is written to, one bit each; combinational.
+        out mask: 4;
+    }
+}
 
 impl QuadAddress {
     /// For the layout and the grid of each of `cases`, with `lanes` lanes in a memory word.
     pub fn new(cases: &[CasePlan], lanes: usize) -> Self {
-        let places: Vec<(Quads, Grid)> = cases.iter().map(|case| (case.layout(), case.grid())).collect();
-        QuadAddress::of(&places, frame_quads(cases), lanes)
+        Places::new(cases, lanes).into()
     }
+}
 
-    fn of(cases: &[(Quads, Grid)], frame_quads: usize, lanes: usize) -> Self {
-        let wire =
-            |of: fn(&(Quads, Grid)) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
-        let parts = cases.iter().map(|(_, grid)| grid.rows * grid.cols).max().unwrap_or(1);
-        let block = QuadAddress {
-            which: Wire::new(count_bits(cases.len())),
-            part_row: wire(|(_, grid)| grid.rows),
-            part_col: wire(|(_, grid)| grid.cols),
-            part: Wire::new(count_bits(parts)),
-            row: wire(|(layout, _)| layout.rows),
-            col: wire(|(layout, _)| layout.cols),
-            address: Wire::new(count_bits(frame_quads * (Quads::LANES / lanes))),
-            lane: Wire::new(2),
-            mask: Wire::new(4),
-            kernel: Body::default(),
-        };
-        let kernel = block.kernel_of(cases, frame_quads, lanes);
-        block.bind(kernel)
+impl From<Places> for QuadAddress {
+    fn from(places: Places) -> Self {
+        QuadAddress { places }
     }
 }
 
@@ -119,49 +150,43 @@ pub(crate) fn lane_of<'k>(word: Expr<'k>, lanes: usize, lane: Expr<'k>) -> Expr<
     }
 }
 
-impl QuadAddress {
-    fn kernel_of(&self, cases: &[(Quads, Grid)], frame_quads: usize, lanes: usize) -> Kernel {
-        let k = Builder::combinational("quad_address");
-        let which = k.input("which", self.which.width());
-        let (row, col) = (k.input("row", self.row.width()), k.input("col", self.col.width()));
-        let part = [k.input("part_row", self.part_row.width()), k.input("part_col", self.part_col.width())];
-        let (address_bits, part_bits) = (count_bits(frame_quads), self.part.width());
+impl Block for QuadAddress {
+    fn build<'k>(&self, k: &'k Builder, io: QuadAddressPorts<Inside<'k>>) {
+        let Places { cases, frame_quads, lanes } = &self.places;
+        let (address_bits, part_bits) = (count_bits(*frame_quads), io.part.bits());
         let place = |&(layout, grid): &(Quads, Grid)| {
             let part = match grid.rows * grid.cols {
                 1 => k.constant(part_bits, 0),
-                _ => (times(&k, part[0], grid.cols, part_bits) + part[1]).resize(part_bits),
+                _ => (times(k, io.part_row, grid.cols, part_bits) + io.part_col).resize(part_bits),
             };
-            let first = times(&k, part, layout.len(), address_bits);
-            let place = Place::of(&k, layout, [row, col]);
-            (part, quad_address_of(&k, layout, place.near, first), place)
+            let first = times(k, part, layout.len(), address_bits);
+            let place = Place::of(k, layout, [io.row, io.col]);
+            (part, quad_address_of(k, layout, place.near, first), place)
         };
         let places: Vec<(Expr, Expr, Place)> = cases.iter().map(place).collect();
-        let chosen = |of: for<'k> fn(&(Expr<'k>, Expr<'k>, Place<'k>)) -> Expr<'k>, bits: usize| {
+        let chosen = |of: for<'p> fn(&(Expr<'p>, Expr<'p>, Place<'p>)) -> Expr<'p>, bits: usize| {
             let each: Vec<Expr> = places.iter().map(of).collect();
-            expression_by_case(which, &each).unwrap_or(k.constant(bits, 0))
+            expression_by_case(io.which, &each).unwrap_or(k.constant(bits, 0))
         };
         let quad = chosen(|(_, address, _)| *address, address_bits);
         let (lower, right) = (chosen(|(.., place)| place.lower, 1), chosen(|(.., place)| place.right, 1));
         // The lane of the quad is the index of the word in it, followed by the lane of the word.
-        let address = match lanes {
+        io.address.set(match lanes {
             1 => quad.concat(lower).concat(right),
             2 => quad.concat(lower),
             _ => quad,
-        };
-        k.wire("address", address);
-        k.wire("part", chosen(|(part, ..)| *part, part_bits));
+        });
+        io.part.set(chosen(|(part, ..)| *part, part_bits));
         let (lower, right) = (k.wire("lower", lower), k.wire("right", right));
         let both_rows = k.wire("both_rows", chosen(|(.., place)| place.both_rows, 1));
         let both_cols = k.wire("both_cols", chosen(|(.., place)| place.both_cols, 1));
-        let lane = match lanes {
+        io.lane.set(match lanes {
             1 => k.constant(2, 0),
             2 => right.extend(2),
             _ => lower.concat(right),
-        };
-        k.wire("lane", lane);
+        });
         let (rows, cols) = ([lower | both_rows, !lower | both_rows], [right | both_cols, !right | both_cols]);
-        k.wire("mask", concat(&[rows[0] & cols[0], rows[0] & cols[1], rows[1] & cols[0], rows[1] & cols[1]]));
-        k.finish()
+        io.mask.set(concat(&[rows[0] & cols[0], rows[0] & cols[1], rows[1] & cols[0], rows[1] & cols[1]]));
     }
 }
 
@@ -177,6 +202,7 @@ fn fold<'k>(k: &'k Builder, at: Expr<'k>, count: usize) -> (Expr<'k>, Expr<'k>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Pipeline};
     use crate::wire::Word;
 
@@ -193,7 +219,7 @@ mod tests {
             let largest = |of: fn(&(Quads, Grid)) -> usize| cases.iter().map(of).max().unwrap();
             let frame = largest(|(layout, grid)| layout.len() * grid.rows * grid.cols);
             for lanes in [4, 2, 1] {
-                let mirror = QuadAddress::of(&cases, frame, lanes);
+                let mirror = QuadAddress { places: Places { cases: cases.clone(), frame_quads: frame, lanes } };
                 let mut random = fastrand::Rng::with_seed(20);
                 let mut taxel = || {
                     let which = random.usize(..cases.len());
@@ -211,7 +237,7 @@ mod tests {
                     let mask = usize::from(place.mask);
                     [taxel / lanes, part, taxel % lanes, mask].map(|value| Some(Word::from(value as u64))).into()
                 };
-                check(mirror.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 4, of));
+                check(&kernel_of(&mirror), &stimulus, &mut Pipeline::new(0, 4, of));
             }
         }
     }

@@ -1,113 +1,92 @@
 //! Counter over the taxels of the array, row by row, with quad address and lane of each.
 
 use dermis_golden::fixed::CasePlan;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::address::quad_address::Places;
 use crate::primitives::{CaseCounter, QuadAddress};
-use crate::wire::Wire;
 
-/// Visits the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
-/// combinational from the count.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Scan {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Index of the case; constant from the first taxel to the last.
-    pub which: Wire<In>,
-    /// Back to the first taxel, with priority over `enable`.
-    pub clear: Signal<In, Bit>,
-    /// Advances to the next taxel at the clock edge; after the last to the first.
-    pub enable: Signal<In, Bit>,
-    /// The current taxel is the array's last.
-    pub last: Signal<Out, Bit>,
-    /// `enable`, and the current taxel is the last of a row of subarrays.
-    pub row_end: Signal<Out, Bit>,
-    /// Address of the current taxel's word, over all subarrays; combinational from the count, valid from the first
-    /// `clear` on.
-    pub address: Wire<Out>,
-    /// Index of the current taxel's subarray; valid with `address`.
-    pub part: Wire<Out>,
-    /// Lane of the word the current taxel is read from, 2 bits; valid with `address`.
-    pub lane: Wire<Out>,
-    /// Lanes the current taxel is written to, one bit each; valid with `address`.
-    pub mask: Wire<Out>,
-    col: RustHdl<CaseCounter>,
-    part_col: RustHdl<CaseCounter>,
-    row: RustHdl<CaseCounter>,
-    part_row: RustHdl<CaseCounter>,
-    quad_address: QuadAddress,
-    line_end: Signal<Local, Bit>,
+block! {
+    /// Visits the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
+    /// combinational from the count.
+    pub struct Scan {
+        places: Places,
+    }
+    ports ScanPorts {
+        clock;
+        /// Index of the case; constant from the first taxel to the last.
+        in which: count_bits(places.cases.len());
+        /// Back to the first taxel, with priority over `enable`.
+        in clear;
+        /// Advances to the next taxel at the clock edge; after the last to the first.
+        in enable;
+        /// The current taxel is the array's last.
+        out last;
+        /// `enable`, and the current taxel is the last of a row of subarrays.
+        out row_end;
+        /// Address of the current taxel's word, over all subarrays; combinational from the count, valid from the first
+        /// `clear` on.
+        out address: places.address_bits();
+        /// Index of the current taxel's subarray; valid with `address`.
+        out part: places.part_bits();
+        /// Lane of the word the current taxel is read from, 2 bits; valid with `address`.
+        out lane: 2;
+        /// Lanes the current taxel is written to, one bit each; valid with `address`.
+        out mask: 4;
+    }
 }
 
 impl Scan {
     /// For the subarrays of each of `cases`, with `lanes` lanes in a memory word.
     pub fn new(cases: &[CasePlan], lanes: usize) -> Self {
-        let each = |of: &dyn Fn(&CasePlan) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
-        let quad_address = QuadAddress::new(cases, lanes);
-        Scan {
-            clk: Default::default(),
-            which: Wire::new(count_bits(cases.len())),
-            clear: Default::default(),
-            enable: Default::default(),
-            last: Default::default(),
-            row_end: Default::default(),
-            address: Wire::new(quad_address.address.width()),
-            part: Wire::new(quad_address.part.width()),
-            lane: Wire::new(2),
-            mask: Wire::new(4),
-            col: RustHdl::new(each(&|case| case.layout().cols)),
-            part_col: RustHdl::new(each(&|case| case.grid().cols)),
-            row: RustHdl::new(each(&|case| case.layout().rows)),
-            part_row: RustHdl::new(each(&|case| case.grid().rows)),
-            quad_address,
-            line_end: Default::default(),
-        }
+        Scan { places: Places::new(cases, lanes) }
+    }
+
+    /// Width of the address of a word.
+    pub fn address_bits(&self) -> usize {
+        self.places.address_bits()
     }
 }
 
-impl Logic for Scan {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.col.clk.next = self.clk.val();
-        self.part_col.clk.next = self.clk.val();
-        self.row.clk.next = self.clk.val();
-        self.part_row.clk.next = self.clk.val();
-        self.col.clear.next = self.clear.val();
-        self.part_col.clear.next = self.clear.val();
-        self.row.clear.next = self.clear.val();
-        self.part_row.clear.next = self.clear.val();
+impl Block for Scan {
+    fn build<'k>(&self, k: &'k Builder, io: ScanPorts<Inside<'k>>) {
+        let [cols, part_cols, rows, part_rows] = self.places.counts();
+        let col = k.instance("col", CaseCounter::new(&cols));
+        let part_col = k.instance("part_col", CaseCounter::new(&part_cols));
+        let row = k.instance("row", CaseCounter::new(&rows));
+        let part_row = k.instance("part_row", CaseCounter::new(&part_rows));
+        let quad_address = k.instance("quad_address", QuadAddress::from(self.places.clone()));
 
-        self.col.which.next = self.which.val();
-        self.part_col.which.next = self.which.val();
-        self.row.which.next = self.which.val();
-        self.part_row.which.next = self.which.val();
-        self.quad_address.which.next = self.which.val();
-        self.line_end.next = self.enable.val() & self.col.last.val() & self.part_col.last.val();
-        self.row_end.next = self.line_end.val() & self.row.last.val();
-        self.col.enable.next = self.enable.val();
-        self.part_col.enable.next = self.enable.val() & self.col.last.val();
-        self.row.enable.next = self.line_end.val();
-        self.part_row.enable.next = self.row_end.val();
-        self.last.next =
-            self.col.last.val() & self.part_col.last.val() & self.row.last.val() & self.part_row.last.val();
+        for counter in [&col, &part_col, &row, &part_row] {
+            counter.clear.set(io.clear);
+            counter.which.set(io.which);
+        }
+        quad_address.which.set(io.which);
+        let line_end = k.wire("line_end", io.enable & col.last & part_col.last);
+        let row_end = io.row_end.set(line_end & row.last);
+        col.enable.set(io.enable);
+        part_col.enable.set(io.enable & col.last);
+        row.enable.set(line_end);
+        part_row.enable.set(row_end);
+        io.last.set(col.last & part_col.last & row.last & part_row.last);
 
-        self.quad_address.row.next = self.row.value.val();
-        self.quad_address.col.next = self.col.value.val();
-        self.quad_address.part_row.next = self.part_row.value.val();
-        self.quad_address.part_col.next = self.part_col.value.val();
-        self.address.next = self.quad_address.address.val();
-        self.part.next = self.quad_address.part.val();
-        self.lane.next = self.quad_address.lane.val();
-        self.mask.next = self.quad_address.mask.val();
+        quad_address.row.set(row.value);
+        quad_address.col.set(col.value);
+        quad_address.part_row.set(part_row.value);
+        quad_address.part_col.set(part_col.value);
+        io.address.set(quad_address.address);
+        io.part.set(quad_address.part);
+        io.lane.set(quad_address.lane);
+        io.mask.set(quad_address.mask);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::scenes::{model, Place};
     use crate::wire::Word;
@@ -160,7 +139,7 @@ mod tests {
             };
             let stimulus: Vec<Vec<Word>> = (0..4000).map(|_| cycle()).collect();
             let subject = |changes: &[Change]| {
-                block_subject!(
+                subject_of!(
                     Scan::new(model.cases(), lanes),
                     changes,
                     inputs [which, clear, enable],

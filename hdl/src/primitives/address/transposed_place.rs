@@ -1,72 +1,67 @@
 //! Quad address of a v_ij, with transposed results put back in place.
 
 use dermis_golden::spec::quads::Quads;
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// Address and taxels of a quad; rows and columns are exchanged for the v_ij that were computed transposed.
-/// Combinational.
-#[derive(dermis_hdl_derive::Block)]
-pub struct TransposedPlace {
-    /// Index of the v_ij; valid with `address` and `quad`.
-    pub index: Wire<In>,
-    /// The quad's address as computed; taken in the same cycle.
-    pub address: Wire<In>,
-    /// Its four taxels as computed, signed; taken in the same cycle.
-    pub quad: Wire<In>,
-    /// The quad's address in the subarray; combinational from `address`.
-    pub placed: Wire<Out>,
-    /// Its four taxels in lane order, signed; combinational from `quad`.
-    pub taxels: Wire<Out>,
-    kernel: Body,
+block! {
+    /// Address and taxels of a quad; rows and columns are exchanged for the v_ij that were computed transposed.
+    /// Combinational.
+    pub struct TransposedPlace {
+        layout: Quads,
+        /// Width of a taxel in bits.
+        bits: usize,
+        /// Number of the v_ij.
+        vectors: usize,
+        /// Indices of those that were computed transposed.
+        transposed: Vec<usize>,
+    }
+    ports TransposedPlacePorts {
+        /// Index of the v_ij; valid with `address` and `quad`.
+        in index: count_bits(*vectors);
+        /// The quad's address as computed; taken in the same cycle.
+        in address: count_bits(layout.len());
+        /// Its four taxels as computed, signed; taken in the same cycle.
+        in quad: 4 * bits;
+        /// The quad's address in the subarray; combinational from `address`.
+        out placed: count_bits(layout.len());
+        /// Its four taxels in lane order, signed; combinational from `quad`.
+        out taxels: 4 * bits;
+    }
 }
-
-kernel_block!(TransposedPlace, inputs [index, address, quad], outputs [placed, taxels]);
 
 impl TransposedPlace {
     /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed`
     /// arrive with rows and columns exchanged.
     pub fn new(layout: Quads, bits: usize, vectors: usize, transposed: Vec<usize>) -> Self {
-        let block = TransposedPlace {
-            index: Wire::new(count_bits(vectors)),
-            address: Wire::new(count_bits(layout.len())),
-            quad: Wire::new(4 * bits),
-            placed: Wire::new(count_bits(layout.len())),
-            taxels: Wire::new(4 * bits),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(layout, bits, count_bits(vectors), &transposed))
+        TransposedPlace { layout, bits, vectors, transposed }
     }
 }
 
-fn kernel(layout: Quads, bits: usize, index_bits: usize, transposed: &[usize]) -> Kernel {
-    let k = Builder::combinational("transposed_place");
-    let (index, address) = (k.input("index", index_bits), k.input("address", count_bits(layout.len())));
-    let quad = k.input("quad", 4 * bits);
-    let across = |at: usize| if at < layout.len() { layout.transposed(at) } else { at };
-    let is = transposed.iter().map(|&own| index.is(own as u64)).reduce(|any, own| any | own);
-    let (placed, taxels) = match is {
-        None => (address, quad),
-        Some(is) => {
-            let exchange = k.wire("exchange", is);
-            let table: Vec<u64> = (0..1 << address.bits()).map(|at| across(at) as u64).collect();
-            let lanes: Vec<Expr> = [3, 1, 2, 0].map(|lane| quad.slice(lane * bits, bits)).into();
-            let across = k.wire("across", address.table(address.bits(), &table));
-            (exchange.mux(across, address), exchange.mux(concat(&lanes), quad))
-        }
-    };
-    k.wire("placed", placed);
-    k.wire("taxels", taxels);
-    k.finish()
+impl Block for TransposedPlace {
+    fn build<'k>(&self, k: &'k Builder, io: TransposedPlacePorts<Inside<'k>>) {
+        let is = self.transposed.iter().map(|&own| io.index.is(own as u64)).reduce(|any, own| any | own);
+        let Some(is) = is else {
+            io.placed.set(io.address);
+            io.taxels.set(io.quad);
+            return;
+        };
+        let exchange = k.wire("exchange", is);
+        let across = |at: usize| if at < self.layout.len() { self.layout.transposed(at) } else { at };
+        let table: Vec<u64> = (0..1 << io.address.bits()).map(|at| across(at) as u64).collect();
+        let lanes: Vec<Expr> = [3, 1, 2, 0].map(|lane| io.quad.slice(lane * self.bits, self.bits)).into();
+        let across = k.wire("across", io.address.table(io.address.bits(), &table));
+        io.placed.set(exchange.mux(across, io.address));
+        io.taxels.set(exchange.mux(concat(&lanes), io.quad));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline};
     use crate::wire::Word;
 
@@ -85,7 +80,7 @@ mod tests {
             };
             let stimulus = random_words(2000, &[count_bits(vectors), count_bits(layout.len()), 4 * bits]);
             let block = TransposedPlace::new(layout, bits, vectors, transposed.clone());
-            check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 2, of));
+            check(&kernel_of(&block), &stimulus, &mut Pipeline::new(0, 2, of));
         }
     }
 }

@@ -27,26 +27,45 @@ mod tests {
     use dermis_golden::fixed::words::arith;
 
     use super::*;
+    use crate::block;
     use crate::language::testbench::{check, Pipeline};
-    use crate::language::Body;
+    use crate::language::{kernel_of, Block, Inside};
     use crate::wire::Word;
+
+    const MOVED: usize = 9;
+
+    block! {
+        struct HalfUp {
+            word: usize,
+        }
+        ports HalfUpPorts {
+            /// The number, with half an LSB.
+            in moved: MOVED;
+            /// The word.
+            out value: word;
+            /// The number does not fit.
+            out clipped;
+        }
+    }
+
+    impl Block for HalfUp {
+        fn build<'k>(&self, k: &'k Builder, io: HalfUpPorts<Inside<'k>>) {
+            let (value, clips) = saturate(k, io.moved, self.word);
+            io.value.set(value);
+            io.clipped.set(clips);
+        }
+    }
 
     #[test]
     fn every_value_is_rounded_half_up_and_saturated() {
-        const MOVED: usize = 9;
         for word in [4, 7] {
-            let k = Builder::combinational("half_up");
-            let (value, clips) = saturate(&k, k.input("moved", MOVED), word);
-            k.wire("value", value);
-            k.wire("clipped", clips);
-            let body = Body::new(k.finish(), &[("moved", MOVED)], &[("value", word), ("clipped", 1)]);
             let of = |inputs: &[Word]| {
                 let half_up = arith::round_shift(inputs[0].signed(0, MOVED), 1);
                 let (value, clipped) = arith::saturate(half_up, word as u32);
                 vec![Some(Word::of_fields(&[value], word)), Some(clipped.into())]
             };
             let all: Vec<Vec<Word>> = (0..1 << MOVED).map(|moved: u64| vec![moved.into()]).collect();
-            check(body.kernel(), &all, &mut Pipeline::new(0, 2, of));
+            check(&kernel_of(&HalfUp { word }), &all, &mut Pipeline::new(0, 2, of));
         }
     }
 }

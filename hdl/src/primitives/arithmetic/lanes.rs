@@ -4,68 +4,87 @@ use dermis_golden::fixed::plan::check::{signature, POLYNOMIAL, START};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use dermis_golden::fixed::{CasePlan, Model};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Net, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Net, Output, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::frame::load::{CoefficientPlaces, PAIR_BITS};
 use crate::primitives::pass::pass_program::{programs, Control};
-use crate::wire::Wire;
 
 const M: usize = MULTIPLIER_BITS as usize;
 
-/// ```text
-/// address --> register --> memory --> register --> a \
-///                                                     * --> product --> accumulator --> chain --> quad
-/// operands ------------------------------------> b   /
-/// ```
-/// A lane is a multiply-accumulator with synchronous clear, as the multiplier blocks of most FPGAs have it. A memory word
-/// holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of three cycles earlier. After
-/// the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in the last group,
-/// the first of them four cycles after the `control` of that product. In the cycle after that product `valid` must be
-/// low, because the accumulators are cleared when its product has been added.
-///
-/// Where low limbs are in a memory of their own, both memories are read and their words combined; the other one then has
-/// a word of zeros.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Lanes {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high; clears the control pipeline and, two cycles later, the accumulators.
-    pub rst: Signal<In, Bit>,
-    /// Index of the section; constant from its first product to its last row.
-    pub which: Wire<In>,
-    /// Address in the coefficient memory; three cycles before `valid` of its product.
-    pub address: Wire<In>,
-    /// Four operands, one per parity, 18 bits each, signed; valid with `valid`.
-    pub operands: Wire<In>,
-    /// `operands` and `control` are valid: one product per lane to accumulate.
-    pub valid: Signal<In, Bit>,
-    /// Last product of an accumulation, and what else [`Control`] has. Valid with `valid`.
-    pub control: Wire<In>,
-    /// Writes `coefficient_data` to the coefficient memory ([`Load`](crate::primitives::Load)); only in a reset. Not read where the
-    /// coefficients are not written.
-    pub coefficient_write: Signal<In, Bit>,
-    /// Word of the memory; valid with `coefficient_write`.
-    pub coefficient_word: Wire<In>,
-    /// Pair of lanes; valid with `coefficient_write`.
-    pub coefficient_pair: Wire<In>,
-    /// The coefficients of two lanes; valid with `coefficient_write`.
-    pub coefficient_data: Wire<In>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
-    pub quad: Wire<Out>,
-    /// `quad` holds a row.
-    pub quad_valid: Signal<Out, Bit>,
-    /// `quad` holds a row two cycles later.
-    pub quad_soon: Signal<Out, Bit>,
-    /// `quad` holds a row of a layer of a network; `quad_valid` is low. Constant 0 without a network.
-    pub layer_valid: Signal<Out, Bit>,
-    /// The signature of the coefficients read since the section's first product, or of a section before it in its
-    /// subarray, is wrong, 1 bit; valid from three cycles after its last product. Constant 0 without the check.
-    pub damaged: Wire<Out>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// address --> register --> memory --> register --> a \
+    ///                                                     * --> product --> accumulator --> chain --> quad
+    /// operands ------------------------------------> b   /
+    /// ```
+    /// A lane is a multiply-accumulator with synchronous clear, as the multiplier blocks of most FPGAs have it. A memory word
+    /// holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of three cycles earlier. After
+    /// the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in the last group,
+    /// the first of them four cycles after the `control` of that product. In the cycle after that product `valid` must be
+    /// low, because the accumulators are cleared when its product has been added.
+    ///
+    /// Where low limbs are in a memory of their own, both memories are read and their words combined; the other one then has
+    /// a word of zeros.
+    #[derive(Clone, Debug)]
+    pub struct Lanes {
+        /// Lanes of one parity; the whole has four times as many.
+        per_parity: usize,
+        /// Width of an accumulator.
+        lane_bits: usize,
+        /// Groups of rows of each section.
+        groups: Vec<usize>,
+        /// Rows of the last group of each section.
+        last_rows: Vec<usize>,
+        /// Coefficients of each word, one per lane.
+        memory: Vec<Vec<i64>>,
+        /// The last so many words are in a memory of their own, with so many bits per lane.
+        narrow: (usize, usize),
+        /// Where coefficients are written.
+        written: CoefficientPlaces,
+        /// Expected signatures of the sections, with the coefficient check.
+        signatures: Option<Vec<u32>>,
+        /// A subarray has all sections in turn, beginning with section 0, in the place of one of them.
+        in_turn: bool,
+        control: Control,
+    }
+    ports LanesPorts {
+        clock;
+        /// Synchronous reset, active high; clears the control pipeline and, two cycles later, the accumulators.
+        in rst;
+        /// Index of the section; constant from its first product to its last row.
+        in which: count_bits(groups.len());
+        /// Address in the coefficient memory; three cycles before `valid` of its product.
+        in address: count_bits(memory.len());
+        /// Four operands, one per parity, 18 bits each, signed; valid with `valid`.
+        in operands: 4 * M;
+        /// `operands` and `control` are valid: one product per lane to accumulate.
+        in valid;
+        /// Last product of an accumulation, and what else [`Control`] has. Valid with `valid`.
+        in control: control.bits();
+        /// Writes `coefficient_data` to the coefficient memory ([`Load`](crate::primitives::Load)); only in a reset. Not read where the
+        /// coefficients are not written.
+        in coefficient_write;
+        /// Word of the memory; valid with `coefficient_write`.
+        in coefficient_word: written.word_bits();
+        /// Pair of lanes; valid with `coefficient_write`.
+        in coefficient_pair: written.pair_bits();
+        /// The coefficients of two lanes; valid with `coefficient_write`.
+        in coefficient_data: PAIR_BITS;
+        /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
+        out quad: 4 * lane_bits;
+        /// `quad` holds a row.
+        out quad_valid;
+        /// `quad` holds a row two cycles later.
+        out quad_soon;
+        /// `quad` holds a row of a layer of a network; `quad_valid` is low. Constant 0 without a network.
+        out layer_valid;
+        /// The signature of the coefficients read since the section's first product, or of a section before it in its
+        /// subarray, is wrong, 1 bit; valid from three cycles after its last product. Constant 0 without the check.
+        out damaged: 1;
+    }
 }
 
 /// File of the coefficient memory, one line per word.
@@ -73,45 +92,12 @@ pub const MEMORY_FILE: &str = "coefficients.hex";
 /// File of the memory of low limbs, one line per word.
 pub const LOW_FILE: &str = "low_coefficients.hex";
 
-kernel_block!(
-    Lanes,
-    clock clk,
-    inputs [
-        rst, which, address, operands, valid, control, coefficient_write, coefficient_word, coefficient_pair,
-        coefficient_data,
-    ],
-    outputs [quad, quad_valid, quad_soon, layer_valid, damaged]
-);
-
-/// Sizes of the lanes.
-#[derive(Clone, Debug)]
-struct Shape {
-    /// Lanes of one parity; the whole has four times as many.
-    per_parity: usize,
-    /// Width of an accumulator.
-    lane_bits: usize,
-    /// Groups of rows, and rows of the last group, of each section.
-    groups: Vec<usize>,
-    last_rows: Vec<usize>,
-    /// Coefficients of each word, one per lane.
-    memory: Vec<Vec<i64>>,
-    /// The last so many words are in a memory of their own, with so many bits per lane.
-    narrow: (usize, usize),
-    /// Where coefficients are written.
-    written: CoefficientPlaces,
-    /// Expected signatures of the sections, with the coefficient check.
-    signatures: Option<Vec<u32>>,
-    /// A subarray has all sections in turn, beginning with section 0, in the place of one of them.
-    in_turn: bool,
-    control: Control,
-}
-
 impl Lanes {
     /// The lanes of `model`, with the coefficients of all its cases in one memory.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (model.formats(), model.cases());
         let programs = programs(model);
-        Lanes::of(&Shape {
+        Lanes {
             per_parity: formats.lanes_per_parity,
             lane_bits: formats.lane_bits as usize,
             groups: programs.iter().map(|(case, _)| case.formats.groups).collect(),
@@ -124,38 +110,7 @@ impl Lanes {
                 .then(|| programs.iter().map(|(case, section)| signature(case, section)).collect()),
             in_turn: formats.by_contact(),
             control: Control::new(model),
-        })
-    }
-
-    fn of(shape: &Shape) -> Self {
-        let [address_bits, pair_bits] = shape.written.bits();
-        let block = Lanes {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(shape.groups.len())),
-            address: Wire::new(count_bits(shape.memory.len())),
-            operands: Wire::new(4 * M),
-            valid: Default::default(),
-            control: Wire::new(shape.control.bits()),
-            coefficient_write: Default::default(),
-            coefficient_word: Wire::new(address_bits),
-            coefficient_pair: Wire::new(pair_bits),
-            coefficient_data: Wire::new(PAIR_BITS),
-            quad: Wire::new(4 * shape.lane_bits),
-            quad_valid: Default::default(),
-            quad_soon: Default::default(),
-            layer_valid: Default::default(),
-            damaged: Wire::new(1),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
-    }
-
-    /// Name and content for `$readmemh` of [`MEMORY_FILE`], and of the memory of low limbs if there is one; lane 0 in
-    /// the least significant bits.
-    pub fn memory_files(&self) -> Vec<(&'static str, String)> {
-        let texts = self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text);
-        [MEMORY_FILE, LOW_FILE].into_iter().zip(texts).collect()
+        }
     }
 }
 
@@ -194,38 +149,31 @@ fn own_copy<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
     *register
 }
 
-impl Shape {
-    fn kernel(&self) -> Kernel {
+impl Block for Lanes {
+    fn build<'k>(&self, k: &'k Builder, io: LanesPorts<Inside<'k>>) {
         let bit = Type::unsigned(1);
-        let k = Builder::new("lanes");
-        let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
-        let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
-        let (valid, control) = (k.input("valid", 1), k.input("control", self.control.bits()));
-        let [address_bits, pair_bits] = self.written.bits();
-        let write = [
-            ("coefficient_write", 1),
-            ("coefficient_word", address_bits),
-            ("coefficient_pair", pair_bits),
-            ("coefficient_data", PAIR_BITS),
-        ];
-        let write = write.map(|(name, bits)| k.input(name, bits));
-        let coefficients = self.coefficients(&k, address, write);
+        let coefficients = self.coefficients(k, &io);
 
         let later = |name: &str, value| {
-            let state = k.state(name, bit, rst, 0);
+            let state = k.state(name, bit, io.rst, 0);
             state.set(value);
             *state
         };
-        let valid1 = later("valid1", valid);
-        let ends = k.wire("ends", valid & control.at(0));
+        let shown = |output: Output<'k>, value| {
+            let state = output.state(io.rst, 0);
+            state.set(value);
+            *state
+        };
+        let valid1 = later("valid1", io.valid);
+        let ends = k.wire("ends", io.valid & io.control.at(0));
         let captured = later("captured", ends);
-        let of_layer = self.control.layer_at().map(|bit| k.delay("of_layer", control.at(bit)));
-        let rows = self.rows(&k, which, rst, of_layer.map_or(captured, |of_layer| captured & !of_layer));
+        let of_layer = self.control.layer_at().map(|bit| k.delay("of_layer", io.control.at(bit)));
+        let rows = self.rows(k, &io, of_layer.map_or(captured, |of_layer| captured & !of_layer));
         let rows = match of_layer {
             None => rows,
             Some(of_layer) => of_layer.mux(k.constant(rows.bits(), self.per_parity as u64), rows),
         };
-        let left = k.state("left", Type::unsigned(rows.bits()), rst, 0);
+        let left = k.state("left", Type::unsigned(rows.bits()), io.rst, 0);
         let more = k.wire("more", left.any());
         k.when(more, || left.set(left.minus(1)));
         k.when(captured, || left.set(rows));
@@ -233,29 +181,31 @@ impl Shape {
         let soon = captured | (more & !left.is(1));
         match of_layer {
             None => {
-                later("quad_valid", later("quad_next", later("quad_soon", soon)));
-                k.wire("layer_valid", k.constant(1, 0));
+                shown(io.quad_valid, later("quad_next", shown(io.quad_soon, soon)));
+                io.layer_valid.set(k.constant(1, 0));
             }
             Some(of_layer) => {
                 // Whose rows leave, until the next accumulation has been captured.
-                let leaving = k.state("leaving_layer", bit, rst, 0);
+                let leaving = k.state("leaving_layer", bit, io.rst, 0);
                 k.when(captured, || leaving.set(of_layer));
                 let soon = later("row_soon", soon);
-                let quad_soon = k.wire("quad_soon", soon & !*leaving);
-                later("quad_valid", later("quad_next", quad_soon));
-                later("layer_valid", later("layer_next", soon & *leaving));
+                let quad_soon = io.quad_soon.set(soon & !*leaving);
+                shown(io.quad_valid, later("quad_next", quad_soon));
+                shown(io.layer_valid, later("layer_next", soon & *leaving));
             }
         }
 
-        self.check(&k, which, control, || later("valid2", valid1), coefficients);
-        let shared = Shared { coefficients, operands, adds: valid1, ends };
-        let heads: Vec<Expr> = (0..4).rev().map(|parity| self.parity(&k, rst, parity, shared)).collect();
-        k.wire("quad", concat(&heads));
-        k.finish()
+        self.check(k, &io, || later("valid2", valid1), coefficients);
+        let shared = Shared { coefficients, operands: io.operands, adds: valid1, ends };
+        let heads: Vec<Expr> = (0..4).rev().map(|parity| self.parity(k, io.rst, parity, shared)).collect();
+        io.quad.set(concat(&heads));
     }
+}
 
+impl Lanes {
     /// One coefficient per lane, three cycles after its address.
-    fn coefficients<'k>(&self, k: &'k Builder, address: Expr<'k>, write: [Expr<'k>; 4]) -> Expr<'k> {
+    fn coefficients<'k>(&self, k: &'k Builder, io: &LanesPorts<Inside<'k>>) -> Expr<'k> {
+        let address = io.address;
         let (lanes, (narrow, low)) = (4 * self.per_parity, self.narrow);
         let (wide_words, low_words) = self.memory.split_at(self.memory.len() - narrow);
         let file = |name: &str, words| Contents::File { name: name.to_owned(), words };
@@ -265,7 +215,7 @@ impl Shape {
         if narrow == 0 {
             let memory =
                 k.memory("memory", words.len(), lanes * M, file(MEMORY_FILE, words)).holds(Holds::Coefficients);
-            let memory = self.written(memory, write);
+            let memory = self.written(memory, io);
             return read("coefficients", memory, k.delay("at", address));
         }
         let zeros = wide_words.len();
@@ -294,29 +244,29 @@ impl Shape {
     }
 
     /// The memory with its write port, where coefficients are written. Nothing is read during the reset in which they are.
-    fn written<'k>(&self, memory: MemoryPort<'k>, write: [Expr<'k>; 4]) -> MemoryPort<'k> {
-        let [write, address, pair, coefficients] = write;
+    fn written<'k>(&self, memory: MemoryPort<'k>, io: &LanesPorts<Inside<'k>>) -> MemoryPort<'k> {
         if self.written.words == 0 {
             return memory;
         }
         let memory = memory.unchecked();
         for own in 0..self.written.pairs {
-            memory.write_part(write & pair.is(own as u64), address, own * PAIR_BITS, coefficients);
+            let enable = io.coefficient_write & io.coefficient_pair.is(own as u64);
+            memory.write_part(enable, io.coefficient_word, own * PAIR_BITS, io.coefficient_data);
         }
         memory
     }
 
     /// Rows that leave after the present group; a counter of the groups where there are several.
-    fn rows<'k>(&self, k: &'k Builder, which: Expr<'k>, rst: Expr<'k>, captured: Expr<'k>) -> Expr<'k> {
+    fn rows<'k>(&self, k: &'k Builder, io: &LanesPorts<Inside<'k>>, captured: Expr<'k>) -> Expr<'k> {
         let row_bits = count_bits(self.per_parity + 1);
-        let last_rows = value_by_case(k, which, &self.last_rows, row_bits);
+        let last_rows = value_by_case(k, io.which, &self.last_rows, row_bits);
         let groups = largest(&self.groups);
         if groups == 1 {
             return last_rows;
         }
         let ends: Vec<usize> = self.groups.iter().map(|groups| groups - 1).collect();
-        let group = k.state("group", Type::unsigned(count_bits(groups)), rst, 0);
-        let is_last = k.wire("last_group", group.equals(value_by_case(k, which, &ends, group.bits())));
+        let group = k.state("group", Type::unsigned(count_bits(groups)), io.rst, 0);
+        let is_last = k.wire("last_group", group.equals(value_by_case(k, io.which, &ends, group.bits())));
         k.when(captured, || group.set(is_last.mux(k.constant(group.bits(), 0), group.plus(1))));
         is_last.mux(last_rows, k.constant(row_bits, self.per_parity as u64))
     }
@@ -326,13 +276,12 @@ impl Shape {
     fn check<'k>(
         &self,
         k: &'k Builder,
-        which: Expr<'k>,
-        control: Expr<'k>,
+        io: &LanesPorts<Inside<'k>>,
         valid2: impl FnOnce() -> Expr<'k>,
         coefficients: Expr<'k>,
     ) {
         let Some(signatures) = &self.signatures else {
-            k.wire("damaged", k.constant(1, 0));
+            io.damaged.set(k.constant(1, 0));
             return;
         };
         let parities = |of: Expr<'k>, bits: usize| {
@@ -341,7 +290,7 @@ impl Shape {
         };
         let odd_lanes = k.delay("odd_lanes", parities(coefficients, M));
         let odd_fours = k.delay("odd_fours", parities(odd_lanes, 4));
-        let opens1 = k.delay("opens1", control.at(self.control.opens_at().unwrap_or(0)));
+        let opens1 = k.delay("opens1", io.control.at(self.control.opens_at().unwrap_or(0)));
         let opens2 = k.delay("opens2", opens1);
         k.comment("Signature of the coefficients read, compared with the expected one.");
         let signature = k.register("signature", Type::unsigned(32));
@@ -352,15 +301,15 @@ impl Shape {
         let expected: Vec<usize> = signatures.iter().map(|&signature| signature as usize).collect();
         let differs = |which: Expr<'k>| signature.differs(value_by_case(k, which, &expected, 32));
         if !self.in_turn {
-            k.wire("damaged", differs(which));
+            io.damaged.set(differs(io.which));
             return;
         }
         k.comment("A section that begins keeps whether one before it in its subarray was damaged.");
-        let (section, earlier) = (k.register("section", which.ty()), k.register("earlier", Type::unsigned(1)));
-        let damaged = k.wire("damaged", differs(*section) | *earlier);
+        let (section, earlier) = (k.register("section", io.which.ty()), k.register("earlier", Type::unsigned(1)));
+        let damaged = io.damaged.set(differs(*section) | *earlier);
         k.when(opens2 & valid2, || {
-            section.set(which);
-            earlier.set(!which.is(0) & damaged);
+            section.set(io.which);
+            earlier.set(!io.which.is(0) & damaged);
         });
     }
 
@@ -407,15 +356,16 @@ mod tests {
     use dermis_golden::fixed::stages::load::COEFFICIENTS_PER_WORD;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
     /// Three lanes per parity and two cases: one group of two rows, two groups of which the second has one row.
-    fn shape() -> Shape {
+    fn shape() -> Lanes {
         let mut random = fastrand::Rng::with_seed(8);
         let mut coefficient = || random.i64(-(1 << (M - 1))..1 << (M - 1));
         let memory = (0..20).map(|_| (0..12).map(|_| coefficient()).collect()).collect();
-        Shape {
+        Lanes {
             per_parity: 3,
             lane_bits: 41,
             groups: vec![1, 2],
@@ -439,7 +389,7 @@ mod tests {
     }
 
     struct Integers {
-        shape: Shape,
+        shape: Lanes,
         /// The products of one, two and three cycles ago.
         pipe: [Beat; 3],
         addresses: [usize; 3],
@@ -557,7 +507,7 @@ mod tests {
 
     /// Accumulations of random length with gaps, one of them after the end; an end at least as many cycles after the
     /// last as rows leave; resets, and another case after a reset.
-    fn stimulus(shape: &Shape, cycles: usize) -> Vec<Vec<Word>> {
+    fn stimulus(shape: &Lanes, cycles: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(9);
         let (mut case, mut first, mut since) = (0u64, true, 0);
         // Cycles since a write, after which the next address is that of a product.
@@ -612,7 +562,7 @@ mod tests {
     /// the same rows: sections change between two accumulations.
     #[test]
     fn a_section_tells_of_those_before_it() {
-        let mut shape = Shape { in_turn: true, groups: vec![1; 2], last_rows: vec![2; 2], ..shape() };
+        let mut shape = Lanes { in_turn: true, groups: vec![1; 2], last_rows: vec![2; 2], ..shape() };
         shape.memory = vec![shape.memory[0].clone(); shape.memory.len()];
         let after = |words: usize| (0..words).fold(START, |signature, _| step(signature, parity(&shape.memory[0])));
         shape.signatures = Some(vec![after(6), after(7)]);
@@ -632,17 +582,17 @@ mod tests {
         let shape = shape();
         let written =
             CoefficientPlaces { words: shape.memory.len(), pairs: 4 * shape.per_parity / COEFFICIENTS_PER_WORD };
-        is_equal(Shape { signatures: None, written, ..shape });
+        is_equal(Lanes { signatures: None, written, ..shape });
     }
 
     #[test]
     fn rows_of_layers_leave_apart() {
-        let shape = Shape { control: Control { layers: true, opens: true }, ..shape() };
-        is_equal(Shape { groups: vec![1, 2], ..shape });
+        let shape = Lanes { control: Control { layers: true, opens: true }, ..shape() };
+        is_equal(Lanes { groups: vec![1, 2], ..shape });
     }
 
-    fn is_equal(shape: Shape) {
-        let block = Lanes::of(&shape);
+    fn is_equal(shape: Lanes) {
+        let kernel = kernel_of(&shape);
         let stimulus = stimulus(&shape, 6000);
         let mut reference = Integers {
             pipe: Default::default(),
@@ -658,13 +608,13 @@ mod tests {
             earlier: None,
             shape,
         };
-        check(block.kernel.kernel(), &stimulus, &mut reference);
+        check(&kernel, &stimulus, &mut reference);
     }
 
     #[test]
     fn a_line_of_the_memory_file_has_lane_0_lowest() {
-        let block = Lanes::of(&Shape { memory: vec![[-1, 0, 1].repeat(4); 2], ..shape() });
-        let [(_, text)] = &block.memory_files()[..] else { panic!("one file") };
+        let kernel = kernel_of(&Lanes { memory: vec![[-1, 0, 1].repeat(4); 2], ..shape() });
+        let [(_, text)] = &kernel.memory_files()[..] else { panic!("one file") };
         // All digits of 12 lanes of 18 bits; −1, 1, 0 and −1 in the lowest four.
         assert_eq!(text.lines().count(), 2);
         assert!(text.lines().all(|line| line.len() == 54 && line.ends_with("c000100003ffff")), "{text}");

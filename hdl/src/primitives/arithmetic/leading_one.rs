@@ -22,22 +22,41 @@ pub fn by_leading_one<'k>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block;
     use crate::language::testbench::{check, Pipeline};
-    use crate::language::Body;
+    use crate::language::{kernel_of, Block, Inside};
     use crate::wire::Word;
+
+    const BITS: usize = 9;
+    const RANGE: std::ops::Range<usize> = 2..BITS;
+
+    fn value(at: usize) -> usize {
+        (3 * at + 5) % 16
+    }
+
+    block! {
+        struct LeadingOne {}
+        ports LeadingOnePorts {
+            /// The word.
+            in word: BITS;
+            /// The constant of its leading one.
+            out value: 4;
+        }
+    }
+
+    impl Block for LeadingOne {
+        fn build<'k>(&self, k: &'k Builder, io: LeadingOnePorts<Inside<'k>>) {
+            io.value.set(by_leading_one(k, io.word, RANGE, 4, value));
+        }
+    }
 
     #[test]
     fn every_word_selects_the_constant_of_its_leading_one() {
-        const BITS: usize = 9;
-        let (range, value) = (2..BITS, |at: usize| (3 * at + 5) % 16);
-        let k = Builder::combinational("leading_one");
-        k.wire("value", by_leading_one(&k, k.input("word", BITS), range.clone(), 4, value));
-        let body = Body::new(k.finish(), &[("word", BITS)], &[("value", 4)]);
         let of = |inputs: &[Word]| {
-            let leading = inputs[0].number().checked_ilog2().map(|at| at as usize).filter(|at| range.contains(at));
+            let leading = inputs[0].number().checked_ilog2().map(|at| at as usize).filter(|at| RANGE.contains(at));
             vec![Some(Word::from(leading.map_or(0, value) as u64))]
         };
         let all: Vec<Vec<Word>> = (0..1 << BITS).map(|word: u64| vec![word.into()]).collect();
-        check(body.kernel(), &all, &mut Pipeline::new(0, 1, of));
+        check(&kernel_of(&LeadingOne {}), &all, &mut Pipeline::new(0, 1, of));
     }
 }

@@ -80,29 +80,55 @@ mod tests {
     use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
+    use crate::block;
     use crate::language::testbench::{check, Pipeline};
-    use crate::language::Body;
+    use crate::language::{kernel_of, Block, Inside};
     use crate::wire::Word;
 
     const WIDTHS: [usize; 4] = [5, 17, 32, 63];
+    /// Bits from one argument to the next.
+    const STEP: usize = 64;
+
+    block! {
+        struct Logarithms {}
+        ports LogarithmsPorts {
+            clock;
+            /// An argument of each width.
+            in arguments: WIDTHS.len() * STEP;
+            /// Their logarithms.
+            out logarithms: WIDTHS.len() * LOG_BITS;
+        }
+    }
+
+    impl Block for Logarithms {
+        fn build<'k>(&self, k: &'k Builder, io: LogarithmsPorts<Inside<'k>>) {
+            let log = |(index, bits): (usize, usize)| {
+                let argument = io.arguments.slice(index * STEP, bits);
+                let located = k.wire(&format!("located{bits}"), locate(k, &format!("locate{bits}"), argument));
+                logarithm(k, &format!("log{bits}"), located)
+            };
+            let logs: Vec<Expr> = WIDTHS.into_iter().enumerate().rev().map(log).collect();
+            io.logarithms.set(concat(&logs));
+        }
+    }
 
     #[test]
     fn logarithms_are_those_of_the_model() {
-        let k = Builder::new("logarithms");
-        for bits in WIDTHS {
-            let x = k.input(&format!("x{bits}"), bits);
-            let located = k.wire(&format!("located{bits}"), locate(&k, &format!("locate{bits}"), x));
-            k.wire(&format!("log{bits}"), logarithm(&k, &format!("log{bits}"), located));
-        }
-        let names = WIDTHS.map(|bits| format!("log{bits}"));
-        let outputs: Vec<(&str, usize)> = names.iter().map(|name| (name.as_str(), LOG_BITS)).collect();
-        let body = Body::new(k.finish(), &[], &outputs);
         let mut random = fastrand::Rng::with_seed(1);
         // Leading ones at every position, and 0.
-        let inputs = |_| WIDTHS.map(|bits| Word::from(random.u64(..) >> random.usize(64 - bits..64))).to_vec();
-        let stimulus: Vec<Vec<Word>> = (0..4000).map(inputs).chain([vec![Word::default(); 4]]).collect();
-        let log = |word: &Word| Some(Word::from(log2(word.number() as i64) as u64));
-        let logs = |inputs: &[Word]| inputs.iter().map(log).collect();
-        check(body.kernel(), &stimulus, &mut Pipeline::new(1, WIDTHS.len(), logs));
+        let mut inputs = |_| {
+            let mut word = Word::default();
+            for (index, bits) in WIDTHS.into_iter().enumerate() {
+                word.set(index * STEP, bits, random.u64(..) >> random.usize(64 - bits..64));
+            }
+            vec![word]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).chain([vec![Word::default()]]).collect();
+        let logs = |inputs: &[Word]| {
+            let log = |(index, bits)| log2(inputs[0].field(index * STEP, bits) as i64);
+            let logs: Vec<i64> = WIDTHS.into_iter().enumerate().map(log).collect();
+            vec![Some(Word::of_fields(&logs, LOG_BITS))]
+        };
+        check(&kernel_of(&Logarithms {}), &stimulus, &mut Pipeline::new(1, 1, logs));
     }
 }

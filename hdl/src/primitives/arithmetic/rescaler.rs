@@ -1,126 +1,71 @@
 //! Accumulators to words: shift, round, saturate, count saturations.
 
 use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
-use rust_hdl::prelude::*;
 
-use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::half_up::rounded;
-use crate::wire::Wire;
 
-/// A quad of accumulators: if `measured`, `raw` shifted right by `shift`, otherwise `quad` by the constant shift of an A
-/// pass.
-///
-/// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
-/// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Rescaler {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Sets `saturations` to 0.
-    pub clear: Signal<In, Bit>,
-    /// There is a row; otherwise its saturations are not counted.
-    pub valid: Signal<In, Bit>,
-    /// The row is `raw`, to be shifted by `shift`.
-    pub measured: Signal<In, Bit>,
-    /// Measured right shift; valid with `measured`.
-    pub shift: Wire<In>,
-    /// Four accumulators of v_00, `acc_bits` each, signed; valid with `measured`.
-    pub raw: Wire<In>,
-    /// Four accumulators of an A pass, `lane_bits` each, signed; valid with `valid` while `measured` is low.
-    pub quad: Wire<In>,
-    /// Four v_ij, `vector_bits` each, signed; three cycles after the row.
-    pub words: Wire<Out>,
-    /// Four operands, `data_bits` each, signed; four cycles after the row.
-    pub operands: Wire<Out>,
-    /// Number of saturated words since `clear`, 16 bits, stays at the largest count; includes a row five cycles after
-    /// it.
-    pub saturations: Wire<Out>,
-    kernel: Body,
+block! {
+    /// A quad of accumulators: if `measured`, `raw` shifted right by `shift`, otherwise `quad` by the constant shift of an A
+    /// pass.
+    ///
+    /// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
+    /// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
+    pub struct Rescaler {
+        /// Width of an accumulator of v_00.
+        acc: usize,
+        /// Width of an accumulator of an A pass.
+        lane: usize,
+        /// Width of a word.
+        word: usize,
+        /// Width of an operand.
+        data: usize,
+        /// Shift of an A pass.
+        a_shift: u32,
+    }
+    ports RescalerPorts {
+        clock;
+        /// Sets `saturations` to 0.
+        in clear;
+        /// There is a row; otherwise its saturations are not counted.
+        in valid;
+        /// The row is `raw`, to be shifted by `shift`.
+        in measured;
+        /// Measured right shift; valid with `measured`.
+        in shift: count_bits(*acc);
+        /// Four accumulators of v_00, `acc_bits` each, signed; valid with `measured`.
+        in raw: 4 * acc;
+        /// Four accumulators of an A pass, `lane_bits` each, signed; valid with `valid` while `measured` is low.
+        in quad: 4 * lane;
+        /// Four v_ij, `vector_bits` each, signed; three cycles after the row.
+        out words: 4 * word;
+        /// Four operands, `data_bits` each, signed; four cycles after the row.
+        out operands: 4 * data;
+        /// Number of saturated words since `clear`, 16 bits, stays at the largest count; includes a row five cycles after
+        /// it.
+        out saturations: SATURATION_BITS;
+    }
 }
-
-kernel_block!(
-    Rescaler,
-    clock clk,
-    inputs [clear, valid, measured, shift, raw, quad],
-    outputs [words, operands, saturations]
-);
 
 /// Width of a saturation counter, in bits.
 pub const SATURATION_BITS: usize = 16;
 
-/// Widths of the words.
-#[derive(Clone, Copy)]
-struct Shape {
-    acc: usize,
-    /// Width of an accumulator of an A pass.
-    lane: usize,
-    word: usize,
-    data: usize,
-    /// Shift of an A pass.
-    a_shift: u32,
-}
-
 impl Rescaler {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        let shape = Shape {
+        Rescaler {
             acc: formats.acc_bits as usize,
             lane: formats.lane_bits as usize,
             word: formats.vector_bits as usize,
             data: formats.data_bits as usize,
             a_shift: formats.a_shift,
-        };
-        Rescaler::of(shape)
-    }
-
-    fn of(shape: Shape) -> Self {
-        let block = Rescaler {
-            clk: Default::default(),
-            clear: Default::default(),
-            valid: Default::default(),
-            measured: Default::default(),
-            shift: Wire::new(count_bits(shape.acc)),
-            raw: Wire::new(4 * shape.acc),
-            quad: Wire::new(4 * shape.lane),
-            words: Wire::new(4 * shape.word),
-            operands: Wire::new(4 * shape.data),
-            saturations: Wire::new(SATURATION_BITS),
-            kernel: Body::default(),
-        };
-        block.bind(shape.kernel())
-    }
-}
-
-impl Shape {
-    fn kernel(self) -> Kernel {
-        let k = Builder::new("rescaler");
-        let [clear, valid, measured] = ["clear", "valid", "measured"].map(|name| k.input(name, 1));
-        let shift = k.input("shift", count_bits(self.acc));
-        let (raw, quad) = (k.input("raw", 4 * self.acc), k.input("quad", 4 * self.lane));
-        let extended = |lane: usize| quad.slice(lane * self.lane, self.lane).signed().extend(self.acc);
-        let row = measured.mux(raw, concat(&[3, 2, 1, 0].map(extended)));
-        let taken = k.delay("taken", row);
-        let valid2 = k.delay("valid2", k.delay("valid1", valid));
-        let amount = measured.mux(shift, k.constant(shift.bits(), self.a_shift.into()));
-        let lane = |lane: usize| {
-            let code = taken.slice(lane * self.acc, self.acc);
-            k.scope(&format!("lane_{lane}"), || self.lane(&k, code, amount))
-        };
-        let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
-        let [words, operands, clipped] =
-            [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
-        k.wire("words", words);
-        k.wire("operands", operands);
-
-        let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
-        count_saturations(&k, "saturations", clear, clipped3);
-        k.finish()
+        }
     }
 
     /// Word, operand and saturation of one accumulator.
-    fn lane<'k>(self, k: &'k Builder, code: Expr<'k>, amount: Expr<'k>) -> [Expr<'k>; 3] {
+    fn lane<'k>(&self, k: &'k Builder, code: Expr<'k>, amount: Expr<'k>) -> [Expr<'k>; 3] {
         // One copy per lane: the lanes are placed far apart, near the MAC lanes that feed them.
         let copy = k.register("amount", amount.ty()).keep();
         copy.set(amount);
@@ -131,6 +76,28 @@ impl Shape {
         let most = moved.top().concat((!moved.top()).repeat(self.word - 1));
         let word = k.delay("word", clipped.mux(most, half_up));
         [word, operand_of(k, word, self.data), clipped]
+    }
+}
+
+impl Block for Rescaler {
+    fn build<'k>(&self, k: &'k Builder, io: RescalerPorts<Inside<'k>>) {
+        let extended = |lane: usize| io.quad.slice(lane * self.lane, self.lane).signed().extend(self.acc);
+        let row = io.measured.mux(io.raw, concat(&[3, 2, 1, 0].map(extended)));
+        let taken = k.delay("taken", row);
+        let valid2 = k.delay("valid2", k.delay("valid1", io.valid));
+        let amount = io.measured.mux(io.shift, k.constant(io.shift.bits(), self.a_shift.into()));
+        let lane = |lane: usize| {
+            let code = taken.slice(lane * self.acc, self.acc);
+            k.scope(&format!("lane_{lane}"), || self.lane(k, code, amount))
+        };
+        let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
+        let [words, operands, clipped] =
+            [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
+        io.words.set(words);
+        io.operands.set(operands);
+
+        let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
+        count_saturations(k, "saturations", io.clear, clipped3);
     }
 }
 
@@ -162,10 +129,11 @@ mod tests {
     use dermis_golden::fixed::words::arith::{round_shift, saturate};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { acc: 45, lane: 41, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
+    const SHAPE: Rescaler = Rescaler { acc: 45, lane: 41, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
 
     /// The quads on their way with their shift, and the counts.
     #[derive(Default)]
@@ -226,6 +194,6 @@ mod tests {
             vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), raw, quad]
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(&mut inputs).collect();
-        check(Rescaler::of(SHAPE).kernel.kernel(), &stimulus, &mut Quads::default());
+        check(&kernel_of(&SHAPE), &stimulus, &mut Quads::default());
     }
 }

@@ -4,100 +4,78 @@
 //! an early `tlast` can still drop it; so its first subarray waits for the rest before it is handed over, and of a dropped
 //! frame nothing is.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside, Type};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder, Kernel, Type};
-
-/// Where frames begin whole, all outputs follow from `full` and `begins`, and there is no register.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Arrival {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// The taxel that is accepted is the last of a row of subarrays.
-    pub row_end: Signal<In, Bit>,
-    /// An early `tlast` drops the frame that is received.
-    pub dropped: Signal<In, Bit>,
-    /// The frame buffer has been read.
-    pub free: Signal<In, Bit>,
-    /// The frame buffer holds a whole frame.
-    pub full: Signal<In, Bit>,
-    /// The passes of a frame begin.
-    pub begins: Signal<In, Bit>,
-    /// The passes of a subarray are complete, until it is handed over.
-    pub complete: Signal<In, Bit>,
-    /// What has arrived is enough to begin the passes; where a row of subarrays is, from two cycles after its last taxel.
-    pub ready: Signal<Out, Bit>,
-    /// The frame in the passes is not complete: its first subarray must not be handed over.
-    pub waits: Signal<Out, Bit>,
-    /// The frame in the passes is complete; high for one cycle.
-    pub arrives: Signal<Out, Bit>,
-    /// The passes of a dropped frame have ended: nothing of it is handed over; high for one cycle.
-    pub discards: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// Where frames begin whole, all outputs follow from `full` and `begins`, and there is no register.
+    pub struct Arrival {
+        /// A frame may begin with its first row of subarrays.
+        early: bool,
+    }
+    ports ArrivalPorts {
+        clock;
+        reset;
+        /// The taxel that is accepted is the last of a row of subarrays.
+        in row_end;
+        /// An early `tlast` drops the frame that is received.
+        in dropped;
+        /// The frame buffer has been read.
+        in free;
+        /// The frame buffer holds a whole frame.
+        in full;
+        /// The passes of a frame begin.
+        in begins;
+        /// The passes of a subarray are complete, until it is handed over.
+        in complete;
+        /// What has arrived is enough to begin the passes; where a row of subarrays is, from two cycles after its last taxel.
+        out ready;
+        /// The frame in the passes is not complete: its first subarray must not be handed over.
+        out waits;
+        /// The frame in the passes is complete; high for one cycle.
+        out arrives;
+        /// The passes of a dropped frame have ended: nothing of it is handed over; high for one cycle.
+        out discards;
+    }
 }
-
-kernel_block!(
-    Arrival,
-    clock clk,
-    inputs [rst, row_end, dropped, free, full, begins, complete],
-    outputs [ready, waits, arrives, discards]
-);
 
 impl Arrival {
     /// `early`: a frame may begin with its first row of subarrays.
     pub fn new(early: bool) -> Self {
-        let block = Arrival {
-            clk: Default::default(),
-            rst: Default::default(),
-            row_end: Default::default(),
-            dropped: Default::default(),
-            free: Default::default(),
-            full: Default::default(),
-            begins: Default::default(),
-            complete: Default::default(),
-            ready: Default::default(),
-            waits: Default::default(),
-            arrives: Default::default(),
-            discards: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(early))
+        Arrival { early }
     }
 }
 
-fn kernel(early: bool) -> Kernel {
-    let k = Builder::new("arrival");
-    let [rst, row_end, dropped, free, full, begins, complete] =
-        ["rst", "row_end", "dropped", "free", "full", "begins", "complete"].map(|name| k.input(name, 1));
-    if !early {
-        let none = k.constant(1, 0);
-        for (name, value) in [("ready", full), ("waits", none), ("arrives", begins), ("discards", none)] {
-            k.wire(name, value);
+impl Block for Arrival {
+    fn build<'k>(&self, k: &'k Builder, io: ArrivalPorts<Inside<'k>>) {
+        if !self.early {
+            let none = k.constant(1, 0);
+            io.ready.set(io.full);
+            io.waits.set(none);
+            io.arrives.set(io.begins);
+            io.discards.set(none);
+            return;
         }
-        return k.finish();
+        let state = |name: &str| k.state(name, Type::unsigned(1), io.rst, 0);
+        k.comment("The last codes of the row are in the buffer one cycle after they are accepted.");
+        let (row, ready) = (state("row"), io.ready.state(io.rst, 0));
+        row.set((io.row_end | *row) & !io.free & !io.dropped);
+        ready.set(*row & !io.free & !io.dropped);
+        k.comment("A frame begins one cycle after `ready` is read; a drop in that cycle is of this frame too.");
+        let (waits, lost, dropped_before) = (io.waits.state(io.rst, 0), state("lost"), state("dropped_before"));
+        dropped_before.set(io.dropped);
+        let arrives = io.arrives.set(*waits & io.full & !*lost);
+        let discards = io.discards.set(io.complete & *lost);
+        let waiting = k.wire("waiting", (io.begins | *waits) & !arrives & !discards);
+        waits.set(waiting);
+        lost.set(waiting & (*lost | *dropped_before));
     }
-    let state = |name: &str| k.state(name, Type::unsigned(1), rst, 0);
-    k.comment("The last codes of the row are in the buffer one cycle after they are accepted.");
-    let (row, ready) = (state("row"), state("ready"));
-    row.set((row_end | *row) & !free & !dropped);
-    ready.set(*row & !free & !dropped);
-    k.comment("A frame begins one cycle after `ready` is read; a drop in that cycle is of this frame too.");
-    let (waits, lost, dropped_before) = (state("waits"), state("lost"), state("dropped_before"));
-    dropped_before.set(dropped);
-    let arrives = k.wire("arrives", *waits & full & !*lost);
-    let discards = k.wire("discards", complete & *lost);
-    let waiting = k.wire("waiting", (begins | *waits) & !arrives & !discards);
-    waits.set(waiting);
-    lost.set(waiting & (*lost | *dropped_before));
-    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline, Reference};
     use crate::wire::Word;
 
@@ -150,10 +128,10 @@ mod tests {
             inputs.map(Word::from).to_vec()
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
-        check(Arrival::new(true).kernel.kernel(), &stimulus, &mut Frames::default());
+        check(&kernel_of(&Arrival::new(true)), &stimulus, &mut Frames::default());
         // Whole frames: no state.
         let whole = |inputs: &[Word]| vec![Some(inputs[4]), Some(0.into()), Some(inputs[5]), Some(0.into())];
         let stimulus = random_words(200, &[1; 7]);
-        check(Arrival::new(false).kernel.kernel(), &stimulus, &mut Pipeline::new(0, 4, whole));
+        check(&kernel_of(&Arrival::new(false)), &stimulus, &mut Pipeline::new(0, 4, whole));
     }
 }

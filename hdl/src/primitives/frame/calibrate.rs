@@ -3,246 +3,189 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::prepare::running_zero::RunningZero;
 use dermis_golden::fixed::stages::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
-use rust_hdl::prelude::*;
 
 use super::running_zero::{follow, Beat, Followed, RECOVERY};
-use crate::kernel_block;
-use crate::language::{Body, Builder, Contents, Expr, MemoryPort, Net, Type};
+use crate::block;
+use crate::language::{Block, Builder, Contents, Inside, MemoryPort, Net, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::stream::pass_through::wires;
-use crate::wire::Wire;
+use crate::primitives::stream::pass_through::pass_through;
 
-/// ```text
-/// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
-/// ```
-/// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
-/// table, where the stream passes through. A running zero takes its drift off the difference, which takes 2 cycles more. The
-/// taxel count restarts at `tlast`, as in `receive`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Calibrate {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `bits` wide, two's complement; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's stress in codes, `bits` wide, two's complement, saturated; above it, where zeros run, whether one is at its
-    /// limit. Valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; during a reset.
-    pub write: Signal<In, Bit>,
-    /// Index of the taxel; valid with `write`.
-    pub write_taxel: Wire<In>,
-    /// Zero in the low bits, gain above; valid with `write`.
-    pub write_entry: Wire<In>,
-    /// Every stress is 0, where tables are writable: they are not whole.
-    pub incomplete: Signal<In, Bit>,
-    kernel: Body,
+block! {
+    /// ```text
+    /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
+    /// ```
+    /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
+    /// table, where the stream passes through. A running zero takes its drift off the difference, which takes 2 cycles more. The
+    /// taxel count restarts at `tlast`, as in `receive`.
+    pub struct Calibrate {
+        /// Zero of each taxel.
+        zero: Option<Vec<i32>>,
+        /// Gain of each taxel.
+        gain: Option<Vec<i32>>,
+        running: Option<RunningZero>,
+        taxels: usize,
+        /// Width of a code in bits.
+        bits: usize,
+        /// The table is written.
+        written: bool,
+    }
+    ports CalibratePorts {
+        clock;
+        reset;
+        /// A taxel's code, `bits` wide, two's complement; valid with `s_axis_tvalid`.
+        in s_axis_tdata: bits;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A taxel's stress in codes, `bits` wide, two's complement, saturated; above it, where zeros run, whether one is at its
+        /// limit. Valid with `m_axis_tvalid`.
+        out m_axis_tdata: bits + usize::from(running.is_some());
+        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+        out m_axis_tvalid;
+        /// The receiver accepts a beat in this cycle.
+        in m_axis_tready;
+        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
+        out m_axis_tlast;
+        /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; during a reset.
+        in write;
+        /// Index of the taxel; valid with `write`.
+        in write_taxel: count_bits(*taxels);
+        /// Zero in the low bits, gain above; valid with `write`.
+        in write_entry: bits + GAIN_BITS as usize;
+        /// Every stress is 0, where tables are writable: they are not whole.
+        in incomplete;
+    }
 }
 
-kernel_block!(
-    Calibrate,
-    clock clk,
-    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, write, write_taxel, write_entry, incomplete],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
-);
-
 /// File of the table, one line per taxel: zero in the low bits, gain above.
-pub const CALIBRATION_FILE: &str = "calibration.hex";
+const CALIBRATION_FILE: &str = "calibration.hex";
 
 impl Calibrate {
     /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not.
     pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Self {
-        let Prepare { zero, gain, running, .. } = prepare;
-        Calibrate::of([zero, gain].map(|table| table.as_deref()), running.as_ref(), taxels, bits, written)
+        let Prepare { zero, gain, running, .. } = prepare.clone();
+        Calibrate { zero, gain, running, taxels, bits, written }
     }
 
-    fn of(
-        [zero, gain]: [Option<&[i32]>; 2],
-        running: Option<&RunningZero>,
-        taxels: usize,
-        bits: usize,
-        written: bool,
-    ) -> Self {
-        let block = Calibrate {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(bits + usize::from(running.is_some())),
-            m_axis_tvalid: Default::default(),
-            m_axis_tready: Default::default(),
-            m_axis_tlast: Default::default(),
-            write: Default::default(),
-            write_taxel: Wire::new(count_bits(taxels)),
-            write_entry: Wire::new(bits + GAIN_BITS as usize),
-            incomplete: Default::default(),
-            kernel: Body::default(),
+    /// Width of a gain in the table.
+    fn gain_bits(&self) -> usize {
+        self.gain.as_ref().map_or(0, |_| GAIN_BITS as usize)
+    }
+
+    /// The memory of the table; none without a zero.
+    fn entries<'k>(&self, k: &'k Builder, io: &CalibratePorts<Inside<'k>>) -> Option<MemoryPort<'k>> {
+        let (zero, bits, gain_bits) = (self.zero.as_ref()?, self.bits, self.gain_bits());
+        let word = |taxel: usize| {
+            let gain = self.gain.as_ref().map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
+            vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
         };
-        let passes = zero.is_none() && running.is_none();
-        let k = match passes {
-            true => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
-            false => Builder::new("calibrate"),
-        };
-        let stream = (!passes).then(|| {
-            let bit = |name: &str| k.input(name, 1);
-            let (rst, data) = (bit("rst"), k.input("s_axis_tdata", bits));
-            Stream { rst, data, offered: bit("s_axis_tvalid"), tlast: bit("s_axis_tlast"), ready: bit("m_axis_tready") }
+        let words = (0..self.taxels).map(word).collect();
+        let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words };
+        let entries = k.memory("entries", self.taxels, bits + gain_bits, contents).holds(Holds::Calibration);
+        if !self.written {
+            return Some(entries);
+        }
+        // Nothing is read during the reset in which it is written.
+        let entries = entries.unchecked();
+        entries.write(io.write, io.write_taxel, io.write_entry);
+        Some(entries)
+    }
+
+    fn calibrated<'k>(&self, k: &'k Builder, io: CalibratePorts<Inside<'k>>) {
+        let (bits, gain_bits, rst, tlast) = (self.bits, self.gain_bits(), io.rst, io.s_axis_tlast);
+        let entries = self.entries(k, &io);
+        let steps = 2 + if self.gain.is_some() { 2 } else { 0 } + if self.running.is_some() { 2 } else { 0 };
+        let taxel = k.state("taxel", Type::unsigned(io.write_taxel.bits()), rst, 0);
+        let entry = entries.map(|entries| {
+            let entry = k.register("entry", Type::unsigned(bits + gain_bits));
+            (entry, entries)
         });
-        let write = [
-            ("write", 1),
-            ("write_taxel", block.write_taxel.width()),
-            ("write_entry", block.write_entry.width()),
-            ("incomplete", 1),
-        ];
-        let write = write.map(|(name, bits)| k.input(name, bits));
-        if let Some(stream) = stream {
-            let table = Table { zero, gain, running, written: written.then_some(write) };
-            calibrated(&k, stream, table, [taxels, bits]);
-        }
-        let kernel = k.finish();
-        block.bind(kernel)
-    }
+        let code = k.register("code", Type::signed(bits));
+        let valids = k.state("valids", Type::unsigned(steps), rst, 0);
+        let lasts = k.register("lasts", Type::unsigned(steps));
+        let moves = k.wire("moves", !valids.top() | io.m_axis_tready);
+        let running = self.running.as_ref().map(|zero| {
+            let waits = k.state("waits", Type::unsigned(RECOVERY), rst, 0).comment("After an early `tlast`.");
+            let end = k.wire("at_end", taxel.is(self.taxels as u64 - 1));
+            (zero, waits, end)
+        });
+        let takes = running.map_or(moves, |(_, waits, _)| k.wire("takes", moves & !waits.any()));
+        let offered = running.map_or(io.s_axis_tvalid, |(_, waits, _)| io.s_axis_tvalid & !waits.any());
+        io.s_axis_tready.set(takes & !rst);
+        io.m_axis_tvalid.set(valids.top());
+        io.m_axis_tlast.set(lasts.top());
 
-    /// Content of [`CALIBRATION_FILE`] for `$readmemh`; `None` without a table.
-    pub fn table_file(&self) -> Option<String> {
-        self.kernel.kernel().memory_files().into_iter().next().map(|(_, text)| text)
-    }
-}
-
-/// The table, and how it is written.
-struct Table<'a, 'k> {
-    zero: Option<&'a [i32]>,
-    gain: Option<&'a [i32]>,
-    running: Option<&'a RunningZero>,
-    /// Whether, where, what; whether the table is not whole.
-    written: Option<[Expr<'k>; 4]>,
-}
-
-/// The inputs of the stream.
-struct Stream<'k> {
-    rst: Expr<'k>,
-    data: Expr<'k>,
-    offered: Expr<'k>,
-    tlast: Expr<'k>,
-    ready: Expr<'k>,
-}
-
-/// The memory with the words of `table`, of codes of `bits` bits; none without a zero.
-fn entries<'k>(k: &'k Builder, table: &Table<'_, 'k>, [taxels, bits]: [usize; 2]) -> Option<MemoryPort<'k>> {
-    let (zero, gain) = (table.zero?, table.gain);
-    let gain_bits = gain.map_or(0, |_| GAIN_BITS as usize);
-    let word = |taxel: usize| {
-        let gain = gain.map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
-        vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
-    };
-    let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words: (0..taxels).map(word).collect() };
-    let entries = k.memory("entries", taxels, bits + gain_bits, contents).holds(Holds::Calibration);
-    Some(match table.written {
-        None => entries,
-        Some([write, taxel, entry, _]) => {
-            // Nothing is read during the reset in which it is written.
-            let entries = entries.unchecked();
-            entries.write(write, taxel, entry);
-            entries
-        }
-    })
-}
-
-fn calibrated<'k>(k: &'k Builder, stream: Stream<'k>, table: Table<'_, 'k>, [taxels, bits]: [usize; 2]) {
-    let Stream { rst, data, offered, tlast, ready } = stream;
-    let entries = entries(k, &table, [taxels, bits]);
-    let Table { gain, running, written, .. } = table;
-    let (gain_bits, steps) = gain.map_or((0, 2), |_| (GAIN_BITS as usize, 4));
-    let steps = steps + if running.is_some() { 2 } else { 0 };
-    let taxel = k.state("taxel", Type::unsigned(count_bits(taxels)), rst, 0);
-    let entry = entries.map(|entries| {
-        let entry = k.register("entry", Type::unsigned(bits + gain_bits));
-        (entry, entries)
-    });
-    let code = k.register("code", Type::signed(bits));
-    let valids = k.state("valids", Type::unsigned(steps), rst, 0);
-    let lasts = k.register("lasts", Type::unsigned(steps));
-    let moves = k.wire("moves", !valids.top() | ready);
-    let running = running.map(|zero| {
-        let waits = k.state("waits", Type::unsigned(RECOVERY), rst, 0).comment("After an early `tlast`.");
-        let end = k.wire("at_end", taxel.is(taxels as u64 - 1));
-        (zero, waits, end)
-    });
-    let takes = running.map_or(moves, |(_, waits, _)| k.wire("takes", moves & !waits.any()));
-    let offered = running.map_or(offered, |(_, waits, _)| offered & !waits.any());
-    k.wire("s_axis_tready", takes & !rst);
-    k.wire("m_axis_tvalid", valids.top());
-    k.wire("m_axis_tlast", lasts.top());
-
-    let difference = match &entry {
-        None => *code,
-        Some((entry, _)) => k.wire("difference", *code - entry.low(bits).signed()),
-    };
-    let of_entry = |(entry, _): &(Net<'k>, MemoryPort<'k>)| entry.slice(bits, gain_bits).signed();
-    let factor = gain.and(entry.as_ref()).map(of_entry);
-    let followed = running.map(|(zero, waits, end)| {
-        let early = k.wire("early", tlast & !end);
-        k.when(moves, || waits.set(waits.low(RECOVERY - 1).concat(offered & early)));
-        let (taxel, off, gain, valid) = (*taxel, difference, factor, valids.at(2));
-        follow(k, zero, taxels, Beat { rst, moves, offered, taxel, end, early, off, gain, valid })
-    });
-    let (difference, factor, limited) = match followed {
-        None => (difference, factor, None),
-        Some(Followed { difference, gain, limited }) => (difference, gain, Some(limited)),
-    };
-    let (result, limited) = match factor {
-        None => (difference, limited),
-        Some(factor) => {
-            let held = k.register("held", difference.ty());
-            let held_gain = k.register("held_gain", Type::signed(gain_bits));
-            let dropped = GAIN_FRACTION as usize - 1;
-            let product = k.register("product", Type::signed(difference.bits() + gain_bits - dropped));
-            k.when(moves, || {
-                held.set(difference);
-                held_gain.set(factor);
-                product.set((*held * *held_gain).shift_right(dropped));
+        let difference = match &entry {
+            None => *code,
+            Some((entry, _)) => k.wire("difference", *code - entry.low(bits).signed()),
+        };
+        let of_entry = |(entry, _): &(Net<'k>, MemoryPort<'k>)| entry.slice(bits, gain_bits).signed();
+        let factor = entry.as_ref().filter(|_| self.gain.is_some()).map(of_entry);
+        let followed = running.map(|(zero, waits, end)| {
+            let early = k.wire("early", tlast & !end);
+            k.when(moves, || waits.set(waits.low(RECOVERY - 1).concat(offered & early)));
+            let (taxel, off, gain, valid) = (*taxel, difference, factor, valids.at(2));
+            follow(k, zero, self.taxels, Beat { rst, moves, offered, taxel, end, early, off, gain, valid })
+        });
+        let (difference, factor, limited) = match followed {
+            None => (difference, factor, None),
+            Some(Followed { difference, gain, limited }) => (difference, gain, Some(limited)),
+        };
+        let (result, limited) = match factor {
+            None => (difference, limited),
+            Some(factor) => {
+                let held = k.register("held", difference.ty());
+                let held_gain = k.register("held_gain", Type::signed(gain_bits));
+                let dropped = GAIN_FRACTION as usize - 1;
+                let product = k.register("product", Type::signed(difference.bits() + gain_bits - dropped));
+                k.when(moves, || {
+                    held.set(difference);
+                    held_gain.set(factor);
+                    product.set((*held * *held_gain).shift_right(dropped));
+                });
+                let limited = limited.map(|limited| {
+                    let limits = k.register("limits", Type::unsigned(2));
+                    k.when(moves, || limits.set(limits.low(1).concat(limited)));
+                    limits.top()
+                });
+                (k.wire("rounded", product.round_shift(1)), limited)
+            }
+        };
+        let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
+        let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
+        let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
+        let stress = io.m_axis_tdata.register();
+        k.when(moves, || {
+            valids.set(valids.low(steps - 1).concat(offered));
+            let after = tlast | taxel.is(self.taxels as u64 - 1);
+            k.when(offered, || taxel.set(after.mux(k.constant(taxel.bits(), 0), taxel.plus(1))));
+            lasts.set(lasts.low(steps - 1).concat(tlast));
+            if let Some((entry, entries)) = &entry {
+                entry.set(entries.read(*taxel));
+            }
+            code.set(io.s_axis_tdata.signed());
+            let calibrated = clipped.mux(limit, result.low(bits));
+            let calibrated = limited.map_or(calibrated, |limited| limited.concat(calibrated));
+            stress.set(match self.written {
+                true => io.incomplete.mux(k.constant(calibrated.bits(), 0), calibrated),
+                false => calibrated,
             });
-            let limited = limited.map(|limited| {
-                let limits = k.register("limits", Type::unsigned(2));
-                k.when(moves, || limits.set(limits.low(1).concat(limited)));
-                limits.top()
-            });
-            (k.wire("rounded", product.round_shift(1)), limited)
+        });
+    }
+}
+
+impl Block for Calibrate {
+    fn build<'k>(&self, k: &'k Builder, io: CalibratePorts<Inside<'k>>) {
+        if self.zero.is_some() || self.running.is_some() {
+            return self.calibrated(k, io);
         }
-    };
-    let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
-    let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
-    let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
-    let stress = k.register("m_axis_tdata", Type::unsigned(bits + usize::from(limited.is_some())));
-    k.when(moves, || {
-        valids.set(valids.low(steps - 1).concat(offered));
-        let after = tlast | taxel.is(taxels as u64 - 1);
-        k.when(offered, || taxel.set(after.mux(k.constant(taxel.bits(), 0), taxel.plus(1))));
-        lasts.set(lasts.low(steps - 1).concat(tlast));
-        if let Some((entry, entries)) = &entry {
-            entry.set(entries.read(*taxel));
-        }
-        code.set(data.signed());
-        let calibrated = clipped.mux(limit, result.low(bits));
-        let calibrated = limited.map_or(calibrated, |limited| limited.concat(calibrated));
-        let whole = |[.., incomplete]: [Expr<'k>; 4]| incomplete.mux(k.constant(calibrated.bits(), 0), calibrated);
-        stress.set(written.map_or(calibrated, whole));
-    });
+        let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
+        let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
+        pass_through(k, "No zero and no gain: the stream passes through.", from, to);
+    }
 }
 
 #[cfg(test)]
@@ -252,6 +195,7 @@ pub(crate) mod tests {
     use dermis_golden::fixed::words::arith::{round_shift, saturate};
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
@@ -385,9 +329,16 @@ pub(crate) mod tests {
                 [beat, vec![Word::default(); 4]].concat()
             })
             .collect();
+        let calibrate = |zero: &[i32], gain: Option<&[i32]>, written| Calibrate {
+            zero: Some(zero.to_vec()),
+            gain: gain.map(<[i32]>::to_vec),
+            running: None,
+            taxels: TAXELS,
+            bits: BITS,
+            written,
+        };
         for gain in [None, Some(&gain[..])] {
-            let block = Calibrate::of([Some(&zero), gain], None, TAXELS, BITS, false);
-            check(block.kernel.kernel(), &stimulus, &mut Table::new(&zero, gain, BITS));
+            check(&kernel_of(&calibrate(&zero, gain, false)), &stimulus, &mut Table::new(&zero, gain, BITS));
         }
         // What is written during a reset is used from then on.
         let writes = (0..TAXELS).map(|taxel| {
@@ -398,12 +349,12 @@ pub(crate) mod tests {
             [&[Word::from(true)], &rest[..], &write].concat()
         });
         let written: Vec<Vec<Word>> = writes.chain(stimulus).collect();
-        let block = Calibrate::of([Some(&[0; TAXELS]); 2], None, TAXELS, BITS, true);
-        check(block.kernel.kernel(), &written, &mut Table::new(&zero, Some(&gain), BITS));
+        let kernel = kernel_of(&calibrate(&[0; TAXELS], Some(&[0; TAXELS]), true));
+        check(&kernel, &written, &mut Table::new(&zero, Some(&gain), BITS));
         // Until the table is whole every stress is 0.
         let mut incomplete = written.clone();
         incomplete.iter_mut().for_each(|inputs| inputs[8] = true.into());
-        check(block.kernel.kernel(), &incomplete, &mut Table::new(&zero, Some(&[0; TAXELS]), BITS));
+        check(&kernel, &incomplete, &mut Table::new(&zero, Some(&[0; TAXELS]), BITS));
     }
 
     /// Codes that drift, presses, stalls, resets, early and missing `tlast`; of the fewest taxels too, back to back.
@@ -451,10 +402,16 @@ pub(crate) mod tests {
                 })
                 .collect();
             assert!(frames.iter().all(|count| *count > 50), "{frames:?}");
-            let stored = with_zero.then_some(&zero[..]);
-            let block = Calibrate::of([stored, gain], Some(&running), taxels, BITS, false);
             let table = Table::new(&zero, gain, BITS).running(&running);
-            check(block.kernel.kernel(), &stimulus, &mut { table });
+            let block = Calibrate {
+                zero: with_zero.then_some(zero),
+                gain: gain.map(<[i32]>::to_vec),
+                running: Some(running),
+                taxels,
+                bits: BITS,
+                written: false,
+            };
+            check(&kernel_of(&block), &stimulus, &mut { table });
         }
     }
 }

@@ -1,65 +1,73 @@
 //! Magnitude and signs of each subarray, gathered while the frame arrives.
 
-use rust_hdl::prelude::*;
-
-use crate::kernel_block;
-use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::block;
+use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::address::case_counter::expression_by_case;
 use crate::primitives::address::counter::count_bits;
-use crate::wire::Wire;
 
-/// For each subarray: the OR of the magnitudes of its accepted codes, and whether any code was above the noise floor or
-/// below its negative. `select` chooses the subarray whose values are on the outputs.
-#[derive(dermis_hdl_derive::Block)]
-pub struct FrameStats {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Clears the values of all subarrays, with priority over `accept`.
-    pub clear: Signal<In, Bit>,
-    /// `code` and `part` are valid and taken in.
-    pub accept: Signal<In, Bit>,
-    /// A code, `bits` wide, two's complement; valid with `accept`.
-    pub code: Wire<In>,
-    /// Index of the code's subarray; valid with `accept`.
-    pub part: Wire<In>,
-    /// Index of the subarray on the outputs; combinational.
-    pub select: Wire<In>,
-    /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
-    pub floor: Wire<In>,
-    /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code; includes a code from
-    /// the cycle after its `accept`.
-    pub magnitude: Wire<Out>,
-    /// A code of subarray `select` was above the noise floor.
-    pub positive: Signal<Out, Bit>,
-    /// A code of subarray `select` was below minus the noise floor.
-    pub negative: Signal<Out, Bit>,
-    kernel: Body,
+block! {
+    /// For each subarray: the OR of the magnitudes of its accepted codes, and whether any code was above the noise floor or
+    /// below its negative. `select` chooses the subarray whose values are on the outputs.
+    pub struct FrameStats {
+        /// Width of a code in bits.
+        bits: usize,
+        /// The noise floor in codes; none where it is written.
+        noise_floor: Option<i32>,
+        /// Number of subarrays.
+        parts: usize,
+    }
+    ports FrameStatsPorts {
+        clock;
+        /// Clears the values of all subarrays, with priority over `accept`.
+        in clear;
+        /// `code` and `part` are valid and taken in.
+        in accept;
+        /// A code, `bits` wide, two's complement; valid with `accept`.
+        in code: bits;
+        /// Index of the code's subarray; valid with `accept`.
+        in part: count_bits(*parts);
+        /// Index of the subarray on the outputs; combinational.
+        in select: count_bits(*parts);
+        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+        in floor: noise_floor.map_or(*bits, |_| 1);
+        /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code; includes a code from
+        /// the cycle after its `accept`.
+        out magnitude: bits - 1;
+        /// A code of subarray `select` was above the noise floor.
+        out positive;
+        /// A code of subarray `select` was below minus the noise floor.
+        out negative;
+    }
 }
-
-kernel_block!(
-    FrameStats,
-    clock clk,
-    inputs [clear, accept, code, part, select, floor],
-    outputs [magnitude, positive, negative]
-);
 
 impl FrameStats {
     /// For codes of `bits` bits, a noise floor of `floor` codes, or if there is none, of port `floor`, and `parts` subarrays.
     pub fn new(bits: usize, floor: Option<i32>, parts: usize) -> Self {
-        let block = FrameStats {
-            clk: Default::default(),
-            clear: Default::default(),
-            accept: Default::default(),
-            code: Wire::new(bits),
-            part: Wire::new(count_bits(parts)),
-            select: Wire::new(count_bits(parts)),
-            floor: Wire::new(floor_bits(floor, bits)),
-            magnitude: Wire::new(bits - 1),
-            positive: Default::default(),
-            negative: Default::default(),
-            kernel: Body::default(),
-        };
-        block.bind(kernel(bits, floor, parts))
+        FrameStats { bits, noise_floor: floor, parts }
+    }
+}
+
+impl Block for FrameStats {
+    fn build<'k>(&self, k: &'k Builder, io: FrameStatsPorts<Inside<'k>>) {
+        let magnitude = k.wire("own_magnitude", magnitude_of(io.code));
+        let [above, below] = beyond(k, io.code, self.noise_floor, io.floor);
+        let (above, below) = (k.wire("above", above), k.wire("below", below));
+        // Each the OR over the accepted codes of a subarray.
+        let gathered = [
+            ("magnitude", magnitude, io.magnitude),
+            ("positive", above, io.positive),
+            ("negative", below, io.negative),
+        ];
+        for (name, value, output) in gathered {
+            let of = |number: usize| {
+                let held = k.state(&format!("{name}_of{number}"), Type::unsigned(value.bits()), io.clear, 0);
+                let own = if self.parts == 1 { io.accept } else { io.accept & io.part.is(number as u64) };
+                k.when(own, || held.set(*held | value));
+                *held
+            };
+            let all: Vec<Expr> = (0..self.parts).map(of).collect();
+            output.set(expression_by_case(io.select, &all).unwrap_or(value));
+        }
     }
 }
 
@@ -84,38 +92,12 @@ pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: Option<i32>, wri
     [most.less(code), code.less(least)]
 }
 
-/// Width of port `floor`.
-fn floor_bits(floor: Option<i32>, bits: usize) -> usize {
-    floor.map_or(bits, |_| 1)
-}
-
-fn kernel(bits: usize, floor: Option<i32>, parts: usize) -> Kernel {
-    let k = Builder::new("frame_stats");
-    let (clear, accept, code) = (k.input("clear", 1), k.input("accept", 1), k.input("code", bits));
-    let (part, select) = (k.input("part", count_bits(parts)), k.input("select", count_bits(parts)));
-    let written = k.input("floor", floor_bits(floor, bits));
-    let magnitude = k.wire("own_magnitude", magnitude_of(code));
-    let [above, below] = beyond(&k, code, floor, written);
-    let (above, below) = (k.wire("above", above), k.wire("below", below));
-    // Each the OR over the accepted codes of a subarray.
-    for (name, value) in [("magnitude", magnitude), ("positive", above), ("negative", below)] {
-        let of = |number: usize| {
-            let held = k.state(&format!("{name}_of{number}"), Type::unsigned(value.bits()), clear, 0);
-            let own = if parts == 1 { accept } else { accept & part.is(number as u64) };
-            k.when(own, || held.set(*held | value));
-            *held
-        };
-        let all: Vec<Expr> = (0..parts).map(of).collect();
-        k.wire(name, expression_by_case(select, &all).unwrap_or(value));
-    }
-    k.finish()
-}
-
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::words::arith::magnitude_bits;
 
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
 
@@ -163,7 +145,7 @@ mod tests {
             }
             let block = FrameStats::new(BITS, (!written).then_some(floor as i32), parts);
             let mut seen = Seen { floor: floor as i64, parts, each: Vec::new() };
-            check(block.kernel.kernel(), &stimulus, &mut seen);
+            check(&kernel_of(&block), &stimulus, &mut seen);
         }
     }
 }

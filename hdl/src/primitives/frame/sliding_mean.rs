@@ -12,7 +12,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::spec::sliding::gain_shift;
 
-use crate::language::{Builder, Contents, Expr, Kernel, Type};
+use crate::language::{Builder, Contents, Expr, Output, Type};
 use crate::primitives::address::counter::count_bits;
 
 /// Width of the number of frames in the mean, which stops where all its bits are set.
@@ -20,85 +20,103 @@ pub fn frames_bits(power: u32) -> usize {
     power as usize + 1
 }
 
-/// For words of `bits` bits of `taxels` taxels, at least three; the last gain is 2^−`power`. With the bit `limited` above a
-/// word, which leaves above the number of frames.
-pub fn kernel(taxels: usize, bits: usize, power: u32, limited: bool) -> Kernel {
-    let k = Builder::new("average");
-    let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power as usize);
-    let (shift, count) = (Type::unsigned(count_bits(power as usize + 1)), Type::unsigned(frames_bits(power)));
-    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits + usize::from(limited)));
-    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
-    let means = k.memory("means", taxels, wide, Contents::Undefined).holds(Holds::Average);
-    k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
-    let taxel = k.state("taxel", index, rst, 0);
-    let gain = k.state("gain", shift, rst, 0);
-    let odd = k.state("odd", bit, rst, 0);
-    let whole = k.state("whole", count, rst, 0);
-    let [held, added, valid] = ["held", "added", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));
-    let (word, sofar) = (k.register("word", Type::signed(bits)), k.register("sofar", Type::signed(wide)));
-    let (held_taxel, added_taxel) = (k.register("held_taxel", index), k.register("added_taxel", index));
-    let held_gain = k.register("held_gain", shift);
-    let held_odd = k.register("held_odd", bit);
-    let [held_last, added_last, last_out] =
-        ["held_last", "added_last", "m_axis_tlast"].map(|name| k.register(name, bit));
-    let marks = Type::unsigned(count.bits + usize::from(limited));
-    let [held_frames, added_frames, frames] =
-        ["held_frames", "added_frames", "frames"].map(|name| k.register(name, marks));
-    let (mean, mean_out) = (k.register("mean", Type::signed(wide)), k.register("m_axis_tdata", Type::unsigned(wide)));
-    let moved = k.register("moved", Type::signed(wide + 2));
+/// The sizes of a sliding mean.
+pub(super) struct SlidingMean {
+    /// Taxels of a frame, at least three.
+    pub taxels: usize,
+    /// Width of a word in bits.
+    pub bits: usize,
+    /// k: the last gain is 2^−k.
+    pub power: usize,
+    /// There is a bit above a word, which leaves above the number of frames.
+    pub limited: bool,
+}
 
-    let at_end = k.wire("at_end", taxel.is(taxels as u64 - 1));
-    let early = k.wire("early", tlast & !at_end);
-    let next = k.wire("next", whole.all().mux(*whole, whole.plus(1)));
-    let rises = k.wire("rises", rises(&k, *whole, power));
-    k.comment("Of the first frame nothing has been stored.");
-    let stored = k.wire("stored", held_gain.is(0).mux(k.signed_constant(wide, 0), *sofar));
-    // 2 (2^k word − mean) − c, which the shift rounds down to the same as 2 (2^k word − mean − c): g is 0 only with c = 0.
-    let difference = word.shift_left(power as usize + 1) - stored.unsigned().concat(*held_odd).signed();
-    let half = (mean.unsigned().concat(k.constant(1, 1)).signed() + *moved).slice(1, wide);
-    let result = k.wire("result", half);
-    let moves = k.wire("moves", !*valid | ready);
-    k.wire("s_axis_tready", moves & !rst);
-    k.when(moves, || {
-        k.when(offered, || {
-            taxel.set((early | at_end).mux(k.constant(taxel.bits(), 0), taxel.plus(1)));
-            k.when(at_end, || {
-                whole.set(next);
-                odd.set(!*odd);
-                gain.set((*gain + rises).low(gain.bits()));
+impl SlidingMean {
+    /// Data, `tvalid`, `tlast` and `m_axis_tready` to data, `tvalid`, `tlast`, `s_axis_tready`, and to the number of frames.
+    pub fn build<'k>(
+        &self,
+        k: &'k Builder,
+        rst: Expr<'k>,
+        [data, offered, tlast, ready]: [Expr<'k>; 4],
+        [data_out, valid_out, last_out, ready_out]: [Output<'k>; 4],
+        frames: Output<'k>,
+    ) {
+        let (power, wide) = (self.power, self.bits + self.power);
+        let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
+        let (shift, count) = (Type::unsigned(count_bits(power + 1)), Type::unsigned(power + 1));
+        let means = k.memory("means", self.taxels, wide, Contents::Undefined).holds(Holds::Average);
+        k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
+        let taxel = k.state("taxel", index, rst, 0);
+        let gain = k.state("gain", shift, rst, 0);
+        let odd = k.state("odd", bit, rst, 0);
+        let whole = k.state("whole", count, rst, 0);
+        let [held, added] = ["held", "added"].map(|name| k.state(name, bit, rst, 0));
+        let valid = valid_out.state(rst, 0);
+        let (word, sofar) = (k.register("word", Type::signed(self.bits)), k.register("sofar", Type::signed(wide)));
+        let (held_taxel, added_taxel) = (k.register("held_taxel", index), k.register("added_taxel", index));
+        let held_gain = k.register("held_gain", shift);
+        let held_odd = k.register("held_odd", bit);
+        let [held_last, added_last] = ["held_last", "added_last"].map(|name| k.register(name, bit));
+        let last_out = last_out.register();
+        let marks = Type::unsigned(frames.bits());
+        let [held_frames, added_frames] = ["held_frames", "added_frames"].map(|name| k.register(name, marks));
+        let frames = frames.register();
+        let (mean, mean_out) = (k.register("mean", Type::signed(wide)), data_out.register());
+        let moved = k.register("moved", Type::signed(wide + 2));
+
+        let at_end = k.wire("at_end", taxel.is(self.taxels as u64 - 1));
+        let early = k.wire("early", tlast & !at_end);
+        let next = k.wire("next", whole.all().mux(*whole, whole.plus(1)));
+        let rises = k.wire("rises", rises(k, *whole, power));
+        k.comment("Of the first frame nothing has been stored.");
+        let stored = k.wire("stored", held_gain.is(0).mux(k.signed_constant(wide, 0), *sofar));
+        // 2 (2^k word − mean) − c, which the shift rounds down to the same as 2 (2^k word − mean − c): g is 0 only with c = 0.
+        let difference = word.shift_left(power + 1) - stored.unsigned().concat(*held_odd).signed();
+        let half = (mean.unsigned().concat(k.constant(1, 1)).signed() + *moved).slice(1, wide);
+        let result = k.wire("result", half);
+        let moves = k.wire("moves", !*valid | ready);
+        ready_out.set(moves & !rst);
+        k.when(moves, || {
+            k.when(offered, || {
+                taxel.set((early | at_end).mux(k.constant(taxel.bits(), 0), taxel.plus(1)));
+                k.when(at_end, || {
+                    whole.set(next);
+                    odd.set(!*odd);
+                    gain.set((*gain + rises).low(gain.bits()));
+                });
+                k.when(early, || {
+                    whole.set(k.constant(whole.bits(), 0));
+                    odd.set(k.constant(1, 0));
+                    gain.set(k.constant(gain.bits(), 0));
+                });
             });
-            k.when(early, || {
-                whole.set(k.constant(whole.bits(), 0));
-                odd.set(k.constant(1, 0));
-                gain.set(k.constant(gain.bits(), 0));
-            });
+            held.set(offered);
+            word.set(data.low(self.bits).signed());
+            sofar.set(means.read(*taxel).signed());
+            held_taxel.set(*taxel);
+            held_gain.set(*gain);
+            held_odd.set(*odd);
+            held_last.set(tlast);
+            held_frames.set(if self.limited { data.top().concat(next) } else { next });
+            added.set(*held);
+            mean.set(stored);
+            moved.set(difference.shift_right_by(*held_gain));
+            added_taxel.set(*held_taxel);
+            added_last.set(*held_last);
+            added_frames.set(*held_frames);
+            valid.set(*added);
+            mean_out.set(result);
+            last_out.set(*added_last);
+            frames.set(*added_frames);
         });
-        held.set(offered);
-        word.set(data.low(bits).signed());
-        sofar.set(means.read(*taxel).signed());
-        held_taxel.set(*taxel);
-        held_gain.set(*gain);
-        held_odd.set(*odd);
-        held_last.set(tlast);
-        held_frames.set(if limited { data.top().concat(next) } else { next });
-        added.set(*held);
-        mean.set(stored);
-        moved.set(difference.shift_right_by(*held_gain));
-        added_taxel.set(*held_taxel);
-        added_last.set(*held_last);
-        added_frames.set(*held_frames);
-        valid.set(*added);
-        mean_out.set(result);
-        last_out.set(*added_last);
-        frames.set(*added_frames);
-    });
-    means.write(moves & *added, *added_taxel, result);
-    k.finish()
+        means.write(moves & *added, *added_taxel, result);
+    }
 }
 
 /// Whether g grows by one from the frame after `whole` frames to the frame after that.
-fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: u32) -> Expr<'k> {
-    let grows = |whole: &usize| gain_shift(whole + 2, power) > gain_shift(whole + 1, power);
+fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: usize) -> Expr<'k> {
+    let grows = |whole: &usize| gain_shift(whole + 2, power as u32) > gain_shift(whole + 1, power as u32);
     let numbers = (0..1 << power).filter(grows).map(|number| whole.is(number as u64));
     numbers.reduce(|any, one| any | one).unwrap_or(k.constant(1, 0))
 }

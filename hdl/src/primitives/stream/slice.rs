@@ -1,36 +1,41 @@
 //! The low bits of a word.
 
-use rust_hdl::prelude::*;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 
-use crate::kernel_block;
-use crate::language::{Body, Builder};
-use crate::wire::Wire;
-
-/// The least significant bits of a wider word; combinational.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Slice {
-    /// The word of which the low bits are shown; taken in every cycle.
-    pub word: Wire<In>,
-    /// Its low bits; combinational.
-    pub low: Wire<Out>,
-    kernel: Body,
+block! {
+    /// The least significant bits of a wider word; combinational.
+    pub struct Slice {
+        /// Width of the word in bits.
+        bits: usize,
+        /// Number of its bits that are shown.
+        low: usize,
+    }
+    ports SlicePorts {
+        /// The word of which the low bits are shown; taken in every cycle.
+        in word: bits;
+        /// Its low bits; combinational.
+        out low: low;
+    }
 }
-
-kernel_block!(Slice, inputs[word], outputs[low]);
 
 impl Slice {
     /// The low `low` bits of words of `bits` bits.
     pub fn new(bits: usize, low: usize) -> Self {
-        let block = Slice { word: Wire::new(bits), low: Wire::new(low), kernel: Body::default() };
-        let k = Builder::combinational("slice");
-        k.wire("low", k.input("word", bits).low(low));
-        block.bind(k.finish())
+        Slice { bits, low }
+    }
+}
+
+impl Block for Slice {
+    fn build<'k>(&self, _: &'k Builder, io: SlicePorts<Inside<'k>>) {
+        io.low.set(io.word.low(self.low));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Pipeline};
     use crate::wire::Word;
 
@@ -43,7 +48,7 @@ mod tests {
                 vec![Some(kept)]
             };
             let block = Slice::new(130, low);
-            check(block.kernel.kernel(), &random_words(200, &[130]), &mut Pipeline::new(0, 1, of));
+            check(&kernel_of(&block), &random_words(200, &[130]), &mut Pipeline::new(0, 1, of));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Both kernels against sums and means in plain integers, with stalls, resets and framing errors.
 
 use super::*;
+use crate::language::kernel_of;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
@@ -93,7 +94,7 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
         })
         .collect();
     let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block, FrameMarks::default());
-    check(average.kernel.kernel(), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
+    check(&kernel_of(&average), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
 /// A word on its way through the block: mean, `tlast`, number of frames.
@@ -184,8 +185,8 @@ fn every_frame_gives_the_mean_so_far() {
             })
             .collect();
         assert!(most > 2 << power, "{most} frames");
-        let marks = FrameMarks { frames_bits: sliding_mean::frames_bits(power), limited: false };
+        let marks = FrameMarks { frames_bits: frames_bits(power), limited: false };
         let average = Average::new(TAXELS, BITS, power, MeanKind::Sliding, marks);
-        check(average.kernel.kernel(), &stimulus, &mut Means::new(power));
+        check(&kernel_of(&average), &stimulus, &mut Means::new(power));
     }
 }

@@ -4,7 +4,8 @@ use dermis_golden::fixed::stages::load::{beats, Outcome};
 use dermis_golden::fixed::{Intake, Model};
 
 use super::*;
-use crate::language::testbench::{block_subject, check, check_with_defects, random_words, Pipeline, Reference};
+use crate::language::kernel_of;
+use crate::language::testbench::{check, check_with_defects, random_words, subject_of, Pipeline, Reference};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
@@ -276,7 +277,7 @@ fn is_taken(model: &Model) {
     let writes_coefficients = !loader.coefficient_words().is_empty();
     assert_eq!(ends_with_pair, writes_coefficients, "a short image ends with two coefficients");
     let subject = |changes: &[Change]| {
-        block_subject!(
+        subject_of!(
             Load::new(model),
             changes,
             inputs [rst, idle, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
@@ -311,10 +312,10 @@ fn is_taken(model: &Model) {
 #[test]
 fn without_writable_tables_the_stream_passes() {
     let model = model(2, 3, "");
-    let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1, 1]);
+    let stimulus = random_words(500, &[1, 1, model.formats().code_bits as usize, 1, 1, 1]);
     let of = |inputs: &[Word]| {
-        let stream = [1, 2, 3, 4, 0].map(|input| Some(inputs[input]));
+        let stream = [2, 3, 4, 5, 0].map(|input| Some(inputs[input]));
         stream.into_iter().chain([Some(Word::default()); 11]).collect()
     };
-    check(Load::new(&model).kernel.kernel(), &stimulus, &mut Pipeline::new(0, 16, of));
+    check(&kernel_of(&Load::new(&model)), &stimulus, &mut Pipeline::new(0, 16, of));
 }
