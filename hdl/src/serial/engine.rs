@@ -22,7 +22,7 @@ engine! {
     /// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
     pub struct Engine {
         stages {
-            receive: Receive => "receive.rs",
+            receive: RustHdl<Receive> => "receive.rs",
             reorder: RustHdl<TaxelReorder> => "taxel_reorder.rs",
             pass_sequencer: RustHdl<PassSequencer> => "pass_sequencer.rs",
             rounder: RustHdl<Rounder> => "rounder.rs",
@@ -73,7 +73,7 @@ impl Engine {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            receive: Receive::new(f, model.noise_floor),
+            receive: RustHdl::new(Receive::new(f, model.noise_floor)),
             reorder: RustHdl::new(TaxelReorder::new(model.layout())),
             pass_sequencer: RustHdl::new(PassSequencer::new(f, unrounded, rounded)),
             rounder: RustHdl::new(Rounder::new(unrounded, rounded)),

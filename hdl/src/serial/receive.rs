@@ -4,135 +4,104 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::Formats;
-use rust_hdl::prelude::*;
 
-use crate::language::RustHdl;
+use crate::block;
+use crate::language::{Block, Builder, Inside};
 use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};
-use crate::wire::Wire;
 
-/// ```text
-/// s_axis --> frame buffer --> word (one cycle after read_address)
-///       \--> magnitude, positive, negative
-/// ```
-/// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing as
-/// in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing` until
-/// `reported`.
-#[derive(dermis_hdl_derive::Block)]
-pub struct Receive {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A beat is accepted in this cycle.
-    pub accept: Signal<Out, Bit>,
-    /// The frame buffer holds a whole frame; high until `free`.
-    pub full: Signal<Out, Bit>,
-    /// The frame has been read: the buffer may be overwritten.
-    pub free: Signal<In, Bit>,
-    /// Row-major index of the taxel to read; taken in every cycle.
-    pub read_address: Wire<In>,
-    /// Its code, signed; one cycle after `read_address`.
-    pub word: Wire<Out>,
-    /// OR of the codes' magnitudes, `input_bits` − 1 wide; valid while `full`.
-    pub magnitude: Wire<Out>,
-    /// A code is above the noise floor; valid while `full`.
-    pub positive: Signal<Out, Bit>,
-    /// A code is below minus the noise floor; valid while `full`.
-    pub negative: Signal<Out, Bit>,
-    /// `tlast` was early or missing since the last `reported`.
-    pub framing: Signal<Out, Bit>,
-    /// Clears `framing`.
-    pub reported: Signal<In, Bit>,
-    taxels: RustHdl<Counter>,
-    frame: RustHdl<Ram>,
-    stats: RustHdl<FrameStats>,
-    whole: RustHdl<Dff>,
-    broken: RustHdl<Dff>,
-    taken: Signal<Local, Bit>,
-    early: Signal<Local, Bit>,
+block! {
+    /// ```text
+    /// s_axis --> frame buffer --> word (one cycle after read_address)
+    ///       \--> magnitude, positive, negative
+    /// ```
+    /// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing
+    /// as in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing`
+    /// until `reported`.
+    pub struct Receive {
+        /// Width of a code in bits.
+        bits: usize,
+        /// Taxels of a frame.
+        taxels: usize,
+        /// Noise floor in codes.
+        floor: i32,
+    }
+    ports ReceivePorts {
+        clock;
+        reset;
+        /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
+        in s_axis_tdata: bits;
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        in s_axis_tvalid;
+        /// The block accepts a beat in this cycle.
+        out s_axis_tready;
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        in s_axis_tlast;
+        /// A beat is accepted in this cycle.
+        out accept;
+        /// The frame buffer holds a whole frame; high until `free`.
+        out full;
+        /// The frame has been read: the buffer may be overwritten.
+        in free;
+        /// Row-major index of the taxel to read; taken in every cycle.
+        in read_address: count_bits(*taxels);
+        /// Its code, signed; one cycle after `read_address`.
+        out word: bits;
+        /// OR of the codes' magnitudes, `input_bits` − 1 wide; valid while `full`.
+        out magnitude: bits - 1;
+        /// A code is above the noise floor; valid while `full`.
+        out positive;
+        /// A code is below minus the noise floor; valid while `full`.
+        out negative;
+        /// `tlast` was early or missing since the last `reported`.
+        out framing;
+        /// Clears `framing`.
+        in reported;
+    }
 }
 
 impl Receive {
     /// For frames of `4 · formats.quads` taxels and a noise floor of `floor` codes.
     pub fn new(formats: &Formats, floor: i32) -> Self {
-        let (taxels, bits) = (4 * formats.quads, formats.input_bits as usize);
-        Receive {
-            clk: Default::default(),
-            rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
-            s_axis_tvalid: Default::default(),
-            s_axis_tready: Default::default(),
-            s_axis_tlast: Default::default(),
-            accept: Default::default(),
-            full: Default::default(),
-            free: Default::default(),
-            read_address: Wire::new(count_bits(taxels)),
-            word: Wire::new(bits),
-            magnitude: Wire::new(bits - 1),
-            positive: Default::default(),
-            negative: Default::default(),
-            framing: Default::default(),
-            reported: Default::default(),
-            taxels: RustHdl::new(Counter::new(taxels)),
-            frame: RustHdl::new(Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }])),
-            stats: RustHdl::new(FrameStats::new(bits, Some(floor), 1)),
-            whole: Default::default(),
-            broken: Default::default(),
-            taken: Default::default(),
-            early: Default::default(),
-        }
+        Receive { bits: formats.input_bits as usize, taxels: 4 * formats.quads, floor }
     }
 }
 
-impl Logic for Receive {
-    #[hdl_gen]
-    fn update(&mut self) {
-        self.taxels.clk.next = self.clk.val();
-        self.frame.clk.next = self.clk.val();
-        self.stats.clk.next = self.clk.val();
-        self.whole.clk.next = self.clk.val();
-        self.broken.clk.next = self.clk.val();
+impl Block for Receive {
+    fn build<'k>(&self, k: &'k Builder, io: ReceivePorts<Inside<'k>>) {
+        let taxels = k.instance("taxels", Counter::new(self.taxels));
+        let frame = Ram::new(self.taxels, 1, self.bits).holding([Holds::Frame { case: 0, lane: 0 }]);
+        let frame = k.instance("frame", frame);
+        let stats = k.instance("stats", FrameStats::new(self.bits, Some(self.floor), 1));
+        let whole = k.instance("whole", Dff {});
+        let broken = k.instance("broken", Dff {});
 
-        self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
-        self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();
-        self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.taxels.last.val();
-        self.accept.next = self.taken.val();
+        io.s_axis_tready.set(!whole.q & !io.rst);
+        let taken = k.wire("taken", io.s_axis_tvalid & !whole.q & !io.rst);
+        let early = k.wire("early", taken & io.s_axis_tlast & !taxels.last);
+        io.accept.set(taken);
 
-        self.taxels.enable.next = self.taken.val();
-        self.taxels.clear.next = self.rst.val() | self.early.val();
-        self.frame.write_address.next = self.taxels.value.val();
-        self.frame.write_data.next = self.s_axis_tdata.val();
-        self.frame.write.next = self.taken.val().into();
-        self.frame.read.next = true;
-        self.frame.read_address.next = self.read_address.val();
-        self.word.next = self.frame.read_data.val();
+        taxels.enable.set(taken);
+        taxels.clear.set(io.rst | early);
+        frame.write_address.set(taxels.value);
+        frame.write_data.set(io.s_axis_tdata);
+        frame.write.set(taken);
+        frame.read.set(k.constant(1, 1));
+        frame.read_address.set(io.read_address);
+        io.word.set(frame.read_data);
 
-        self.stats.accept.next = self.taken.val();
-        self.stats.clear.next = self.rst.val() | self.free.val() | self.early.val();
-        self.stats.part.next = false.into();
-        self.stats.select.next = false.into();
-        self.stats.floor.next = false.into();
-        self.stats.code.next = self.s_axis_tdata.val();
-        self.magnitude.next = self.stats.magnitude.val();
-        self.positive.next = self.stats.positive.val();
-        self.negative.next = self.stats.negative.val();
+        stats.accept.set(taken);
+        stats.clear.set(io.rst | io.free | early);
+        [stats.part, stats.select, stats.floor].iter().for_each(|input| input.set(k.constant(1, 0)));
+        stats.code.set(io.s_axis_tdata);
+        io.magnitude.set(stats.magnitude);
+        io.positive.set(stats.positive);
+        io.negative.set(stats.negative);
 
-        self.full.next = self.whole.q.val();
-        self.whole.d.next =
-            (self.whole.q.val() | (self.taken.val() & self.taxels.last.val())) & !self.free.val() & !self.rst.val();
-        self.framing.next = self.broken.q.val();
-        self.broken.d.next = ((self.broken.q.val() & !self.reported.val())
-            | self.early.val()
-            | (self.taken.val() & self.taxels.last.val() & !self.s_axis_tlast.val()))
-            & !self.rst.val();
+        io.full.set(whole.q);
+        whole.d.set((whole.q | (taken & taxels.last)) & !io.free & !io.rst);
+        io.framing.set(broken.q);
+        let missing = taken & taxels.last & !io.s_axis_tlast;
+        broken.d.set(((broken.q & !io.reported) | early | missing) & !io.rst);
     }
 }
 
@@ -142,7 +111,7 @@ mod tests {
     use dermis_golden::fixed::Model;
 
     use super::*;
-    use crate::language::testbench::{block_subject, check_with_defects, MemoryReference, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, MemoryReference, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::stages::Reception;
@@ -205,7 +174,7 @@ mod tests {
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
         let subject = |changes: &[Change]| {
-            block_subject!(
+            subject_of!(
                 Receive::new(model.formats(), model.noise_floor),
                 changes,
                 inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, read_address, reported],
