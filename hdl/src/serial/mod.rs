@@ -11,7 +11,7 @@
 //!                                                                                          candidates, score
 //! ```
 //! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output. [`Engine`]
-//! and [`Receive`] connect blocks by `#[hdl_gen]`; each other block is one [kernel](crate::language).
+//! connects them by `#[hdl_gen]`.
 
 mod banks;
 mod candidates;
@@ -35,7 +35,7 @@ pub use coefficient_shift::CoefficientShift;
 pub(crate) use engine::Serial;
 pub use forces::Forces;
 pub use horner::Horner;
-pub use pass::{Pass, LOW_FILE, WIDE_FILE};
+pub use pass::Pass;
 pub use pass_sequencer::PassSequencer;
 pub use receive::Receive;
 pub use rounder::Rounder;

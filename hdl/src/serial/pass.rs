@@ -16,27 +16,31 @@ use dermis_golden::fixed::words::schedule::Kind;
 use dermis_golden::fixed::Model;
 
 use crate::block;
-use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Kernel, Type};
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
 use crate::primitives::count_bits;
 use crate::wire::Word;
 
 /// File of the coefficients as wide as an operand.
-pub const WIDE_FILE: &str = "coefficients.hex";
+const WIDE_FILE: &str = "coefficients.hex";
 /// File of the low limb of Cz⁺.
-pub const LOW_FILE: &str = "coefficients_low.hex";
+const LOW_FILE: &str = "coefficients_low.hex";
 const OPERAND: usize = OPERAND_BITS as usize;
 
 block! {
     /// Four multiply-accumulate lanes; timing in the module docs.
     pub struct Pass {
+        /// Coefficients by address.
         wide: Vec<[i64; 4]>,
-        /// Of Cz⁺; empty if it has no low limb.
+        /// Low limbs of Cz⁺ by address; empty if it has none.
         low: Vec<[i64; 4]>,
+        /// Width of a low limb.
         low_bits: usize,
         /// Left shift of a product of two high limbs.
         align: usize,
         acc_bits: usize,
+        /// Width of the address of a coefficient.
         address_bits: usize,
+        /// Width of the address of an operand.
         operand_bits: usize,
     }
     ports PassPorts {
@@ -91,12 +95,6 @@ impl Pass {
             address_bits: 2 + 2 * bits,
             operand_bits: count_bits(first_vector(f) + f.operand_vectors()) + bits,
         }
-    }
-
-    /// Memory files of the block with this kernel: name and text.
-    pub fn memory_files(kernel: &Kernel) -> Vec<(&'static str, String)> {
-        let texts = kernel.memory_files().into_iter().map(|(_, text)| text);
-        [WIDE_FILE, LOW_FILE].into_iter().zip(texts).collect()
     }
 }
 

@@ -22,8 +22,11 @@ block! {
     /// Function in the module docs. A total is written to its memory six cycles after its value arrived; the values of
     /// a candidate are 16 cycles apart.
     pub struct Score {
+        /// Width of a value.
         word: usize,
+        /// Width of a floor.
         floor: usize,
+        /// Width of a total.
         score: usize,
         taxels: u64,
     }
