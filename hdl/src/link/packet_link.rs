@@ -9,7 +9,7 @@ use super::{
     CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
 };
 use crate::block;
-use crate::language::{Block, Builder, Inside};
+use crate::language::{Block, Builder, Inside, Outside};
 use crate::primitives::RegisterSlice;
 
 block! {
@@ -21,16 +21,10 @@ block! {
     /// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
     /// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
     pub struct PacketLink {
-        parser: Parser,
-        ingress: FrameIngress,
-        towards: RegisterSlice,
-        back: RegisterSlice,
-        requests: Requests,
-        resultants: Resultants,
-        sources: Sources,
-        packer: Packer,
-        encoder: SlipEncoder,
-        counters: CounterRam,
+        /// What the packets depend on.
+        shape: Shape,
+        /// Answer to a request for the identity.
+        identity: Identity,
     }
     ports PacketLinkPorts {
         clock;
@@ -48,7 +42,7 @@ block! {
         /// The link accepts the byte in this cycle.
         in send_ready;
         /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
-        out s_axis_tdata: towards.widths().m_axis_tdata;
+        out s_axis_tdata: shape.stream_bits();
         /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
         out s_axis_tvalid;
         /// The engine accepts the beat in this cycle.
@@ -75,38 +69,25 @@ block! {
 impl PacketLink {
     /// For the packets of `shape`; requests for the identity are answered with `identity`.
     pub fn new(shape: &Shape, identity: &Identity) -> Self {
-        PacketLink {
-            parser: Parser::new(shape),
-            ingress: FrameIngress::new(shape),
-            towards: RegisterSlice::new(shape.stream_bits(), shape.answers.are_fast()),
-            back: RegisterSlice::new(96, shape.answers.are_fast()),
-            requests: Requests::new(shape),
-            resultants: Resultants::new(shape),
-            sources: Sources::new(shape.answers.are_fast()),
-            packer: Packer::new(shape.payloads()),
-            encoder: SlipEncoder::new(shape.answers.are_fast()),
-            counters: CounterRam::new(identity, shape.answers.are_fast()),
-        }
+        PacketLink { shape: shape.clone(), identity: *identity }
     }
 }
 
 impl Block for PacketLink {
     fn build<'k>(&self, k: &'k Builder, io: PacketLinkPorts<Inside<'k>>) {
+        let registered = self.shape.answers.are_fast();
         let decoder = k.instance("decoder", SlipDecoder::default());
-        let parser = k.instance("parser", &self.parser);
-        let ingress = k.instance("ingress", &self.ingress);
-        let towards = k.instance("towards", &self.towards);
-        let back = k.instance("back", &self.back);
-        let requests = k.instance("requests", &self.requests);
-        let resultants = k.instance("resultants", &self.resultants);
-        let sources = k.instance("sources", &self.sources);
-        let packer = k.instance("packer", &self.packer);
-        let encoder = k.instance("encoder", &self.encoder);
-        let counters = k.instance("counters", &self.counters);
+        let parser = k.instance("parser", Parser::new(&self.shape));
+        let ingress = k.instance("ingress", FrameIngress::new(&self.shape));
+        let towards = k.instance("towards", RegisterSlice::new(self.shape.stream_bits(), registered));
+        let requests = k.instance("requests", Requests::new(&self.shape));
+        let packer = k.instance("packer", Packer::new(self.shape.payloads()));
+        let encoder = k.instance("encoder", SlipEncoder::new(registered));
+        let counters = k.instance("counters", CounterRam::new(&self.identity, registered));
         let arriving = k.instance("arriving", Crc::default());
         let leaving = k.instance("leaving", Crc::default());
 
-        k.comment("Received bytes to packets");
+        k.comment("Received bytes to packets.");
         decoder.data.set(io.receive_data);
         decoder.valid.set(io.receive_valid);
         decoder.broken.set(io.receive_broken);
@@ -119,7 +100,7 @@ impl Block for PacketLink {
         arriving.octet.set(decoder.content);
         arriving.load.set(decoder.content_valid);
 
-        k.comment("Packets to the engine");
+        k.comment("Packets to the engine.");
         ingress.frame_begin.set(parser.frame_begin);
         ingress.image.set(parser.image);
         ingress.payload.set(parser.payload);
@@ -135,18 +116,58 @@ impl Block for PacketLink {
         io.s_axis_tvalid.set(towards.m_axis_tvalid);
         io.s_axis_tlast.set(towards.m_axis_tlast);
 
-        k.comment("Requests and counters");
+        k.comment("Requests and counters.");
         requests.good.set(parser.good);
         requests.kind.set(parser.kind);
         requests.number.set(parser.number);
         requests.taken.set(ingress.taken);
-        requests.answered.set(back.m_axis_tvalid);
         requests.begun.set(packer.begun);
         counters.taken.set(ingress.taken | requests.noted);
         counters.fault.set(parser.fault);
         counters.overrun.set(ingress.overrun | requests.overrun);
 
-        k.comment("Engine to packets");
+        k.comment("Engine to packets.");
+        self.answer(k, &io, &requests, &counters, &packer);
+        leaving.restart.set(packer.crc_restart);
+        leaving.octet.set(packer.crc_octet);
+        leaving.load.set(packer.crc_load);
+        packer.crc_low.set(leaving.low);
+        packer.crc_busy.set(leaving.busy);
+
+        k.comment("Outputs used in the other direction only.");
+        k.wire("unused", arriving.busy | leaving.right);
+        k.wire("unused_low", arriving.low);
+
+        k.comment("Packets to sent bytes.");
+        encoder.content.set(packer.content);
+        encoder.border.set(packer.border);
+        encoder.content_valid.set(packer.valid);
+        packer.ready.set(encoder.content_ready);
+        encoder.ready.set(io.send_ready);
+        io.send_data.set(encoder.data);
+        io.send_valid.set(encoder.valid);
+
+        io.requested.set(requests.waiting);
+        io.activity.set(io.receive_valid | requests.waiting | encoder.valid);
+        io.dropped.set(parser.bad | ingress.overrun | requests.overrun);
+    }
+}
+
+impl PacketLink {
+    /// From the beats of the engine, identity and counters to the payload of an answer.
+    fn answer<'k>(
+        &self,
+        k: &'k Builder,
+        io: &PacketLinkPorts<Inside<'k>>,
+        requests: &RequestsPorts<Outside<'k>>,
+        counters: &CounterRamPorts<Outside<'k>>,
+        packer: &PackerPorts<Outside<'k>>,
+    ) {
+        let registered = self.shape.answers.are_fast();
+        let back = k.instance("back", RegisterSlice::new(96, registered));
+        let resultants = k.instance("resultants", Resultants::new(&self.shape));
+        let sources = k.instance("sources", Sources::new(registered));
+
         resultants.run.set(sources.answer_wanted);
         resultants.summarise.set(sources.summarise);
         resultants.taken.set(packer.taken & sources.answer_wanted);
@@ -158,6 +179,7 @@ impl Block for PacketLink {
         resultants.beat_valid.set(back.m_axis_tvalid);
         resultants.beat_last.set(back.m_axis_tlast);
         back.m_axis_tready.set(resultants.beat_ready);
+        requests.answered.set(back.m_axis_tvalid);
         sources.source.set(packer.source);
         sources.begun.set(packer.begun);
         sources.wanted.set(packer.wanted);
@@ -176,28 +198,6 @@ impl Block for PacketLink {
         packer.octet.set(sources.octet);
         packer.word_valid.set(sources.word_valid);
         packer.word_last.set(sources.word_last);
-        leaving.restart.set(packer.crc_restart);
-        leaving.octet.set(packer.crc_octet);
-        leaving.load.set(packer.crc_load);
-        packer.crc_low.set(leaving.low);
-        packer.crc_busy.set(leaving.busy);
-
-        k.comment("Outputs used in the other direction only");
-        k.wire("unused", arriving.busy | leaving.right);
-        k.wire("unused_low", arriving.low);
-
-        k.comment("Packets to sent bytes");
-        encoder.content.set(packer.content);
-        encoder.border.set(packer.border);
-        encoder.content_valid.set(packer.valid);
-        packer.ready.set(encoder.content_ready);
-        encoder.ready.set(io.send_ready);
-        io.send_data.set(encoder.data);
-        io.send_valid.set(encoder.valid);
-
-        io.requested.set(requests.waiting);
-        io.activity.set(io.receive_valid | requests.waiting | encoder.valid);
-        io.dropped.set(parser.bad | ingress.overrun | requests.overrun);
     }
 }
 

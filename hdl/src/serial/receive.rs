@@ -14,16 +14,16 @@ block! {
     /// s_axis --> frame buffer --> word (one cycle after read_address)
     ///       \--> magnitude, positive, negative
     /// ```
-    /// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing as
-    /// in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing` until
-    /// `reported`.
+    /// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing
+    /// as in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing`
+    /// until `reported`.
     pub struct Receive {
+        /// Width of a code in bits.
+        bits: usize,
         /// Taxels of a frame.
         taxels: usize,
-        /// Width of a code.
-        bits: usize,
-        frame: Ram,
-        stats: FrameStats,
+        /// Noise floor in codes.
+        floor: i32,
     }
     ports ReceivePorts {
         clock;
@@ -62,21 +62,16 @@ block! {
 impl Receive {
     /// For frames of `4 · formats.quads` taxels and a noise floor of `floor` codes.
     pub fn new(formats: &Formats, floor: i32) -> Self {
-        let (taxels, bits) = (4 * formats.quads, formats.input_bits as usize);
-        Receive {
-            taxels,
-            bits,
-            frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
-            stats: FrameStats::new(bits, Some(floor), 1),
-        }
+        Receive { bits: formats.input_bits as usize, taxels: 4 * formats.quads, floor }
     }
 }
 
 impl Block for Receive {
     fn build<'k>(&self, k: &'k Builder, io: ReceivePorts<Inside<'k>>) {
         let taxels = k.instance("taxels", Counter::new(self.taxels));
-        let frame = k.instance("frame", &self.frame);
-        let stats = k.instance("stats", &self.stats);
+        let frame = Ram::new(self.taxels, 1, self.bits).holding([Holds::Frame { case: 0, lane: 0 }]);
+        let frame = k.instance("frame", frame);
+        let stats = k.instance("stats", FrameStats::new(self.bits, Some(self.floor), 1));
         let whole = k.instance("whole", Dff {});
         let broken = k.instance("broken", Dff {});
 
@@ -96,9 +91,7 @@ impl Block for Receive {
 
         stats.accept.set(taken);
         stats.clear.set(io.rst | io.free | early);
-        stats.part.set(k.constant(1, 0));
-        stats.select.set(k.constant(1, 0));
-        stats.floor.set(k.constant(1, 0));
+        [stats.part, stats.select, stats.floor].iter().for_each(|input| input.set(k.constant(1, 0)));
         stats.code.set(io.s_axis_tdata);
         io.magnitude.set(stats.magnitude);
         io.positive.set(stats.positive);
@@ -107,10 +100,8 @@ impl Block for Receive {
         io.full.set(whole.q);
         whole.d.set((whole.q | (taken & taxels.last)) & !io.free & !io.rst);
         io.framing.set(broken.q);
-        broken.d.set(((broken.q & !io.reported)
-            | early
-            | (taken & taxels.last & !io.s_axis_tlast))
-            & !io.rst);
+        let missing = taken & taxels.last & !io.s_axis_tlast;
+        broken.d.set(((broken.q & !io.reported) | early | missing) & !io.rst);
     }
 }
 
@@ -120,7 +111,7 @@ mod tests {
     use dermis_golden::fixed::Model;
 
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, MemoryReference, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, MemoryReference, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::stages::Reception;
