@@ -8,8 +8,8 @@ use dermis_golden::spec::board::EngineKind;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::error::HdlError;
 use crate::engine::stages;
+use crate::error::HdlError;
 use crate::language::{Attributes, Hierarchy, Kernel, Slot, SEPARATOR};
 use crate::simulate::{design, Running};
 use crate::wire::Word;
@@ -199,9 +199,8 @@ impl Recorder {
         let blocks = describe(&hierarchy);
         let ports = blocks.iter().flat_map(|block| block.ports.iter().map(|port| (block.instance, port.name.as_str())));
         let engine = Running::new(&hierarchy, &ports.collect::<Vec<_>>());
-        let slot = |block: &BlockText| {
-            block.ports.iter().map(|port| engine.run().slot(block.instance, &port.name)).collect()
-        };
+        let slot =
+            |block: &BlockText| block.ports.iter().map(|port| engine.run().slot(block.instance, &port.name)).collect();
         let slots = blocks.iter().map(slot).collect();
         let traces = blocks.into_iter().map(|block| Trace { block, cycles: Vec::new() }).collect();
         Ok(Recorder { engine, slots, traces })

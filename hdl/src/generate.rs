@@ -14,11 +14,11 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::device::Tap;
+use crate::engine::stages;
 use crate::error::HdlError;
 use crate::language::{self, Attributes, Change, Hierarchy};
 use crate::manifest::{seal, GeneratedFile, MANIFEST, MANIFEST_VERSION};
 use crate::primitives::MEMORY_FILE;
-use crate::engine::stages;
 use crate::simulate::design;
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;

@@ -42,9 +42,9 @@ mod core_file;
 mod error;
 mod generate;
 mod integration;
+mod parallel;
 #[cfg(test)]
 mod scenes;
-mod parallel;
 mod simulate;
 mod taps;
 mod testbench;

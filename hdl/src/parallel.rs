@@ -35,8 +35,8 @@ use crate::primitives::{
     SATURATION_BITS,
 };
 use crate::stages::{
-    Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, Relax,
-    Rescale, Resultants, Search, Segment, Send, Shear, Unfold, Window,
+    Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, Relax, Rescale, Resultants,
+    Search, Segment, Send, Shear, Unfold, Window,
 };
 
 /// The parts of the engine that follow from the scene.
@@ -168,9 +168,8 @@ impl Parallel {
         let searched_framing = k.instance("searched_framing", Dff {});
         let sent_framing = k.instance("sent_framing", Dff {});
         let single = self.parts.iter().all(|&parts| parts == 1);
-        let register = |name: &str, bits: usize, varies: bool| {
-            k.instance(name, EnableRegister::new(bits).constant(!varies))
-        };
+        let register =
+            |name: &str, bits: usize, varies: bool| k.instance(name, EnableRegister::new(bits).constant(!varies));
         let case = |name: &str| register(name, receive.which.bits(), self.parts.len() > 1);
         let [frame_case, searched_case, sent_case] = ["frame_case", "searched_case", "sent_case"].map(case);
         let searched_part = register("searched_part", count_bits(largest(&self.parts)), true);
@@ -254,8 +253,7 @@ impl Parallel {
         let unsent = k.wire("unsent", sending.q & !send.done);
         let behind = first.q & unsent;
         let behind = k.wire("behind", if single { behind & !condition.q } else { behind });
-        let hand_over =
-            k.wire("hand_over", complete & !arrival.waits & !behind & (!searching.q | search.done));
+        let hand_over = k.wire("hand_over", complete & !arrival.waits & !behind & (!searching.q | search.done));
         let passed = if self.ahead { hand_over & part.last } else { contacts.ended & searched_last.q };
         let passed = k.wire("passed", passed);
         computing.d.set((begin_frame | (computing.q & !passed & !arrival.discards)) & !prepare.restart);

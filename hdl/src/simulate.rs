@@ -98,7 +98,8 @@ struct Simulator {
 /// As [`crate::generate`].
 pub fn simulator(model: &Model) -> Result<Box<dyn Device>, HdlError> {
     let streams = streams(model);
-    let observed: Vec<(&str, &str)> = streams.iter().flat_map(|stream| stream.signals()).map(|name| ("", name)).collect();
+    let observed: Vec<(&str, &str)> =
+        streams.iter().flat_map(|stream| stream.signals()).map(|name| ("", name)).collect();
     let engine = Running::new(&design(model)?, &observed);
     let taps = streams.iter().map(|stream| Tapped::new(stream, engine.run())).collect();
     Ok(Box::new(Simulator { engine, taps }))

@@ -77,11 +77,8 @@ impl Stream {
 
     /// Names and widths; `bits` gives the width of a signal.
     fn tap(&self, bits: impl Fn(&str) -> usize) -> Tap {
-        let signal = |part: &Part| TapSignal {
-            name: part.name.to_owned(),
-            bits: bits(part.name) as u32,
-            signed: part.signed,
-        };
+        let signal =
+            |part: &Part| TapSignal { name: part.name.to_owned(), bits: bits(part.name) as u32, signed: part.signed };
         let word: Vec<TapSignal> = self.parts.iter().map(signal).collect();
         let port = |part: &Part| part.name.rsplit("__").next().unwrap_or(part.name);
         let fields = match self.fields {

@@ -136,7 +136,7 @@ impl Core {
 
 /// Connects the instance `$bus` of a bus: its pins, and registers behind it.
 macro_rules! connect {
-    ($bus:ident, $io:ident, $registers:ident, in [$($input:ident),+], out [$($output:ident),+]) => {
+    ($bus:ident, $io:ident, $registers:ident, $rst:ident, in [$($input:ident),+], out [$($output:ident),+]) => {
         $($bus.$input.set($io.$input);)+
         $($io.$output.set($bus.$output);)+
         $registers.select.set($bus.select);
@@ -146,7 +146,7 @@ macro_rules! connect {
         $registers.strobe.set($bus.strobe);
         $bus.content.set($registers.content);
         $bus.refused.set($registers.refused);
-        $bus.rst.set(!$io.aresetn);
+        $$bus.rst.set($rst);
     };
 }
 
@@ -210,7 +210,7 @@ impl Block for Core {
             Bus::AxiLite => {
                 let bus = k.instance("bus", AxiLite::default());
                 connect!(
-                    bus, io, registers,
+                    bus, io, registers, rst,
                     in [
                         s_axil_awaddr, s_axil_awvalid, s_axil_wdata, s_axil_wstrb, s_axil_wvalid, s_axil_bready,
                         s_axil_araddr, s_axil_arvalid, s_axil_rready
@@ -224,7 +224,7 @@ impl Block for Core {
             Bus::Wishbone => {
                 let bus = k.instance("bus", Wishbone::default());
                 connect!(
-                    bus, io, registers,
+                    bus, io, registers, rst,
                     in [wb_cyc, wb_stb, wb_we, wb_adr, wb_dat_w, wb_sel], out [wb_dat_r, wb_ack, wb_err]
                 );
             }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::error::KernelError;
 use super::expression::Expr;
+use super::hierarchy::SEPARATOR;
 use super::kernel::{
     Contents, Domain, Instance, Item, Kernel, Memory, MemoryId, Node, NodeId, Port, Register, Role, Signal, SignalId,
     Type, Write,
 };
 use super::keywords::is_keyword;
-use super::hierarchy::SEPARATOR;
 
 /// The port that resets a block.
 const RESET: &str = "rst";
@@ -79,7 +79,7 @@ impl Builder {
     }
 
     /// A signal that an instance drives.
-    pub(super) fn from_instance(&self, name: &str, bits: usize) -> Expr<'_> {
+    pub(super) fn instance_output(&self, name: &str, bits: usize) -> Expr<'_> {
         *self.declare(name, Type::unsigned(bits), Role::Instance)
     }
 

@@ -260,7 +260,7 @@ impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
     }
 
     fn output(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Expr<'k> {
-        self.builder.from_instance(&self.name(name), bits)
+        self.builder.instance_output(&self.name(name), bits)
     }
 }
 

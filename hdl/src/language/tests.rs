@@ -1,8 +1,8 @@
 mod errors;
 
+use super::kernel::{Port, Role};
 use super::resources::FLATTENED;
 use super::testbench::{check, random_words, verilated, Reference, Subject};
-use super::kernel::{Port, Role};
 use super::*;
 use crate::wire::Word;
 

@@ -1,8 +1,8 @@
 //! A board's pins, independent of the simulator.
 
+use crate::scan::ScanPins;
 #[cfg(doc)]
 use dermis_golden::spec::link_kind::LinkKind;
-use crate::scan::ScanPins;
 
 /// A board's output pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -101,7 +101,8 @@ impl BoardTop {
             return Err(HdlError::Unsupported {
                 field: "hardware.tables",
                 value: "rom".to_owned(),
-                what: "a board that scans its array without writable tables, over whose link zero and gain of the array \
+                what:
+                    "a board that scans its array without writable tables, over whose link zero and gain of the array \
                        come,",
             });
         }

@@ -111,8 +111,8 @@ impl Block for SpiSlave {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::{kernel_of, Hierarchy, Run};
     use crate::language::testbench::{check, Reference};
+    use crate::language::{kernel_of, Hierarchy, Run};
     use crate::wire::Word;
 
     /// The registers of both sides in plain integers.

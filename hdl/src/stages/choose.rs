@@ -60,65 +60,67 @@ impl Choose {
 
 impl Block for Choose {
     fn build<'k>(&self, k: &'k Builder, io: ChoosePorts<Inside<'k>>) {
-    let ChoosePorts { rst, code, accept, tlast, free, .. } = io;
-    let bit = Type::unsigned(1);
-    let (rows, cols, magnitude_bits) = (self.sensor.rows, self.sensor.cols, self.bits - 1);
-    let magnitude = Type::unsigned(magnitude_bits);
+        let ChoosePorts { rst, code, accept, tlast, free, .. } = io;
+        let bit = Type::unsigned(1);
+        let (rows, cols, magnitude_bits) = (self.sensor.rows, self.sensor.cols, self.bits - 1);
+        let magnitude = Type::unsigned(magnitude_bits);
 
-    let [line_end, frame_end, restart, last3] = ["line_end", "frame_end", "restart", "last3"].map(|name| match name {
-        "last3" => k.register(name, bit),
-        _ => k.net(name, bit),
-    });
-    let row = k.state("row", Type::unsigned(count_bits(rows)), *restart, 0);
-    let col = k.state("col", Type::unsigned(count_bits(cols)), *restart, 0);
-    line_end.set(col.is(cols as u64 - 1));
-    frame_end.set(*line_end & row.is(rows as u64 - 1));
-    restart.set(rst | accept & tlast & !*frame_end);
-    k.when(accept, || {
-        col.set(line_end.mux(k.constant(col.bits(), 0), col.plus(1)));
-        k.when(*line_end, || row.set(frame_end.mux(k.constant(row.bits(), 0), row.plus(1))));
-    });
+        let [line_end, frame_end, restart, last3] =
+            ["line_end", "frame_end", "restart", "last3"].map(|name| match name {
+                "last3" => k.register(name, bit),
+                _ => k.net(name, bit),
+            });
+        let row = k.state("row", Type::unsigned(count_bits(rows)), *restart, 0);
+        let col = k.state("col", Type::unsigned(count_bits(cols)), *restart, 0);
+        line_end.set(col.is(cols as u64 - 1));
+        frame_end.set(*line_end & row.is(rows as u64 - 1));
+        restart.set(rst | accept & tlast & !*frame_end);
+        k.when(accept, || {
+            col.set(line_end.mux(k.constant(col.bits(), 0), col.plus(1)));
+            k.when(*line_end, || row.set(frame_end.mux(k.constant(row.bits(), 0), row.plus(1))));
+        });
 
-    k.comment("Position and magnitude of a code");
-    let forget = k.wire("forget", *restart | *last3);
-    let valid1 = k.delay("valid1", accept & !*restart);
-    let last1 = k.delay("last1", accept & *frame_end & !rst);
-    let last2 = k.delay("last2", last1 & !rst);
-    last3.set(last2 & !rst);
-    let magnitude1 = k.delay("magnitude1", code.low(magnitude_bits) ^ code.top().repeat(magnitude_bits));
-    let rows1 = k.delay("rows1", beside(k, *row, rows));
-    let cols1 = k.delay("cols1", beside(k, *col, cols));
+        k.comment("Position and magnitude of a code");
+        let forget = k.wire("forget", *restart | *last3);
+        let valid1 = k.delay("valid1", accept & !*restart);
+        let last1 = k.delay("last1", accept & *frame_end & !rst);
+        let last2 = k.delay("last2", last1 & !rst);
+        last3.set(last2 & !rst);
+        let magnitude1 = k.delay("magnitude1", code.low(magnitude_bits) ^ code.top().repeat(magnitude_bits));
+        let rows1 = k.delay("rows1", beside(k, *row, rows));
+        let cols1 = k.delay("cols1", beside(k, *col, cols));
 
-    k.comment("Maxima");
-    let [peak, middle_rows, middle_cols] =
-        ["peak", "middle_rows", "middle_cols"].map(|name| k.state(name, magnitude, forget, 0));
-    for (most, counts) in [(peak, None), (middle_rows, Some(rows1)), (middle_cols, Some(cols1))] {
-        let larger = most.less(magnitude1);
-        let takes = counts.map_or(larger, |counts| counts & larger);
-        k.when(valid1 & takes, || most.set(magnitude1));
-    }
-    let signs = (self.condition != Condition::Loaded).then(|| signs(k, self, [*row, *col, code, valid1, forget]));
+        k.comment("Maxima");
+        let [peak, middle_rows, middle_cols] =
+            ["peak", "middle_rows", "middle_cols"].map(|name| k.state(name, magnitude, forget, 0));
+        for (most, counts) in [(peak, None), (middle_rows, Some(rows1)), (middle_cols, Some(cols1))] {
+            let larger = most.less(magnitude1);
+            let takes = counts.map_or(larger, |counts| counts & larger);
+            k.when(valid1 & takes, || most.set(magnitude1));
+        }
+        let signs = (self.condition != Condition::Loaded).then(|| signs(k, self, [*row, *col, code, valid1, forget]));
 
-    k.comment("Limit for a contact, choice");
-    let share = peak.shift_right(CUT_SHIFT as usize).extend(magnitude_bits);
-    let floor = k.constant(magnitude_bits, self.floor.max(0) as u64);
-    let limit = k.delay("limit", if self.floor > 0 { floor.less(share).mux(share, floor) } else { share });
-    let cut_rows = k.wire("cut_rows", limit.less(*middle_rows));
-    let cut_cols = k.wire("cut_cols", limit.less(*middle_cols));
-    let which_bits = count_bits(self.grids.len());
-    let choice = self.grids.iter().enumerate().skip(1).rev().fold(k.constant(which_bits, 0), |other, (case, grid)| {
-        let cut = match (grid.rows > 1, grid.cols > 1) {
-            (true, true) => cut_rows | cut_cols,
-            (true, false) => cut_rows,
-            _ => cut_cols,
-        };
-        let refused = signs.map_or(cut, |signs| cut | differ(signs, *grid));
-        (!refused).mux(k.constant(which_bits, case as u64), other)
-    });
-    let which = io.which.register();
-    k.when(*last3, || which.set(choice));
-    let settled = io.settled.register();
-    settled.set((*settled | *last3) & !free & !rst);
+        k.comment("Limit for a contact, choice");
+        let share = peak.shift_right(CUT_SHIFT as usize).extend(magnitude_bits);
+        let floor = k.constant(magnitude_bits, self.floor.max(0) as u64);
+        let limit = k.delay("limit", if self.floor > 0 { floor.less(share).mux(share, floor) } else { share });
+        let cut_rows = k.wire("cut_rows", limit.less(*middle_rows));
+        let cut_cols = k.wire("cut_cols", limit.less(*middle_cols));
+        let which_bits = count_bits(self.grids.len());
+        let choice =
+            self.grids.iter().enumerate().skip(1).rev().fold(k.constant(which_bits, 0), |other, (case, grid)| {
+                let cut = match (grid.rows > 1, grid.cols > 1) {
+                    (true, true) => cut_rows | cut_cols,
+                    (true, false) => cut_rows,
+                    _ => cut_cols,
+                };
+                let refused = signs.map_or(cut, |signs| cut | differ(signs, *grid));
+                (!refused).mux(k.constant(which_bits, case as u64), other)
+            });
+        let which = io.which.register();
+        k.when(*last3, || which.set(choice));
+        let settled = io.settled.register();
+        settled.set((*settled | *last3) & !free & !rst);
     }
 }
 
@@ -261,8 +263,7 @@ pub(crate) mod tests {
             (Condition::BothSigns, 0, vec![grid(1, 1), grid(2, 1)]),
         ] {
             let rule = Choose { sensor: sensor.clone(), grids, condition, floor, bits: BITS };
-            let subject =
-                subject_of!(rule, &[], inputs [rst, accept, tlast, free, code], outputs [which, settled]);
+            let subject = subject_of!(rule, &[], inputs [rst, accept, tlast, free, code], outputs [which, settled]);
             check(subject, &stimulus(&rule, 30_000), &mut Expected::new(&rule));
         }
     }

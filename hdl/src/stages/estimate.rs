@@ -83,7 +83,6 @@ impl Estimate {
                 .map(|network| Layers { hidden: formats.hidden_rows().sum(), shift: network.shift as usize }),
         }
     }
-
 }
 
 /// A signed number within `range`.

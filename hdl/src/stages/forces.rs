@@ -171,7 +171,7 @@ impl Block for Forces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, random_word, MemoryReference, Reference};
+    use crate::language::testbench::{check_with_defects, random_word, subject_of, MemoryReference, Reference};
     use crate::language::Change;
     use crate::primitives::{List, Requests};
     use crate::scenes::model;

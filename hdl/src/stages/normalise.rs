@@ -1,6 +1,5 @@
 //! Stage `normalise`: block exponent of the input, one left shift for all codes of a subarray.
 
-
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside};
 use crate::primitives::{by_leading_one, count_bits};
@@ -26,7 +25,6 @@ block! {
         out shift: count_bits(*bits);
     }
 }
-
 
 impl Normalise {
     /// For codes of `bits` bits.

@@ -11,8 +11,8 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, longest, position_bits, programs, BitDelay, Counter, Delay, Dff, Lanes, OperandScale,
-    OperandSelect, OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
+    count_bits, longest, position_bits, programs, BitDelay, Counter, Delay, Dff, Lanes, OperandScale, OperandSelect,
+    OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
 };
 
 block! {
@@ -122,8 +122,10 @@ impl Block for Pass {
         let select = k.instance("select", &self.select);
         let scale = k.instance("scale", &self.scale);
         let lanes = k.instance("lanes", &self.lanes);
-        let low_address = k.instance("low_address", Slice::new(pass_program.operand_address.bits(), count_bits(self.quads)));
-        let coefficient_address = k.instance("coefficient_address", Delay::new(pass_program.coefficient_address.bits(), scaling));
+        let low_address =
+            k.instance("low_address", Slice::new(pass_program.operand_address.bits(), count_bits(self.quads)));
+        let coefficient_address =
+            k.instance("coefficient_address", Delay::new(pass_program.coefficient_address.bits(), scaling));
 
         pass_program.which.set(io.which);
         operand_writer.which.set(io.which);
@@ -189,7 +191,7 @@ mod tests {
     use dermis_golden::fixed::CasePlan;
 
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, random_word, Reference};
+    use crate::language::testbench::{check_with_defects, random_word, subject_of, Reference};
     use crate::language::Change;
     use crate::scenes::{learned, model};
     use crate::wire::Word;

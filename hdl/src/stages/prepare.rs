@@ -124,7 +124,7 @@ impl Block for Prepare {
 mod tests {
     use super::*;
     use crate::language::testbench::{
-        subject_of, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+        check, check_with_defects, random_word, random_words, subject_of, Pipeline, Reference, Subject,
     };
     use crate::language::Change;
     use crate::primitives::{Sums, Table};

@@ -204,10 +204,7 @@ impl Receive {
         complete.d.set(whole.q & !io.free & !io.rst);
         whole.d.set((whole.q | (taken & scan.last)) & !io.free & !io.rst);
         io.framing.set(broken.q);
-        broken.d.set(((broken.q & !io.reported)
-            | early
-            | (taken & scan.last & !io.s_axis_tlast))
-            & !io.rst);
+        broken.d.set(((broken.q & !io.reported) | early | (taken & scan.last & !io.s_axis_tlast)) & !io.rst);
     }
 }
 

@@ -11,8 +11,7 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, largest, BitDelay, CaseCounter, Delay, Dff, LimbSum, Ram, RawLength, Rescaler,
-    SATURATION_BITS,
+    count_bits, largest, BitDelay, CaseCounter, Delay, Dff, LimbSum, Ram, RawLength, Rescaler, SATURATION_BITS,
 };
 
 block! {
@@ -149,7 +148,7 @@ mod tests {
     use dermis_golden::fixed::stages::rescale::{operand, raw_length, rescale, shift};
 
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::wire::Word;

@@ -263,9 +263,7 @@ impl Sweeps {
         let stall = k.wire("stall", due & sequencer.next_last & !io.ready);
         stalled_before.d.set(stall & !io.rst);
         io.stalled.set(stall);
-        set_up.d.set(((due & !stall)
-            | (sequencer.chains & period.last))
-            & !io.rst);
+        set_up.d.set(((due & !stall) | (sequencer.chains & period.last)) & !io.rst);
         compared_later.d.set(best.done & best.closes);
         period.clear.set(set_up.q);
         period.enable.set(k.constant(1, 1));

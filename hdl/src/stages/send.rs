@@ -108,7 +108,7 @@ impl Block for Send {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, Reference};
+    use crate::language::testbench::{check_with_defects, subject_of, Reference};
     use crate::language::Change;
     use crate::scenes::{learned, model, Place};
     use crate::wire::Word;

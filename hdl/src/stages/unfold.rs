@@ -108,7 +108,7 @@ mod tests {
     use dermis_golden::fixed::stages::unfold::unfold;
 
     use super::*;
-    use crate::language::testbench::{subject_of, check_with_defects, random_word, Reference};
+    use crate::language::testbench::{check_with_defects, random_word, subject_of, Reference};
     use crate::language::Change;
     use crate::scenes::model;
     use crate::wire::Word;

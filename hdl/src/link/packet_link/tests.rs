@@ -7,7 +7,7 @@ use dermis_golden::fixed::stages::load;
 use dermis_golden::wire::link::{codes_to_bytes, Beat, Counters, Decoder, Kind, Packet, Sums, BEAT_BYTES};
 
 use super::*;
-use crate::language::testbench::{subject_of, check_with_defects, Reference, Subject};
+use crate::language::testbench::{check_with_defects, subject_of, Reference, Subject};
 use crate::language::Change;
 use crate::link::Answers;
 use crate::wire::Word;

@@ -7,7 +7,7 @@ use dermis_golden::fixed::stages::search::{search, Best, Block, Polynomial, Sear
 use dermis_golden::fixed::words::formats::HALVINGS;
 
 use super::*;
-use crate::language::testbench::{subject_of, check_with_defects, Reference};
+use crate::language::testbench::{check_with_defects, subject_of, Reference};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;

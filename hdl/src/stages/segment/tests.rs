@@ -253,7 +253,12 @@ fn defects_are_found() {
         Change::value("", "line_found", |k| k.constant(1, 1)),
     ];
     let kinds: Vec<usize> = (0..2 * KINDS).map(|index| index % KINDS).collect();
-    check_with_defects(|changes| subject(&array, changes), &stimulus(&array, &kinds, 7), || Segmenting::new(&array), &defects);
+    check_with_defects(
+        |changes| subject(&array, changes),
+        &stimulus(&array, &kinds, 7),
+        || Segmenting::new(&array),
+        &defects,
+    );
 }
 
 /// The plan lists every memory of the block.

@@ -10,7 +10,7 @@ use dermis_golden::spec::window::Place;
 
 use super::*;
 use crate::language::testbench::{
-    subject_of, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+    check, check_with_defects, random_word, random_words, subject_of, Pipeline, Reference, Subject,
 };
 use crate::language::{kernel_of, Change};
 use crate::scenes::model;
