@@ -146,7 +146,7 @@ macro_rules! connect {
         $registers.strobe.set($bus.strobe);
         $bus.content.set($registers.content);
         $bus.refused.set($registers.refused);
-        $$bus.rst.set($rst);
+        $bus.rst.set($rst);
     };
 }
 
