@@ -88,7 +88,7 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
 
-bench: setup ## time a golden reconstruction, rust-hdl's simulation against Verilator's, Python against Rust, and the drawing of the live page
+bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, and the drawing of the live page
 	$(CARGO) bench --package dermis-golden
 	$(CARGO) bench --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
@@ -135,7 +135,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 # out by name, since --lib links a test program of it even with `test = false`.
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out (70 minutes)
 	@echo '== all tests'
-	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --exclude dermis-python --lib --bins --tests --no-fail-fast -- --include-ignored
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --exclude dermis-python --lib --bins --examples --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check

@@ -1,6 +1,6 @@
 //! The engine's pins as a clocked device, independent of the simulator.
 //!
-//! rust-hdl's simulation, the Verilated RTL and the post-synthesis netlist all implement [`Device`], so that one test
+//! The kernel simulation, the Verilated RTL and the post-synthesis netlist all implement [`Device`], so that one test
 //! bench drives them all.
 //!
 //! ```text

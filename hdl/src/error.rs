@@ -24,7 +24,7 @@ pub enum HdlError {
     /// A block's kernel is not sound; a defect of this crate.
     #[error("internal: {0}")]
     Kernel(#[from] KernelError),
-    /// The description fails rust-hdl's checks; a defect of this crate.
+    /// The description is not consistent; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
 }

@@ -1,24 +1,24 @@
-//! Dermis in hardware: the fixed-point pipeline as a rust-hdl description, from which the Verilog is generated.
+//! Dermis in hardware: the fixed-point pipeline as blocks of a language inside Rust, from which the Verilog is generated.
 //!
 //! ```text
 //! codes → prepare → receive → normalise → fold → pass → rescale → unfold → search → forces → send → beats, status
 //! ```
-//! [`engine`] connects the [`stages`], built from [`primitives`]; [`serial`] is the engine for small devices; [`link`]
-//! puts either behind a UART or an SPI, [`bus`] makes it a core for a SoC, [`scan`] reads the converters of its array. All widths come from the formats of the bit-true model.
+//! [`engine`] is the block of all stages, of one of two kinds: the parallel one connects the [`stages`], built from
+//! [`primitives`]; [`serial`] is that for small devices. [`link`] puts an engine behind a UART or an SPI, [`bus`] makes it a
+//! core for a SoC, [`scan`] reads the converters of its array. All widths come from the formats of the bit-true model.
 //!
 //! What is derived from what:
-//! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
-//!   module, memories and the estimate of the logic come from one graph of typed expressions.
-//! - *`#[hdl_gen]` blocks*, which connect others: engines, most stages and the link's top levels. rust-hdl simulates
-//!   them, and the assignments that it reads off the same Rust become a kernel too ([`language::Hierarchy`]), from which
-//!   Verilog and estimate follow. They hold single-bit control and connections.
-//! - *Tests*: each of both stands beside a test against plain integers, in rust-hdl's simulation or the kernel's own and
-//!   under Verilator, every output, every cycle, except the board tops: packets of whole frames test these against the
-//!   bit-true model, in both simulations too.
-//! - rust-hdl's probe gives the hierarchy; all modules are printed by the [`language`], with the memories placed as the
-//!   bit-true model plans them. No block has a second description, and nothing reads Verilog back.
-//! - Widths, names and directions of ports in the guide come from the built engine, their meaning from the comments of
-//!   the fields ([`describe`]).
+//! - *Blocks of the [`language`]*: [`block!`](crate::block) declares parameters and ports, each once; a kernel, one graph of typed
+//!   expressions with the instances of the blocks inside, is the behaviour. Kernel simulation, Verilog, memories and the
+//!   estimate of the logic come from it.
+//! - *Tests*: each block stands beside a test against plain integers, in kernel simulation and under Verilator, every output,
+//!   every cycle, except the board tops: packets of whole frames test these against the bit-true model, in both simulations
+//!   too. Kernel simulation and Verilog come from one graph, so that their agreement tests the printer, not the description;
+//!   the bit-true model and the references in plain integers are what is independent.
+//! - All modules are printed by the [`language`], with the memories placed as the bit-true model plans them. No block has a
+//!   second description, and nothing reads Verilog back.
+//! - Names, directions, widths and meanings of ports in Verilog and guide come from their declaration ([`describe`]).
+//! - [`language::RustHdl`] carries any block in a design of rust-hdl, with its ports as signals (`examples/rust_hdl.rs`).
 #![deny(missing_docs)]
 
 pub mod bus;

@@ -1,7 +1,7 @@
 //! Signals whose width the scene decides.
 //!
 //! rust-hdl's `Signal<D, Bits<N>>` fixes N at compile time, but here a scene file read at run time decides every width.
-//! [`Wire`] is a rust-hdl atom like `Signal`, usable in `#[hdl_gen]` kernels, checks, Verilog generation and waveforms,
+//! [`Wire`] is a rust-hdl atom like `Signal`, usable in the designs, checks and waveforms of rust-hdl,
 //! that carries its width as a value. Its content is a [`Word`], a plain bit vector; the primitives decide whether it
 //! is signed.
 

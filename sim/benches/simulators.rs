@@ -1,8 +1,8 @@
-//! Run time of one frame in rust-hdl's simulation and under Verilator, and their ratio.
+//! Run time of one frame in kernel simulation and under Verilator, and their ratio.
 //!
 //! ```text
 //! make bench, or: cargo bench --package dermis-sim --bench simulators
-//! sensor-1: rust-hdl 149.63 ms, verilator 3.23 ms, ratio 46.32    fastest of several runs each
+//! sensor-1: kernel 149.63 ms, verilator 3.23 ms, ratio 46.32    fastest of several runs each
 //! ```
 //! The ratio is compared across versions, because it depends less on the machine. With every block written twice, by hand,
 //! it is 17.98 for sensor-1 and 27.27 for eight-by-eight (two cores, Verilator 5.006); with one kernel per block 46.32 and
@@ -44,10 +44,10 @@ fn main() -> anyhow::Result<()> {
         let scene = Scene::builtin(name)?;
         let frame = &Frame::shipped(&scene)[0];
         let hardware = Hardware::new(Model::new(&scene)?, &build)?;
-        let [ours, verilator] = [Simulator::RustHdl, Simulator::Verilator].map(|s| fastest(&hardware, s, frame));
+        let [ours, verilator] = [Simulator::Kernel, Simulator::Verilator].map(|s| fastest(&hardware, s, frame));
         let (ours, verilator) = (ours?, verilator?);
         println!(
-            "{name}: rust-hdl {:.2} ms, verilator {:.2} ms, ratio {:.2}",
+            "{name}: kernel {:.2} ms, verilator {:.2} ms, ratio {:.2}",
             1e3 * ours.as_secs_f64(),
             1e3 * verilator.as_secs_f64(),
             ours.as_secs_f64() / verilator.as_secs_f64()

@@ -5,7 +5,7 @@
 //! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
-//! | [`cosim`] | co-simulation: the hardware under Verilator and rust-hdl, compared with the bit-true model, stressed, with faults |
+//! | [`cosim`] | co-simulation: the hardware under Verilator and in kernel simulation, compared with the bit-true model, stressed, with faults |
 //! | [`mod@engine`] | engines by name, models and simulated hardware, and the one way to their results |
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`recording`] | frames and results of a stream in an MCAP file, with the message types of ROS 2 |

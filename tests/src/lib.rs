@@ -3,7 +3,7 @@
 //!
 //! | test | claims |
 //! |---|---|
-//! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycles against a committed table |
+//! | `equality` | generated Verilog = kernel simulation = bit-true model, on every shipped frame; cycles against a committed table |
 //! | `event_driven` | every word and cycle under Icarus; no X after a reset; undefined registers found |
 //! | `accuracy` | golden model against known forces, bit-true against golden model, both against a committed table |
 //! | `dead` | dead taxels: the same equality, independence of their readings, agreement with the golden model |
@@ -20,7 +20,7 @@
 //! | `faults` | flipped bits in ROM, RAM and registers: every bit is reachable, outcomes add up, a reset recovers |
 //! | `features` | tests, program and Python package compile the same crates once |
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
-//! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
+//! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = kernel simulation, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `tables` | images of tables between frames: equality before, after, and while tables are not whole |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |

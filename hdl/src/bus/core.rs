@@ -191,7 +191,7 @@ impl Block for Core {
         labels.last.set(stream_in.complete);
         labels.word.set(stream_in.label);
         labels.m_axis_tready.set(stream_out.sent);
-        k.wire("unused", labels.m_axis_tlast | labels.m_axis_tvalid);
+        k.unused([labels.m_axis_tlast, labels.m_axis_tvalid]);
 
         stream_out.s_axis_tdata.set(engine.m_axis_tdata);
         stream_out.s_axis_tvalid.set(engine.m_axis_tvalid);

@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use super::error::KernelError;
 use super::expression::Expr;
-use super::hierarchy::SEPARATOR;
 use super::kernel::{
     Contents, Domain, Instance, Item, Kernel, Memory, MemoryId, Node, NodeId, Port, Register, Role, Signal, SignalId,
-    Type, Write,
+    Type, Write, SEPARATOR,
 };
 use super::keywords::is_keyword;
 
@@ -73,6 +72,11 @@ impl Builder {
         *self.declare(name, Type::unsigned(bits), Role::Input)
     }
 
+    /// Says that nothing reads these signals, on purpose: outputs of instances that nothing reads are otherwise an error.
+    pub fn unused<'k>(&'k self, signals: impl IntoIterator<Item = Expr<'k>>) {
+        self.kernel.borrow_mut().unused.extend(signals.into_iter().map(|signal| signal.id));
+    }
+
     /// Declares a port.
     pub(super) fn port(&self, port: Port) {
         self.kernel.borrow_mut().ports.push(port);
@@ -102,7 +106,8 @@ impl Builder {
             let node = kernel.interned[&(Node::Signal(rst), kernel.signals[rst].ty)];
             let names = kernel.instances.iter().map(|instance| format!("{}{SEPARATOR}{RESET}", instance.name));
             let open = names.filter_map(|name| kernel.signal_of(&name));
-            open.filter(|&id| kernel.signals[id].value.is_none() && !input(id)).map(|id| (id, node)).collect()
+            let driven = |id: SignalId| kernel.signals[id].role.is_driven_outside();
+            open.filter(|&id| kernel.signals[id].value.is_none() && !driven(id)).map(|id| (id, node)).collect()
         };
         let mut kernel = self.kernel.borrow_mut();
         for (id, node) in resets {
@@ -302,7 +307,6 @@ impl Builder {
         for Port { name, bits, output, .. } in kernel.ports.clone() {
             kernel.bind(&name, bits, output);
         }
-        kernel.connects = !kernel.instances.is_empty();
         kernel.check();
         kernel
     }

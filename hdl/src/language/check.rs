@@ -18,6 +18,11 @@ impl Kernel {
         let block = self.block.clone();
         self.errors
             .extend(unassigned.into_iter().map(|signal| KernelError::Unassigned { block: block.clone(), signal }));
+        let unread: Vec<KernelError> = match self.unread().join(", ") {
+            names if names.is_empty() => Vec::new(),
+            signals => vec![KernelError::Unread { block: block.clone(), signals }],
+        };
+        self.errors.extend(unread);
         let roots: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
         if let Err(wires) = self.order(&[roots, self.edge_roots()].concat()) {
             let names: Vec<&str> = wires.iter().map(|&wire| self.signals[wire].name.as_str()).collect();

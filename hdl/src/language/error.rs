@@ -91,6 +91,14 @@ pub enum KernelError {
         /// Why not.
         reason: &'static str,
     },
+    /// Outputs of instances that nothing reads and that are not said to be unused.
+    #[error("block {block}: nothing reads {signals}; say `unused` if that is on purpose")]
+    Unread {
+        /// Name of the block.
+        block: String,
+        /// The outputs, each after its instance.
+        signals: String,
+    },
     /// A port of the block that the kernel lacks, or that has another width there.
     #[error("block {block}, port {port} of {bits} bits: {found}")]
     Port {

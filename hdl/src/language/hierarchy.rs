@@ -6,11 +6,8 @@ use std::sync::Arc;
 
 use super::change::Change;
 use super::error::KernelError;
-use super::kernel::{Kernel, Role};
+use super::kernel::{Kernel, Role, SEPARATOR};
 use super::verilog::range;
-
-/// Between the levels of the name of a module or a net. Neither `$` nor `.`, which Tcl, XDC and VHDL do not take.
-pub const SEPARATOR: &str = "__";
 
 /// Path of a block, and one of its ports or signals.
 pub(super) type Net = (String, String);

@@ -244,6 +244,9 @@ pub(crate) struct Instance {
     pub(crate) kernel: Arc<Kernel>,
 }
 
+/// Between the levels of the name of a module or a net. Neither `$` nor `.`, which Tcl, XDC and VHDL do not take.
+pub const SEPARATOR: &str = "__";
+
 /// What a clock port means.
 const CLOCK: &str = "Clock; registers change on its rising edge.";
 
@@ -282,8 +285,8 @@ pub struct Kernel {
     pub(crate) errors: Vec<KernelError>,
     /// Defects of expressions whose signals are not known before the kernel is finished.
     pub(crate) defects: Vec<(NodeId, Defect)>,
-    /// The kernel only connects blocks: a linter shall see which of their outputs nobody reads.
-    pub(crate) connects: bool,
+    /// Signals that nothing reads, on purpose.
+    pub(crate) unused: Vec<NodeId>,
 }
 
 impl Kernel {
@@ -331,9 +334,16 @@ impl Kernel {
         self.errors.push(error);
     }
 
-    /// Every output that depends on inputs in the same cycle, with their names.
+    /// Every output, and every input of an instance, that depends on inputs or on outputs of instances in the same cycle, with
+    /// their names.
     pub(crate) fn combinational(&self) -> Vec<(&str, Vec<&str>)> {
-        let outputs = self.signals.iter().filter(|signal| signal.output && matches!(signal.role, Role::Wire { .. }));
+        let inputs = self.instances.iter().flat_map(|instance| {
+            let inputs = instance.kernel.ports.iter().filter(|port| !port.output);
+            inputs.map(|port| format!("{}{SEPARATOR}{}", instance.name, port.name))
+        });
+        let inputs: BTreeSet<String> = inputs.collect();
+        let leaves = |signal: &&Signal| signal.output || inputs.contains(&signal.name);
+        let outputs = self.signals.iter().filter(leaves).filter(|signal| matches!(signal.role, Role::Wire { .. }));
         outputs.map(|signal| (signal.name.as_str(), self.inputs_of(signal))).collect()
     }
 
@@ -393,13 +403,19 @@ impl Kernel {
         })
     }
 
-    /// Names of the inputs that nothing reads.
-    pub(crate) fn unread(&self) -> BTreeSet<&str> {
+    /// Names of the outputs of instances that nothing reads, and that are not said to be unused.
+    pub(crate) fn unread(&self) -> Vec<&str> {
         let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
-        let read: BTreeSet<NodeId> = self.within(&[values, self.edge_roots()].concat()).collect();
-        let is_read = |id: SignalId| read.iter().any(|&node| self.nodes[node].0 == Node::Signal(id));
-        let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role.is_driven_outside());
-        inputs.filter(|(id, _)| !is_read(*id)).map(|(_, signal)| signal.name.as_str()).collect()
+        let roots = [&values[..], &self.edge_roots(), &self.unused].concat();
+        let read: BTreeSet<SignalId> = self
+            .within(&roots)
+            .filter_map(|node| match self.nodes[node].0 {
+                Node::Signal(id) => Some(id),
+                _ => None,
+            })
+            .collect();
+        let outputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role == Role::Instance);
+        outputs.filter(|(id, _)| !read.contains(id)).map(|(_, signal)| signal.name.as_str()).collect()
     }
 
     /// Its ports, the clock first: name, whether it is an output, width in bits, meaning.

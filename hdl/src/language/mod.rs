@@ -1,15 +1,15 @@
 //! A small hardware language: blocks whose widths a scene decides, written once.
 //!
-//! rust-hdl's `Bits<N>` takes its width from the Rust compiler and its signed products stop at 16×16. A [`Kernel`] is the
-//! behaviour of a block as a graph of typed expressions, built by ordinary Rust when the scene is known:
+//! A [`Kernel`] is the behaviour of a block as a graph of typed expressions, built by ordinary Rust when the scene is known; it
+//! has the blocks inside it as instances:
 //!
 //! ```text
-//! Builder -- expressions, signals, registers, memories --> Kernel --+--> Simulation   inside rust-hdl's `update`
-//!   (Rust loops and functions repeat)                     checked   +--> Verilog      the body of the block's module
-//!                                                                   +--> LUTs, flip-flops, memories
+//! block!, Block::build --> Kernel --> Hierarchy --+--> Run          all kernels as one, simulated
+//!   ports, logic, instances  checked              +--> Verilog      a module for each block
+//!                                                 +--> LUTs, flip-flops, memories
 //! ```
-//! A block is a rust-hdl `Block` whose ports are the struct's fields, with a field `kernel` of type [`Body`]; the
-//! macro [`kernel_block!`](crate::kernel_block) writes `update` and `connect`; [`Hierarchy`] prints the modules. No node holds text or a function.
+//! [`block!`](crate::block) declares the parameters and the ports of a block; [`Block::build`] describes what is between them with a
+//! [`Builder`]. No node holds text or a function. [`RustHdl`] makes any block one of rust-hdl.
 //!
 //! | checked when a kernel is built | error |
 //! |---|---|
@@ -18,7 +18,7 @@
 //! | operands of unequal or impossible width | [`KernelError::Width`] |
 //! | a signal without value, or with two | [`KernelError::Unassigned`], [`KernelError::AssignedTwice`] |
 //! | a wire that depends on itself | [`KernelError::Loop`] |
-//! | more than connections in a block that connects others | [`KernelError::Wiring`] |
+//! | an output of an instance that nothing reads | [`KernelError::Unread`] |
 //! | a port that the kernel lacks | [`KernelError::Port`] |
 //! | a name used twice, or none of Verilog | [`KernelError::Name`] |
 
@@ -49,10 +49,10 @@ pub use build::{Builder, MemoryPort, Net};
 pub use change::Change;
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
-pub use hierarchy::{Attributes, Hierarchy, SEPARATOR};
-pub use kernel::{Contents, Kernel, Memory, Type};
-pub use ports::{kernel_of, Block, Inside, Interface, Make, Output, Outside, View, Width, Widths};
+pub use hierarchy::{Attributes, Hierarchy};
+pub use kernel::{Contents, Kernel, Memory, Type, SEPARATOR};
+pub use ports::{kernel_of, Block, Inside, Interface, Make, Output, Outside, View, Visit, VisitMut, Width, Widths};
 pub(crate) use resources::distributed_luts;
 pub use run::{Run, Slot};
-pub use rust_hdl::{RustHdl, SignalPort, Signals};
+pub use rust_hdl::{RustHdl, Signals};
 pub use simulate::Simulation;

@@ -15,9 +15,7 @@ use std::sync::Arc;
 
 use super::build::{Builder, Net};
 use super::expression::Expr;
-use super::hierarchy::SEPARATOR;
-use super::kernel::{Kernel, Port, Type};
-use super::rust_hdl::{SignalPort, Signals};
+use super::kernel::{Kernel, Port, Type, SEPARATOR};
 
 /// A hardware block: its parameters are the fields of a struct, from which its ports and its behaviour follow.
 pub trait Block: Interface {
@@ -44,11 +42,11 @@ pub trait Interface {
         self.ports(&mut MakeWidths)
     }
 
-    /// Shows `visit` the ports of a block in rust-hdl, in the order of their declaration: name, whether it is an output.
-    fn visit(ports: &Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &dyn SignalPort));
+    /// Shows `visitor` the ports in the order of their declaration.
+    fn visit<V: View>(ports: &Self::Ports<V>, visitor: &mut dyn Visit<V>);
 
     /// As [`Interface::visit`], to change them.
-    fn visit_mut(ports: &mut Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &mut dyn SignalPort));
+    fn visit_mut<V: View>(ports: &mut Self::Ports<V>, visitor: &mut dyn VisitMut<V>);
 }
 
 impl<B: Interface> Interface for &B {
@@ -62,12 +60,12 @@ impl<B: Interface> Interface for &B {
         (**self).ports(make)
     }
 
-    fn visit(ports: &Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &dyn SignalPort)) {
-        B::visit(ports, visit);
+    fn visit<V: View>(ports: &Self::Ports<V>, visitor: &mut dyn Visit<V>) {
+        B::visit(ports, visitor);
     }
 
-    fn visit_mut(ports: &mut Self::Ports<Signals>, visit: &mut dyn FnMut(&'static str, bool, &mut dyn SignalPort)) {
-        B::visit_mut(ports, visit);
+    fn visit_mut<V: View>(ports: &mut Self::Ports<V>, visitor: &mut dyn VisitMut<V>) {
+        B::visit_mut(ports, visitor);
     }
 }
 
@@ -99,6 +97,30 @@ pub trait Make<V: View> {
     fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::In;
     /// An output of `bits` bits.
     fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::Out;
+}
+
+/// Sees each port of a view.
+pub trait Visit<V: View> {
+    /// An input of one bit.
+    fn in_bit(&mut self, name: &'static str, port: &V::InBit);
+    /// An output of one bit.
+    fn out_bit(&mut self, name: &'static str, port: &V::OutBit);
+    /// Another input.
+    fn input(&mut self, name: &'static str, port: &V::In);
+    /// Another output.
+    fn output(&mut self, name: &'static str, port: &V::Out);
+}
+
+/// Changes each port of a view.
+pub trait VisitMut<V: View> {
+    /// An input of one bit.
+    fn in_bit(&mut self, port: &mut V::InBit);
+    /// An output of one bit.
+    fn out_bit(&mut self, port: &mut V::OutBit);
+    /// Another input.
+    fn input(&mut self, port: &mut V::In);
+    /// Another output.
+    fn output(&mut self, port: &mut V::Out);
 }
 
 /// Ports as their block sees them.
@@ -405,18 +427,17 @@ macro_rules! block {
                 $ports { $($port: $crate::block!(@make $direction make, stringify!($port), [$($doc),+] $(, $width)?),)* }
             }
 
-            fn visit(
-                ports: &$ports<$crate::language::Signals>,
-                visit: &mut dyn FnMut(&'static str, bool, &dyn $crate::language::SignalPort),
-            ) {
-                $(visit(stringify!($port), $crate::block!(@is_output $direction), &ports.$port);)*
+            #[allow(unused_variables)]
+            fn visit<V: $crate::language::View>(ports: &$ports<V>, visitor: &mut dyn $crate::language::Visit<V>) {
+                $($crate::block!(@visit $direction visitor, (stringify!($port), &ports.$port) $(, $width)?);)*
             }
 
-            fn visit_mut(
-                ports: &mut $ports<$crate::language::Signals>,
-                visit: &mut dyn FnMut(&'static str, bool, &mut dyn $crate::language::SignalPort),
+            #[allow(unused_variables)]
+            fn visit_mut<V: $crate::language::View>(
+                ports: &mut $ports<V>,
+                visitor: &mut dyn $crate::language::VisitMut<V>,
             ) {
-                $(visit(stringify!($port), $crate::block!(@is_output $direction), &mut ports.$port);)*
+                $($crate::block!(@visit $direction visitor, (&mut ports.$port) $(, $width)?);)*
             }
         }
     };
@@ -432,8 +453,10 @@ macro_rules! block {
     (@make out $make:ident, $name:expr, $doc:tt, $width:expr) => {
         $make.output($name, $crate::language::Width::from($width).0, &$doc)
     };
-    (@is_output in) => { false };
-    (@is_output out) => { true };
+    (@visit in $visitor:ident, $port:tt) => { $visitor.in_bit $port };
+    (@visit out $visitor:ident, $port:tt) => { $visitor.out_bit $port };
+    (@visit in $visitor:ident, $port:tt, $width:expr) => { $visitor.input $port };
+    (@visit out $visitor:ident, $port:tt, $width:expr) => { $visitor.output $port };
 }
 
 #[cfg(test)]

@@ -53,13 +53,6 @@ impl Run {
         self.simulation.set(slot.first, limbs(slot.bits) as usize, word.limbs());
     }
 
-    /// As [`Run::set`], from limbs of 64 bits, least significant first; those that are missing are 0.
-    pub fn set_limbs(&mut self, slot: Slot, value: &[u64]) {
-        let mut word = Word::default();
-        word.set_limbs(value);
-        self.set(slot, word);
-    }
-
     /// The value of a signal, settled by [`Run::settle`].
     pub fn get(&self, slot: Slot) -> Word {
         let mut word = Word::default();

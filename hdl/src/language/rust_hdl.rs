@@ -6,9 +6,9 @@ use rust_hdl::core::probe::Probe;
 use rust_hdl::prelude::{Bit, Block as RustHdlBlock, Clock, Direction, In, Logic, Out, Signal};
 
 use super::hierarchy::Hierarchy;
-use super::ports::{kernel_of, Block, Interface, Make, View};
+use super::ports::{kernel_of, Block, Interface, Make, View, Visit, VisitMut};
 use super::run::{Run, Slot};
-use crate::wire::Wire;
+use crate::wire::{Wire, Word};
 
 /// Ports as signals of rust-hdl.
 #[derive(Clone, Copy, Debug)]
@@ -21,39 +21,25 @@ impl View for Signals {
     type Out = Wire<Out>;
 }
 
-/// A port as a signal of rust-hdl, whose value is limbs of 64 bits, least significant first.
-pub trait SignalPort: RustHdlBlock {
-    /// Gives the current value to `take`; limbs at the end that are zeros may be missing.
-    fn read(&self, take: &mut dyn FnMut(&[u64]));
+/// A port as a signal of rust-hdl.
+trait Port: RustHdlBlock {
+    /// The current value.
+    fn read(&self) -> Word;
     /// Sets the value after the next update.
-    fn write(&mut self, value: &[u64]);
+    fn write(&mut self, value: Word);
     /// Marks the port as driven by its block.
     fn drive(&mut self);
 }
 
-impl<D: Direction> SignalPort for Wire<D> {
-    fn read(&self, take: &mut dyn FnMut(&[u64])) {
-        take(self.limbs());
-    }
-
-    fn write(&mut self, value: &[u64]) {
-        self.next.set_limbs(value);
-    }
-
-    fn drive(&mut self) {
-        Logic::connect(self);
-    }
-}
-
-macro_rules! one_bit {
-    ($direction:ty) => {
-        impl SignalPort for Signal<$direction, Bit> {
-            fn read(&self, take: &mut dyn FnMut(&[u64])) {
-                take(&[u64::from(self.val())]);
+macro_rules! port {
+    ([$($generics:tt)*] $signal:ty, $self:ident => $read:expr, $value:ident => $next:expr) => {
+        impl $($generics)* Port for $signal {
+            fn read(&$self) -> Word {
+                $read
             }
 
-            fn write(&mut self, value: &[u64]) {
-                self.next = value[0] != 0;
+            fn write(&mut self, $value: Word) {
+                self.next = $next;
             }
 
             fn drive(&mut self) {
@@ -63,8 +49,51 @@ macro_rules! one_bit {
     };
 }
 
-one_bit!(In);
-one_bit!(Out);
+port!([<D: Direction>] Wire<D>, self => self.val().word(), value => value.into());
+port!([] Signal<In, Bit>, self => self.val().into(), value => value.number() == 1);
+port!([] Signal<Out, Bit>, self => self.val().into(), value => value.number() == 1);
+
+/// Calls a function with each port: its name, whether it is an output.
+struct Each<F>(F);
+
+impl<F: FnMut(&'static str, bool, &dyn Port)> Visit<Signals> for Each<F> {
+    fn in_bit(&mut self, name: &'static str, port: &Signal<In, Bit>) {
+        self.0(name, false, port);
+    }
+
+    fn out_bit(&mut self, name: &'static str, port: &Signal<Out, Bit>) {
+        self.0(name, true, port);
+    }
+
+    fn input(&mut self, name: &'static str, port: &Wire<In>) {
+        self.0(name, false, port);
+    }
+
+    fn output(&mut self, name: &'static str, port: &Wire<Out>) {
+        self.0(name, true, port);
+    }
+}
+
+/// Calls a function with each port, to change it: whether it is an output.
+struct EachMut<F>(F);
+
+impl<F: FnMut(bool, &mut dyn Port)> VisitMut<Signals> for EachMut<F> {
+    fn in_bit(&mut self, port: &mut Signal<In, Bit>) {
+        self.0(false, port);
+    }
+
+    fn out_bit(&mut self, port: &mut Signal<Out, Bit>) {
+        self.0(true, port);
+    }
+
+    fn input(&mut self, port: &mut Wire<In>) {
+        self.0(false, port);
+    }
+
+    fn output(&mut self, port: &mut Wire<Out>) {
+        self.0(true, port);
+    }
+}
 
 struct MakeSignals;
 
@@ -105,18 +134,21 @@ impl<B: Block> RustHdl<B> {
         let ports = block.ports(&mut MakeSignals);
         let run = Run::new(&Hierarchy::of_kernel(kernel_of(&block)), &[]);
         let mut slots = Vec::new();
-        B::visit(&ports, &mut |name, _, _| slots.push(run.slot("", name)));
+        B::visit(&ports, &mut Each(|name, _, _: &dyn Port| slots.push(run.slot("", name))));
         RustHdl { clk: Default::default(), ports, run, slots, started: false }
     }
 }
 
 impl<B: Interface> RustHdl<B> {
     fn update_ports(&mut self, outputs: bool) {
-        B::visit_mut(&mut self.ports, &mut |_, is_output, port| {
-            if is_output == outputs {
-                port.update_all();
-            }
-        });
+        B::visit_mut(
+            &mut self.ports,
+            &mut EachMut(|is_output: bool, port: &mut dyn Port| {
+                if is_output == outputs {
+                    port.update_all();
+                }
+            }),
+        );
     }
 }
 
@@ -138,32 +170,39 @@ impl<B: Interface> Logic for RustHdl<B> {
     fn update(&mut self) {
         let RustHdl { clk, ports, run, slots, started } = self;
         *started = true;
-        let mut index = 0..;
-        B::visit(ports, &mut |_, is_output, port| {
-            let slot = index.next().map(|at| slots[at]).unwrap_or_default();
-            if !is_output {
-                port.read(&mut |limbs| run.set_limbs(slot, limbs));
-            }
-        });
+        let mut at = slots.iter();
+        B::visit(
+            ports,
+            &mut Each(|_, is_output: bool, port: &dyn Port| {
+                if let Some(&slot) = at.next().filter(|_| !is_output) {
+                    run.set(slot, port.read());
+                }
+            }),
+        );
         if B::CLOCK.is_some() && clk.pos_edge() {
             run.clock();
         }
         run.settle();
-        let mut index = 0..;
-        B::visit_mut(ports, &mut |_, is_output, port| {
-            let slot = index.next().map(|at| slots[at]).unwrap_or_default();
-            if is_output && slot.bits() > 0 {
-                port.write(run.get(slot).limbs());
-            }
-        });
+        let mut at = slots.iter();
+        B::visit_mut(
+            ports,
+            &mut EachMut(|is_output: bool, port: &mut dyn Port| {
+                if let Some(&slot) = at.next().filter(|slot| is_output && slot.bits() > 0) {
+                    port.write(run.get(slot));
+                }
+            }),
+        );
     }
 
     fn connect(&mut self) {
-        B::visit_mut(&mut self.ports, &mut |_, is_output, port| {
-            if is_output {
-                port.drive();
-            }
-        });
+        B::visit_mut(
+            &mut self.ports,
+            &mut EachMut(|is_output: bool, port: &mut dyn Port| {
+                if is_output {
+                    port.drive();
+                }
+            }),
+        );
     }
 }
 
@@ -183,7 +222,7 @@ impl<B: Interface> RustHdlBlock for RustHdl<B> {
 
     fn has_changed(&self) -> bool {
         let mut changed = self.clk.has_changed() || !self.started;
-        B::visit(&self.ports, &mut |_, _, port| changed |= port.has_changed());
+        B::visit(&self.ports, &mut Each(|_, _, port: &dyn Port| changed |= port.has_changed()));
         changed
     }
 
@@ -192,7 +231,7 @@ impl<B: Interface> RustHdlBlock for RustHdl<B> {
         if let Some(clock) = B::CLOCK {
             self.clk.accept(clock, probe);
         }
-        B::visit(&self.ports, &mut |name, _, port| port.accept(name, probe));
+        B::visit(&self.ports, &mut Each(|name, _, port: &dyn Port| port.accept(name, probe)));
         probe.visit_end_scope(name, self);
     }
 }

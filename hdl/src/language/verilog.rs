@@ -78,7 +78,7 @@ impl Printer<'_> {
         for signal in &kernel.signals {
             self.declare(signal);
         }
-        let unread = if kernel.connects { Vec::new() } else { self.unused() };
+        let unread = self.unused();
         for item in &kernel.items {
             match item {
                 Item::Comment(text) => self.line(&format!("// {text}")),

@@ -204,7 +204,7 @@ impl Block for BoardTop {
                 link.m_axis_tvalid.set(engine.m_axis_tvalid);
                 link.m_axis_tlast.set(engine.m_axis_tlast);
                 engine.m_axis_tready.set(link.m_axis_tready);
-                k.wire("unused", link.requested);
+                k.unused([link.requested]);
             }
             Source::Scan(scan) => {
                 let engine = k.instance("engine", &**scan);

@@ -12,7 +12,7 @@
 //! The packets are those of [`dermis_golden::wire::link`]. Any block that carries bytes both ways can replace the UART or the
 //! SPI slave; a board has one of them.
 //!
-//! `board_top` connects blocks by `#[hdl_gen]`; each other block is a [`Block`](crate::language::Block) of the language.
+//! `board_top` connects them, with an engine or a scan.
 
 mod board;
 mod board_top;

@@ -135,8 +135,7 @@ impl Block for PacketLink {
         packer.crc_busy.set(leaving.busy);
 
         k.comment("Outputs used in the other direction only.");
-        k.wire("unused", arriving.busy | leaving.right);
-        k.wire("unused_low", arriving.low);
+        k.unused([arriving.busy, leaving.right, arriving.low]);
 
         k.comment("Packets to sent bytes.");
         encoder.content.set(packer.content);

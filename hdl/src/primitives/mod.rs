@@ -1,8 +1,7 @@
 //! Arithmetic, memories, counters and queues, from which the [stages](crate::stages) are built.
 //!
-//! rust-hdl 0.46 reads some signed constructs differently from the Verilog it prints, and has no multiplication beyond
-//! 16×16. So blocks are kernels of the [`language`](crate::language): simulation, Verilog and the estimate of their logic
-//! follow from one graph. Co-simulation compares the blocks with the bit-true model, stage by stage, and proofs cover those
+//! Simulation, Verilog and the estimate of their logic follow from one graph of the [`language`](crate::language). Co-simulation
+//! compares the blocks with the bit-true model, stage by stage, and proofs cover those
 //! that carry a handshake.
 //!
 //! The other modules hold what several blocks share: expressions of kernels in `constant_product`, `half_up`,

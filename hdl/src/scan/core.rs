@@ -146,7 +146,7 @@ impl Block for ScanCore {
         engine.m_axis_tready.set(told.s_axis_tready);
         match tables.as_ref().zip(codes.as_ref()) {
             Some((tables, codes)) => {
-                k.wire("unused", capture.complete);
+                k.unused([capture.complete]);
                 codes.code.set(capture.m_axis_tdata);
                 codes.passed.set(tables.passed);
                 codes.complete.set(tables.complete);

@@ -10,8 +10,8 @@
 //!                                                                                      '-> along_x, transposed, along_y,
 //!                                                                                          candidates, score
 //! ```
-//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output. [`Engine`]
-//! connects them by `#[hdl_gen]`.
+//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output. [`Serial`]
+//! connects them.
 
 mod banks;
 mod candidates;

@@ -42,6 +42,12 @@ pub(super) fn build_banks<'k>(
     io.row_end.set(first.row_end);
     io.dropped.set(first.dropped);
     io.framing.set(first.framing);
+    for (number, bank) in banks.iter().enumerate() {
+        k.unused([bank.full, bank.which]);
+        if number > 0 {
+            k.unused([bank.s_axis_tready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
+        }
+    }
     io.full.set(choose.settled);
     io.which.set(choose.which);
     let chosen = |of: fn(&ReceivePorts<Outside<'k>>) -> Expr<'k>| {
@@ -79,7 +85,8 @@ mod tests {
             let index = which.map_or(0, |which| which.number() as usize);
             let mut outputs = self.buffers[index].outputs(inputs);
             (outputs[5], outputs[6]) = (settled, which);
-            // What is gathered of a subarray is that of the chosen case.
+            // Before the first choice no buffer is chosen; what is gathered of a subarray is that of the chosen case.
+            outputs[7] = outputs[7].filter(|_| which.is_some());
             outputs[8..11].iter_mut().for_each(|gathered| *gathered = gathered.filter(|_| settles));
             outputs
         }

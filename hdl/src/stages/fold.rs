@@ -117,6 +117,7 @@ impl Block for Fold {
         k.comment("Products read the input while it is written.");
         begins.d.set(running.q & lead.equal);
         io.readable.set(begins.q);
+        k.unused([frame_quads.last]);
     }
 }
 

@@ -1,13 +1,10 @@
 //! The stages of the pipeline, one file each, named as in the bit-true model. A stage starts on the `done` pulse of the
 //! one before.
 //!
-//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` connect
-//! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
-//! `estimate`, `relax`, `segment`, `contacts`, `window`, `shear`, `label_beats`, `unsearched` and `resultants` are
-//! [kernels](crate::language).
+//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` are made of instances of
+//! [primitives](crate::primitives), with single-bit control between them; the others have the logic in their own kernel.
 //!
-//! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
-//! `search` in a scene without one. Both pairs have the same ports. `estimate` and `relax` work where a network gives μ, `segment`,
+//! `banks`, with `choose`, is `receive` where the case is chosen per frame; `unsearched` is `search` in a scene without one. `estimate` and `relax` work where a network gives μ, `segment`,
 //! `contacts`, `window`, `shear` and `label_beats` where it gives one for each contact; in other scenes they are wires.
 
 mod banks;

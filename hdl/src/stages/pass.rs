@@ -179,6 +179,7 @@ impl Block for Pass {
         io.damaged.set(lanes.damaged);
         io.issued.set(issue);
         io.step.set(pass_program.step);
+        k.unused([column.last]);
     }
 }
 

@@ -186,6 +186,7 @@ impl Receive {
         frame.read.set(k.constant(1, 1));
         frame.read_address.set(io.quad_address);
         io.quad.set(frame.read_data);
+        k.unused([scan.lane]);
 
         stats_enable.d.set(taken & !early);
         stats_part.d.set(scan.part);

@@ -348,6 +348,7 @@ impl Sweeps {
         io.found.set(best.found);
         io.compared.set(best.done);
         io.taken.set(best.taken);
+        k.unused([period.value]);
     }
 }
 

@@ -17,7 +17,7 @@ use crate::report::{self, CosimReport, ScanReport};
 #[command(after_help = "Examples:
   dermis cosim sensor-1
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
-  dermis cosim eight-by-eight --device rust-hdl
+  dermis cosim eight-by-eight --device kernel
   dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
   dermis cosim hand.toml --tables left-hand.toml     hardware of hand.toml that takes the tables of a specimen
   dermis cosim mat.toml                              a scene with an adc-scan: its converters too
@@ -68,9 +68,9 @@ fn wire_fault(text: &str) -> Result<Fault, String> {
 enum DeviceChoice {
     /// The generated Verilog, under Verilator.
     Verilator,
-    /// The same design in rust-hdl's own simulator.
-    RustHdl,
-    /// Verilator, then rust-hdl.
+    /// The same design in kernel simulation.
+    Kernel,
+    /// Verilator, then the kernel simulation.
     Both,
     /// The netlist synthesised for the board, under Verilator: compares beats and cycles, not stages; takes minutes.
     Netlist,
@@ -80,8 +80,8 @@ impl DeviceChoice {
     fn simulators(self) -> &'static [Simulator] {
         match self {
             DeviceChoice::Verilator => &[Simulator::Verilator],
-            DeviceChoice::RustHdl => &[Simulator::RustHdl],
-            DeviceChoice::Both => &[Simulator::Verilator, Simulator::RustHdl],
+            DeviceChoice::Kernel => &[Simulator::Kernel],
+            DeviceChoice::Both => &[Simulator::Verilator, Simulator::Kernel],
             DeviceChoice::Netlist => &[Simulator::Netlist],
         }
     }

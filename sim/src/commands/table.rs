@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     }
     let verify = |name: &String| -> Result<Verified> {
         let (scene, frames) = shipped(name, "dermis cosim takes them with --frame")?;
-        verify(&scene, &frames, &[Simulator::Verilator, Simulator::RustHdl], build_dir)
+        verify(&scene, &frames, &[Simulator::Verilator, Simulator::Kernel], build_dir)
     };
     let all = scenes_or(scenes, QUICK_SCENES).iter().map(verify).collect::<Result<Vec<_>>>()?;
     let equal = all.iter().all(|v| v.findings.is_equal());

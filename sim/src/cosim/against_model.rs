@@ -79,7 +79,7 @@ impl Vector {
 
 /// A device with its name and its taps.
 pub struct DeviceUnderTest<'a> {
-    /// Name in messages: `verilator`, `rust-hdl`.
+    /// Name in messages: `verilator`, `kernel`.
     pub name: &'a str,
     /// The device.
     pub device: &'a mut dyn Device,

@@ -57,7 +57,7 @@ pub fn traces(scene: &Scene, build: &Path) -> Result<Vec<Trace>> {
     let vector = hardware.vector(frames)?.without_stages();
     let _progress = Progress::start(&format!("{}: ports of a frame", scene.name));
     let mut recorder = Recorder::new(&hardware.model)?;
-    run(DeviceUnderTest { name: "rust-hdl", device: &mut recorder, taps: &[] }, &[vector], Stimulus::FullSpeed);
+    run(DeviceUnderTest { name: "kernel", device: &mut recorder, taps: &[] }, &[vector], Stimulus::FullSpeed);
     Ok(recorder.into_traces())
 }
 

@@ -48,8 +48,8 @@ pub struct DeviceTimeout {
 pub enum Simulator {
     /// The generated Verilog, under Verilator.
     Verilator,
-    /// The same design in rust-hdl's own simulator.
-    RustHdl,
+    /// The same design in kernel simulation.
+    Kernel,
     /// The netlist synthesised for the scene's board, under Verilator.
     Netlist,
 }
@@ -59,7 +59,7 @@ impl Simulator {
     pub fn name(self) -> &'static str {
         match self {
             Simulator::Verilator => "verilator",
-            Simulator::RustHdl => "rust-hdl",
+            Simulator::Kernel => "kernel",
             Simulator::Netlist => "netlist",
         }
     }
@@ -121,7 +121,7 @@ impl Hardware {
     fn device_with(&self, simulator: Simulator, optimisation: Optimisation) -> Result<Box<dyn Device>> {
         Ok(match simulator {
             Simulator::Verilator => Box::new(self.verilated(&self.generated, false, optimisation)?),
-            Simulator::RustHdl => self::simulator(&self.built)?,
+            Simulator::Kernel => self::simulator(&self.built)?,
             Simulator::Netlist => {
                 let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
                 Box::new(self.verilated(&netlist, false, optimisation)?)
@@ -162,7 +162,7 @@ impl Hardware {
     /// As [`Hardware::device`]; a scene whose board has no link; a scan of a sensor without shipped frames.
     pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
         let board: Box<dyn BoardDevice> = match simulator {
-            Simulator::RustHdl => board_simulator(&self.built)?,
+            Simulator::Kernel => board_simulator(&self.built)?,
             _ => Box::new(VerilatedBoard::new(&generate_board(&self.built)?, &self.built, &self.cache)?),
         };
         match self.built.scene.hardware.adc_scan {
@@ -175,7 +175,7 @@ impl Hardware {
     pub fn taps(&self, simulator: Simulator) -> &[Tap] {
         match simulator {
             Simulator::Netlist => &[],
-            Simulator::Verilator | Simulator::RustHdl => &self.generated.taps,
+            Simulator::Verilator | Simulator::Kernel => &self.generated.taps,
         }
     }
 

@@ -4,7 +4,7 @@
 //! frame -> codes --+--> bit-true model ------------> Trace ----+
 //!                  |                                           +--> compare_recording -> Findings
 //!                  +--> drive -> Device (Verilator,            |
-//!                                rust-hdl) -> Recording -------+
+//!                                  kernel) -> Recording -------+
 //! ```
 //!
 //! | module | does |

@@ -5,7 +5,7 @@
 //! frame -> golden ------------------------------> Reconstruction --+
 //!       -> bit-true model --> Trace, Reconstruction ---------------+--> FrameResult
 //!       -> Verilator: full speed, back to back, with stalls --> Findings, Times -+
-//!       -> rust-hdl: full speed ----------------> Findings --------+
+//!       -> kernel: full speed ----------------> Findings --------+
 //!       -> netlist, on request: full speed -----> Findings --------+
 //! ```
 
@@ -109,7 +109,7 @@ pub fn verify_specimen(
         frame_interval: None,
         planned_interval: planned_interval(&hardware.model, &vectors),
         runs: Vec::new(),
-        verilog: simulators.iter().any(|&simulator| simulator != Simulator::RustHdl),
+        verilog: simulators.iter().any(|&simulator| simulator != Simulator::Kernel),
     };
     let mut times: Vec<Times> = Vec::new();
     for &simulator in simulators {
@@ -147,7 +147,7 @@ fn simulate(
 ) -> Result<Vec<Times>> {
     let stimuli: &[Stimulus] = match simulator {
         Simulator::Verilator => &[Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: SEED }],
-        Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
+        Simulator::Kernel | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device_for(simulator, vectors, stimuli.len())?;
     let image = hardware.image();

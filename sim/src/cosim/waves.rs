@@ -331,7 +331,7 @@ mod tests {
         let frames = &Frame::shipped(&scene)[2..3];
         let work = tempfile::tempdir().unwrap();
         let folder = work.path().join("waves");
-        let command = waves(&scene, frames, Simulator::RustHdl, work.path(), &folder).unwrap();
+        let command = waves(&scene, frames, Simulator::Kernel, work.path(), &folder).unwrap();
         let (vcd, list) = (folder.join("eight-by-eight.vcd"), folder.join("eight-by-eight.gtkw"));
         assert_eq!(command, format!("gtkwave {} {}", vcd.display(), list.display()));
         assert_eq!(std::fs::metadata(&vcd).unwrap().permissions().mode() & 0o777, 0o644);

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `data-flow.svg` | stages of the hardware and the words between them | always the same |
 //! | `feet.svg` | forces of two feet, bit-true model | always the same |
-//! | `timing-STAGE.svg` | the ports of a stage during a frame, rust-hdl's simulation | always the same |
+//! | `timing-STAGE.svg` | the ports of a stage during a frame, kernel simulation | always the same |
 //! | `time-sensor-1-shear.svg` | shear error against the time of a frame | measured anew |
 
 use std::path::Path;

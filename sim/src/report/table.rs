@@ -150,7 +150,7 @@ fn count(cycles: Option<u64>) -> String {
     cycles.map_or("-".into(), |c| c.to_string())
 }
 
-/// Whether the Verilog equals the model; `-` if only rust-hdl's simulation was run.
+/// Whether the Verilog equals the model; `-` if only kernel simulation was run.
 fn equality_cell(verified: &Verified, equal: bool) -> String {
     match (verified.verilog, equal) {
         (false, _) => "-",

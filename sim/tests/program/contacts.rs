@@ -45,7 +45,7 @@ fn contacts_are_reconstructed_in_words_and_in_hardware() {
     let (code, text, error) = run(folder, &["check", "pad.toml", "--draws", "2"]);
     assert_eq!(code, Some(0), "{error}");
     assert!(text.contains("within the budget of 1000 µs"), "{text}");
-    let (code, text, error) = run(folder, &["cosim", "pad.toml", "--frame", "f.json", "--device", "rust-hdl"]);
+    let (code, text, error) = run(folder, &["cosim", "pad.toml", "--frame", "f.json", "--device", "kernel"]);
     assert_eq!(code, Some(0), "{error}");
     assert!(text.contains("equal to the bit-true model to the bit"), "{text}");
     let (code, text, error) = run(folder, &["build", "pad.toml", "--explain", "--out", "rtl"]);

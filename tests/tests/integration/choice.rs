@@ -103,8 +103,8 @@ fn every_case_is_equal_in_any_order() {
         assert!(switches >= 4, "{:?}: {switches} changes", scene.partition);
         let stalls = [1, 2, 3].map(|seed| Stimulus::Stalls { seed });
         let verilog = [&[Stimulus::FullSpeed], &stalls[..]].concat();
-        let simulators = [(Simulator::Verilator, &verilog[..]), (Simulator::RustHdl, &verilog[..2])];
-        // rust-hdl's simulation takes most of the time: without the others at least one scene.
+        let simulators = [(Simulator::Verilator, &verilog[..]), (Simulator::Kernel, &verilog[..2])];
+        // kernel simulation takes most of the time: without the others at least one scene.
         for (simulator, stimuli) in variants(&simulators, if number == 0 { 2 } else { 1 }) {
             let findings = check(&hardware, *simulator, &vectors, stimuli);
             assert_equal(&findings, format!("{:?}", scene.partition));

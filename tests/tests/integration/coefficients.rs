@@ -40,7 +40,7 @@ fn small(more: &str) -> Scene {
 }
 
 fn check(scene: &Scene, frames: &[Frame]) {
-    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
+    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::Kernel], &build_dir()).unwrap();
     assert_equal(&verified.findings, &scene.name);
     // The output equals the model's, which never raises the flag.
     assert!(verified.rows.iter().all(|row| !row.fixed.flags.contains(&Flag::CoefficientsDamaged)));

@@ -40,7 +40,7 @@ fn drawn_frames_are_equal_on_every_simulator() {
     for (name, dead) in SCENES {
         let scene = masked(name, dead);
         // Compilation by Verilator is slow: one scene of each sensor, the one with more dead taxels.
-        let simulators = [Simulator::RustHdl, Simulator::Verilator];
+        let simulators = [Simulator::Kernel, Simulator::Verilator];
         let simulators = if dead.len() > 1 { &simulators[..] } else { &simulators[..1] };
         let verified = verify(&scene, &frames(&scene, 4), simulators, &build_dir()).unwrap();
         assert_equal(&verified.findings, &scene.name);
@@ -63,7 +63,7 @@ fn unlike_scenes_are_equal() {
              [input]\ndead = {dead}"
         );
         let scene = Scene::parse(&text, name).unwrap();
-        let verified = verify(&scene, &frames(&scene, 4), &[Simulator::RustHdl], &build_dir()).unwrap();
+        let verified = verify(&scene, &frames(&scene, 4), &[Simulator::Kernel], &build_dir()).unwrap();
         assert_equal(&verified.findings, name);
     }
 }

@@ -1,5 +1,5 @@
 //! Equality to the bit, from the first word of the first stage to the last status beat: the generated
-//! Verilog (full speed, back to back, and with stalls after an interrupted frame) and rust-hdl's own simulation
+//! Verilog (full speed, back to back, and with stalls after an interrupted frame) and kernel simulation
 //! against the bit-true model, on every shipped frame, with exact cycle counts, none above those of the committed table.
 
 use dermis_golden::data::frame::Frame;
@@ -12,7 +12,7 @@ use dermis_sim::report;
 use dermis_tests::{assert_equal, build_dir, check_cycles, scene};
 
 fn check(scene: &Scene, frames: &[Frame]) -> Verified {
-    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
+    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::Kernel], &build_dir()).unwrap();
     assert_equal(&verified.findings, &scene.name);
     verified
 }
@@ -67,7 +67,7 @@ fn golden_judges_the_codes_that_the_hardware_gets() {
     let peak = frames[0].peak_MPa();
     let share = peak / frames[1].peak_MPa() / 200.0;
     frames[1].stress_MPa.iter_mut().for_each(|b| *b *= share);
-    let verified = verify(&scene, &frames, &[Simulator::RustHdl], &build_dir()).unwrap();
+    let verified = verify(&scene, &frames, &[Simulator::Kernel], &build_dir()).unwrap();
     let unreliable = |flags: &[Flag]| flags.contains(&Flag::ShearUnreliable);
     let rows: Vec<[bool; 2]> =
         verified.rows.iter().map(|row| [unreliable(&row.golden.flags), unreliable(&row.fixed.flags)]).collect();

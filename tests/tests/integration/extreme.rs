@@ -1,5 +1,5 @@
 //! Extreme frames in hardware: the codes of every one of [`dermis_golden::study::stability::extreme::frames`], through the generated
-//! Verilog (full speed and with stalls) and rust-hdl's simulation, against the bit-true model, to the bit and the cycle.
+//! Verilog (full speed and with stalls) and kernel simulation, against the bit-true model, to the bit and the cycle.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Case;
@@ -30,7 +30,7 @@ fn check(scene: &Scene, least: usize) {
     let runs = [
         (Simulator::Verilator, Stimulus::FullSpeed),
         (Simulator::Verilator, Stimulus::Stalls { seed: 5 }),
-        (Simulator::RustHdl, Stimulus::FullSpeed),
+        (Simulator::Kernel, Stimulus::FullSpeed),
     ];
     for (simulator, stimulus) in runs {
         let findings = compare(&hardware, simulator, &vectors, stimulus);

@@ -1,4 +1,4 @@
-//! Frames whose `tlast` comes early or is missing, under Verilator and in rust-hdl's simulation: an incomplete frame
+//! Frames whose `tlast` comes early or is missing, under Verilator and in kernel simulation: an incomplete frame
 //! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
 //! `framing`, once.
 
@@ -85,7 +85,7 @@ fn setting() -> Setting {
     Setting { plain: sent(0), flagged: sent(FRAMING.mask()), codes, hardware }
 }
 
-const SIMULATORS: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
+const SIMULATORS: [Simulator; 2] = [Simulator::Verilator, Simulator::Kernel];
 
 #[test]
 fn an_early_tlast_drops_its_frame_and_flags_the_next_one_once() {

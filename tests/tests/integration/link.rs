@@ -1,5 +1,5 @@
 //! The board's link over UART or SPI (`spi`): for any input the board's top module behaves the same under Verilator and
-//! in rust-hdl's simulation, pin by pin and half cycle by half cycle; its answers are those of the bit-true model; and
+//! in kernel simulation, pin by pin and half cycle by half cycle; its answers are those of the bit-true model; and
 //! its counters record every packet dropped.
 
 use std::ops::Deref;
@@ -26,7 +26,7 @@ const CYCLES_PER_BIT: u32 = 8;
 const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
 
 /// Both simulators, in lockstep; one is a tenth of the work.
-const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
+const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::Kernel];
 
 /// Changes of pins until a board is out of reset; before, Verilator's registers are undefined.
 const RESET: u64 = 40;
@@ -38,7 +38,7 @@ impl BoardDevice for Both {
     fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs {
         let [a, b] = self.0.each_mut().map(|device| device.settle(inputs, clock));
         self.1 += 1;
-        assert!(self.1 < RESET || a == b, "change {}: Verilator {a:?}, rust-hdl {b:?}", self.1);
+        assert!(self.1 < RESET || a == b, "change {}: Verilator {a:?}, kernel simulation {b:?}", self.1);
         b
     }
 }

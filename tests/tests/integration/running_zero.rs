@@ -79,8 +79,8 @@ fn a_run_with_presses_is_equal() {
             assert_equal(&compare(&hardware, Simulator::Verilator, &vectors, stimulus), format!("{what}, {stimulus}"));
         }
         assert_equal(
-            &compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed),
-            format!("{what}, rust-hdl"),
+            &compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed),
+            format!("{what}, kernel"),
         );
         // Zeros move, and reach their limit and leave it.
         let mut fixed = scene.clone();

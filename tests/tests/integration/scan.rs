@@ -1,4 +1,4 @@
-//! Scan by the hardware: codes and beats equal the bit-true model to the bit in Verilator and in rust-hdl's simulation, with
+//! Scan by the hardware: codes and beats equal the bit-true model to the bit in Verilator and in kernel simulation, with
 //! converters modelled from their data sheet, none of whose times is broken; what faults of the wires do; seeded defects.
 
 use dermis_golden::data::frame::Frame;
@@ -17,7 +17,7 @@ use dermis_tests::{build_dir, scene, variants, verilog_code};
 use crate::tables::specimen;
 
 /// Both simulators.
-const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
+const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::Kernel];
 
 /// `eight-by-eight`, scanned by one MAX11125 or two ADS8688.
 fn scanned(converters: usize, average: u32) -> (Scene, Vec<Frame>) {

@@ -1,6 +1,6 @@
 //! Scenes of other shapes, degrees, formats and options than the built-in ones are equal to the bit as well.
 //!
-//! A few go through Verilator and rust-hdl's simulation; many random ones through rust-hdl's simulation alone, which
+//! A few go through Verilator and the kernel simulation; many random ones through kernel simulation alone, which
 //! needs no compiler.
 
 use dermis_golden::data::frame::Frame;
@@ -93,7 +93,7 @@ fn unlike_scenes_are_equal() {
     let scenes = variants(&SCENES, 7);
     for (name, text) in scenes {
         let scene = parse(name, text);
-        let simulators = [Simulator::Verilator, Simulator::RustHdl];
+        let simulators = [Simulator::Verilator, Simulator::Kernel];
         // As many averaged frames as others: the interval is measured from the second one on.
         let frames = vec![frames(&scene); 1 << scene.input.average].concat();
         let verified = verify(&scene, &frames, &simulators, &build_dir()).unwrap();
@@ -114,7 +114,7 @@ fn a_unipolar_array_is_equal() {
                 thickness_mm = 2.0\n[input]\nunipolar = true\ndead = [[1, 2]]\n";
     let (scene, _file) = with_network(text, &[9]);
     let frames = frames(&scene);
-    let simulators = [Simulator::Verilator, Simulator::RustHdl];
+    let simulators = [Simulator::Verilator, Simulator::Kernel];
     assert_equal(&verify(&scene, &frames, &simulators, &build_dir()).unwrap().findings, text);
     let model = Model::for_frames(&scene, &frames).unwrap();
     let mut clipped = 0;
@@ -163,7 +163,7 @@ proptest! {
             .collect();
         let expected = hardware.model.run(&codes);
         let vectors = [dermis_sim::cosim::Vector::new(&hardware.model, "random".into(), codes, expected)];
-        let findings = compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed);
+        let findings = compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
     }
 }
@@ -209,7 +209,7 @@ fn calibrated_readings_are_equal_and_give_the_forces_of_the_stress() {
         if scene.input.average > 0 {
             readings = readings.into_iter().flat_map(|frame| [frame.clone(), frame]).collect();
         }
-        let simulators = [Simulator::Verilator, Simulator::RustHdl];
+        let simulators = [Simulator::Verilator, Simulator::Kernel];
         let verified = verify(&scene, &readings, &simulators, &build_dir()).unwrap();
         assert_equal(&verified.findings, name);
         // Rounding to codes with a scale up to a few times coarser, through an inverse of condition 10².

@@ -1,4 +1,4 @@
-//! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator;
+//! The serial engine: equal to the bit-true model in every stage, beat and cycle, in kernel simulation and under Verilator;
 //! scenes that it does not support are rejected by field.
 
 use dermis_golden::data::frame::Frame;
@@ -14,7 +14,7 @@ use dermis_tests::tools::cells;
 use dermis_tests::{assert_equal, build_dir, compare, scene};
 
 const BOARD: &str = "icebreaker";
-const BOTH: &[Simulator] = &[Simulator::Verilator, Simulator::RustHdl];
+const BOTH: &[Simulator] = &[Simulator::Verilator, Simulator::Kernel];
 
 fn on_board(mut scene: Scene) -> Scene {
     scene.hardware.board = BOARD.to_string();

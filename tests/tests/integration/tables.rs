@@ -109,7 +109,7 @@ fn is_equal(scene: &Scene, what: &str) {
     for stimulus in [Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: 3 }] {
         assert_equal(&compare(&hardware, Simulator::Verilator, &vectors, stimulus), format!("{what}, {stimulus}"));
     }
-    assert_equal(&compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed), format!("{what}, rust-hdl"));
+    assert_equal(&compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed), format!("{what}, kernel"));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! ```text
 //! frames -> Array -> answers by plan ------> stages::scan -> codes -> bit-true model -> beats ---+
 //!             |                                                                                  +--> Findings
-//!             '----> Converters <-- pins --> ScanDevice (Verilator, rust-hdl) -> codes, beats ---+
+//!             '----> Converters <-- pins --> ScanDevice (Verilator, kernel) -> codes, beats ---+
 //!                        '--> violations of the data sheet's times ------------------------------'
 //! ```
 //! Both ways take an answer from the same function of row, channel and number of the frame on the bus; by plan these are

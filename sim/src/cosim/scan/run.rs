@@ -287,8 +287,8 @@ pub fn verify_scan(
                 Simulator::Verilator => {
                     Box::new(VerilatedScan::new(&generate_scan(&hardware)?, &hardware, &build.join("verilator"))?)
                 }
-                Simulator::RustHdl => scan_simulator(&hardware)?,
-                Simulator::Netlist => bail!("a scan is not simulated as netlist: take verilator or rust-hdl"),
+                Simulator::Kernel => scan_simulator(&hardware)?,
+                Simulator::Netlist => bail!("a scan is not simulated as netlist: take verilator or kernel"),
             };
             let (findings, times) = simulate(&mut *device, &label, &model, &array, &expected, image.as_ref(), stalls);
             verified.findings.extend(findings);

@@ -34,7 +34,7 @@ fn board(simulators: &[Simulator]) -> Board {
     let raw = |model: &Model, simulator: &Simulator| -> Box<dyn BoardDevice> {
         let cache = build_dir().join("verilator");
         match simulator {
-            Simulator::RustHdl => board_simulator(model).unwrap(),
+            Simulator::Kernel => board_simulator(model).unwrap(),
             _ => Box::new(VerilatedBoard::new(&generate_board(model).unwrap(), model, &cache).unwrap()),
         }
     };
