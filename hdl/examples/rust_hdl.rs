@@ -104,7 +104,8 @@ fn frame(model: &Model) -> Vec<i32> {
     let half = (1i64 << (model.formats().code_bits - 2)) - 1;
     let bow = |at: usize, count: usize| (4 * at * (count - at) / count / count.div_ceil(2).max(1)) as i64;
     let top = (bow(sensor.rows / 2, sensor.rows) * bow(sensor.cols / 2, sensor.cols)).max(1);
-    let code = |taxel: usize| half * bow(taxel / sensor.cols, sensor.rows) * bow(taxel % sensor.cols, sensor.cols) / top;
+    let code =
+        |taxel: usize| half * bow(taxel / sensor.cols, sensor.rows) * bow(taxel % sensor.cols, sensor.cols) / top;
     (0..sensor.taxels()).map(|taxel| code(taxel) as i32).collect()
 }
 
@@ -134,7 +135,8 @@ mod tests {
 
     #[test]
     fn the_engine_in_a_rust_hdl_design_answers_as_the_model() {
-        let text = "name = \"small\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+        let text =
+            "name = \"small\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
                     [search]\nnoise_floor_MPa = 0.0\nmu_max = 0.3\n";
         assert!(compare(&Scene::parse(text, "small.toml").unwrap()).unwrap() > 16);
     }

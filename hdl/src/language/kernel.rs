@@ -337,14 +337,19 @@ impl Kernel {
     /// Every output, and every input of an instance, that depends on inputs or on outputs of instances in the same cycle, with
     /// their names.
     pub(crate) fn combinational(&self) -> Vec<(&str, Vec<&str>)> {
+        let inputs = self.instance_inputs();
+        let leaves = |signal: &&Signal| signal.output || inputs.contains(&signal.name);
+        let outputs = self.signals.iter().filter(leaves).filter(|signal| matches!(signal.role, Role::Wire { .. }));
+        outputs.map(|signal| (signal.name.as_str(), self.inputs_of(signal))).collect()
+    }
+
+    /// Names of the signals that drive inputs of instances.
+    pub(crate) fn instance_inputs(&self) -> BTreeSet<String> {
         let inputs = self.instances.iter().flat_map(|instance| {
             let inputs = instance.kernel.ports.iter().filter(|port| !port.output);
             inputs.map(|port| format!("{}{SEPARATOR}{}", instance.name, port.name))
         });
-        let inputs: BTreeSet<String> = inputs.collect();
-        let leaves = |signal: &&Signal| signal.output || inputs.contains(&signal.name);
-        let outputs = self.signals.iter().filter(leaves).filter(|signal| matches!(signal.role, Role::Wire { .. }));
-        outputs.map(|signal| (signal.name.as_str(), self.inputs_of(signal))).collect()
+        inputs.collect()
     }
 
     /// Names of the inputs on which a wire depends in the same cycle.

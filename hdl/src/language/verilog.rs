@@ -168,7 +168,9 @@ impl Printer<'_> {
         }
         let unread = |node: NodeId| !read.get(&node).is_some_and(|bits| bits.iter().all(|bit| *bit));
         let own_node = |id: SignalId| kernel.interned[&(Node::Signal(id), kernel.signals[id].ty)];
-        let signals = (0..kernel.signals.len()).filter(|&id| !kernel.signals[id].output && unread(own_node(id)));
+        let inside = kernel.instance_inputs();
+        let is_read = |id: SignalId| kernel.signals[id].output || inside.contains(&kernel.signals[id].name);
+        let signals = (0..kernel.signals.len()).filter(|&id| !is_read(id) && unread(own_node(id)));
         let (inputs, signals): (Vec<SignalId>, Vec<SignalId>) =
             signals.partition(|&id| kernel.signals[id].role.is_driven_outside());
         let names = |ids: Vec<SignalId>| ids.into_iter().map(|id| kernel.signals[id].name.clone());

@@ -257,6 +257,17 @@ impl Serial {
         io.m_axis_tvalid.set(forces.m_axis_tvalid);
         io.m_axis_tlast.set(forces.m_axis_tlast);
         forces.m_axis_tready.set(io.m_axis_tready);
+
+        k.comment("What only the test bench reads");
+        k.unused([
+            receive.accept,
+            pass_sequencer.normalised_valid,
+            pass_sequencer.folding,
+            pass_sequencer.rescaled_valid,
+        ]);
+        k.unused([butterfly.quad, butterfly.quad_valid, pass.quad, pass.quad_valid, unfold.taxel, unfold.taxel_valid]);
+        k.unused([search_sequencer.value_valid, search_sequencer.taken, search_sequencer.compared]);
+        k.unused([coefficient_shift.value]);
     }
 }
 
