@@ -2,7 +2,7 @@
 
 SCENE     ?= sensor-1
 BOARD     ?=
-# Those of `make run`; by default the four that take seconds.
+# Those of `make run`; by default those that take seconds.
 SCENES    ?=
 BUILD     ?= build
 TOOLS      = $(BUILD)/tools

@@ -147,6 +147,11 @@ typedef enum {
 
 
 /**
+ * Cross-check in a thread of its own, always the newest result, so that no result waits for it.
+ */
+#define DERMIS_CROSS_CHECK_BESIDE 18446744073709551615ull
+
+/**
  * What became of a call.
  */
 typedef enum {
@@ -212,6 +217,11 @@ typedef struct dermis_result dermis_result;
  * A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
  */
 typedef struct dermis_scene dermis_scene;
+
+/**
+ * The frames of a sensor in the order of time, and what they show of it. One thread at a time may use it.
+ */
+typedef struct dermis_stream dermis_stream;
 
 /**
  * One contact of a result. A figure counts where its marker is true; else it is NaN.
@@ -371,10 +381,43 @@ dermis_status dermis_result_flags(const dermis_result *result, uint32_t *flags);
 const char *dermis_result_json(const dermis_result *result);
 
 /**
+ * Begin a stream of frames of a scene. It belongs to the caller: dermis_stream_free; the scene may be freed before it. After
+ * an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses, or with a sliding mean.
+ *
+ * engine is "golden" or "fixed", as for dermis_reconstruct. cross_check says which results the estimator evidence reads too,
+ * where the engine has another one: every so many, from the first one on, before they are given; 0: none;
+ * DERMIS_CROSS_CHECK_BESIDE: the newest ones, as often as there is time. A finding is in the results up to the next one;
+ * checks.cross_check_age in the text of dermis_result_json says how many results ago.
+ */
+dermis_status dermis_stream_new(const dermis_scene *scene,
+                                const char *engine,
+                                uint64_t cross_check,
+                                dermis_stream **stream);
+
+/**
+ * Free a stream; NULL is allowed. Results that it gave stay valid.
+ */
+void dermis_stream_free(dermis_stream *stream);
+
+/**
+ * Take the next frame: count = rows * cols values, as for dermis_reconstruct. *result belongs to the caller:
+ * dermis_result_free; it is NULL after an error, and where input.average = k until the last of 2^k frames.
+ *
+ * A frame that is refused for its values has no part in the results; one that the engine refuses ends its block. Either way the
+ * stream goes on with the next frame.
+ */
+dermis_status dermis_stream_push(dermis_stream *stream,
+                                 const double *stress_MPa,
+                                 size_t count,
+                                 dermis_result **result);
+
+/**
  * Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene
  * may be freed before it. After an error *link is NULL; DERMIS_STATUS_INPUT for a scene whose hardware cannot have a link.
+ * cross_check is that of dermis_stream_new: the frames that are answered are a stream.
  */
 dermis_status dermis_link_new(const dermis_scene *scene,
+                              uint64_t cross_check,
                               dermis_link **link);
 
 /**

@@ -175,7 +175,7 @@ int main(int argc, char **argv)
     if (argc == 4) {
         dermis_link *link = NULL;
         const int port = open(argv[3], O_RDWR | O_NOCTTY);
-        if (port >= 0 && dermis_link_new(scene, &link) == DERMIS_STATUS_OK)
+        if (port >= 0 && dermis_link_new(scene, 1, &link) == DERMIS_STATUS_OK)
             result = ask(link, port, stress_MPa, taxels);
         if (port >= 0)
             close(port);

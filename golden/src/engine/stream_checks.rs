@@ -81,6 +81,8 @@ pub struct StreamChecks {
     /// That after the frames of the last result of [`StreamChecks::next`].
     state: State,
     history: History,
+    /// Frames of a block that is not complete.
+    waiting: Vec<Frame>,
     check: Option<Arc<CrossCheck>>,
     pace: CheckPace,
     worker: Option<Arc<Worker>>,
@@ -104,7 +106,8 @@ impl StreamChecks {
             worker
         });
         let (scene, history) = (engine.scene().clone(), History::new(engine.scene()));
-        StreamChecks { scene, state: State::default(), history, check, pace, worker, next: 0, found: None }
+        let waiting = Vec::new();
+        StreamChecks { scene, state: State::default(), history, waiting, check, pace, worker, next: 0, found: None }
     }
 
     /// The next result of `engine`, with figures and flags; of `frames` as [`StreamChecks::add`] has them.
@@ -120,6 +123,25 @@ impl StreamChecks {
         self.state.begun = true;
         self.add_after(drift, frames, result.resultant_N, &mut result.diagnostics());
         Ok(result)
+    }
+
+    /// The result of `engine` whose block `frame` completes, with the frames of the block; `None` before. The scene has no sliding
+    /// mean, which takes all frames so far.
+    ///
+    /// # Errors
+    /// As [`Engine::reconstruct_after`]; the frames of the block are dropped.
+    pub fn push(
+        &mut self,
+        engine: &(impl Engine + ?Sized),
+        frame: Frame,
+    ) -> Result<Option<(Vec<Frame>, Reconstruction)>, EngineError> {
+        self.waiting.push(frame);
+        if self.waiting.len() < self.scene.input.frames_per_result() {
+            return Ok(None);
+        }
+        let frames = std::mem::take(&mut self.waiting);
+        let result = self.next(engine, &frames)?;
+        Ok(Some((frames, result)))
     }
 
     /// Adds figures and flags to the next result, with this resultant in N, of `frames`: of a block its own, of a sliding mean

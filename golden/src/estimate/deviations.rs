@@ -52,12 +52,14 @@ const LARGEST_FILE: u64 = 1 << 20;
 const LARGEST_SCORE: f64 = (1 << 24) as f64;
 
 /// Tables that are part of the program, in JSON.
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 7] = [
     ("sensor-1", include_str!("../../scenes/sensor-1.deviations")),
+    ("sensor-1-bonded", include_str!("../../scenes/sensor-1-bonded.deviations")),
     ("sensor-2", include_str!("../../scenes/sensor-2.deviations")),
     ("sensor-3", include_str!("../../scenes/sensor-3.deviations")),
     ("sensor-4", include_str!("../../scenes/sensor-4.deviations")),
     ("eight-by-eight", include_str!("../../scenes/eight-by-eight.deviations")),
+    ("eight-by-eight-bonded", include_str!("../../scenes/eight-by-eight-bonded.deviations")),
 ];
 
 /// The same, read once: models are built by the thousand.

@@ -27,6 +27,8 @@ pub mod plan;
 pub mod stages;
 pub mod words;
 
+#[cfg(test)]
+mod bonded_tests;
 mod contacts;
 mod decode;
 mod error;

@@ -39,6 +39,7 @@ impl Plan {
         let text = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "array": [sensor.rows, sensor.cols],
+            "medium": self.scene.medium,
             "formats": self.formats(),
             "cover": (!hardware.has_writable_coefficients()).then(cover),
             "full_scale_MPa": input.full_scale_MPa,

@@ -101,6 +101,8 @@ pub enum Medium {
 }
 
 impl Medium {
+    /// Poisson ratio of a bonded layer for which none is stated: that of silicone and polyurethane.
+    pub const ELASTOMER: f64 = 0.48;
     /// The range of [`Medium::allows_poisson`] in words, for messages.
     pub const POISSON_ALLOWED: &'static str = "a number above 0 and below 0.5";
 

@@ -35,7 +35,7 @@ mod tests;
 mod unlike;
 
 pub use deviations::{deviations_coverage, measure_deviations};
-pub use sensitivity::{sensitivities, SensitivityRow};
+pub use sensitivity::{other_medium, sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};
 pub use unlike::{misfit_limit, unlike_study, UnlikeRow};

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! stress, doubles ── dermis_reconstruct ── dermis_result ── forces, contacts, flags
+//!        ├── dermis_stream_push, frame by frame ──────────────────────────┤
 //!        └── dermis_link_frame ── bytes ── port, board ── bytes ── dermis_link_receive ──┘
 //! ```
 //! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says is
@@ -13,6 +14,7 @@
 //! | [`guard`] | no panic reaches C: status codes, texts of errors, checks of pointers |
 //! | [`scene`] | scenes, and reconstruction of their frames |
 //! | [`result`] | results: forces, contacts with error bars, flags |
+//! | [`mod@stream`] | frames in the order of time |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
 #![deny(missing_docs)]
 // Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
@@ -26,3 +28,4 @@ pub mod guard;
 pub mod link;
 pub mod result;
 pub mod scene;
+pub mod stream;

@@ -10,8 +10,10 @@
 //! | out: answer | [`dermis_result`] | N |
 
 use std::mem::MaybeUninit;
+use std::slice::from_ref;
 
 use dermis_golden::data::frame::Frame;
+use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
 use dermis_sim::link::{check_identity, Answer, PhysicalAnswer};
@@ -19,10 +21,12 @@ use dermis_sim::link::{check_identity, Answer, PhysicalAnswer};
 use crate::guard::{attempt, copy, dermis_status, exclusive, free, guarded, place, reference, room, values, Error};
 use crate::result::dermis_result;
 use crate::scene::{dermis_scene, frames};
+use crate::stream::pace;
 
 /// The host end of a board's link. One thread at a time may use it.
 pub struct dermis_link {
     model: Model,
+    checks: StreamChecks,
     decoder: Decoder,
     sequence: u8,
     /// The readings sent under each sequence number, until they are answered.
@@ -84,8 +88,15 @@ impl dermis_link {
             text: format!("an answer of type {} has {bytes} bytes", packet.kind.name()),
         })?;
         let result = match answer.decode(&self.model, &readings)? {
-            Some(result) => dermis_result::of_model(result),
-            None => dermis_result::of_board(PhysicalAnswer::new(&self.model, &readings, &answer)?),
+            Some(mut result) => {
+                self.checks.add(from_ref(&readings), result.resultant_N, &mut result.diagnostics());
+                dermis_result::of_model(result)
+            }
+            None => {
+                let mut physical = PhysicalAnswer::new(&self.model, &readings, &answer)?;
+                self.checks.add(from_ref(&readings), physical.resultant_N, &mut physical.diagnostics());
+                dermis_result::of_board(physical)
+            }
         };
         Ok((dermis_answer::Result, Some(result)))
     }
@@ -109,8 +120,13 @@ impl Wire<'_> {
 
 /// Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene
 /// may be freed before it. After an error *link is NULL; DERMIS_STATUS_INPUT for a scene whose hardware cannot have a link.
+/// cross_check is that of dermis_stream_new: the frames that are answered are a stream.
 #[no_mangle]
-pub unsafe extern "C" fn dermis_link_new(scene: *const dermis_scene, link: *mut *mut dermis_link) -> dermis_status {
+pub unsafe extern "C" fn dermis_link_new(
+    scene: *const dermis_scene,
+    cross_check: u64,
+    link: *mut *mut dermis_link,
+) -> dermis_status {
     guarded(|| {
         let link = unsafe { place("link", link) }?;
         link.write(std::ptr::null_mut());
@@ -122,7 +138,8 @@ pub unsafe extern "C" fn dermis_link_new(scene: *const dermis_scene, link: *mut 
             return Err(Error { status: dermis_status::Input, text });
         }
         let sent = vec![None; usize::from(u8::MAX) + 1];
-        let made = dermis_link { model, decoder: Decoder::default(), sequence: 0, sent };
+        let checks = StreamChecks::new(&model, pace(cross_check));
+        let made = dermis_link { model, checks, decoder: Decoder::default(), sequence: 0, sent };
         link.write(Box::into_raw(Box::new(made)));
         Ok(())
     })

@@ -13,7 +13,7 @@ use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::checks::pull::tare_load;
 use dermis_golden::spec::scene::Scene;
-use dermis_golden::study::noise::expected::{expected, Expectation, StatedNoise};
+use dermis_golden::study::noise::expected::{expected, of_other_medium, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
 
 use super::check_noise::NoiseArguments;
@@ -54,7 +54,8 @@ const EXAMPLES: &str = "Examples:
 
 A built-in name or a file is checked as a scene, a folder as a build. A scene that only the floating-point model takes is
 no error: the reason is printed. The expected errors are those of drawn contacts of any shape, at the noise that the scene
-states or its tare frames show, else at several levels; with shear in proportion to search.mu_max.";
+states or its tare frames show, else at several levels; with shear in proportion to search.mu_max. The last table has the errors
+if the cover is held otherwise than the scene's medium says, at the first level.";
 
 /// Runs the command.
 ///
@@ -98,16 +99,19 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     let noise_not_stated = noise_not_stated(&scene)?;
     let (peak_MPa, with_hardware) = (arguments.peak, hardware.is_some());
     let asked = Expectation { peak_MPa, draws: arguments.draws as usize, seed: arguments.seed, with_hardware };
+    let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
+    let errors = expected(&scene, &asked, &noise, &progress)
+        .and_then(|own| Ok((own, of_other_medium(&scene, &asked, &noise, &progress)?)));
     // A tiny array has no room for the contacts; the rest of the check still stands.
-    let errors = expected(&scene, &asked, &noise, &|done, total| bar.set_of(done as u64, total as u64));
-    let (errors, not_drawn) = match errors {
+    let ((errors, other_medium), not_drawn) = match errors {
         Ok(errors) => (errors, None),
-        Err(reason) => (Vec::new(), Some(reason.to_string())),
+        Err(reason) => (Default::default(), Some(reason.to_string())),
     };
     let matrices = golden.matrices();
     Ok(SceneCheck {
         target: arguments.target.clone(),
         checked_as: "scene",
+        medium: scene.medium.to_string(),
         estimator: golden.estimator().name(),
         degree: matrices.degree,
         spectral_radius: matrices.spectral_radius,
@@ -122,6 +126,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         noise_not_stated,
         tare_load,
         errors,
+        other_medium,
         not_drawn,
     })
 }

@@ -162,14 +162,15 @@ pub fn scenes_or(scenes: &[String], default: impl IntoIterator<Item = &'static s
     }
 }
 
-/// The built-in scene with the sensor in a frame file, else the default scene of that sensor.
+/// The built-in scene with the sensor and medium in a frame file, else the default scene of both; where the file names no medium,
+/// the first with the sensor.
 fn scene_of_frame(path: &str) -> Result<Scene> {
-    let sensor = Frame::load(path, None)?.sensor;
+    let Frame { sensor, medium, .. } = Frame::load(path, None)?;
     for name in Scene::builtin_names() {
         let scene = Scene::builtin(name)?;
-        if scene.sensor == sensor {
+        if scene.sensor == sensor && medium.is_none_or(|medium| medium == scene.medium) {
             return Ok(scene);
         }
     }
-    Ok(Scene::of_sensor(&sensor, "frame"))
+    Ok(Scene { medium: medium.unwrap_or_default(), ..Scene::of_sensor(&sensor, "frame") })
 }

@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{anyhow, bail, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::board::Board;
-use dermis_golden::spec::scene::{Scene, SearchSpec};
+use dermis_golden::spec::scene::{Medium, Scene, SearchSpec};
 use dermis_golden::write::write;
 
 /// Arguments of `dermis new`.
@@ -20,9 +20,11 @@ use dermis_golden::write::write;
 #[command(after_help = "Examples:
   dermis new pad.toml --rows 16 --cols 12 --pitch 3 --thickness 2.5
   dermis new strip.toml --rows 4 --cols 20 --pitch 5,4 --thickness 3 --noise 0.0002 --full-scale 0.25
-  dermis new skin.toml --rows 8 --cols 8 --pitch 4 --thickness 4 --bonded 0.48 --friction 0.5
+  dermis new skin.toml --rows 8 --cols 8 --pitch 4 --thickness 4 --poisson 0.45 --friction 0.5
+  dermis new block.toml --rows 8 --cols 8 --pitch 4 --thickness 6 --cover free
 
-On a terminal, what is left out is asked; an existing file is not replaced.")]
+The cover of nearly every array is bonded to a rigid base, so that is the default: read as a free one, the shear is wrong by
+half and more. `dermis check` says what the other one would cost. On a terminal, what is left out is asked; an existing file is not replaced.")]
 pub struct Arguments {
     /// File to write; its name without the ending is the scene's.
     file: PathBuf,
@@ -47,12 +49,33 @@ pub struct Arguments {
     /// Largest ratio of shear to normal force.
     #[arg(long, value_name = "MU")]
     friction: Option<f64>,
-    /// The cover is bonded to a rigid base and has this Poisson ratio; default: a half-space.
-    #[arg(long, value_name = "POISSON")]
-    bonded: Option<f64>,
+    /// How the cover is held; default: bonded.
+    #[arg(long, value_enum)]
+    cover: Option<Cover>,
+    /// Poisson ratio of a bonded cover; default: 0.48, that of silicone and polyurethane; foams have 0.3 and less.
+    #[arg(long, value_name = "RATIO")]
+    poisson: Option<f64>,
     /// Board for the hardware: a name that `dermis boards` lists, or the path of a file that ends with .toml.
     #[arg(long, value_name = "BOARD")]
     board: Option<String>,
+}
+
+/// How the cover is held.
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Cover {
+    /// Glued or moulded to a rigid base with the taxels.
+    #[default]
+    Bonded,
+    /// Not glued, or many pitches thick above taxels on which it continues: a half-space.
+    Free,
+}
+
+impl FromStr for Cover {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Cover, String> {
+        <Cover as ValueEnum>::from_str(text, true)
+    }
 }
 
 /// Distance of the taxels in mm along columns and rows.
@@ -142,6 +165,7 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let Pitch([x, y]) =
         asker.required(&arguments.pitch, "pitch", "pitch in mm, along columns and rows: X,Y or one number")?;
     let thickness = asker.required(&arguments.thickness, "thickness", "thickness of the cover in mm")?;
+    let medium = medium_text(arguments, asker)?;
     let noise = asker.optional(&arguments.noise, "standard deviation of one reading in MPa")?;
     let full_scale = asker.optional(&arguments.full_scale, "stress of the largest reading in MPa")?;
     let mut text = format!(
@@ -149,11 +173,8 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
          [sensor]\nrows = {rows}\ncols = {cols}\n\
          pitch_x_mm = {x:?}       # along the columns\n\
          pitch_y_mm = {y:?}       # along the rows\n\
-         thickness_mm = {thickness:?}     # of the cover: the depth at which stress is read\n"
+         thickness_mm = {thickness:?}     # of the cover: the depth at which stress is read\n\n{medium}"
     );
-    if let Some(poisson) = arguments.bonded {
-        write!(text, "\n[medium]\nkind = \"bonded-layer\"\npoisson = {poisson:?}\n")?;
-    }
     text += "\n[search]\n";
     match arguments.friction {
         Some(friction) => writeln!(text, "mu_max = {friction:?}           # largest ratio of shear to normal force")?,
@@ -185,6 +206,32 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
         write!(text, "\n[hardware]\nboard = {}\n", format_args!("{board:?}"))?;
     }
     Ok(text)
+}
+
+/// The table of the medium, which says what would be another.
+///
+/// # Errors
+/// A Poisson ratio of a free cover.
+fn medium_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
+    let question = "how the cover is held, bonded to a rigid base or free; empty: bonded, as nearly every array has it";
+    let cover = match arguments.cover {
+        Some(cover) => cover,
+        None => asker.ask(question)?.unwrap_or_default(),
+    };
+    Ok(match (cover, arguments.poisson) {
+        (Cover::Bonded, poisson) => format!(
+            "[medium]\n\
+             kind = \"bonded-layer\"  # the cover is bonded to a rigid base, as on nearly every array; a free one: \"half-space\"\n\
+             poisson = {:?}         # of silicone and polyurethane 0.48, of foams 0.3 and less\n",
+            poisson.unwrap_or(Medium::ELASTOMER)
+        ),
+        (Cover::Free, None) => {
+            "[medium]\nkind = \"half-space\"    # the cover is free; one on a rigid base: \"bonded-layer\"\n".to_owned()
+        }
+        (Cover::Free, Some(poisson)) => {
+            bail!("--poisson {poisson}: only with --cover bonded; stress under a free cover does not depend on it")
+        }
+    })
 }
 
 /// The board as the scene `file` names it: the path of a board's file relative to the scene's folder, where that is the
@@ -220,9 +267,9 @@ mod tests {
     #[test]
     fn answers_and_options_give_the_same_scene() {
         let options = ["--rows", "4", "--cols", "6", "--pitch", "3,2.5", "--thickness", "2", "--noise", "0.001"];
-        let (by_options, questions) = written(&options, "");
+        let (by_options, questions) = written(&[&options[..], &["--cover", "free"]].concat(), "");
         assert_eq!(questions, "stress of the largest reading in MPa; empty: unknown: ");
-        let (by_answers, questions) = written(&[], "4\nsix\n6\n3,2.5\n2\n0.001\n\n");
+        let (by_answers, questions) = written(&[], "4\nsix\n6\n3,2.5\n2\nfree\n0.001\n\n");
         assert!(questions.contains("number of columns: \"six\" is not understood\nnumber of columns: "), "{questions}");
         let text = by_options.unwrap();
         assert_eq!(text, by_answers.unwrap());
@@ -234,7 +281,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_scene_and_comments_hold_the_defaults() {
         let needed = ["--rows", "4", "--cols", "4", "--pitch", "4", "--thickness", "4"];
-        let more = ["--full-scale", "0.3", "--friction", "0.4", "--bonded", "0.45", "--board", "icebreaker"];
+        let more = ["--full-scale", "0.3", "--friction", "0.4", "--poisson", "0.45", "--board", "icebreaker"];
         let scene = Scene::parse(&written(&[needed, more].concat(), "").0.unwrap(), "pad.toml").unwrap();
         assert_eq!((scene.input.full_scale_MPa, scene.search.mu_max), (Some(0.3), 0.4));
         assert_eq!(
@@ -246,8 +293,18 @@ mod tests {
         assert_eq!(beside("pad.toml"), "boards/own.toml");
         let absolute = std::env::current_dir().unwrap().join("boards/own.toml").display().to_string();
         assert_eq!(beside("scenes/pad.toml"), absolute);
-        let scene = Scene::parse(&written(&needed, "").0.unwrap(), "pad.toml").unwrap();
-        assert_eq!(scene, Scene::of_sensor(&scene.sensor, "pad"));
+        let parsed = |options: &[&str], answers: &str| {
+            Scene::parse(&written(&[&needed, options].concat(), answers).0.unwrap(), "pad.toml").unwrap()
+        };
+        let free = parsed(&["--cover", "free"], "");
+        assert_eq!(free, Scene::of_sensor(&free.sensor, "pad"));
+        let medium = Medium::BondedLayer { poisson: 0.48 };
+        // Nothing said, an empty answer, an answer.
+        for (options, answers) in [(&[][..], ""), (&[], "\n"), (&[], "Bonded\n"), (&["--cover", "bonded"], "")] {
+            assert_eq!(parsed(options, answers), Scene { medium, ..free.clone() }, "{options:?} {answers:?}");
+        }
+        let refused = written(&[&needed[..], &["--cover", "free", "--poisson", "0.4"]].concat(), "").0.unwrap_err();
+        assert!(refused.to_string().starts_with("--poisson 0.4: only with --cover bonded"), "{refused}");
     }
 
     #[test]

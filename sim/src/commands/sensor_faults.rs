@@ -16,7 +16,8 @@ use crate::report::study::sensor_faults;
 
 A press is drawn, grows in a stream of 12 frames, and is spoiled. The engines get the last frame alone (frame) or after the
 others (stream): the golden model without and with its noise stated, then 0.05 % of the peak unless --noise says otherwise, and
-the bit-true model. A flag that an engine raises on every clean frame of the scene does not count.")]
+the bit-true model, with the search and, where the scene names one, with its network, as sensor-1-noisy has it. A flag that an
+engine raises on every clean frame of the scene does not count.")]
 pub struct Arguments {
     /// Built-in names or paths of scenes; default: sensor-1, eight-by-eight.
     scenes: Vec<String>,

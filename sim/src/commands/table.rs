@@ -24,10 +24,10 @@ use crate::report::{self, Format};
   dermis table sensor-1 --case 0 --format csv
   dermis table sensor-3 --case adaptive --case contacts --case 4x2
   dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
-  dermis table --cosim                               co-simulate the four scenes that take seconds, one line each
+  dermis table --cosim                               co-simulate the scenes that take seconds, one line each
   dermis table sensor-1 eight-by-eight --cosim")]
 pub struct Arguments {
-    /// Built-in names or paths of scenes; default: all built-in ones, with --cosim the four that take seconds.
+    /// Built-in names or paths of scenes; default: all built-in ones, with --cosim those that take seconds.
     scenes: Vec<String>,
     /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3, with a network the scene's own.
     #[arg(long = "case", value_name = "CASE")]

@@ -46,4 +46,11 @@ pub use findings::{Findings, Mismatch, KEPT_PER_FRAME};
 
 /// Scenes whose co-simulation takes seconds: those of the short report, of `dermis table --cosim` and, on their shipped frames,
 /// of the tests.
-pub const QUICK_SCENES: [&str; 4] = ["sensor-1", "sensor-1-noisy", "eight-by-eight", "eight-by-eight-contacts"];
+pub const QUICK_SCENES: [&str; 6] = [
+    "sensor-1",
+    "sensor-1-noisy",
+    "sensor-1-bonded",
+    "eight-by-eight",
+    "eight-by-eight-bonded",
+    "eight-by-eight-contacts",
+];

@@ -4,7 +4,8 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::checks::pull::TareLoad;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_golden::study::noise::expected::StatedNoise;
-use dermis_golden::study::noise::ShapeRow;
+use dermis_golden::study::noise::outcome::Summary;
+use dermis_golden::study::noise::{SensitivityRow, ShapeRow};
 use dermis_hdl::usage::{total, StageUsage, Usage};
 use serde::Serialize;
 
@@ -39,6 +40,8 @@ pub struct SceneCheck {
     pub scene: String,
     /// The array.
     pub sensor: Sensor,
+    /// The medium, in words.
+    pub medium: String,
     /// The floating-point model's estimator, by its name in scenes.
     pub estimator: &'static str,
     /// Degree of the series in μ.
@@ -65,6 +68,8 @@ pub struct SceneCheck {
     pub tare_load: Option<TareLoad>,
     /// Errors on drawn frames.
     pub errors: Vec<ShapeRow>,
+    /// Errors on drawn frames of the other medium, at the first level of noise.
+    pub other_medium: Vec<SensitivityRow>,
     /// Why there are none.
     pub not_drawn: Option<String>,
 }
@@ -146,7 +151,7 @@ pub fn build_check(build: &BuildCheck) -> String {
 /// What was found of a scene.
 pub fn scene_check(check: &SceneCheck) -> String {
     let SceneCheck { scene, sensor, estimator, degree, spectral_radius: r, mu_max, board, .. } = check;
-    let mut text = format!("scene       {scene}: {sensor}\n");
+    let mut text = format!("scene       {scene}: {sensor}, {}\n", check.medium);
     text += &format!("model       estimator {estimator}, degree {degree} (r = {r:.3} at mu_max = {mu_max})\n");
     if !check.dead.is_empty() {
         let dead: Vec<String> = check.dead.iter().map(|[row, col]| format!("{row},{col}")).collect();
@@ -174,7 +179,20 @@ pub fn scene_check(check: &SceneCheck) -> String {
         Some(reason) => text += &format!("errors      none: {reason}\n"),
         None => text += &errors(&check.errors),
     }
+    text += &other_medium(check);
     text
+}
+
+/// What it costs if the cover is held otherwise; nothing where no frames could be drawn.
+fn other_medium(check: &SceneCheck) -> String {
+    let (Some(first), Some(level)) = (check.other_medium.first(), check.errors.first()) else { return String::new() };
+    let rows = check.other_medium.iter().map(|row| (level.noise, &row.estimator, &row.summary));
+    format!(
+        "\nmedium      if the cover is no {} as the scene states but a {}:\n\n{}",
+        check.medium,
+        first.medium,
+        table(rows)
+    )
 }
 
 fn noise(noise: &StatedNoise) -> String {
@@ -192,18 +210,20 @@ fn noise(noise: &StatedNoise) -> String {
     }
 }
 
-/// Errors of drawn frames: median and 90 % quantile.
+/// Errors of drawn frames.
 fn errors(rows: &[ShapeRow]) -> String {
     let draws = rows.first().map_or(0, |row| row.summary.draws);
+    let table = table(rows.iter().map(|row| (row.noise, &row.estimator, &row.summary)));
+    format!("errors      of {draws} drawn contacts of any shape; none: no shear, Σ b·area\n\n{table}")
+}
+
+/// Errors by noise and estimator: median and 90 % quantile.
+fn table<'a>(rows: impl Iterator<Item = (f64, &'a String, &'a Summary)>) -> String {
     let head = ["noise", "estimator", "e_t median", "e_t 90 %", "e_n median", "e_n 90 %", "flagged"];
-    let cells = rows.iter().map(|row| {
-        let of = &row.summary;
+    let cells = rows.map(|(noise, estimator, of)| {
         let spreads = [of.tangential.median, of.tangential.ninety, of.normal.median, of.normal.ninety, of.flagged];
         let numbers = spreads.map(|interval| percent_text(interval.value));
-        [vec![percent_text(row.noise), row.estimator.clone()], numbers.to_vec()].concat()
+        [vec![percent_text(noise), estimator.clone()], numbers.to_vec()].concat()
     });
-    format!(
-        "errors      of {draws} drawn contacts of any shape; none: no shear, Σ b·area\n\n{}",
-        markdown(&head, cells.collect())
-    )
+    markdown(&head, cells.collect())
 }

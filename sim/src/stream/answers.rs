@@ -153,8 +153,8 @@ pub fn run_until(
         })
     };
     stop.add(&queue);
-    let (waiting, times, counts) = (Vec::new(), Vec::new(), Counts::default());
-    let mut stream = Stream { engine, checks: StreamChecks::new(engine, options.pace), waiting, times, counts };
+    let (times, counts) = (Vec::new(), Counts::default());
+    let mut stream = Stream { engine, checks: StreamChecks::new(engine, options.pace), times, counts };
     loop {
         if stop.stopped() {
             queue.close();
@@ -205,9 +205,7 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 struct Stream<'a> {
     engine: &'a dyn Engine,
     checks: StreamChecks,
-    /// Frames of a block that is not complete.
-    waiting: Vec<Frame>,
-    /// Seconds since 1970 when the line of each was read.
+    /// Seconds since 1970 when the line of each frame of a block that is not complete was read.
     times: Vec<f64>,
     counts: Counts,
 }
@@ -216,19 +214,17 @@ impl Stream<'_> {
     /// Hands on what a line gave; nothing for a frame that does not complete its block.
     fn answer(&mut self, received: &Received, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
-            self.waiting.push(frame);
             self.times.push(seconds(received.time));
-            if self.waiting.len() < self.engine.scene().input.frames_per_result() {
-                return Ok(None);
-            }
-            let (frames, times) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.times));
-            let result = self.checks.next(self.engine, &frames).map_err(|error| typed(error).to_string())?;
-            Ok(Some((frames, times, result)))
+            self.checks.push(self.engine, frame).map_err(|error| {
+                self.times.clear();
+                typed(error).to_string()
+            })
         });
         let line = received.number;
         match result {
             Ok(None) => Ok(()),
-            Ok(Some((frames, times, result))) => {
+            Ok(Some((frames, result))) => {
+                let times = std::mem::take(&mut self.times);
                 let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
                 self.counts.answered += 1;
                 let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);

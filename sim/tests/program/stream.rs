@@ -182,7 +182,7 @@ fn noise_of_a_device_is_measured_and_written_into_the_scene() {
     };
     let new =
         ["new", "pad.toml", "--rows", "8", "--cols", "8", "--pitch", "4", "--thickness", "3", "--full-scale", "0.5"];
-    assert_eq!(run(&new, "").0, Some(0));
+    assert_eq!(run(&[&new[..], &["--cover", "free"]].concat(), "").0, Some(0));
     let frame = line(&frames()[1]);
     let flags = || -> Vec<String> {
         let json = run(&["reconstruct", "pad.toml", "--stream", "--engine", "fixed", "--check-every", "0"], &frame).1;

@@ -155,8 +155,8 @@ fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Fin
     (findings, device.undefined.clone())
 }
 
-fn setup(frames: usize, search_width: usize) -> (Hardware, Vec<Vector>) {
-    let (mut scene, shipped) = scene("eight-by-eight");
+fn setup(name: &str, frames: usize, search_width: usize) -> (Hardware, Vec<Vector>) {
+    let (mut scene, shipped) = scene(name);
     scene.hardware.search_width = Some(search_width);
     of_scene(&scene, &shipped[..frames])
 }
@@ -169,10 +169,12 @@ fn of_scene(scene: &Scene, frames: &[Frame]) -> (Hardware, Vec<Vector>) {
 
 #[test]
 fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
-    for (frames, search_width, stimulus) in
-        [(3, 4, Stimulus::FullSpeed), (3, 4, Stimulus::Stalls { seed: 1 }), (1, 1, Stimulus::FullSpeed)]
-    {
-        let (hardware, vectors) = setup(frames, search_width);
+    for (name, frames, search_width, stimulus) in [
+        ("eight-by-eight", 3, 4, Stimulus::FullSpeed),
+        ("eight-by-eight", 3, 4, Stimulus::Stalls { seed: 1 }),
+        ("eight-by-eight-bonded", 1, 1, Stimulus::FullSpeed),
+    ] {
+        let (hardware, vectors) = setup(name, frames, search_width);
         let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
         assert_equal(&findings, stimulus);
         assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
@@ -207,7 +209,7 @@ fn with_a_network_and_with_contacts_nothing_is_undefined_either() {
 /// start value shows as correct; the data of a queue place that has not been written.
 #[test]
 fn an_undefined_register_is_found() {
-    let (mut hardware, vectors) = setup(1, 4);
+    let (mut hardware, vectors) = setup("eight-by-eight", 1, 4);
     let queue = "forces__leaving";
     let unwritten = |k: &'static str| Change::value(queue, k, |k| k.array("places").read(!k.named("read").low(4)));
     let defects = [(Change::undefined(queue, "m_axis_tvalid"), "valid"), (unwritten("head"), "data")];

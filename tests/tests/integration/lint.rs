@@ -7,7 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::partition::Case;
-use dermis_golden::spec::scene::{Condition, TableStorage};
+use dermis_golden::spec::scene::{Condition, Medium, TableStorage};
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;
@@ -54,8 +54,10 @@ fn idle_waivers(waivers: &str, warnings: &str) -> Vec<String> {
 
 #[test]
 fn generated_verilog_is_clean_and_needs_each_waiver() {
-    let own = QUICK_SCENES.map(|name| (name, None));
-    for (name, board) in own.into_iter().chain([("eight-by-eight", Some("icebreaker"))]) {
+    // The Verilog of a bonded layer has the constructs of the half-space's.
+    let half_space = |name: &&str| scene(name).0.medium == Medium::HalfSpace;
+    let own = QUICK_SCENES.into_iter().filter(half_space).map(|name| (name, None));
+    for (name, board) in own.chain([("eight-by-eight", Some("icebreaker"))]) {
         let mut scene = scene(name).0;
         scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
         let generated = generate(&Model::new(&scene).unwrap()).unwrap();

@@ -8,6 +8,7 @@ use std::path::Path;
 
 mod accuracy;
 mod artix;
+mod bonded;
 mod choice;
 mod circles;
 mod coefficients;

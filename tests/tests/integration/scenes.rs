@@ -16,19 +16,23 @@ use proptest::prelude::*;
 const SCENES: [(&str, &str); 16] = [
     // One quad: a longer pause between accumulations.
     ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
-    // Six subarrays in turn, odd rows.
-    ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
+    // Six subarrays in turn, odd rows, under a bonded layer.
+    (
+        "partition",
+        "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+         [medium]\nkind = \"bonded-layer\"\n[partition]\nrows = 2\ncols = 3\n",
+    ),
     // Ax is used for Ay, and columns are left out.
     ("thin", "[sensor]\nrows = 12\ncols = 12\npitch_x_mm = 8.0\npitch_y_mm = 8.0\nthickness_mm = 0.91\n[fixed]\nprune_bits = 12\n"),
-    // A sliding mean, resultants in the status of several subarrays.
+    // A sliding mean, resultants in the status of several subarrays, under an almost incompressible layer.
     (
         "sliding-resultants",
-        "[input]\naverage = 1\nmean = \"sliding\"\n[output]\nforces = \"resultants\"\n[partition]\nrows = 3\ncols = 2\n",
+        "[medium]\nkind = \"bonded-layer\"\npoisson = 0.499\n[input]\naverage = 1\nmean = \"sliding\"\n[output]\nforces = \"resultants\"\n[partition]\nrows = 3\ncols = 2\n",
     ),
     // No limbs, the smallest words.
     ("narrow", "[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n"),
-    // One taxel per cycle, among them copies on middle lines.
-    ("one-taxel", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[hardware]\nsearch_width = 1\n"),
+    // One taxel per cycle, among them copies on middle lines, under a compressible layer.
+    ("one-taxel", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[medium]\nkind = \"bonded-layer\"\npoisson = 0.3\n[hardware]\nsearch_width = 1\n"),
     (
         "thresholds",
         "[partition]\ncondition = \"both-signs\"\n[threshold]\nmin_force_N = 0.05\n[search]\nnoise_floor_MPa = 0.001\n\

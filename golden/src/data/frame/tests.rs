@@ -203,11 +203,13 @@ fn every_shipped_file_parses_and_belongs_to_its_scene() {
         ("sensor-1", 8),
         ("sensor-1-noisy", 8),
         ("sensor-1-unipolar", 8),
+        ("sensor-1-bonded", 5),
         ("sensor-2", 9),
         ("sensor-3", 7),
         ("sensor-3-contacts", 7),
         ("sensor-4", 3),
         ("eight-by-eight", 5),
+        ("eight-by-eight-bonded", 5),
         ("eight-by-eight-contacts", 5),
     ];
     for (name, count) in counts {

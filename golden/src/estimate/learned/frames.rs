@@ -21,8 +21,9 @@
 
 use super::features::Readings;
 use crate::data::generator::draws::{DrawOptions, Draws, Shape};
-use crate::data::generator::support::{Kernels, Support};
+use crate::data::generator::support::Support;
 use crate::data::generator::GeneratorError;
+use crate::estimate::float::objective::taxels::Taxels;
 use crate::random::Random;
 use crate::spec::scene::Scene;
 use crate::spec::window::{Place, Window};
@@ -84,7 +85,7 @@ impl Frames {
                 Draws::new(scene, DrawOptions { shapes: shapes.clone(), contacts, ratio, seed, ..Default::default() })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let kernels = Kernels::new(&window.sensor(&scene.sensor), scene.medium);
+        let array = Taxels::new(&window.sensor(&scene.sensor), scene.medium);
         let frame = |number: usize| -> Result<Vec<Item>, GeneratorError> {
             // Where so many do not fit on the array, fewer.
             let (most, number) = (number % draws.len(), number as u64);
@@ -93,7 +94,7 @@ impl Frames {
                 .fold(draws[most].contacts(number), |drawn, count| drawn.or_else(|_| draws[count].contacts(number)))?;
             let supports = contacts.iter().map(Support::new).collect::<Result<Vec<_>, _>>()?;
             let mut random = Random::new((seed ^ number << 24).wrapping_mul(SPREAD));
-            let own = (0..supports.len()).map(|own| item(scene, window, &kernels, &supports, own, &mut random));
+            let own = (0..supports.len()).map(|own| item(scene, window, &array, &supports, own, &mut random));
             progress();
             Ok(own.collect())
         };
@@ -151,14 +152,7 @@ impl Frames {
 }
 
 /// Contact `own` of an array in its window.
-fn item(
-    scene: &Scene,
-    window: Window,
-    kernels: &Kernels,
-    supports: &[Support],
-    own: usize,
-    random: &mut Random,
-) -> Item {
+fn item(scene: &Scene, window: Window, array: &Taxels, supports: &[Support], own: usize, random: &mut Random) -> Item {
     let sensor = &scene.sensor;
     let centre = centre_mm(&supports[own]);
     // Where the estimate of the centre is not exact, the window is the next one.
@@ -169,23 +163,23 @@ fn item(
     let taxels = window.taxels_of(sensor, origin);
     let dead = |taxel: usize| scene.input.is_dead([taxel / sensor.cols, taxel % sensor.cols]);
     let masked: Vec<bool> = taxels.iter().map(|taxel| taxel.is_none_or(dead)).collect();
-    let stress = |support: &Support, force_N: [f64; 3]| -> Vec<f32> {
-        let at = |t: usize| {
-            let nodes = support.at_mm.iter().zip(&support.share);
-            let one = |([x, y], share): (&[f64; 2], &f64)| {
-                share * kernels.stress_MPa(t, [x - middle[0], y - middle[1]], force_N)
-            };
-            nodes.map(one).sum::<f64>() as f32
-        };
-        (0..masked.len()).map(|t| if masked[t] { 0.0 } else { at(t) }).collect()
+    // Per N along x, y and z.
+    let stress = |support: &Support| {
+        let mut axes = [(); 3].map(|()| vec![0.0; masked.len()]);
+        for ([x, y], share) in support.at_mm.iter().zip(&support.share) {
+            array.add_unit_forces([x - middle[0], y - middle[1]], *share, &mut axes);
+        }
+        axes
     };
+    let read = |t: usize, b: f64| if masked[t] { 0.0 } else { b as f32 };
     let normal = supports[own].force_N[2];
-    let axes = [[normal, 0.0, 0.0], [0.0, normal, 0.0], [0.0, 0.0, normal]].map(|force| stress(&supports[own], force));
+    let scaled = |axis: Vec<f64>| axis.iter().enumerate().map(|(t, b)| read(t, normal * b)).collect();
+    let axes = stress(&supports[own]).map(scaled);
     let mut others = Vec::new();
     for (_, support) in supports.iter().enumerate().filter(|(k, _)| *k != own) {
-        let more = stress(support, support.force_N);
+        let ([x, y, z], [fx, fy, fz]) = (stress(support), support.force_N);
         others.resize(masked.len(), 0.0);
-        others.iter_mut().zip(more).for_each(|(sum, more): (&mut f32, f32)| *sum += more);
+        others.iter_mut().enumerate().for_each(|(t, sum)| *sum += read(t, fx * x[t] + fy * y[t] + fz * z[t]));
     }
     Item { axes, others, masked }
 }

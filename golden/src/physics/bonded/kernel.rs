@@ -20,7 +20,9 @@
 
 use super::transfer;
 use crate::physics::gauss::rule;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// r in units of h from which the kernels are zero.
 pub const REACH: f64 = 40.0;
@@ -34,6 +36,8 @@ const TERMS: usize = 20;
 const LAST_Q: f64 = 44.0;
 /// Nodes of a panel in q.
 const NODES: usize = 24;
+/// Poisson ratios whose tables are kept, 9 kB each: more than a study has.
+const KEPT: usize = 16;
 
 /// Series of gn and gs on one piece.
 type Piece = [[f64; TERMS]; 2];
@@ -41,12 +45,29 @@ type Piece = [[f64; TERMS]; 2];
 /// The kernels of one Poisson ratio.
 #[derive(Clone, Debug)]
 pub struct Kernel {
-    pieces: Vec<Piece>,
+    pieces: Arc<[Piece]>,
 }
 
 impl Kernel {
-    /// Tabulates the kernels for a Poisson ratio of 0 to below 0.5; takes about 0.05 s.
+    /// The kernels for a Poisson ratio of 0 to below 0.5. The first call of a process for a ratio tabulates them, which takes
+    /// about 0.05 s: as long as the stress of a hundred frames.
     pub fn new(poisson: f64) -> Kernel {
+        static KNOWN: Mutex<BTreeMap<u64, Kernel>> = Mutex::new(BTreeMap::new());
+        let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kernel) = known().get(&poisson.to_bits()) {
+            return kernel.clone();
+        }
+        // Not under the lock: other ratios need not wait.
+        let kernel = Kernel::tabulated(poisson);
+        let mut known = known();
+        if known.len() >= KEPT {
+            known.clear();
+        }
+        known.insert(poisson.to_bits(), kernel.clone());
+        kernel
+    }
+
+    fn tabulated(poisson: f64) -> Kernel {
         let near = (NEAR / PIECES[0]) as usize;
         let far = ((REACH - NEAR) / PIECES[1]) as usize;
         let starts = (0..near).map(|k| (PIECES[0] * k as f64, PIECES[0]));
@@ -157,6 +178,15 @@ mod tests {
         }
         assert!(kernel.at(REACH - 1e-9).iter().all(|g| g.abs() < 1e-13));
         assert_eq!(kernel.at(REACH), [0.0; 2]);
+    }
+
+    #[test]
+    fn a_ratio_is_tabulated_once() {
+        let (first, again) = (Kernel::new(0.377), Kernel::new(0.377));
+        assert!(Arc::ptr_eq(&first.pieces, &again.pieces));
+        (0..=KEPT).for_each(|k| drop(Kernel::new(0.001 * k as f64)));
+        assert_eq!(Kernel::new(0.377).at(0.5), first.at(0.5));
+        assert_ne!(Kernel::new(0.378).at(0.5), first.at(0.5));
     }
 
     #[test]

@@ -112,21 +112,23 @@ mod tests {
     use crate::fixed::Model;
     use crate::result::checks::PULL;
     use crate::result::flags::Flag;
+    use crate::spec::scene::Medium;
 
     fn builtin(name: &str) -> Scene {
         Scene::builtin(name).unwrap()
     }
 
-    /// Presses with any shear up to mu_max, at 0 to 1 % of noise and 8 to 20 bits; noise alone; the shipped frames.
+    /// Presses with any shear up to mu_max, at 0 to 1 % of noise and 8 to 20 bits; noise alone; the shipped frames. A bonded layer
+    /// shows more of the tension behind a shear.
     #[test]
     fn what_presses_pulls_less() {
-        let (mut all, mut raised, mut largest) = (0, 0, 0.0f64);
-        let mut count = |share: Option<f64>| {
+        let (mut all, mut largest) = (0, [0.0f64; 2]);
+        let mut count = |scene: &Scene, share: Option<f64>| {
             all += 1;
-            raised += usize::from(share > Some(PULL));
-            largest = largest.max(share.unwrap_or(0.0));
+            let own = &mut largest[usize::from(scene.medium != Medium::HalfSpace)];
+            *own = own.max(share.unwrap_or(0.0));
         };
-        for name in ["sensor-1", "eight-by-eight", "sensor-2", "sensor-1-unipolar"] {
+        for name in ["sensor-1", "eight-by-eight", "sensor-2", "sensor-1-unipolar", "sensor-1-bonded"] {
             let scene = builtin(name);
             for number in 0..24 {
                 let options = DrawOptions { contacts: 1 + (number % 2) as usize, seed: 5, ..Default::default() };
@@ -140,16 +142,17 @@ mod tests {
                         let noise = noise * drawn.peak_MPa() / own.peak_MPa();
                         let converter =
                             Converter { noise, bits: Some(bits), full_scale_MPa, seed: number, ..Default::default() };
-                        count(pull_share(&scene, &converter.convert(&own).unwrap()));
+                        count(&scene, pull_share(&scene, &converter.convert(&own).unwrap()));
                     }
                 }
             }
         }
         for name in Scene::builtin_names() {
-            Frame::shipped(&builtin(name)).iter().for_each(|frame| count(pull_share(&builtin(name), frame)));
+            let scene = builtin(name);
+            Frame::shipped(&scene).iter().for_each(|frame| count(&scene, pull_share(&scene, frame)));
         }
-        println!("{raised} of {all}, largest {largest}");
-        assert!(largest < 0.1 * PULL && all > 1000, "{raised} of {all}, largest {largest}");
+        println!("{all}, largest {largest:?}");
+        assert!(largest[0] < 0.1 * PULL && largest[1] < 0.2 * PULL && all > 1000, "{all}, largest {largest:?}");
     }
 
     /// A tare under load: with nothing on the array, and with a press elsewhere.

@@ -238,7 +238,8 @@ mod tests {
     #[test]
     fn clean_presses_raise_no_flag() {
         const PRESSES: u64 = 12;
-        let scenes = ["sensor-1", "eight-by-eight", "sensor-1-unipolar"].map(|name| Scene::builtin(name).unwrap());
+        let names = ["sensor-1", "eight-by-eight", "sensor-1-unipolar", "sensor-1-bonded"];
+        let scenes = names.map(|name| Scene::builtin(name).unwrap());
         let (mut all, mut raised) = (0, [0; 4]);
         for scene in scenes.into_iter().chain([thin()]) {
             for (bits, noise) in

@@ -8,15 +8,17 @@ use std::io::Read;
 const LARGEST_FILE: u64 = 1 << 20;
 
 /// Built-in scenes: name and TOML text.
-const BUILTINS: [(&str, &str); 9] = [
+const BUILTINS: [(&str, &str); 11] = [
     ("sensor-1", include_str!("../../../scenes/sensor-1.toml")),
     ("sensor-1-noisy", include_str!("../../../scenes/sensor-1-noisy.toml")),
     ("sensor-1-unipolar", include_str!("../../../scenes/sensor-1-unipolar.toml")),
+    ("sensor-1-bonded", include_str!("../../../scenes/sensor-1-bonded.toml")),
     ("sensor-2", include_str!("../../../scenes/sensor-2.toml")),
     ("sensor-3", include_str!("../../../scenes/sensor-3.toml")),
     ("sensor-3-contacts", include_str!("../../../scenes/sensor-3-contacts.toml")),
     ("sensor-4", include_str!("../../../scenes/sensor-4.toml")),
     ("eight-by-eight", include_str!("../../../scenes/eight-by-eight.toml")),
+    ("eight-by-eight-bonded", include_str!("../../../scenes/eight-by-eight-bonded.toml")),
     ("eight-by-eight-contacts", include_str!("../../../scenes/eight-by-eight-contacts.toml")),
 ];
 

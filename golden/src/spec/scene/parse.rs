@@ -50,8 +50,6 @@ const SCHEMA: [(&str, &[&str]); 13] = [
     ),
     ("output", &["forces"]),
 ];
-/// Default Poisson ratio of a bonded layer: soft rubber.
-const DEFAULT_POISSON: f64 = 0.48;
 /// Smallest mu_max above 0: with a smaller one, the powers of μ vanish in the hardware's words.
 const LEAST_MU_MAX: f64 = 0.001;
 /// Largest mu_max, above the friction of any elastic cover.
@@ -169,7 +167,7 @@ fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
 }
 
 fn medium(reader: &Reader) -> Result<Medium, SceneError> {
-    let layer = Medium::BondedLayer { poisson: DEFAULT_POISSON };
+    let layer = Medium::BondedLayer { poisson: Medium::ELASTOMER };
     let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
     let kind = reader.choice("medium.kind", &names)?;
     let poisson = reader.number("medium.poisson", Medium::allows_poisson, Medium::POISSON_ALLOWED)?;

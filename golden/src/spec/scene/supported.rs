@@ -2,7 +2,6 @@
 //!
 //! | field | golden model | hardware, bit-true model |
 //! |---|---|---|
-//! | `medium.kind` | all | "half-space" |
 //! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more cases, if they fit the device; "contacts" with a network |
 //! | `partition.condition` | all | with "contacts" "loaded" |
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
@@ -71,7 +70,6 @@ impl Scene {
         let several = self.partition.case == Case::Adaptive;
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
-            rule(self.medium != Medium::HalfSpace, "medium.kind", self.medium.to_string(), "half-space"),
             rule(
                 self.partition.case == Case::Contacts && self.hardware_estimator() != EstimatorKind::Network,
                 "partition.case",

@@ -302,7 +302,6 @@ fn cases_are_listed_or_all_that_divide() {
 #[test]
 fn choices_not_built_yet_say_so() {
     let cases = [
-        ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, adaptive, rows and"),
         (
             "[partition]\ncase = \"contacts\"\ncondition = \"both-signs\"\n[hardware]\nestimator = \"network\"",

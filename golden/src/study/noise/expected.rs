@@ -8,12 +8,13 @@
 //! | in: scene | – | noise as stated or shown by tare frames, of the mean of its frames; mu_max |
 //! | in: peak | MPa | largest stress of a press; `None`: the scene's full scale |
 //! | out: rows | – | the baseline, the scene's estimator, and where asked for the hardware |
+//! | out: rows of the other medium | – | the same estimators on frames whose cover is held otherwise |
 //!
 //! The frames are stress already: calibration, tare and averaging are left out, their noise is in the level; so is the
 //! threshold, since the loads are scaled. The ratio of
 //! shear to load is that of [`DrawOptions`], in proportion to the scene's mu_max.
 
-use super::{shape_study, Candidate, ShapeRow, ShapeStudy, StudyError};
+use super::{other_medium, shape_study, Candidate, SensitivityRow, ShapeRow, ShapeStudy, StudyError};
 use crate::data::generator::converter::Converter;
 use crate::data::generator::draws::DrawOptions;
 use crate::data::input::Input;
@@ -82,6 +83,27 @@ pub fn expected(
     noise: &StatedNoise,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ShapeRow>, StudyError> {
+    let (bare, study) = drawn(scene, asked, noise);
+    shape_study(&bare, &study, progress)
+}
+
+/// The errors where the cover is held otherwise than the scene states, at its noise or without any, by [`other_medium`].
+///
+/// # Errors
+/// As [`other_medium`].
+pub fn of_other_medium(
+    scene: &Scene,
+    asked: &Expectation,
+    noise: &StatedNoise,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<SensitivityRow>, StudyError> {
+    let (bare, mut study) = drawn(scene, asked, noise);
+    study.levels.truncate(1);
+    other_medium(&bare, &study, progress)
+}
+
+/// The scene as far as it matters to frames of stress, and what is drawn for it.
+fn drawn(scene: &Scene, asked: &Expectation, noise: &StatedNoise) -> (Scene, ShapeStudy) {
     let mut bare = scene.clone().with_chosen_hardware();
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.hardware.take_stress();
@@ -101,7 +123,7 @@ pub fn expected(
     // A scene without a stated noise is not told it: the golden model finds it in the frame.
     let told = share.is_some();
     let study = ShapeStudy { levels, draws: asked.draws, options, told, candidates, ..ShapeStudy::default() };
-    shape_study(&bare, &study, progress)
+    (bare, study)
 }
 
 #[cfg(test)]
@@ -138,6 +160,25 @@ mod tests {
         };
         let (quiet, noisy, hardware) = (median(1e-6, 1), median(1e-3, 1), median(1e-4, 2));
         assert!(quiet < noisy && quiet < hardware, "{quiet} {noisy} {hardware}");
+    }
+
+    /// Each medium read as the other costs most of the shear or more, in both models, at the stated noise.
+    #[test]
+    fn the_other_medium_costs_the_shear() {
+        for (name, other) in [("eight-by-eight", "bonded-layer, poisson 0.48"), ("eight-by-eight-bonded", "half-space")]
+        {
+            let mut scene = Scene::builtin(name).unwrap();
+            scene.search.noise_floor_MPa = Some(1e-6);
+            let noise = StatedNoise::of(&scene, Some(0.1)).unwrap();
+            let wrong = of_other_medium(&scene, &asked(Some(0.1)), &noise, &|_, _| ()).unwrap();
+            let right = rows(&scene, Some(0.1));
+            assert_eq!((wrong.len(), right.len()), (2, 3));
+            for (wrong, right) in wrong.iter().zip(&right[1..]) {
+                assert_eq!((wrong.medium.as_str(), &wrong.estimator), (other, &right.estimator));
+                let [wrong, right] = [&wrong.summary, &right.summary].map(|summary| summary.tangential.median.value);
+                assert!(wrong > 0.25 && wrong > 3.0 * right, "{name}: {wrong} {right}");
+            }
+        }
     }
 
     #[test]

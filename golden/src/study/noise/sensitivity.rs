@@ -9,6 +9,8 @@
 //! | Poisson ratio of a bonded layer (0.45 on a half-space scene) | the same, below 0.5 |
 //! | medium: a bonded layer stated as half-space | – |
 //! | gain spread, not stated | 0.5, 1, 3, 10 % |
+//!
+//! [`other_medium`] alone costs a scene's user no more than its own errors: a bonded layer read as a half-space, or the other way.
 
 use super::outcome::Summary;
 use super::shapes::{outcomes, readings, stated, ShapeStudy};
@@ -24,6 +26,7 @@ const OFF: [f64; 6] = [-0.10, -0.05, -0.02, 0.02, 0.05, 0.10];
 const GAINS: [f64; 4] = [0.005, 0.01, 0.03, 0.10];
 /// Poisson ratio of the layer for scenes on a half-space: 10 % more is still below 0.5.
 const POISSON: f64 = 0.45;
+const HALF_SPACE_FOR_LAYER: &str = "half-space for bonded layer";
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,8 +63,44 @@ pub fn sensitivities(
     study: &ShapeStudy,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<SensitivityRow>, StudyError> {
+    measured(settings(scene), study, progress)
+}
+
+/// The errors where the cover is held otherwise than `scene` states: bonded to a rigid base where it states a half-space, thick or
+/// free where it states a layer. As [`sensitivities`].
+///
+/// ```
+/// use dermis_golden::{spec::scene::Scene, study::noise::{other_medium, Candidate, ShapeStudy}};
+///
+/// let study = ShapeStudy { draws: 6, candidates: vec![Candidate::Scene], ..Default::default() };
+/// let rows = other_medium(&Scene::builtin("eight-by-eight-bonded")?, &study, &|_, _| ())?;
+/// // A quarter of the shear and more.
+/// assert!(rows[0].medium == "half-space" && rows[0].summary.tangential.median.value > 0.25);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`sensitivities`].
+pub fn other_medium(
+    scene: &Scene,
+    study: &ShapeStudy,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<SensitivityRow>, StudyError> {
+    let (what, medium) = match scene.medium {
+        Medium::HalfSpace => (HALF_SPACE_FOR_LAYER, Medium::BondedLayer { poisson: Medium::ELASTOMER }),
+        Medium::BondedLayer { .. } => ("bonded layer for half-space", Medium::HalfSpace),
+    };
+    let truth = Scene { medium, ..scene.clone() };
+    measured(vec![Setting { what, off: None, truth, stated: scene.clone(), gain_spread: 0.0 }], study, progress)
+}
+
+/// The errors of each setting at the first noise level of `study`, for each of its candidates.
+fn measured(
+    settings: Vec<Setting>,
+    study: &ShapeStudy,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<SensitivityRow>, StudyError> {
     study.check()?;
-    let settings = settings(scene);
     let total = settings.len() * study.candidates.len() * study.draws;
     let done = AtomicUsize::new(0);
     let step = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
@@ -116,7 +155,7 @@ fn settings(scene: &Scene) -> Vec<Setting> {
         }
     }
     let half_space = Scene { medium: Medium::HalfSpace, ..scene.clone() };
-    settings.push(setting("half-space for bonded layer", None, &bonded, half_space));
+    settings.push(setting(HALF_SPACE_FOR_LAYER, None, &bonded, half_space));
     for spread in GAINS {
         let plain = setting("gain spread", Some(spread), scene, scene.clone());
         settings.push(Setting { gain_spread: spread, ..plain });

@@ -12,7 +12,7 @@ use crate::result::checks::history::History;
 use crate::result::errors::Errors;
 use crate::result::flags::Flag;
 use crate::result::reconstruct::Reconstruction;
-use crate::spec::scene::Scene;
+use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
 use crate::study::noise::StudyError;
 use rayon::prelude::*;
@@ -45,16 +45,19 @@ enum Engine {
     Golden,
     Stated,
     Fixed,
+    Network,
 }
 
 /// The engines, each as `dermis reconstruct --frame` and `--stream` run it.
-pub const ENGINES: [Path; 6] = [
+pub const ENGINES: [Path; 8] = [
     Path { engine: Engine::Golden, stream: false },
     Path { engine: Engine::Golden, stream: true },
     Path { engine: Engine::Stated, stream: false },
     Path { engine: Engine::Stated, stream: true },
     Path { engine: Engine::Fixed, stream: false },
     Path { engine: Engine::Fixed, stream: true },
+    Path { engine: Engine::Network, stream: false },
+    Path { engine: Engine::Network, stream: true },
 ];
 
 impl Path {
@@ -67,6 +70,8 @@ impl Path {
             (Engine::Stated, true) => "golden, noise stated, stream",
             (Engine::Fixed, false) => "fixed, frame",
             (Engine::Fixed, true) => "fixed, stream",
+            (Engine::Network, false) => "fixed with network, frame",
+            (Engine::Network, true) => "fixed with network, stream",
         }
     }
 }
@@ -220,14 +225,22 @@ struct Engines<'a> {
     scene: &'a Scene,
     golden: Golden,
     fixed: CheckedEngine<Model>,
+    /// The bit-true model with the scene's network, as `sensor-1-noisy` has that of `sensor-1`; `None` where it names none.
+    network: Option<CheckedEngine<Model>>,
 }
 
 impl Engines<'_> {
     fn new(scene: &Scene) -> Result<Engines<'_>, StudyError> {
-        Ok(Engines { scene, golden: Golden::new(scene)?, fixed: CheckedEngine::new(Box::new(Model::new(scene)?)) })
+        let bit_true = |scene: &Scene| Ok::<_, StudyError>(CheckedEngine::new(Box::new(Model::new(scene)?)));
+        let network = scene.search.network.is_some().then(|| {
+            let mut scene = scene.clone();
+            scene.hardware.estimator = Some(EstimatorKind::Network);
+            bit_true(&scene)
+        });
+        Ok(Engines { scene, golden: Golden::new(scene)?, fixed: bit_true(scene)?, network: network.transpose()? })
     }
 
-    /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it.
+    /// The answers as a frame and as the last one of a stream; `None` where the engine refuses it, or the scene has it not.
     fn answers(&self, engine: Engine, stream: &[Vec<f64>], noise_MPa: f64) -> Result<[Option<Answer>; 2], StudyError> {
         let frames = stream.iter().map(|stress| Frame::from_stress("spoiled", &self.scene.sensor, stress.clone()));
         let frames: Vec<Frame> = frames.collect::<Result<_, _>>()?;
@@ -236,6 +249,10 @@ impl Engines<'_> {
             Engine::Golden => self.golden.run(last).map_err(StudyError::from),
             Engine::Stated => self.golden.run_with_noise(last, noise_MPa).map_err(StudyError::from),
             Engine::Fixed => self.fixed.result(std::slice::from_ref(last), true).map_err(StudyError::from),
+            Engine::Network => match &self.network {
+                Some(network) => network.result(std::slice::from_ref(last), true).map_err(StudyError::from),
+                None => return Ok([None, None]),
+            },
         };
         let result = match result {
             Err(
@@ -258,13 +275,18 @@ impl Engines<'_> {
     /// The verdicts of all [`ENGINES`] on a press with a fault; a clean press has the noise of its size.
     fn judge(&self, press: &Press, fault: &Fault, size: f64, noise: f64) -> Result<Vec<Judged>, StudyError> {
         let mut all = Vec::with_capacity(ENGINES.len());
-        for engine in [Engine::Golden, Engine::Stated, Engine::Fixed] {
+        for engine in [Engine::Golden, Engine::Stated, Engine::Fixed, Engine::Network] {
             let noise = if fault.kind == Kind::Clean { size } else { noise_of(engine, noise) };
             let stream = press.spoiled(&self.scene.sensor, fault, size, noise);
             let last = stream.last().map_or(&[][..], |last| last);
             let truth_N = (fault.kind != Kind::NoContact).then_some(press.total_N);
             let answers = self.answers(engine, &stream, noise * press.peak_MPa)?;
-            all.extend(answers.map(|answer| answer.map(|answer| answer.judged(&self.scene.sensor, last, truth_N))));
+            let absent = engine == Engine::Network && self.network.is_none();
+            all.extend(answers.map(|answer| match answer {
+                Some(answer) => Judged::Result(answer.judged(&self.scene.sensor, last, truth_N)),
+                None if absent => Judged::Absent,
+                None => Judged::Refused,
+            }));
         }
         Ok(all)
     }
@@ -278,8 +300,15 @@ fn noise_of(engine: Engine, noise: f64) -> f64 {
     }
 }
 
-/// A result compared with the truth; `None` is a frame that the engine refuses.
-type Judged = Option<Verdict>;
+/// What an engine makes of a frame.
+enum Judged {
+    /// A result, compared with the truth.
+    Result(Verdict),
+    /// The engine refuses the frame.
+    Refused,
+    /// The scene does not have the engine.
+    Absent,
+}
 
 /// Flags and errors of a result.
 struct Verdict {
@@ -323,7 +352,10 @@ struct Task<'a> {
 
 /// The flags that every one of the clean `judged` has; those of frames that are refused are none.
 fn always(judged: &[&Judged]) -> BTreeSet<Flag> {
-    let mut all = judged.iter().filter_map(|judged| judged.as_ref()).map(|verdict| verdict.flags.clone());
+    let mut all = judged.iter().filter_map(|judged| match judged {
+        Judged::Result(verdict) => Some(verdict.flags.clone()),
+        Judged::Refused | Judged::Absent => None,
+    });
     let first = all.next().unwrap_or_default();
     all.fold(first, |both, own| both.intersection(&own).copied().collect())
 }
@@ -332,7 +364,8 @@ fn always(judged: &[&Judged]) -> BTreeSet<Flag> {
 fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
     let one = Counts { frames: 1, ..Counts::default() };
     match judged {
-        Some(verdict) if verdict.flags.is_subset(carried) => {
+        Judged::Absent => Counts::default(),
+        Judged::Result(verdict) if verdict.flags.is_subset(carried) => {
             Counts { silent: verdict.wrong.into(), right: (!verdict.wrong).into(), worst_z: verdict.z, ..one }
         }
         _ => Counts { flagged: 1, ..one },
@@ -347,8 +380,9 @@ fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
 ///
 /// let small = SensorFaults { frames: 1, quick: true, only: vec!["sign reversed".to_owned()], ..Default::default() };
 /// let rows = sensor_faults(&[Scene::builtin("eight-by-eight")?], &small, &|_, _| ())?;
-/// // A press that pulls is flagged by every engine.
-/// assert!(rows.len() == 1 && rows[0].engines.iter().all(|counts| counts.flagged == 1));
+/// // A press that pulls is flagged by every engine that the scene has; it names no network.
+/// assert!(rows.len() == 1 && rows[0].engines.iter().all(|counts| counts.flagged == counts.frames));
+/// assert!(rows[0].engines[5].frames == 1 && rows[0].engines[7].frames == 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

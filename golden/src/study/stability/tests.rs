@@ -71,8 +71,7 @@ fn errors_name_a_value_that_works() {
     let mut layer = scene(1.0, InverseKind::Tsvd);
     layer.medium = Medium::BondedLayer { poisson: 0.4999 };
     let row = measure(&Setting::new("layer", layer)).unwrap();
-    assert!(row.fixed_refused.unwrap().contains("medium.kind"));
-    assert!(row.double.unwrap().normal.unwrap() < 0.01);
+    assert!([row.double, row.fixed].iter().all(|figures| figures.unwrap().normal.unwrap() < 0.01), "{row:?}");
 }
 
 #[test]

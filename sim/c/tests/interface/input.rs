@@ -7,6 +7,7 @@ use dermis_c::guard::{dermis_last_error, dermis_status, dermis_version, guarded}
 use dermis_c::link::*;
 use dermis_c::result::*;
 use dermis_c::scene::*;
+use dermis_c::stream::*;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
@@ -131,6 +132,7 @@ fn null_is_an_error_everywhere_and_frees_nothing() {
         dermis_scene_free(null_mut());
         dermis_result_free(null_mut());
         dermis_link_free(null_mut());
+        dermis_stream_free(null_mut());
         [
             (dermis_reconstruct(null(), c"golden".as_ptr(), force, 64, true, &mut result), "scene is NULL"),
             (dermis_reconstruct(null(), c"golden".as_ptr(), force, 64, true, null_mut()), "result is NULL"),
@@ -139,7 +141,9 @@ fn null_is_an_error_everywhere_and_frees_nothing() {
             (dermis_result_contacts(null(), null_mut(), 0, &mut count), "result is NULL"),
             (dermis_result_contacts(null(), null_mut(), 0, null_mut()), "count is NULL"),
             (dermis_result_flags(null(), &mut flags), "result is NULL"),
-            (dermis_link_new(null(), &mut null_mut()), "scene is NULL"),
+            (dermis_link_new(null(), 0, &mut null_mut()), "scene is NULL"),
+            (dermis_stream_new(null(), c"golden".as_ptr(), 0, &mut null_mut()), "scene is NULL"),
+            (dermis_stream_push(null_mut(), force, 64, &mut result), "stream is NULL"),
             (dermis_link_identify(null_mut(), wire.as_mut_ptr(), 8, &mut size), "link is NULL"),
             (dermis_link_frame(null_mut(), force, 64, true, wire.as_mut_ptr(), 8, &mut size), "link is NULL"),
             (dermis_link_receive(null_mut(), wire.as_ptr(), 8, &mut used, &mut answer, &mut result), "link is NULL"),

@@ -42,7 +42,7 @@ impl Drop for Setting {
 impl Setting {
     fn new(name: &str) -> Setting {
         let (scene, mut link) = (scene(name), null_mut());
-        assert_eq!(unsafe { dermis_link_new(scene, &mut link) }, dermis_status::Ok, "{}", last_error());
+        assert_eq!(unsafe { dermis_link_new(scene, 0, &mut link) }, dermis_status::Ok, "{}", last_error());
         unsafe { dermis_scene_free(scene) };
         Setting { link, model: Model::new(&Scene::builtin(name).unwrap()).unwrap() }
     }
@@ -212,7 +212,7 @@ fn what_cannot_be_sent_is_named() {
     let (mut scene, mut link) = (null_mut(), null_mut::<dermis_link>().wrapping_add(1));
     unsafe {
         assert_eq!(dermis_scene_parse(toml.as_ptr(), c"pad.toml".as_ptr(), &mut scene), dermis_status::Ok);
-        assert_eq!(dermis_link_new(scene, &mut link), dermis_status::Input);
+        assert_eq!(dermis_link_new(scene, 0, &mut link), dermis_status::Input);
         dermis_scene_free(scene);
     }
     assert!(last_error().starts_with("input.average = 1:") && link.is_null(), "{}", last_error());

@@ -6,3 +6,4 @@ mod example;
 mod header;
 mod input;
 mod link;
+mod stream;
