@@ -175,7 +175,8 @@ impl Printer<'_> {
             signals.partition(|&id| kernel.signals[id].role.is_driven_outside());
         let names = |ids: Vec<SignalId>| ids.into_iter().map(|id| kernel.signals[id].name.clone());
         let has_edge = kernel.registers().any(|(_, _, register)| register.domain.is_none())
-            || kernel.memories.iter().any(|m| !m.writes.is_empty());
+            || kernel.memories.iter().any(|m| !m.writes.is_empty())
+            || kernel.instances.iter().any(|instance| instance.kernel.clock.is_some());
         let clock = kernel.clock.iter().filter(|_| !has_edge).cloned();
         let inputs: Vec<String> = clock.chain(names(inputs)).collect();
         if !inputs.is_empty() {

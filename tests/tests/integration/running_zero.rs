@@ -78,10 +78,7 @@ fn a_run_with_presses_is_equal() {
         for stimulus in [Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: 3 }] {
             assert_equal(&compare(&hardware, Simulator::Verilator, &vectors, stimulus), format!("{what}, {stimulus}"));
         }
-        assert_equal(
-            &compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed),
-            format!("{what}, kernel"),
-        );
+        assert_equal(&compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed), format!("{what}, kernel"));
         // Zeros move, and reach their limit and leave it.
         let mut fixed = scene.clone();
         fixed.input.zero = Zero::Fixed;
