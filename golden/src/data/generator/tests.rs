@@ -33,7 +33,9 @@ fn again(frame: &Frame) -> Frame {
 #[test]
 fn shipped_frames_come_out_of_their_contacts() {
     let mut exact = 0;
-    for frame in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"].into_iter().flat_map(shipped) {
+    // Those that the generator made itself say nothing of it.
+    let other = |frame: &Frame| frame.source.as_deref() != Some("bonded-layer-quadrature");
+    for frame in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"].into_iter().flat_map(shipped).filter(other) {
         let made = again(&frame);
         let midpoints = frame.id.contains("random") || frame.id.contains("multi");
         let tolerance = match frame.source.as_deref() {
