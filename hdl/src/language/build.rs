@@ -29,7 +29,8 @@ pub struct Builder {
 #[derive(Clone, Copy, Debug)]
 pub struct Net<'k> {
     builder: &'k Builder,
-    signal: SignalId,
+    /// None of the input of an instance that is left out.
+    signal: Option<SignalId>,
     value: Expr<'k>,
 }
 
@@ -82,8 +83,19 @@ impl Builder {
         self.kernel.borrow_mut().ports.push(port);
     }
 
-    /// A signal that an instance drives.
+    /// A signal that drives an input of an instance; one that is left out takes no value.
+    pub(super) fn instance_input(&self, name: &str, bits: usize) -> Net<'_> {
+        match bits {
+            0 => Net { builder: self, signal: None, value: self.constant(1, 0) },
+            bits => self.net(name, Type::unsigned(bits)),
+        }
+    }
+
+    /// A signal that an instance drives; 0 for an output that is left out.
     pub(super) fn instance_output(&self, name: &str, bits: usize) -> Expr<'_> {
+        if bits == 0 {
+            return self.constant(1, 0);
+        }
         *self.declare(name, Type::unsigned(bits), Role::Instance)
     }
 
@@ -127,7 +139,7 @@ impl Builder {
     /// A combinational signal with a value. A driven port is a signal of the port's name.
     pub fn wire<'k>(&'k self, name: &str, value: Expr<'k>) -> Expr<'k> {
         let net = self.declare(name, value.ty(), Role::Wire { declared: false });
-        self.kernel.borrow_mut().items.push(Item::Wire(net.signal));
+        self.kernel.borrow_mut().items.extend(net.signal.map(Item::Wire));
         net.set(value);
         *net
     }
@@ -354,7 +366,7 @@ impl Builder {
         kernel.signals.push(Signal { name, ty, role, value: None, guards: Vec::new(), comment: None, output: false });
         let signal = kernel.signals.len() - 1;
         let id = kernel.intern(Node::Signal(signal), ty);
-        Net { builder: self, signal, value: Expr { kernel: &self.kernel, id } }
+        Net { builder: self, signal: Some(signal), value: Expr { kernel: &self.kernel, id } }
     }
 }
 
@@ -362,11 +374,12 @@ impl<'k> Net<'k> {
     /// Assigns `value` under the conditions of the enclosing [`Builder::when`]. A later assignment has priority over an
     /// earlier one of another condition. A narrower value is extended.
     pub fn set(&self, value: Expr<'k>) {
-        let value = value.assigned_to(self.signal);
+        let Some(target) = self.signal else { return };
+        let value = value.assigned_to(target);
         let guard = self.builder.conditions.borrow().last().copied();
         let (before, twice, is_wire) = {
             let kernel = self.builder.kernel.borrow();
-            let signal = &kernel.signals[self.signal];
+            let signal = &kernel.signals[target];
             let is_wire = matches!(signal.role, Role::Wire { .. });
             (signal.value, signal.guards.contains(&guard) || (guard.is_none() && !signal.guards.is_empty()), is_wire)
         };
@@ -388,11 +401,11 @@ impl<'k> Net<'k> {
             }
         };
         let mut kernel = self.builder.kernel.borrow_mut();
-        let signal = &mut kernel.signals[self.signal];
+        let signal = &mut kernel.signals[target];
         signal.value = Some(next.id);
         signal.guards.push(guard);
-        if is_wire && !kernel.items.contains(&Item::Wire(self.signal)) {
-            kernel.items.push(Item::Wire(self.signal));
+        if is_wire && !kernel.items.contains(&Item::Wire(target)) {
+            kernel.items.push(Item::Wire(target));
         }
     }
 
@@ -403,7 +416,9 @@ impl<'k> Net<'k> {
 
     /// With a comment at its declaration.
     pub fn comment(self, text: &str) -> Self {
-        self.builder.kernel.borrow_mut().signals[self.signal].comment = Some(text.to_owned());
+        if let Some(signal) = self.signal {
+            self.builder.kernel.borrow_mut().signals[signal].comment = Some(text.to_owned());
+        }
         self
     }
 
@@ -418,14 +433,17 @@ impl<'k> Net<'k> {
     }
 
     fn register(self, change: impl FnOnce(&mut Register)) -> Self {
-        if let Role::Register(register) = &mut self.builder.kernel.borrow_mut().signals[self.signal].role {
-            change(register);
+        if let Some(signal) = self.signal {
+            if let Role::Register(register) = &mut self.builder.kernel.borrow_mut().signals[signal].role {
+                change(register);
+            }
         }
         self
     }
 
     fn name(&self) -> String {
-        self.builder.kernel.borrow().signals[self.signal].name.clone()
+        let kernel = self.builder.kernel.borrow();
+        self.signal.map(|signal| kernel.signals[signal].name.clone()).unwrap_or_default()
     }
 }
 

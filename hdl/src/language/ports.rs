@@ -278,7 +278,7 @@ impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
     }
 
     fn input(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Net<'k> {
-        self.builder.net(&self.name(name), Type::unsigned(bits))
+        self.builder.instance_input(&self.name(name), bits)
     }
 
     fn output(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Expr<'k> {
@@ -355,7 +355,7 @@ impl Builder {
 /// }
 /// ```
 /// A port without a width is one bit wide; a width is an expression of the parameters, which are in scope by their names.
-/// A port of width 0 is left out: inside, such an input is 0 and such an output goes nowhere.
+/// A port of width 0 is left out: on either side what reads it is 0, and what drives it goes nowhere.
 /// `clock` is the port `clk`, `clock aclk` one of another name, `reset` the port `rst`. A block without `clock` is
 /// combinational.
 #[macro_export]
@@ -460,12 +460,4 @@ macro_rules! block {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn docs_of_ports_have_no_links() {
-        let doc = [" As `a` of", " [`Ram`](super::Ram), or [`b`](B); then."];
-        assert_eq!(text(&doc), "As `a` of `Ram`, or `b`; then.");
-    }
-}
+mod tests;
