@@ -17,6 +17,7 @@
 //! | `prior` | p = F w: load and smooth shape under the envelope |
 //! | `model` | evidence, posterior, slope and information in μ |
 //! | `ascent` | μ of all contacts |
+//! | `cholesky` | factor of a matrix, on one core |
 //! | `clipped` | readings of zero on an array that reads no tension |
 //! | `baseline` | offset, slopes and bends that no force causes |
 //! | `noise` | size of the noise, where it is not stated |
@@ -39,6 +40,7 @@
 mod ascent;
 mod baseline;
 pub(crate) mod cells;
+mod cholesky;
 mod clipped;
 mod contact;
 mod envelope;

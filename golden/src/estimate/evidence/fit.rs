@@ -9,22 +9,21 @@
 //! | out: [`Estimate`] | – | N per MPa of the peak |
 
 mod advice;
+mod regions;
 
 use super::ascent::{ascend, Top};
-use super::baseline::{plane, terms, Sizes, TERMS};
+use super::baseline::{plane, terms, Sizes};
 use super::contact::forces;
-use super::envelope::{envelope, from_stress};
 use super::estimate::Estimate;
 use super::estimator::Evidence;
-use super::model::{Design, Products, Readings};
-use super::prior::{factor, remainder};
+use super::model::{Design, Readings};
 use super::residual::Residual;
 use super::{clipped, noise};
 use crate::data::frame::Forces;
-use crate::estimate::segment::{neighbours, segment, WIDTH};
+use crate::estimate::segment::neighbours;
 use crate::result::reconstruct::ContactEstimate;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par, Scale};
+use faer::{Mat, Scale};
+use regions::Regions;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Smallest standard deviation of a reading.
@@ -46,12 +45,6 @@ const ENVELOPE_FACTOR: f64 = 1.1;
 const PASSES: usize = 2;
 /// Steps of the ascent.
 const STEPS: usize = 4;
-/// Largest variance of a pressure, in units of its own, that may be left out because there are more coefficients than
-/// readings: with more the shear counts as not known. On drawn contacts of up to 0.7 of a 6 × 6 or 8 × 8 array, which leave up to
-/// 0.09, the errors are those of smaller ones.
-const WIDE: f64 = 0.1;
-/// Coefficients of a contact beside which larger ones take none.
-const LEAST_RANK: usize = 8;
 /// Steps with the noise, baseline and clipped readings of a pass: the next round goes on from there.
 const PASS_STEPS: usize = 1;
 /// Change of μ per round, in units of mu_max, below which the rounds end.
@@ -67,6 +60,8 @@ pub(super) struct Fit<'a> {
     used: &'a [bool],
     /// The taxels that are read.
     taxels: Vec<usize>,
+    /// Where they are in the tables of influence.
+    offsets: Vec<usize>,
     /// Which of them read zero because they read no tension.
     clipped: Vec<usize>,
     /// Which of them are read for what the estimate says of them alone.
@@ -83,17 +78,6 @@ pub(super) struct Fit<'a> {
     labels: Vec<usize>,
     /// μ of each contact.
     mu: Vec<[f64; 2]>,
-}
-
-/// The contacts under their envelopes.
-struct Regions {
-    /// Cells of each contact.
-    cells: Vec<Vec<usize>>,
-    /// F of each contact.
-    factors: Vec<Mat<f64>>,
-    design: Design,
-    /// Whether a pressure has many more coefficients than the readings can tell, and was cut to as many.
-    wide: bool,
 }
 
 /// What a fit says of one frame.
@@ -121,34 +105,6 @@ struct Found {
     covariance: Mat<f64>,
 }
 
-impl Regions {
-    /// p = F w on all `count` cells.
-    fn pressure(&self, w: &[f64], count: usize) -> Vec<f64> {
-        let (mut p, mut first) = (vec![0.0; count], 0);
-        for (cells, factor) in self.cells.iter().zip(&self.factors) {
-            for (k, &cell) in cells.iter().enumerate() {
-                p[cell] = (0..factor.ncols()).map(|i| factor[(k, i)] * w[first + i]).sum();
-            }
-            first += factor.ncols();
-        }
-        p
-    }
-
-    /// For each contact, the load of every coefficient.
-    fn loads(&self) -> Vec<Vec<f64>> {
-        let mut first = 0;
-        let load = |factor: &Mat<f64>| {
-            let mut own = vec![0.0; self.design.rank()];
-            for i in 0..factor.ncols() {
-                own[first + i] = factor.col(i).iter().sum();
-            }
-            first += factor.ncols();
-            own
-        };
-        self.factors.iter().map(load).collect()
-    }
-}
-
 impl<'a> Fit<'a> {
     /// A fit that has not begun, of the taxels `used`; `stated` is the noise in units of the peak, if it is known.
     pub fn new(scene: &'a Evidence, b: &'a [f64], used: &'a [bool], stated: Option<f64>) -> Fit<'a> {
@@ -158,15 +114,15 @@ impl<'a> Fit<'a> {
         let without: Vec<f64> = (0..b.len()).map(above).collect();
         let readings = (0..b.len()).filter(|&t| used[t]).map(|t| without[t]);
         let sigma = stated.unwrap_or_else(|| noise::first(readings).min(UNKNOWN)).max(FLOOR);
-        let p = from_stress(&scene.cells, &without, used, sigma);
+        let p = scene.envelopes.first_pressure(sensor, &without, used, sigma);
         let taxels = scene.window(&p, sigma);
         let of = |is: &dyn Fn(usize) -> bool| (0..taxels.len()).filter(|k| is(taxels[*k])).collect();
         let clipped = of(&|t| used[t] && scene.unipolar && b[t] <= 0.0);
         let missing = of(&|t| !used[t]);
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
         let (labels, mu, sizes) = (vec![0; p.len()], vec![[0.0; 2]], Sizes::of_plane(first));
-        let stated = stated.is_some();
-        Fit { scene, b, used, taxels, clipped, missing, readings, sizes, sigma, stated, p, labels, mu }
+        let (stated, offsets) = (stated.is_some(), scene.cells.offsets(&taxels));
+        Fit { scene, b, used, taxels, offsets, clipped, missing, readings, sizes, sigma, stated, p, labels, mu }
     }
 
     /// Whether a reading counts: it is neither clipped nor missing.
@@ -232,10 +188,9 @@ impl<'a> Fit<'a> {
 
     /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
     fn segment(&mut self) {
-        let cells = &self.scene.cells;
-        let loaded = envelope(cells, &self.p, self.scene.length_mm, self.sigma);
+        let loaded = self.scene.envelopes.of(self.p.iter().copied(), self.sigma);
         let p: Vec<f64> = self.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
-        let segments = segment(&cells.grid, &p, WIDTH);
+        let segments = self.scene.segmenter.segment_forces(&p).segments;
         let mut strongest: Vec<Option<usize>> = vec![None; segments.count];
         let loaded = segments.labels.iter().enumerate().filter(|(cell, _)| p[*cell] > 0.0);
         for (cell, label) in loaded.filter_map(|(cell, label)| Some((cell, (*label)?))) {
@@ -285,67 +240,6 @@ impl<'a> Fit<'a> {
         self.mu.remove(b);
     }
 
-    /// The contacts under envelopes of the last pressure.
-    fn regions(&self) -> Regions {
-        let (cells, length) = (&self.scene.cells, self.scene.length_mm);
-        let mut of_contact = Vec::new();
-        for contact in 0..self.mu.len() {
-            let inside = |cell: usize| self.labels[cell] == contact;
-            let p: Vec<f64> = (0..self.p.len()).map(|cell| if inside(cell) { self.p[cell] } else { 0.0 }).collect();
-            let e = envelope(cells, &p, length, self.sigma);
-            let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && inside(cell)).collect();
-            let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
-            of_contact.push((own, on_own));
-        }
-        let remainder = remainder(self.sigma);
-        let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
-        let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
-            let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
-            let (factor, rest) = factor(cells, own, on_own, length, remainder, most);
-            (rest > WIDE, factor)
-        };
-        let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
-        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(own, _)| own).collect();
-        let design = self.design(&of_contact, &factors);
-        Regions { cells: of_contact, factors, design, wide: cut.contains(&true) }
-    }
-
-    /// S: the stress of every column of every factor, for shear along x and y and normal force, and of the baseline.
-    fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
-        let n = self.taxels.len();
-        let rank = TERMS + factors.iter().map(Mat::ncols).sum::<usize>();
-        let mut s = Mat::zeros(n, 3 * rank);
-        let mut contact = Vec::with_capacity(rank);
-        for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
-            let mut influence = [0, 1, 2].map(|_| Mat::zeros(n, own.len()));
-            for (column, &cell) in own.iter().enumerate() {
-                for (row, &taxel) in self.taxels.iter().enumerate() {
-                    let [x, y, z] = self.scene.cells.influence(taxel, cell);
-                    for (matrix, value) in influence.iter_mut().zip([z, x, y]) {
-                        matrix[(row, column)] = value;
-                    }
-                }
-            }
-            for (block, matrix) in influence.iter().enumerate() {
-                let columns = s.subcols_mut(block * rank + contact.len(), factor.ncols());
-                matmul(columns, Accum::Replace, matrix, factor, 1.0, Par::Seq);
-            }
-            contact.extend(vec![k; factor.ncols()]);
-        }
-        contact.extend([0; TERMS]);
-        let mut design = Design { s, contact, baseline: TERMS };
-        self.baseline(&mut design);
-        design
-    }
-
-    /// The columns B S of the baseline.
-    fn baseline(&self, design: &mut Design) {
-        for (column, term) in design.of_baseline().zip(0..) {
-            let of = |taxel: usize| self.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
-            self.taxels.iter().enumerate().for_each(|(k, &taxel)| design.s[(k, column)] = of(taxel));
-        }
-    }
-
     /// Standard deviation of a taxel.
     fn noise(&self, taxel: usize) -> f64 {
         (self.sigma * self.scene.noise_shares[taxel]).max(FLOOR)
@@ -368,9 +262,9 @@ impl<'a> Fit<'a> {
     fn ascend(&mut self, design: &mut Design, steps: usize) -> Option<Top> {
         let prior = self.scene.prior;
         self.weigh();
-        let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, steps)?;
+        let mut top = ascend(design, &self.readings, &self.mu, prior, steps)?;
         for _ in 0..PASSES {
-            let stress = design.stress(&top.posterior, &top.mu);
+            let stress = top.posterior.stress(&self.readings);
             if !self.stated {
                 let ratio = noise::ratio(&self.readings, |k| self.counts(k), &stress);
                 self.sigma = (self.sigma * ratio).clamp(FLOOR, 1.0);
@@ -385,7 +279,7 @@ impl<'a> Fit<'a> {
                 let noise = self.noise(self.taxels[k]);
                 clipped::update(&mut self.readings, k, stress[k], noise);
             }
-            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps.min(PASS_STEPS))?;
+            top = ascend(design, &self.readings, &top.mu, prior, steps.min(PASS_STEPS))?;
         }
         Some(top)
     }
@@ -405,8 +299,7 @@ impl<'a> Fit<'a> {
     fn estimate(&self, found: &Found, rounds: usize) -> Option<Fitted> {
         let Found { regions, top, covariance } = found;
         let cells = &self.scene.cells;
-        let products = Products::new(&regions.design, &self.readings);
-        let forces = forces(&products, top, covariance, &regions.loads());
+        let forces = forces((&regions.design, &self.readings), top, covariance, &regions.loads());
         let mut on_taxels = Forces::zeros(self.b.len());
         let mut contacts = Vec::with_capacity(forces.len());
         for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
@@ -450,14 +343,14 @@ impl<'a> Fit<'a> {
     /// The estimate with what it leaves of the readings.
     fn fitted(&self, estimate: Estimate, regions: &Regions, top: &Top) -> Fitted {
         let design = &regions.design;
-        let stress = design.stress(&top.posterior, &top.mu);
+        let stress = top.posterior.stress(&self.readings);
         let sensor = &self.scene.cells.sensor;
         let residual = Residual::new(&self.readings, |k| self.counts(k), &stress);
         let least = if self.stated { 1.0 } else { FLOOR / self.sigma };
-        let baseline = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
+        let baseline = top.posterior.stress_of(|i| design.of_baseline().contains(&i));
         let counted: Vec<usize> = (0..self.taxels.len()).filter(|&k| self.counts(k)).collect();
-        let load = counted.iter().map(|&k| self.b[self.taxels[k]] - baseline(k)).sum::<f64>();
-        let square = counted.iter().map(|&k| baseline(k).powi(2)).sum::<f64>() / (counted.len().max(1) as f64);
+        let load = counted.iter().map(|&k| self.b[self.taxels[k]] - baseline[k]).sum::<f64>();
+        let square = counted.iter().map(|&k| baseline[k].powi(2)).sum::<f64>() / (counted.len().max(1) as f64);
         let worst = residual.worst(least).map(|(k, size)| (self.taxels[k], size));
         Fitted {
             worst,
