@@ -68,6 +68,11 @@ impl Sizes {
         Sizes([offset.abs(), (0.5 * (x * x + y * y)).sqrt(), LEAST].map(|size| size.clamp(LEAST, LARGEST)))
     }
 
+    /// Whether there is a baseline that has an effect.
+    pub fn matter(self) -> bool {
+        self.0.iter().any(|size| *size > LEAST)
+    }
+
     /// Size of a term.
     pub fn of(self, term: usize) -> f64 {
         self.0[GROUPS[term]]

@@ -59,6 +59,6 @@ mod tests {
             assert!((row - [4.0, 5.0, -5.0][i]).abs() < 1e-12);
             (0..3).for_each(|j| assert!((unit[(i, j)] - f64::from(i == j)).abs() < 1e-12));
         }
-        assert!(Cholesky::new(Mat::from_fn(2, 2, |i, j| f64::from(i == j) - 0.5)).is_none());
+        assert!(Cholesky::new(Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 })).is_none());
     }
 }

@@ -75,7 +75,8 @@ mod tests {
             let mu = [[0.0; 2]];
             for _ in 0..3 {
                 let posterior = design.posterior(&readings, &mu).unwrap();
-                update(&mut readings, 1, posterior.stress(&readings)[1], sigma);
+                let stress = posterior.stress(&readings)[1];
+                update(&mut readings, 1, stress, sigma);
             }
             let posterior = design.posterior(&readings, &mu).unwrap();
             let density = |w: f64| {

@@ -43,13 +43,15 @@ impl Fit<'_> {
                 told
             };
             let told: Vec<Gaussian> = (0..own.len()).map(ask).collect();
-            (self.mu, found.covariance) = match adviser.combined {
+            (self.now.mu, found.covariance) = match adviser.combined {
                 true => combine(&own, &own_covariance, &told)?,
                 false => (told.iter().map(|told| told.mean).collect(), variances(&told)),
             };
-            found.regions = self.regions();
-            found.top = self.ascend(&mut found.regions.design, 0)?;
-            self.p = found.regions.pressure(&found.top.posterior.w, self.p.len());
+            found.regions = self.regions(0.0);
+            let design = &mut found.regions.design;
+            let top = self.ascend(design, 0)?;
+            found.top = self.with_rest(design, top, 0, 2)?;
+            self.take(&found.regions, &found.top);
         }
         Some(found)
     }

@@ -60,17 +60,18 @@ impl Regions {
 }
 
 impl Fit<'_> {
-    /// The contacts under envelopes of the last pressure.
-    pub(super) fn regions(&self) -> Regions {
+    /// The contacts under envelopes of the last pressure, of which at least the variance `least` may be left out.
+    pub(super) fn regions(&self, least: f64) -> Regions {
         let mut of_contact = Vec::new();
-        for contact in 0..self.mu.len() {
+        for contact in 0..self.now.mu.len() {
             let own = |(p, label): (&f64, &usize)| if *label == contact { *p } else { 0.0 };
-            let e = self.scene.envelopes.of(self.p.iter().zip(&self.labels).map(own), self.sigma);
-            let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && self.labels[cell] == contact).collect();
+            let e = self.scene.envelopes.of(self.now.p.iter().zip(&self.now.labels).map(own), self.now.sigma);
+            let own: Vec<usize> =
+                (0..e.len()).filter(|&cell| e[cell] > 0.0 && self.now.labels[cell] == contact).collect();
             let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
             of_contact.push((own, on_own));
         }
-        let remainder = remainder(self.sigma);
+        let remainder = remainder(self.now.sigma).max(least);
         let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
         let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
             let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
@@ -107,7 +108,7 @@ impl Fit<'_> {
     /// The columns B S of the baseline.
     pub(super) fn baseline(&self, design: &mut Design) {
         for (column, term) in design.of_baseline().zip(0..) {
-            let of = |taxel: usize| self.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
+            let of = |taxel: usize| self.now.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
             self.taxels.iter().enumerate().for_each(|(k, &taxel)| design.s[(k, column)] = of(taxel));
         }
     }
