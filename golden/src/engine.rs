@@ -21,6 +21,7 @@ pub use stream_checks::{CheckPace, StreamChecks};
 use crate::data::frame::Frame;
 use crate::data::input::drift::Drift;
 use crate::data::input::Input;
+use crate::estimate::evidence::LastFit;
 use crate::estimate::float::{Golden, GoldenError};
 use crate::fixed::stages::prepare::Prepared;
 use crate::fixed::{FixedError, Model};
@@ -50,6 +51,8 @@ pub struct State {
     drift: Drift,
     /// The state of the hardware, for its bit-true model.
     prepared: Option<Prepared>,
+    /// The fit of the last frame, for the estimator `evidence`.
+    last: Option<LastFit>,
     /// Whether there were frames.
     begun: bool,
 }
@@ -112,7 +115,7 @@ impl Engine for Golden {
     }
 
     fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        Ok(self.run_after(&mut state.drift, frames)?)
+        Ok(self.run_after(&mut state.drift, &mut state.last, frames)?)
     }
 }
 

@@ -32,6 +32,7 @@ pub mod converter;
 pub mod draws;
 mod error;
 mod plantar;
+pub mod presses;
 mod random;
 mod stress;
 pub(crate) mod support;

@@ -19,6 +19,7 @@
 use super::Engine;
 use crate::data::frame::Frame;
 use crate::data::input::drift::Drift;
+use crate::estimate::evidence::LastFit;
 use crate::estimate::float::Golden;
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;
@@ -83,9 +84,16 @@ impl CrossCheck {
     }
 
     /// What it says of the result with this resultant in N, [x, y, normal], of `frames`, the readings of one result, where
-    /// zeros have a `drift` before them; `None` for frames that `evidence` refuses.
-    pub fn finding(&self, frames: &[Frame], mut drift: Drift, resultant_N: [f64; 3]) -> Option<Finding> {
-        let reference = self.golden.run_after(&mut drift, frames).ok()?;
+    /// zeros have a `drift` before them and the fit of an earlier frame is `last`, then that of these; `None` for frames that
+    /// `evidence` refuses.
+    pub fn finding(
+        &self,
+        frames: &[Frame],
+        mut drift: Drift,
+        last: &mut Option<LastFit>,
+        resultant_N: [f64; 3],
+    ) -> Option<Finding> {
+        let reference = self.golden.run_after(&mut drift, last, frames).ok()?;
         let checks = reference.checks;
         let mut flags: Vec<Flag> = reference.flags.iter().copied().filter(|flag| OF_READINGS.contains(flag)).collect();
         let disturbed = !flags.is_empty() || checks.leaves_structure();
@@ -102,7 +110,7 @@ impl CrossCheck {
 
     /// Adds figures and flags to the result with this resultant in N of `frames`, as [`CrossCheck::finding`] finds them.
     pub fn check(&self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
-        if let Some(finding) = self.finding(frames, Drift::default(), resultant_N) {
+        if let Some(finding) = self.finding(frames, Drift::default(), &mut None, resultant_N) {
             self.add(&finding, 0, result);
         }
     }

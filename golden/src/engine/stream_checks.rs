@@ -12,6 +12,7 @@ use super::cross_check::{CrossCheck, Finding};
 use super::{Engine, EngineError, State};
 use crate::data::frame::Frame;
 use crate::data::input::drift::Drift;
+use crate::estimate::evidence::LastFit;
 use crate::result::checks::history::History;
 use crate::result::reconstruct::{Diagnostics, Reconstruction};
 use crate::spec::scene::Scene;
@@ -58,6 +59,7 @@ impl Worker {
 
     /// Answers jobs until the stream ends.
     fn work(&self, check: &CrossCheck) {
+        let mut last = None;
         loop {
             let mut exchange = self.exchange();
             let job = loop {
@@ -68,7 +70,7 @@ impl Worker {
                 }
             };
             drop(exchange);
-            if let Some(finding) = check.finding(&job.frames, job.drift, job.resultant_N) {
+            if let Some(finding) = check.finding(&job.frames, job.drift, &mut last, job.resultant_N) {
                 self.exchange().found = Some((job.number, finding));
             }
         }
@@ -83,6 +85,8 @@ pub struct StreamChecks {
     history: History,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
+    /// The last fit of the cross-check, where it has no thread of its own.
+    checked: Option<LastFit>,
     check: Option<Arc<CrossCheck>>,
     pace: CheckPace,
     worker: Option<Arc<Worker>>,
@@ -106,8 +110,18 @@ impl StreamChecks {
             worker
         });
         let (scene, history) = (engine.scene().clone(), History::new(engine.scene()));
-        let waiting = Vec::new();
-        StreamChecks { scene, state: State::default(), history, waiting, check, pace, worker, next: 0, found: None }
+        StreamChecks {
+            scene,
+            state: State::default(),
+            history,
+            waiting: Vec::new(),
+            checked: None,
+            check,
+            pace,
+            worker,
+            next: 0,
+            found: None,
+        }
     }
 
     /// The next result of `engine`, with figures and flags; of `frames` as [`StreamChecks::add`] has them.
@@ -116,7 +130,7 @@ impl StreamChecks {
     /// As [`Engine::reconstruct_after`].
     pub fn next(&mut self, engine: &(impl Engine + ?Sized), frames: &[Frame]) -> Result<Reconstruction, EngineError> {
         if self.scene.input.slides() {
-            self.state = State::default();
+            self.state = State { last: self.state.last.take(), ..State::default() };
         }
         let drift = self.state.drift.clone();
         let mut result = engine.reconstruct_after(&mut self.state, frames)?;
@@ -166,7 +180,8 @@ impl StreamChecks {
                 worker.changed.notify_one();
             }
             (None, CheckPace::Every(period)) if number.is_multiple_of(period) => {
-                self.found = check.finding(frames, drift, resultant_N).map(|finding| (number, finding));
+                self.found =
+                    check.finding(frames, drift, &mut self.checked, resultant_N).map(|finding| (number, finding));
             }
             _ => (),
         }

@@ -17,11 +17,13 @@
 //! | `prior` | p = F w: load and smooth shape under the envelope |
 //! | `model` | evidence, posterior, slope and information in μ |
 //! | `ascent` | μ of all contacts |
+//! | `cholesky` | factor of a matrix, on one core |
 //! | `clipped` | readings of zero on an array that reads no tension |
 //! | `baseline` | offset, slopes and bends that no force causes |
 //! | `noise` | size of the noise, where it is not stated |
 //! | `contact` | force and standard deviation |
 //! | `residual` | whether what is left can be white noise |
+//! | `follow` | a frame of a stream, from the fit of the frame before |
 //! | `screen`, `suspect` | taxels that read what no force explains; they are taken as missing |
 //! | `failed` | Σ b·area where no fit explains the stress |
 //!
@@ -39,6 +41,7 @@
 mod ascent;
 mod baseline;
 pub(crate) mod cells;
+mod cholesky;
 mod clipped;
 mod contact;
 mod envelope;
@@ -46,6 +49,7 @@ mod estimate;
 mod estimator;
 mod failed;
 mod fit;
+mod follow;
 mod model;
 mod noise;
 mod prior;
@@ -57,9 +61,11 @@ mod tests;
 
 pub use estimate::Estimate;
 pub use estimator::Evidence;
+pub use follow::LastFit;
 
 use crate::data::frame::Forces;
 use fit::Fitted;
+use follow::{follow, Scaled};
 
 /// Share of Σ b·area below which a normal force does not explain the stress.
 const EXPLAINED: f64 = 0.5;
@@ -72,21 +78,39 @@ impl Evidence {
 
     /// The same without the readings of the taxels `missing`, row-major indices.
     pub fn solve_without(&self, b: &[f64], missing: &[usize], noise_MPa: Option<f64>) -> Estimate {
+        self.solve_after(&mut None, b, missing, noise_MPa)
+    }
+
+    /// The same of a frame of a stream, where `last` is what the frame before left, and then what this one leaves.
+    pub fn solve_after(
+        &self,
+        last: &mut Option<LastFit>,
+        b: &[f64],
+        missing: &[usize],
+        noise_MPa: Option<f64>,
+    ) -> Estimate {
         let there: Vec<bool> = (0..b.len()).map(|t| self.alive[t] && !missing.contains(&t)).collect();
         let Some(unit) = suspect::peak(b, &there) else {
+            *last = None;
             let (forces_N, noise_MPa) = (Forces::zeros(b.len()), noise_MPa.unwrap_or(0.0));
             return Estimate { forces_N, noise_MPa, ..Estimate::default() };
         };
         // In units of the peak, so that no frame is too small or too large.
         let scaled: Vec<f64> = b.iter().map(|b| b / unit).collect();
+        let frame = Scaled { b: &scaled, there: &there, stated: noise_MPa.map(|noise| noise / unit), unit };
         let explained = |fitted: &Fitted| {
             let normal: f64 = fitted.estimate.forces_N.fz.iter().sum();
             normal.is_finite() && normal >= EXPLAINED * fitted.load
         };
-        let Some(fitted) = suspect::fit(self, &scaled, &there, noise_MPa.map(|noise| noise / unit)).filter(explained)
-        else {
+        let before = last.take().and_then(|last| Some((follow(self, frame, &last).filter(explained)?, last)));
+        let (fitted, before) = match before {
+            Some((fitted, last)) => (Some(fitted), Some(last)),
+            None => (suspect::fit(self, &scaled, &there, frame.stated).filter(explained), None),
+        };
+        let Some(fitted) = fitted else {
             return self.without_fit(b, noise_MPa);
         };
+        *last = LastFit::new(&fitted, frame, before.as_ref());
         let mut estimate = fitted.estimate;
         estimate.scale(unit);
         estimate.noise_MPa = noise_MPa.unwrap_or(estimate.noise_MPa);

@@ -100,13 +100,7 @@ pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
 
 /// The same with what led to it.
 pub fn basins(sensor: &Sensor, p: &[f64], width: f64) -> Basins {
-    let peak = p.iter().copied().fold(0.0, f64::max);
-    let word = |p: &f64| if *p > 0.0 { (p / peak * 2f64.powi(PEAK_BITS)).round() as i64 } else { 0 };
-    let words: Vec<i64> = p.iter().map(word).collect();
-    match Segmenter::new(sensor, width).segment(&words) {
-        found if found.segments.count > 0 => found,
-        found => Basins { segments: Segments::whole(p.len()), ..found },
-    }
+    Segmenter::new(sensor, width).segment_forces(p)
 }
 
 /// The up to eight neighbours of a taxel, diagonal ones included, ascending.
@@ -236,6 +230,17 @@ impl Segmenter {
             sensor: sensor.clone(),
             windows: [Window::new(sensor.cols, x, sigma(x)), Window::new(sensor.rows, y, sigma(y))],
             slopes: [slope(x), slope(y), slope(x.hypot(y))],
+        }
+    }
+
+    /// The contacts for the normal forces `p` in N, row-major; without a contact the whole array is one.
+    pub fn segment_forces(&self, p: &[f64]) -> Basins {
+        let peak = p.iter().copied().fold(0.0, f64::max);
+        let word = |p: &f64| if *p > 0.0 { (p / peak * 2f64.powi(PEAK_BITS)).round() as i64 } else { 0 };
+        let words: Vec<i64> = p.iter().map(word).collect();
+        match self.segment(&words) {
+            found if found.segments.count > 0 => found,
+            found => Basins { segments: Segments::whole(p.len()), ..found },
         }
     }
 

@@ -13,9 +13,9 @@
 //! | in: μ | contacts × 2 | – |
 //! | out: μ, covariance (J + 1/s²)⁻¹ | contacts × 2, square of it | – |
 
-use super::model::{Posterior, Products, Slope};
-use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
-use faer::{Col, Mat, Side};
+use super::cholesky::Cholesky;
+use super::model::{Design, Posterior, Readings, Slope};
+use faer::Mat;
 
 /// Halvings of a step before the ascent ends.
 const HALVINGS: usize = 6;
@@ -64,12 +64,12 @@ impl Prior {
 
     /// J + 1/s², whose inverse is the covariance of μ, factored. J is a difference of large matrices: where rounding makes it
     /// indefinite, it is raised by the rounding that it can have. `None` if it is not representable.
-    fn information(self, slope: &Slope) -> Option<Llt<f64>> {
+    fn information(self, slope: &Slope) -> Option<Cholesky> {
         let n = slope.gradient.len();
         let factor = |raised: f64| {
             let own =
                 |i: usize, j: usize| slope.information[(i, j)] + if i == j { self.precision() + raised } else { 0.0 };
-            Mat::from_fn(n, n, own).llt(Side::Lower).ok()
+            Cholesky::new(Mat::from_fn(n, n, own))
         };
         let largest = (0..n).map(|i| slope.information[(i, i)].abs()).fold(0.0, f64::max);
         factor(0.0).or_else(|| factor(ROUNDING * largest)).or_else(|| factor(largest))
@@ -87,21 +87,20 @@ impl Prior {
 }
 
 /// Ascends from `mu` by at most `steps` steps; `None` if the model is not representable there.
-pub(super) fn ascend(products: &Products, mu: &[[f64; 2]], prior: Prior, steps: usize) -> Option<Top> {
-    let top = |mu: Vec<[f64; 2]>| {
-        let posterior = products.at(&mu)?;
-        let slope = products.slope(&posterior);
-        Some(Top { mu, posterior, slope })
+pub(super) fn ascend(design: &Design, readings: &Readings, mu: &[[f64; 2]], prior: Prior, steps: usize) -> Option<Top> {
+    let top = |mu: Vec<[f64; 2]>, posterior: Posterior| {
+        let slope = design.slope(readings, &posterior);
+        Top { mu, posterior, slope }
     };
-    let mut best = top(mu.to_vec())?;
+    let mut best = top(mu.to_vec(), design.posterior(readings, mu)?);
     if prior.mu_max == 0.0 {
         return Some(best);
     }
     for _ in 0..steps {
         let value = best.posterior.value + prior.log(&best.mu);
         let uphill = |i: usize| best.slope.gradient[i] - prior.precision() * best.mu[i / 2][i % 2];
-        let right = Col::from_fn(best.slope.gradient.len(), uphill);
-        let step = prior.information(&best.slope)?.solve(&right);
+        let mut step: Vec<f64> = (0..best.slope.gradient.len()).map(uphill).collect();
+        prior.information(&best.slope)?.solve(&mut step);
         let longest = step.iter().fold(0.0f64, |longest, step| step.abs().max(longest));
         if longest <= TOLERANCE * prior.mu_max {
             break;
@@ -114,10 +113,9 @@ pub(super) fn ascend(products: &Products, mu: &[[f64; 2]], prior: Prior, steps: 
                 prior.within([x + share * step[2 * k], y + share * step[2 * k + 1]])
             };
             let mu: Vec<[f64; 2]> = (0..best.mu.len()).map(moved).collect();
-            let next = products.at(&mu).filter(|next| next.value + prior.log(&mu) > value);
+            let next = design.posterior(readings, &mu).filter(|next| next.value + prior.log(&mu) > value);
             if let Some(posterior) = next {
-                let slope = products.slope(&posterior);
-                higher = Some(Top { mu, posterior, slope });
+                higher = Some(top(mu, posterior));
                 break;
             }
             share /= 2.0;

@@ -27,9 +27,10 @@
 //! | in: posterior of c | terms | – |
 //! | out: sizes | 3 | of the peak |
 
+use super::cholesky::Cholesky;
 use crate::spec::sensor::Sensor;
-use faer::linalg::solvers::Solve;
-use faer::{Col, Mat, Side};
+use faer::Mat;
+use std::cmp::Ordering;
 
 /// The group of each term: offset, slopes, bends.
 const GROUPS: [usize; TERMS] = [0, 1, 1, 2, 2, 2];
@@ -65,6 +66,11 @@ impl Sizes {
     pub fn of_plane(plane: [f64; PLANE]) -> Sizes {
         let [offset, x, y] = plane;
         Sizes([offset.abs(), (0.5 * (x * x + y * y)).sqrt(), LEAST].map(|size| size.clamp(LEAST, LARGEST)))
+    }
+
+    /// Whether there is a baseline that has an effect.
+    pub fn matter(self) -> bool {
+        self.0.iter().any(|size| *size > LEAST)
     }
 
     /// Size of a term.
@@ -103,25 +109,24 @@ pub(super) fn plane(sensor: &Sensor, b: &[f64], used: &[bool]) -> [f64; PLANE] {
     let width = |k: &usize| sorted[k + half] - sorted[*k];
     let first = (0..sorted.len() - half).min_by(|a, b| width(a).total_cmp(&width(b))).unwrap_or(0);
     let mut plane = [0.5 * (sorted[first] + sorted[first + half]), 0.0, 0.0];
-    let at = |plane: [f64; PLANE], t: usize| -> f64 {
-        plane.iter().zip(terms(sensor, t)).map(|(size, term)| size * term).sum()
-    };
+    let of_taxel: Vec<[f64; TERMS]> = all.iter().map(|&t| terms(sensor, t)).collect();
     for _ in 0..STEPS {
-        let mut near = all.clone();
-        near.sort_by(|&s, &t| (b[s] - at(plane, s)).abs().total_cmp(&(b[t] - at(plane, t)).abs()));
-        near.truncate(half + 1);
-        let mut gram = Mat::<f64>::zeros(PLANE, PLANE);
-        let mut right = Col::<f64>::zeros(PLANE);
-        for &t in &near {
-            let own = terms(sensor, t);
+        let away = |k: usize| {
+            let at: f64 = plane.iter().zip(of_taxel[k]).map(|(size, term)| size * term).sum();
+            ((b[all[k]] - at).abs(), k)
+        };
+        let mut near: Vec<(f64, usize)> = (0..all.len()).map(away).collect();
+        near.select_nth_unstable_by(half, |s, t| s.partial_cmp(t).unwrap_or(Ordering::Equal));
+        let (mut gram, mut right) = (Mat::<f64>::zeros(PLANE, PLANE), [0.0; PLANE]);
+        for &(_, k) in &near[..=half] {
             for i in 0..PLANE {
-                right[i] += own[i] * b[t];
-                (0..PLANE).for_each(|j| gram[(i, j)] += own[i] * own[j]);
+                right[i] += of_taxel[k][i] * b[all[k]];
+                (0..PLANE).for_each(|j| gram[(i, j)] += of_taxel[k][i] * of_taxel[k][j]);
             }
         }
-        let Ok(factor) = gram.llt(Side::Lower) else { break };
-        let next = factor.solve(&right);
-        plane = [next[0], next[1], next[2]];
+        let Some(factor) = Cholesky::new(gram) else { break };
+        factor.solve(&mut right);
+        plane = right;
     }
     let largest = plane.iter().map(|size| size.abs()).sum::<f64>();
     if largest <= FIRST {

@@ -24,8 +24,9 @@ pub(crate) struct Cells {
     pub grid: Sensor,
     /// Cells per taxel along x and y.
     per_taxel: [usize; 2],
-    /// Influence for each distance, row-major in the distances along y and x.
-    table: Vec<[f64; 3]>,
+    /// Stress in MPa per N along z, x and y: for each line of cells within a taxel and each distance in taxels, first along y,
+    /// then along x. The entries of the taxels of a row follow each other.
+    influence: [Vec<f64>; 3],
 }
 
 impl Cells {
@@ -41,31 +42,53 @@ impl Cells {
             thickness_mm: sensor.thickness_mm,
         };
         let side = [grid.pitch_x_mm, grid.pitch_y_mm];
-        let influence = CellInfluence::new(side, sensor.thickness_mm, medium);
+        let by_point = CellInfluence::new(side, sensor.thickness_mm, medium);
         // A taxel with an even number of cells has its centre on their border: all distances are odd in half sides.
         let distance =
             |step: usize, per_taxel: usize| step as f64 + if per_taxel.is_multiple_of(2) { 0.5 } else { 0.0 };
         let at = |index: usize| {
             let (row, col) = (index / grid.cols, index % grid.cols);
-            influence.at([distance(col, fx) * side[0], distance(row, fy) * side[1]])
+            by_point.at([distance(col, fx) * side[0], distance(row, fy) * side[1]])
         };
-        let table = (0..grid.taxels()).map(at).collect();
-        Cells { sensor: sensor.clone(), grid, per_taxel: [fx, fy], table }
+        // The other quadrants are mirror images.
+        let quadrant: Vec<[f64; 3]> = (0..grid.taxels()).map(at).collect();
+        let [along_x, along_y] =
+            [(sensor.cols, fx), (sensor.rows, fy)].map(|(lines, per_taxel)| twice(lines, per_taxel));
+        let mut influence = [const { Vec::new() }; 3];
+        for y in &along_y {
+            for x in &along_x {
+                let step = |twice: &isize| twice.unsigned_abs() / 2;
+                let [own_x, own_y, own_z] = quadrant[step(y) * grid.cols + step(x)];
+                let signed = |along: &isize, value: f64| if *along < 0 { -value } else { value };
+                let values = [own_z, signed(x, own_x), signed(y, own_y)];
+                influence.iter_mut().zip(values).for_each(|(table, value)| table.push(value));
+            }
+        }
+        Cells { sensor: sensor.clone(), grid, per_taxel: [fx, fy], influence }
     }
 
-    /// Stress in MPa on a taxel per N along x, y and z on a cell.
-    pub fn influence(&self, taxel: usize, cell: usize) -> [f64; 3] {
+    /// Number of distances in taxels along x, for each line of cells within a taxel.
+    fn distances_x(&self) -> usize {
+        2 * self.sensor.cols - 1
+    }
+
+    /// Where the taxels with these row-major indices are in each table, from the entry of a cell.
+    pub fn offsets(&self, taxels: &[usize]) -> Vec<usize> {
+        let row = self.per_taxel[0] * self.distances_x();
+        taxels.iter().map(|taxel| taxel / self.sensor.cols * row + taxel % self.sensor.cols).collect()
+    }
+
+    /// Stress in MPa on the taxels with these [`Cells::offsets`] per N along z, x and y on `cell`, below each other.
+    pub fn influence(&self, offsets: &[usize], cell: usize, into: &mut [f64]) {
+        let Sensor { rows, cols, .. } = self.sensor;
         let [fx, fy] = self.per_taxel;
-        let (row, col) = (taxel / self.sensor.cols, taxel % self.sensor.cols);
-        let (cell_row, cell_col) = (cell / self.grid.cols, cell % self.grid.cols);
-        // Twice the distance in cell sides.
-        let twice = |line: usize, cell: usize, per_taxel: usize| {
-            (2 * line * per_taxel + per_taxel - 1) as isize - 2 * cell as isize
-        };
-        let (along_x, along_y) = (twice(col, cell_col, fx), twice(row, cell_row, fy));
-        let step = |twice: isize| twice.unsigned_abs() / 2;
-        let [x, y, z] = self.table[step(along_y) * self.grid.cols + step(along_x)];
-        [if along_x < 0 { -x } else { x }, if along_y < 0 { -y } else { y }, z]
+        let (row, col) = (cell / self.grid.cols, cell % self.grid.cols);
+        let line = (row % fy * (2 * rows - 1) + rows - 1 - row / fy) * fx + col % fx;
+        let origin = line * self.distances_x() + cols - 1 - col / fx;
+        for (table, into) in self.influence.iter().zip(into.chunks_exact_mut(offsets.len().max(1))) {
+            let entries = &table[origin..];
+            into.iter_mut().zip(offsets).for_each(|(value, offset)| *value = entries[*offset]);
+        }
     }
 
     /// The taxel above whose area a cell lies.
@@ -85,6 +108,13 @@ impl Cells {
     }
 }
 
+/// Twice the distance taxel − cell in cell sides, for each line of cells within a taxel and each distance of taxels.
+fn twice(lines: usize, per_taxel: usize) -> Vec<isize> {
+    let (most, sides) = (lines as isize - 1, per_taxel as isize);
+    let of = move |within: isize| (-most..=most).map(move |away| 2 * sides * away + sides - 1 - 2 * within);
+    (0..sides).flat_map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,11 +131,15 @@ mod tests {
             assert_eq!(cells.per_taxel, [2, 3]);
             let side = [cells.grid.pitch_x_mm, cells.grid.pitch_y_mm];
             let direct = CellInfluence::new(side, 3.0, medium);
-            for taxel in 0..12 {
-                for cell in 0..cells.grid.taxels() {
+            let taxels = [0, 1, 3, 6, 7, 8, 11];
+            let (offsets, mut got) = (cells.offsets(&taxels), [0.0; 21]);
+            for cell in 0..cells.grid.taxels() {
+                cells.influence(&offsets, cell, &mut got);
+                for (k, &taxel) in taxels.iter().enumerate() {
                     let ([x, y], [u, v]) = (cells.taxel_mm(taxel), cells.position_mm(cell));
-                    let (got, wanted) = (cells.influence(taxel, cell), direct.at([x - u, y - v]));
-                    assert!((0..3).all(|k| (got[k] - wanted[k]).abs() < 1e-12), "{taxel} {cell}: {got:?} {wanted:?}");
+                    let [own_x, own_y, own_z] = direct.at([x - u, y - v]);
+                    let off = [got[k] - own_z, got[7 + k] - own_x, got[14 + k] - own_y];
+                    assert!(off.iter().all(|off| off.abs() < 1e-12), "{taxel} {cell}: {off:?}");
                 }
             }
         }

@@ -51,7 +51,7 @@ pub(super) fn update(readings: &mut Readings, t: usize, [mean, variance]: [f64; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::evidence::model::{Design, Products};
+    use crate::estimate::evidence::model::Design;
     use faer::Mat;
 
     #[test]
@@ -66,15 +66,19 @@ mod tests {
     #[test]
     fn moments_are_exact_for_one_reading() {
         for (shift, sigma) in [(0.0, 0.3), (2.0, 0.5), (-1.0, 0.01)] {
-            let design =
-                Design { s: Mat::from_fn(2, 3, |_, i| if i == 0 { 1.0 } else { 0.0 }), contact: vec![0], baseline: 0 };
+            let design = Design {
+                s: Mat::from_fn(6, 1, |row, _| if row < 2 { 1.0 } else { 0.0 }),
+                contact: vec![0],
+                baseline: 0,
+            };
             let mut readings = Readings { y: vec![shift, 0.0], precision: vec![2.0, 0.0] };
             let mu = [[0.0; 2]];
             for _ in 0..3 {
-                let posterior = Products::new(&design, &readings).at(&mu).unwrap();
-                update(&mut readings, 1, design.stress(&posterior, &mu)[1], sigma);
+                let posterior = design.posterior(&readings, &mu).unwrap();
+                let stress = posterior.stress(&readings)[1];
+                update(&mut readings, 1, stress, sigma);
             }
-            let posterior = Products::new(&design, &readings).at(&mu).unwrap();
+            let posterior = design.posterior(&readings, &mu).unwrap();
             let density = |w: f64| {
                 let normal = (-0.5 * (w * w + 2.0 * (w - shift).powi(2))).exp();
                 normal * 0.5 * libm::erfc(w / sigma * FRAC_1_SQRT_2)

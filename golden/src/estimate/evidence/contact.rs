@@ -16,7 +16,7 @@
 //! | out: force and standard deviation | 3 per contact | N, [x, y, normal] |
 
 use super::ascent::Top;
-use super::model::Products;
+use super::model::{Design, Readings};
 use faer::Mat;
 
 /// Standard deviation, as a share of the load, of what the envelope leaves out.
@@ -34,9 +34,14 @@ pub(super) struct ContactForce {
 
 /// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others,
 /// `covariance` that of all μ.
-pub(super) fn forces(products: &Products, top: &Top, covariance: &Mat<f64>, loads: &[Vec<f64>]) -> Vec<ContactForce> {
+pub(super) fn forces(
+    (design, readings): (&Design, &Readings),
+    top: &Top,
+    covariance: &Mat<f64>,
+    loads: &[Vec<f64>],
+) -> Vec<ContactForce> {
     let unknowns = 2 * loads.len();
-    let drift = products.drift(&top.posterior, unknowns);
+    let drift = design.drift(readings, &top.posterior);
     let one = |k: usize| {
         let f = &loads[k];
         let r = f.len();

@@ -2,9 +2,11 @@
 
 use super::ascent::Prior;
 use super::cells::Cells;
-use super::envelope::envelope;
+use super::envelope::Envelopes;
+use super::prior::Shape;
 use super::screen::Screen;
 use crate::estimate::learned::Learned;
+use crate::estimate::segment::{Segmenter, WIDTH};
 use crate::spec::scene::Scene;
 
 /// ℓ in units of the depth.
@@ -19,7 +21,9 @@ const WINDOW: f64 = 4.0;
 /// The estimator of one scene.
 pub struct Evidence {
     pub(super) cells: Cells,
-    pub(super) length_mm: f64,
+    pub(super) envelopes: Envelopes,
+    pub(super) shape: Shape,
+    pub(super) segmenter: Segmenter,
     pub(super) prior: Prior,
     /// Taxels that are not dead.
     pub(super) alive: Vec<bool>,
@@ -48,9 +52,12 @@ impl Evidence {
         let length_mm = (LENGTH_PER_DEPTH * sensor.thickness_mm).clamp(least, most);
         let mut alive = vec![true; sensor.taxels()];
         scene.input.dead.iter().for_each(|[row, col]| alive[row * sensor.cols + col] = false);
+        let cells = Cells::new(sensor, scene.medium, length_mm);
         Evidence {
-            cells: Cells::new(sensor, scene.medium, length_mm),
-            length_mm,
+            envelopes: Envelopes::new(&cells, length_mm),
+            shape: Shape::new(&cells.grid, length_mm),
+            segmenter: Segmenter::new(&cells.grid, WIDTH),
+            cells,
             prior: Prior { mu_max: scene.search.mu_max },
             screen: Screen::new(sensor, scene.medium, &alive),
             alive,
@@ -82,7 +89,7 @@ impl Evidence {
         let lines = |pitch: f64| (WINDOW * sensor.thickness_mm / pitch).ceil() as usize + 1;
         let (along_x, along_y) = (lines(sensor.pitch_x_mm), lines(sensor.pitch_y_mm));
         let mut near = vec![false; self.alive.len()];
-        let loaded = envelope(&self.cells, p, self.length_mm, sigma);
+        let loaded = self.envelopes.of(p.iter().copied(), sigma);
         let mut seen = vec![false; self.alive.len()];
         for cell in (0..loaded.len()).filter(|&cell| loaded[cell] > 0.0) {
             let taxel = self.cells.taxel_of(cell);

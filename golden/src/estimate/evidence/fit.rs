@@ -9,32 +9,29 @@
 //! | out: [`Estimate`] | – | N per MPa of the peak |
 
 mod advice;
+mod outcome;
+mod regions;
 
 use super::ascent::{ascend, Top};
-use super::baseline::{plane, terms, Sizes, TERMS};
-use super::contact::forces;
-use super::envelope::{envelope, from_stress};
+use super::baseline::{plane, terms, Sizes};
 use super::estimate::Estimate;
 use super::estimator::Evidence;
-use super::model::{Design, Products, Readings};
-use super::prior::{factor, remainder};
-use super::residual::Residual;
+use super::model::{Design, Readings};
 use super::{clipped, noise};
-use crate::data::frame::Forces;
-use crate::estimate::segment::{neighbours, segment, WIDTH};
-use crate::result::reconstruct::ContactEstimate;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par, Scale};
-use std::f64::consts::FRAC_1_SQRT_2;
+use crate::estimate::segment::neighbours;
+use faer::{Mat, Scale};
+use regions::Regions;
 
 /// Smallest standard deviation of a reading.
-const FLOOR: f64 = 1e-4;
+pub(super) const FLOOR: f64 = 1e-4;
 /// Largest first noise where it is not known.
 const UNKNOWN: f64 = 0.02;
-/// Largest number of rounds.
-const ROUNDS: usize = 8;
-/// Smallest number of rounds: the envelope has left the first, too wide one.
+/// Largest number of rounds with coarse pressures.
+const ROUNDS: usize = 7;
+/// Smallest number of them: the envelope has left the first, too wide one.
 const LEAST_ROUNDS: usize = 4;
+/// Largest variance that a coarse pressure leaves out, in units of the largest of its shape: envelope and μ need no more.
+const COARSE: f64 = 0.01;
 /// Square of the distance of two μ, in standard deviations, below which contacts that touch are one: the 95 % quantile
 /// of two unknowns.
 const SAME_MU: f64 = 6.0;
@@ -42,22 +39,33 @@ const SAME_MU: f64 = 6.0;
 const SEGMENTED: usize = 6;
 /// Standard deviation of μ over the one under a known envelope, on drawn frames of sensor-1.
 const ENVELOPE_FACTOR: f64 = 1.1;
-/// Times per round that noise and clipped readings are found anew.
+/// Times per round that noise, baseline and clipped readings are found anew.
 const PASSES: usize = 2;
-/// Steps of the ascent.
-const STEPS: usize = 4;
-/// Largest variance of a pressure, in units of its own, that may be left out because there are more coefficients than
-/// readings: with more the shear counts as not known. On drawn contacts of up to 0.7 of a 6 × 6 or 8 × 8 array, which leave up to
-/// 0.09, the errors are those of smaller ones.
-const WIDE: f64 = 0.1;
-/// Coefficients of a contact beside which larger ones take none.
-const LEAST_RANK: usize = 8;
-/// Steps with the noise, baseline and clipped readings of a pass: the next round goes on from there.
-const PASS_STEPS: usize = 1;
+/// Noise found over the noise of the round before, below which another round follows the last one.
+const QUIETER: f64 = 0.5;
+/// Largest number of these.
+const FINER_ROUNDS: usize = 2;
+/// Steps of the ascent in the last round.
+const STEPS: usize = 2;
 /// Change of μ per round, in units of mu_max, below which the rounds end.
 const SETTLED: f64 = 1e-3;
 /// The same in standard deviations of μ.
 const SETTLED_SIGMA: f64 = 0.1;
+
+/// What the rounds of a fit have found so far, in units of the peak.
+#[derive(Clone, Debug)]
+pub(super) struct Progress {
+    /// Pressure on each cell.
+    pub p: Vec<f64>,
+    /// Contact of each cell.
+    pub labels: Vec<usize>,
+    /// μ of each contact.
+    pub mu: Vec<[f64; 2]>,
+    /// Sizes of the baseline.
+    pub sizes: Sizes,
+    /// Standard deviation of the noise.
+    pub sigma: f64,
+}
 
 /// One frame.
 pub(super) struct Fit<'a> {
@@ -67,33 +75,18 @@ pub(super) struct Fit<'a> {
     used: &'a [bool],
     /// The taxels that are read.
     taxels: Vec<usize>,
+    /// Where they are in the tables of influence.
+    offsets: Vec<usize>,
     /// Which of them read zero because they read no tension.
     clipped: Vec<usize>,
     /// Which of them are read for what the estimate says of them alone.
     missing: Vec<usize>,
     readings: Readings,
-    /// Sizes of the baseline.
-    sizes: Sizes,
-    sigma: f64,
-    /// Whether sigma is known.
+    /// Whether the noise is known.
     stated: bool,
-    /// Pressure on each cell.
-    p: Vec<f64>,
-    /// Contact of each cell.
-    labels: Vec<usize>,
-    /// μ of each contact.
-    mu: Vec<[f64; 2]>,
-}
-
-/// The contacts under their envelopes.
-struct Regions {
-    /// Cells of each contact.
-    cells: Vec<Vec<usize>>,
-    /// F of each contact.
-    factors: Vec<Mat<f64>>,
-    design: Design,
-    /// Whether a pressure has many more coefficients than the readings can tell, and was cut to as many.
-    wide: bool,
+    now: Progress,
+    /// Number of rounds.
+    round: usize,
 }
 
 /// What a fit says of one frame.
@@ -104,6 +97,10 @@ pub(super) struct Fitted {
     pub worst: Option<(usize, f64)>,
     /// The stress on each taxel that is not used.
     pub predicted: Vec<(usize, f64)>,
+    /// What the rounds found.
+    pub found: Progress,
+    /// The number of contacts into which the pressure divides.
+    pub parts: usize,
     /// Σ b·area that no baseline explains, of the readings that count.
     pub load: f64,
     /// Log evidence of the readings that count, without the constant.
@@ -121,34 +118,6 @@ struct Found {
     covariance: Mat<f64>,
 }
 
-impl Regions {
-    /// p = F w on all `count` cells.
-    fn pressure(&self, w: &[f64], count: usize) -> Vec<f64> {
-        let (mut p, mut first) = (vec![0.0; count], 0);
-        for (cells, factor) in self.cells.iter().zip(&self.factors) {
-            for (k, &cell) in cells.iter().enumerate() {
-                p[cell] = (0..factor.ncols()).map(|i| factor[(k, i)] * w[first + i]).sum();
-            }
-            first += factor.ncols();
-        }
-        p
-    }
-
-    /// For each contact, the load of every coefficient.
-    fn loads(&self) -> Vec<Vec<f64>> {
-        let mut first = 0;
-        let load = |factor: &Mat<f64>| {
-            let mut own = vec![0.0; self.design.rank()];
-            for i in 0..factor.ncols() {
-                own[first + i] = factor.col(i).iter().sum();
-            }
-            first += factor.ncols();
-            own
-        };
-        self.factors.iter().map(load).collect()
-    }
-}
-
 impl<'a> Fit<'a> {
     /// A fit that has not begun, of the taxels `used`; `stated` is the noise in units of the peak, if it is known.
     pub fn new(scene: &'a Evidence, b: &'a [f64], used: &'a [bool], stated: Option<f64>) -> Fit<'a> {
@@ -158,15 +127,22 @@ impl<'a> Fit<'a> {
         let without: Vec<f64> = (0..b.len()).map(above).collect();
         let readings = (0..b.len()).filter(|&t| used[t]).map(|t| without[t]);
         let sigma = stated.unwrap_or_else(|| noise::first(readings).min(UNKNOWN)).max(FLOOR);
-        let p = from_stress(&scene.cells, &without, used, sigma);
-        let taxels = scene.window(&p, sigma);
+        let p = scene.envelopes.first_pressure(sensor, &without, used, sigma);
+        let (labels, mu, sizes) = (vec![0; p.len()], vec![[0.0; 2]], Sizes::of_plane(first));
+        Fit::from(scene, b, used, stated, Progress { p, labels, mu, sizes, sigma })
+    }
+
+    /// The same that goes on from what the rounds of another frame found.
+    pub fn from(scene: &'a Evidence, b: &'a [f64], used: &'a [bool], stated: Option<f64>, before: Progress) -> Fit<'a> {
+        let sigma = stated.unwrap_or(before.sigma).max(FLOOR);
+        let now = Progress { sigma, ..before };
+        let taxels = scene.window(&now.p, sigma);
         let of = |is: &dyn Fn(usize) -> bool| (0..taxels.len()).filter(|k| is(taxels[*k])).collect();
         let clipped = of(&|t| used[t] && scene.unipolar && b[t] <= 0.0);
         let missing = of(&|t| !used[t]);
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
-        let (labels, mu, sizes) = (vec![0; p.len()], vec![[0.0; 2]], Sizes::of_plane(first));
-        let stated = stated.is_some();
-        Fit { scene, b, used, taxels, clipped, missing, readings, sizes, sigma, stated, p, labels, mu }
+        let (stated, offsets) = (stated.is_some(), scene.cells.offsets(&taxels));
+        Fit { scene, b, used, taxels, offsets, clipped, missing, readings, stated, now, round: 0 }
     }
 
     /// Whether a reading counts: it is neither clipped nor missing.
@@ -174,38 +150,58 @@ impl<'a> Fit<'a> {
         self.clipped.binary_search(&k).is_err() && self.missing.binary_search(&k).is_err()
     }
 
-    /// The estimate; `None` if the model is not representable.
+    /// The estimate of a frame of which nothing is known; `None` if the model is not representable.
     pub fn run(mut self) -> Option<Fitted> {
-        let (mut round, mut joined) = (0, false);
-        let (regions, top) = loop {
-            round += 1;
-            if round <= SEGMENTED && !joined {
+        self.approach()?;
+        self.finish()
+    }
+
+    /// Rounds with coarse pressures, until μ stands still.
+    fn approach(&mut self) -> Option<()> {
+        let mut joined = false;
+        loop {
+            self.round += 1;
+            if self.round <= SEGMENTED && !joined {
                 self.segment();
             }
-            if self.mu.is_empty() {
+            if self.now.mu.is_empty() {
                 return None;
             }
-            let before = self.mu.clone();
-            let mut regions = self.regions();
-            let top = self.ascend(&mut regions.design, STEPS)?;
-            self.mu.clone_from(&top.mu);
-            self.p = regions.pressure(&top.posterior.w, self.p.len());
+            let before = self.now.mu.clone();
+            let mut regions = self.regions(COARSE);
+            let top = self.ascend(&mut regions.design, 1)?;
+            let top = self.with_rest(&mut regions.design, top, 1, 0)?;
+            self.take(&regions, &top);
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
-            let most = before.iter().zip(&self.mu).map(moved).fold(0.0, f64::max);
-            let settled = before.len() == self.mu.len() && most <= self.settled(&top);
-            // Where the shear stays open, the regions are all that the rounds have to find.
-            if round == ROUNDS || (regions.wide && round >= SEGMENTED) {
-                break (regions, top);
+            let most = before.iter().zip(&top.mu).map(moved).fold(0.0, f64::max);
+            let mut done = before.len() == top.mu.len() && most <= self.settled(&top);
+            if self.round < LEAST_ROUNDS {
+                continue;
             }
-            if round >= LEAST_ROUNDS {
-                match self.similar_pair(&top) {
-                    Some((a, b)) => {
-                        self.join(a, b);
-                        joined = true;
-                    }
-                    None if settled => break (regions, top),
-                    None => (),
-                }
+            if let Some((a, b)) = self.similar_pair(&top) {
+                self.join(a, b);
+                (joined, done) = (true, false);
+            }
+            // Where the shear stays open, the regions are all that the rounds have to find.
+            if done || self.round == ROUNDS || regions.wide && self.round >= SEGMENTED {
+                return Some(());
+            }
+        }
+    }
+
+    /// The last round, as fine as the noise lets see, and the estimate; `None` if the model is not representable. Where it finds
+    /// much less noise than the rounds before, whose coarse pressures left more, the envelope reaches farther: another one follows.
+    pub fn finish(mut self) -> Option<Fitted> {
+        let last = self.round + 1 + FINER_ROUNDS;
+        let (regions, top) = loop {
+            self.round += 1;
+            let before = self.now.sigma;
+            let mut regions = self.regions(0.0);
+            let top = self.ascend(&mut regions.design, STEPS)?;
+            let top = self.with_rest(&mut regions.design, top, 1, 1)?;
+            self.take(&regions, &top);
+            if self.now.sigma > QUIETER * before || self.round == last {
+                break (regions, top);
             }
         };
         let unknowns = 2 * top.mu.len();
@@ -220,7 +216,7 @@ impl<'a> Fit<'a> {
         if let Some(adviser) = self.scene.adviser.as_ref().filter(|_| !found.regions.wide) {
             found = self.advised(adviser, found)?;
         }
-        self.estimate(&found, round)
+        self.estimate(&found)
     }
 
     /// Change of μ per round below which the rounds end.
@@ -232,10 +228,9 @@ impl<'a> Fit<'a> {
 
     /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
     fn segment(&mut self) {
-        let cells = &self.scene.cells;
-        let loaded = envelope(cells, &self.p, self.scene.length_mm, self.sigma);
-        let p: Vec<f64> = self.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
-        let segments = segment(&cells.grid, &p, WIDTH);
+        let loaded = self.scene.envelopes.of(self.now.p.iter().copied(), self.now.sigma);
+        let p: Vec<f64> = self.now.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
+        let segments = self.scene.segmenter.segment_forces(&p).segments;
         let mut strongest: Vec<Option<usize>> = vec![None; segments.count];
         let loaded = segments.labels.iter().enumerate().filter(|(cell, _)| p[*cell] > 0.0);
         for (cell, label) in loaded.filter_map(|(cell, label)| Some((cell, (*label)?))) {
@@ -245,15 +240,15 @@ impl<'a> Fit<'a> {
         }
         // Regions without a loaded cell are no contacts.
         let kept: Vec<usize> = (0..segments.count).filter(|&label| strongest[label].is_some()).collect();
-        let mu_of = |&label: &usize| strongest[label].map_or([0.0; 2], |cell| self.mu[self.labels[cell]]);
-        self.mu = kept.iter().map(mu_of).collect();
+        let mu_of = |&label: &usize| strongest[label].map_or([0.0; 2], |cell| self.now.mu[self.now.labels[cell]]);
+        self.now.mu = kept.iter().map(mu_of).collect();
         let number = |label: &Option<usize>| kept.iter().position(|kept| Some(*kept) == *label).unwrap_or(0);
-        self.labels = segments.labels.iter().map(number).collect();
+        self.now.labels = segments.labels.iter().map(number).collect();
     }
 
     /// Two contacts that touch and whose μ the stress does not tell apart: parts of one, such as a ring.
     fn similar_pair(&self, top: &Top) -> Option<(usize, usize)> {
-        if self.mu.len() < 2 || self.scene.prior.mu_max == 0.0 {
+        if self.now.mu.len() < 2 || self.scene.prior.mu_max == 0.0 {
             return None;
         }
         let covariance = self.scene.prior.covariance(&top.slope)?;
@@ -262,16 +257,16 @@ impl<'a> Fit<'a> {
                 let of = |k: usize, l: usize| covariance[(2 * k + i, 2 * l + j)];
                 of(a, a) + of(b, b) - of(a, b) - of(b, a)
             };
-            let off = [self.mu[a][0] - self.mu[b][0], self.mu[a][1] - self.mu[b][1]];
+            let off = [self.now.mu[a][0] - self.now.mu[b][0], self.now.mu[a][1] - self.now.mu[b][1]];
             let [xx, xy, yy] = [spread(0, 0), spread(0, 1), spread(1, 1)];
             let determinant = xx * yy - xy * xy;
             (yy * off[0] * off[0] - 2.0 * xy * off[0] * off[1] + xx * off[1] * off[1]) / determinant
         };
         let grid = &self.scene.cells.grid;
-        let loaded = |cell: &usize| self.p[*cell] > 0.0;
-        let pairs = (0..self.p.len()).filter(loaded).flat_map(|cell| {
+        let loaded = |cell: &usize| self.now.p[*cell] > 0.0;
+        let pairs = (0..self.now.p.len()).filter(loaded).flat_map(|cell| {
             let other = neighbours(grid, cell).filter(loaded);
-            other.map(move |other| (self.labels[cell], self.labels[other]))
+            other.map(move |other| (self.now.labels[cell], self.now.labels[other]))
         });
         let near = pairs.filter(|(a, b)| a < b).filter(|pair| distance(pair) <= SAME_MU);
         near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
@@ -279,76 +274,15 @@ impl<'a> Fit<'a> {
 
     /// Makes contact `b` a part of contact `a`.
     fn join(&mut self, a: usize, b: usize) {
-        for label in &mut self.labels {
+        for label in &mut self.now.labels {
             *label = if *label == b { a } else { *label - usize::from(*label > b) };
         }
-        self.mu.remove(b);
-    }
-
-    /// The contacts under envelopes of the last pressure.
-    fn regions(&self) -> Regions {
-        let (cells, length) = (&self.scene.cells, self.scene.length_mm);
-        let mut of_contact = Vec::new();
-        for contact in 0..self.mu.len() {
-            let inside = |cell: usize| self.labels[cell] == contact;
-            let p: Vec<f64> = (0..self.p.len()).map(|cell| if inside(cell) { self.p[cell] } else { 0.0 }).collect();
-            let e = envelope(cells, &p, length, self.sigma);
-            let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && inside(cell)).collect();
-            let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
-            of_contact.push((own, on_own));
-        }
-        let remainder = remainder(self.sigma);
-        let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
-        let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
-            let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
-            let (factor, rest) = factor(cells, own, on_own, length, remainder, most);
-            (rest > WIDE, factor)
-        };
-        let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
-        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(own, _)| own).collect();
-        let design = self.design(&of_contact, &factors);
-        Regions { cells: of_contact, factors, design, wide: cut.contains(&true) }
-    }
-
-    /// S: the stress of every column of every factor, for shear along x and y and normal force, and of the baseline.
-    fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
-        let n = self.taxels.len();
-        let rank = TERMS + factors.iter().map(Mat::ncols).sum::<usize>();
-        let mut s = Mat::zeros(n, 3 * rank);
-        let mut contact = Vec::with_capacity(rank);
-        for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
-            let mut influence = [0, 1, 2].map(|_| Mat::zeros(n, own.len()));
-            for (column, &cell) in own.iter().enumerate() {
-                for (row, &taxel) in self.taxels.iter().enumerate() {
-                    let [x, y, z] = self.scene.cells.influence(taxel, cell);
-                    for (matrix, value) in influence.iter_mut().zip([z, x, y]) {
-                        matrix[(row, column)] = value;
-                    }
-                }
-            }
-            for (block, matrix) in influence.iter().enumerate() {
-                let columns = s.subcols_mut(block * rank + contact.len(), factor.ncols());
-                matmul(columns, Accum::Replace, matrix, factor, 1.0, Par::Seq);
-            }
-            contact.extend(vec![k; factor.ncols()]);
-        }
-        contact.extend([0; TERMS]);
-        let mut design = Design { s, contact, baseline: TERMS };
-        self.baseline(&mut design);
-        design
-    }
-
-    /// The columns B S of the baseline.
-    fn baseline(&self, design: &mut Design) {
-        for (column, term) in design.of_baseline().zip(0..) {
-            let of = |taxel: usize| self.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
-            self.taxels.iter().enumerate().for_each(|(k, &taxel)| design.s[(k, column)] = of(taxel));
-        }
+        self.now.mu.remove(b);
     }
 
     /// Standard deviation of a taxel.
     fn noise(&self, taxel: usize) -> f64 {
-        (self.sigma * self.scene.noise_shares[taxel]).max(FLOOR)
+        (self.now.sigma * self.scene.noise_shares[taxel]).max(FLOOR)
     }
 
     /// Readings and precision of the taxels that are not clipped.
@@ -363,134 +297,46 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The largest posterior of μ under the present envelopes within `steps` steps, with the noise, the baseline and the
-    /// clipped readings that go with it; without a step the posterior at the present μ.
+    /// The largest posterior of μ under the present envelopes within `steps` steps; without a step that at the present μ.
     fn ascend(&mut self, design: &mut Design, steps: usize) -> Option<Top> {
-        let prior = self.scene.prior;
         self.weigh();
-        let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, steps)?;
-        for _ in 0..PASSES {
-            let stress = design.stress(&top.posterior, &top.mu);
-            if !self.stated {
-                let ratio = noise::ratio(&self.readings, |k| self.counts(k), &stress);
-                self.sigma = (self.sigma * ratio).clamp(FLOOR, 1.0);
-                self.weigh();
+        self.baseline(design);
+        ascend(design, &self.readings, &self.now.mu, self.scene.prior, steps)
+    }
+
+    /// The same from `top`, with the noise, the baseline and the clipped readings that go with it, found anew at least `least`
+    /// times; more than once only where there is a baseline or a clipped reading.
+    fn with_rest(&mut self, design: &mut Design, mut top: Top, steps: usize, least: usize) -> Option<Top> {
+        for pass in 0..PASSES {
+            self.find_rest(design, &top);
+            if pass >= least && !self.now.sizes.matter() && self.clipped.is_empty() {
+                break;
             }
-            let first = design.of_baseline().start;
-            let of =
-                |term: usize| [top.posterior.w[first + term], top.posterior.covariance()[(first + term, first + term)]];
-            self.sizes = self.sizes.found(std::array::from_fn(of));
-            self.baseline(design);
-            for &k in &self.clipped {
-                let noise = self.noise(self.taxels[k]);
-                clipped::update(&mut self.readings, k, stress[k], noise);
-            }
-            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps.min(PASS_STEPS))?;
+            self.now.mu = top.mu;
+            top = self.ascend(design, steps)?;
         }
         Some(top)
     }
 
-    /// Centre of pressure of the cells of a contact in mm from the array's centre.
-    fn centre_mm(&self, own: &[usize]) -> [f64; 2] {
-        let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
-        let mut moment = [0.0; 2];
-        for &cell in own {
-            let place = self.scene.cells.position_mm(cell);
-            (0..2).for_each(|axis| moment[axis] += self.p[cell].max(0.0) / pressed * place[axis]);
+    /// Finds noise, baseline and clipped readings that go with a posterior.
+    fn find_rest(&mut self, design: &Design, top: &Top) {
+        let (stress, posterior) = (top.posterior.stress(&self.readings), &top.posterior);
+        if !self.stated {
+            let ratio = noise::ratio(&self.readings, |k| self.counts(k), &stress);
+            self.now.sigma = (self.now.sigma * ratio).clamp(FLOOR, 1.0);
         }
-        moment
-    }
-
-    /// The result of the last round.
-    fn estimate(&self, found: &Found, rounds: usize) -> Option<Fitted> {
-        let Found { regions, top, covariance } = found;
-        let cells = &self.scene.cells;
-        let products = Products::new(&regions.design, &self.readings);
-        let forces = forces(&products, top, covariance, &regions.loads());
-        let mut on_taxels = Forces::zeros(self.b.len());
-        let mut contacts = Vec::with_capacity(forces.len());
-        for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
-            let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
-            if pressed == 0.0 {
-                return None;
-            }
-            for &cell in own {
-                // Contacts do not pull: the pressures below zero go to the others.
-                let share = self.p[cell].max(0.0) / pressed;
-                let taxel = cells.taxel_of(cell);
-                let [fx, fy, fz] = force.force_N.map(|force| share * force);
-                on_taxels.fx[taxel] += fx;
-                on_taxels.fy[taxel] += fy;
-                on_taxels.fz[taxel] += fz;
-            }
-            let contact = ContactEstimate {
-                centre_mm: self.centre_mm(own),
-                mu: top.mu[k],
-                force_N: force.force_N,
-                sigma_N: force.sigma_N,
-                mu_covariance: force.mu_covariance,
-            };
-            contacts.push(contact);
-        }
-        let known = self.taxels.len() - self.clipped.len() - self.missing.len();
-        let misfit_probability = self.stated.then(|| chi_square_tail(top.posterior.square, known as f64));
-        let (noise_MPa, rank) = (self.sigma, regions.design.rank());
-        let estimate = Estimate {
-            contacts,
-            forces_N: on_taxels,
-            noise_MPa,
-            misfit_probability,
-            rounds,
-            rank,
-            ..Estimate::default()
-        };
-        Some(self.fitted(estimate, regions, top))
-    }
-
-    /// The estimate with what it leaves of the readings.
-    fn fitted(&self, estimate: Estimate, regions: &Regions, top: &Top) -> Fitted {
-        let design = &regions.design;
-        let stress = design.stress(&top.posterior, &top.mu);
-        let sensor = &self.scene.cells.sensor;
-        let residual = Residual::new(&self.readings, |k| self.counts(k), &stress);
-        let least = if self.stated { 1.0 } else { FLOOR / self.sigma };
-        let baseline = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
-        let counted: Vec<usize> = (0..self.taxels.len()).filter(|&k| self.counts(k)).collect();
-        let load = counted.iter().map(|&k| self.b[self.taxels[k]] - baseline(k)).sum::<f64>();
-        let square = counted.iter().map(|&k| baseline(k).powi(2)).sum::<f64>() / (counted.len().max(1) as f64);
-        let worst = residual.worst(least).map(|(k, size)| (self.taxels[k], size));
-        Fitted {
-            worst,
-            predicted: self.missing.iter().map(|&k| (self.taxels[k], stress[k][0])).collect(),
-            evidence: top.posterior.value,
-            wide: regions.wide,
-            load: load * sensor.pitch_x_mm * sensor.pitch_y_mm,
-            estimate: Estimate {
-                baseline_MPa: square.sqrt(),
-                outlier: worst.map(|(_, size)| size),
-                residual_correlation: Some(residual.correlation(sensor, &self.taxels)),
-                ..estimate
-            },
+        let first = design.of_baseline().start;
+        let of = |term: usize| [posterior.w[first + term], posterior.covariance()[(first + term, first + term)]];
+        self.now.sizes = self.now.sizes.found(std::array::from_fn(of));
+        for &k in &self.clipped {
+            let noise = self.noise(self.taxels[k]);
+            clipped::update(&mut self.readings, k, stress[k], noise);
         }
     }
-}
 
-/// Probability that χ² with `freedom` degrees of freedom exceeds `value` (Wilson and Hilferty 1931).
-fn chi_square_tail(value: f64, freedom: f64) -> f64 {
-    let spread = 2.0 / (9.0 * freedom);
-    let z = ((value / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
-    0.5 * libm::erfc(z * FRAC_1_SQRT_2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::chi_square_tail;
-
-    /// Tabulated quantiles of χ².
-    #[test]
-    fn tails_by_table() {
-        for (freedom, value, tail) in [(10.0, 18.307, 0.05), (100.0, 135.807, 0.01), (100.0, 99.334, 0.5)] {
-            assert!((chi_square_tail(value, freedom) / tail - 1.0).abs() < 0.02, "{freedom} {value}");
-        }
+    /// Takes over pressure and μ of a round.
+    fn take(&mut self, regions: &Regions, top: &Top) {
+        self.now.mu.clone_from(&top.mu);
+        self.now.p = regions.pressure(&top.posterior.w, self.now.p.len());
     }
 }

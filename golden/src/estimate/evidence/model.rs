@@ -7,25 +7,34 @@
 //! log evidence = −½ yᵀK⁻¹y − ½ log|K|        K = H Hᵀ + T⁻¹,  T the precision of each reading
 //! ```
 //!
-//! K is as large as the array, but H has few columns: with M = 1 + HᵀTH and u = HᵀTy everything follows from M (r × r),
-//! log|K| = log|M| − log|T| and yᵀK⁻¹y = yᵀTy − uᵀM⁻¹u. M and u are polynomials in μ whose coefficients, the blocks of
-//! SᵀTS and SᵀTy with S = [Gz F, Gx F, Gy F], are computed once; a candidate μ then costs two r × r factorisations.
+//! K is as large as the array, but H has few columns: with M = 1 + HᵀTH everything follows from M (r × r): the posterior mean
+//! M⁻¹HᵀTy of w, its covariance M⁻¹, log|K| = log|M| − log|T| and yᵀK⁻¹y = |w|² + |y − H w|², weighed by T.
+//!
+//! With d_u = ∂(H w)/∂μ_u, the stress that more shear of a contact adds,
+//!
+//! ```text
+//! slope_u = d_uᵀT(y − H w) − tr(M⁻¹ HᵀT ∂H/∂μ_u)        information_uv = d_uᵀT d_v − d_uᵀTH M⁻¹ HᵀT d_v
+//! ```
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: S | readings × 3r | MPa |
+//! | in: S = [Gz F; Gx F; Gy F] | 3 readings × r | MPa |
 //! | in: y, T | readings | MPa, 1/MPa² |
 //! | out: w and its covariance M⁻¹ | r, r × r | – |
 //! | out: slope and information in μ | 2 × contacts, square of it | – |
 
+use super::cholesky::Cholesky;
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
-use faer::{Accum, Col, Mat, Par, Side};
+use faer::linalg::matmul::triangular::{matmul as half_matmul, BlockStructure};
+use faer::{Accum, Mat, Par};
 use std::cell::OnceCell;
 
-/// S for the readings in use, and which contact each column of a block belongs to.
+/// Sums of a scalar product that grow side by side.
+const LANES: usize = 8;
+
+/// S for the readings in use, and which contact each column belongs to.
 pub(super) struct Design {
-    /// [Gz F, Gx F, Gy F], readings × 3r, MPa.
+    /// Gz F, Gx F and Gy F below each other, 3 readings × r, MPa.
     pub s: Mat<f64>,
     /// Contact of each of the r coefficients; those of the baseline, the last ones, are counted to the first contact, as no μ
     /// moves their stress.
@@ -43,15 +52,6 @@ pub(super) struct Readings {
     pub precision: Vec<f64>,
 }
 
-/// SᵀTS, SᵀTy and yᵀTy.
-pub(super) struct Products<'a> {
-    design: &'a Design,
-    gram: Mat<f64>,
-    right: Vec<f64>,
-    square: f64,
-    log_precision: f64,
-}
-
 /// The posterior at one μ.
 pub(super) struct Posterior {
     /// Log evidence, without the constant.
@@ -60,11 +60,13 @@ pub(super) struct Posterior {
     pub square: f64,
     /// Posterior mean of w.
     pub w: Vec<f64>,
-    /// M, factored, and its inverse once that is needed.
-    factor: Llt<f64>,
-    inverse: OnceCell<Mat<f64>>,
-    /// (Ga F)ᵀ T H for a = z, x, y: row block a of SᵀTS times the factors of μ.
-    rows: [Mat<f64>; 3],
+    /// H.
+    h: Mat<f64>,
+    /// y − H w.
+    left: Vec<f64>,
+    factor: Cholesky,
+    /// M⁻¹ and H M⁻¹; most candidates for μ do without.
+    spread: OnceCell<[Mat<f64>; 2]>,
 }
 
 /// Slope of the log evidence in μ, and its information.
@@ -75,16 +77,58 @@ pub(super) struct Slope {
     pub information: Mat<f64>,
 }
 
-impl Posterior {
-    /// Posterior covariance of w, M⁻¹; most candidates for μ do without.
-    pub fn covariance(&self) -> &Mat<f64> {
-        self.inverse.get_or_init(|| self.factor.inverse())
-    }
+/// Σ a b.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    a.zip(b).for_each(|(a, b)| (0..LANES).for_each(|k| sums[k] += a[k] * b[k]));
+    rest + sums.iter().sum::<f64>()
 }
 
-/// z + μ1 x + μ2 y, entry by entry.
-fn combine(entries: &mut [f64], [z, x, y]: [&[f64]; 3], [mu1, mu2]: [f64; 2]) {
-    entries.iter_mut().zip(z).zip(x).zip(y).for_each(|(((entry, z), x), y)| *entry = z + mu1 * x + mu2 * y);
+/// `sum` + `factor` `values`, entry by entry.
+fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
+    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+}
+
+/// The entries of `a` times those of `b`.
+fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+impl Posterior {
+    fn spread(&self) -> &[Mat<f64>; 2] {
+        self.spread.get_or_init(|| {
+            let inverse = self.factor.inverse();
+            let mut stress = Mat::zeros(self.h.nrows(), self.h.ncols());
+            matmul(&mut stress, Accum::Replace, &self.h, &inverse, 1.0, Par::Seq);
+            [inverse, stress]
+        })
+    }
+
+    /// Posterior covariance of w, M⁻¹.
+    pub fn covariance(&self) -> &Mat<f64> {
+        &self.spread()[0]
+    }
+
+    /// The stress on every reading: mean in MPa, variance in MPa².
+    pub fn stress(&self, readings: &Readings) -> Vec<[f64; 2]> {
+        let [_, stress] = self.spread();
+        let mut variance = vec![0.0; self.left.len()];
+        for i in 0..self.w.len() {
+            let entries = self.h.col_as_slice(i).iter().zip(stress.col_as_slice(i));
+            variance.iter_mut().zip(entries).for_each(|(sum, (h, s))| *sum += h * s);
+        }
+        let mean = readings.y.iter().zip(&self.left).map(|(y, left)| y - left);
+        mean.zip(variance).map(|(mean, variance)| [mean, variance]).collect()
+    }
+
+    /// The stress of the coefficients of which `of` is true, on every reading in MPa.
+    pub fn stress_of(&self, of: impl Fn(usize) -> bool) -> Vec<f64> {
+        let mut sum = vec![0.0; self.left.len()];
+        (0..self.w.len()).filter(|&i| of(i)).for_each(|i| add(&mut sum, self.w[i], self.h.col_as_slice(i)));
+        sum
+    }
 }
 
 impl Design {
@@ -93,143 +137,101 @@ impl Design {
         self.contact.len()
     }
 
+    /// Number of unknowns of μ.
+    fn unknowns(&self) -> usize {
+        2 * self.contact.iter().max().map_or(0, |last| last + 1)
+    }
+
     /// The coefficients of the baseline.
     pub fn of_baseline(&self) -> std::ops::Range<usize> {
         self.rank() - self.baseline..self.rank()
     }
 
+    /// The stress of coefficient `i` along z, x and y.
+    fn along_axes(&self, i: usize) -> [&[f64]; 3] {
+        let n = self.s.nrows() / 3;
+        let all = self.s.col_as_slice(i);
+        [0, 1, 2].map(|axis| &all[axis * n..][..n])
+    }
+
     /// H(μ), readings × r.
-    pub fn at(&self, mu: &[[f64; 2]]) -> Mat<f64> {
-        let r = self.rank();
-        let mut h = Mat::zeros(self.s.nrows(), r);
+    fn at(&self, mu: &[[f64; 2]]) -> Mat<f64> {
+        let mut h = Mat::zeros(self.s.nrows() / 3, self.rank());
         for (i, &contact) in self.contact.iter().enumerate() {
-            combine(h.col_as_slice_mut(i), [0, 1, 2].map(|axis| self.s.col_as_slice(axis * r + i)), mu[contact]);
+            let ([z, x, y], [mu1, mu2]) = (self.along_axes(i), mu[contact]);
+            let entries = h.col_as_slice_mut(i).iter_mut().zip(z).zip(x).zip(y);
+            entries.for_each(|(((h, z), x), y)| *h = z + mu1 * x + mu2 * y);
         }
         h
     }
 
-    /// The stress of the posterior at μ on every reading: mean in MPa, variance in MPa².
-    pub fn stress(&self, posterior: &Posterior, mu: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let h = self.at(mu);
-        let spread = &h * posterior.covariance();
-        let of = |t: usize, other: &dyn Fn(usize) -> f64| (0..self.rank()).map(|i| h[(t, i)] * other(i)).sum();
-        (0..h.nrows()).map(|t| [of(t, &|i| posterior.w[i]), of(t, &|i| spread[(t, i)])]).collect()
-    }
-}
-
-impl<'a> Products<'a> {
-    /// The products of a design and readings.
-    pub fn new(design: &'a Design, readings: &Readings) -> Products<'a> {
-        let (n, wide) = (design.s.nrows(), design.s.ncols());
-        let Readings { y, precision } = readings;
-        let scaled = Mat::from_fn(n, wide, |t, i| precision[t].sqrt() * design.s[(t, i)]);
-        let mut gram = Mat::zeros(wide, wide);
-        matmul(&mut gram, Accum::Replace, scaled.transpose(), &scaled, 1.0, Par::Seq);
-        let weighted = Col::from_fn(n, |t| precision[t] * y[t]);
-        let right: Vec<f64> = (design.s.transpose() * weighted).iter().copied().collect();
-        let square = y.iter().zip(precision).map(|(y, t)| t * y * y).sum();
-        let log_precision = precision.iter().filter(|t| **t > 0.0).map(|t| t.ln()).sum();
-        Products { design, gram, right, square, log_precision }
-    }
-
-    /// Column `j` of SᵀTS, rows of block `a` (z, x, y).
-    fn column(&self, a: usize, j: usize) -> &[f64] {
-        let r = self.design.rank();
-        &self.gram.col_as_slice(j)[a * r..][..r]
-    }
-
     /// The posterior at μ, one pair per contact; `None` if it is not representable.
-    pub fn at(&self, mu: &[[f64; 2]]) -> Option<Posterior> {
-        let (design, r) = (self.design, self.design.rank());
-        let shares: Vec<[f64; 2]> = design.contact.iter().map(|&contact| mu[contact]).collect();
-        let rows = [0, 1, 2].map(|a| {
-            let mut rows = Mat::zeros(r, r);
-            for (j, &mu) in shares.iter().enumerate() {
-                combine(rows.col_as_slice_mut(j), [0, 1, 2].map(|b| self.column(a, b * r + j)), mu);
-            }
-            rows
-        });
+    pub fn posterior(&self, readings: &Readings, mu: &[[f64; 2]]) -> Option<Posterior> {
+        let Readings { y, precision } = readings;
+        let (h, r) = (self.at(mu), self.rank());
+        let root: Vec<f64> = precision.iter().map(|t| t.sqrt()).collect();
+        let mut scaled = h.clone();
+        (0..r).for_each(|i| scaled.col_as_slice_mut(i).iter_mut().zip(&root).for_each(|(h, root)| *h *= root));
         let mut m = Mat::zeros(r, r);
-        for j in 0..r {
-            let [z, x, y] = rows.each_ref().map(|rows| rows.col_as_slice(j));
-            let entries = m.col_as_slice_mut(j).iter_mut().zip(z).zip(x).zip(y).zip(&shares);
-            entries.for_each(|((((entry, z), x), y), [mu1, mu2])| *entry = z + mu1 * x + mu2 * y);
-            m[(j, j)] += 1.0;
-        }
-        let of = |i: usize| self.right[i] + shares[i][0] * self.right[r + i] + shares[i][1] * self.right[2 * r + i];
-        let u = Col::from_fn(r, of);
-        let factor = m.llt(Side::Lower).ok()?;
-        let w = factor.solve(&u);
-        let explained: f64 = w.iter().zip(u.iter()).map(|(w, u)| w * u).sum();
-        let square = (self.square - explained).max(0.0);
-        let lower = factor.L();
-        let log_m = 2.0 * (0..r).map(|i| lower[(i, i)].ln()).sum::<f64>();
-        let value = -0.5 * (square + log_m - self.log_precision);
-        let w: Vec<f64> = w.iter().copied().collect();
-        value.is_finite().then(|| Posterior { value, square, w, factor, inverse: OnceCell::new(), rows })
+        let (half, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        half_matmul(&mut m, half, Accum::Replace, scaled.transpose(), whole, &scaled, whole, 1.0, Par::Seq);
+        (0..r).for_each(|i| m[(i, i)] += 1.0);
+        let factor = Cholesky::new(m)?;
+        let weighted = times(precision, y);
+        let mut w: Vec<f64> = (0..r).map(|i| dot(h.col_as_slice(i), &weighted)).collect();
+        factor.solve(&mut w);
+        let mut left = y.clone();
+        (0..r).for_each(|i| add(&mut left, -w[i], h.col_as_slice(i)));
+        let square = dot(&w, &w) + dot(&times(precision, &left), &left);
+        let log_precision: f64 = precision.iter().filter(|t| **t > 0.0).map(|t| t.ln()).sum();
+        let value = -0.5 * (square + factor.log_determinant() - log_precision);
+        value.is_finite().then(|| Posterior { value, square, w, h, left, factor, spread: OnceCell::new() })
     }
 
-    /// For each unknown of μ, contact by contact: HᵀT of the derivative of the stress (r × unknowns), and the part of
-    /// HᵀT(y − H w) that its own columns see (r × unknowns).
-    fn derivatives(&self, posterior: &Posterior, unknowns: usize) -> [Mat<f64>; 2] {
-        let (contact, r) = (&self.design.contact, self.design.rank());
-        let Posterior { w, rows, .. } = posterior;
-        let (mut cross, mut left) = (Mat::<f64>::zeros(r, unknowns), Mat::<f64>::zeros(r, unknowns));
-        for axis in [0, 1] {
-            let mut stress = vec![0.0; r];
-            for j in 0..r {
-                let mut sums = vec![0.0; unknowns / 2];
-                for (i, entry) in rows[axis + 1].col_as_slice(j).iter().enumerate() {
-                    stress[i] += entry * w[j];
-                    sums[contact[i]] += entry * w[i];
-                }
-                sums.into_iter().enumerate().for_each(|(contact, sum)| cross[(j, 2 * contact + axis)] = sum);
-            }
-            for (i, stress) in stress.into_iter().enumerate() {
-                left[(i, 2 * contact[i] + axis)] = self.right[(axis + 1) * r + i] - stress;
-            }
+    /// For each unknown of μ, contact by contact, the derivative d of the stress times T.
+    fn derivatives(&self, readings: &Readings, posterior: &Posterior) -> Vec<[Vec<f64>; 2]> {
+        let mut all = vec![vec![0.0; readings.y.len()]; self.unknowns()];
+        for (i, &contact) in self.contact.iter().enumerate() {
+            let [_, along @ ..] = self.along_axes(i);
+            (0..2).for_each(|axis| add(&mut all[2 * contact + axis], posterior.w[i], along[axis]));
         }
-        [cross, left]
+        all.into_iter().map(|d| [times(&readings.precision, &d), d]).collect()
+    }
+
+    /// HᵀT d for each of the derivatives.
+    fn cross(&self, posterior: &Posterior, derivatives: &[[Vec<f64>; 2]]) -> Mat<f64> {
+        let of = |i: usize, u: usize| dot(posterior.h.col_as_slice(i), &derivatives[u][0]);
+        Mat::from_fn(self.rank(), derivatives.len(), of)
     }
 
     /// Derivative of the posterior mean w in each unknown of μ, r × unknowns.
-    pub fn drift(&self, posterior: &Posterior, unknowns: usize) -> Mat<f64> {
-        let [cross, left] = self.derivatives(posterior, unknowns);
-        posterior.covariance() * (left - cross)
+    pub fn drift(&self, readings: &Readings, posterior: &Posterior) -> Mat<f64> {
+        let cross = self.cross(posterior, &self.derivatives(readings, posterior));
+        let left = times(&readings.precision, &posterior.left);
+        let right = Mat::from_fn(self.rank(), cross.ncols(), |i, u| {
+            let own = if self.contact[i] == u / 2 { dot(self.along_axes(i)[1 + u % 2], &left) } else { 0.0 };
+            own - cross[(i, u)]
+        });
+        let mut drift = Mat::zeros(self.rank(), cross.ncols());
+        matmul(&mut drift, Accum::Replace, posterior.covariance(), &right, 1.0, Par::Seq);
+        drift
     }
 
     /// Slope and information at the μ of `posterior`.
-    pub fn slope(&self, posterior: &Posterior) -> Slope {
-        let (contact, r) = (&self.design.contact, self.design.rank());
-        let unknowns = 2 * contact.iter().max().map_or(0, |last| last + 1);
-        let (Posterior { w, rows, .. }, covariance) = (posterior, posterior.covariance());
-        let [cross, left] = self.derivatives(posterior, unknowns);
-        let mut gradient = vec![0.0; unknowns];
-        for (axis, rows) in [(0, &rows[1]), (1, &rows[2])] {
-            // The covariance is symmetric: its rows are its columns.
-            let mut trace = vec![0.0; r];
-            for j in 0..r {
-                let entries = trace.iter_mut().zip(rows.col_as_slice(j)).zip(covariance.col_as_slice(j));
-                entries.for_each(|((trace, entry), covariance)| *trace += entry * covariance);
-            }
-            for (i, trace) in trace.into_iter().enumerate() {
-                let unknown = 2 * contact[i] + axis;
-                gradient[unknown] += w[i] * left[(i, unknown)] - trace;
-            }
+    pub fn slope(&self, readings: &Readings, posterior: &Posterior) -> Slope {
+        let derivatives = self.derivatives(readings, posterior);
+        let mut gradient: Vec<f64> = derivatives.iter().map(|[weighted, _]| dot(weighted, &posterior.left)).collect();
+        let [covariance, stress] = posterior.spread();
+        for (i, &contact) in self.contact.iter().enumerate() {
+            let (weighted, [_, along @ ..]) = (times(&readings.precision, stress.col_as_slice(i)), self.along_axes(i));
+            (0..2).for_each(|axis| gradient[2 * contact + axis] -= dot(&weighted, along[axis]));
         }
-        let inner = cross.transpose() * (covariance * &cross);
-        // Row by row.
-        let mut information = vec![0.0; unknowns * unknowns];
-        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            for i in 0..r {
-                // SᵀTS is symmetric, too.
-                let of = &mut information[unknowns * (2 * contact[i] + a)..][..unknowns];
-                for (j, entry) in self.column(b + 1, (a + 1) * r + i).iter().enumerate() {
-                    of[2 * contact[j] + b] += w[i] * entry * w[j];
-                }
-            }
-        }
-        let information = Mat::from_fn(unknowns, unknowns, |i, j| information[unknowns * i + j] - inner[(i, j)]);
+        let (cross, unknowns) = (self.cross(posterior, &derivatives), derivatives.len());
+        let mut known = Mat::zeros(self.rank(), unknowns);
+        matmul(&mut known, Accum::Replace, covariance, &cross, 1.0, Par::Seq);
+        let information = Mat::from_fn(unknowns, unknowns, |u, v| {
+            dot(&derivatives[u][0], &derivatives[v][1]) - dot(cross.col_as_slice(u), known.col_as_slice(v))
+        });
         Slope { gradient, information }
     }
 }
@@ -240,7 +242,8 @@ mod tests {
 
     /// Two contacts with two coefficients each, six readings.
     fn setting() -> (Design, Readings) {
-        let s = Mat::from_fn(6, 12, |t, i| ((3 * t + 5 * i) as f64).sin());
+        // Row t of block a, column i.
+        let s = Mat::from_fn(18, 4, |row, i| ((3 * (row % 6) + 5 * (4 * (row / 6) + i)) as f64).sin());
         let y = (0..6).map(|t| (t as f64).cos()).collect();
         (
             Design { s, contact: vec![0, 0, 1, 1], baseline: 0 },
@@ -252,7 +255,6 @@ mod tests {
     #[test]
     fn agrees_with_the_large_matrix() {
         let (design, readings) = setting();
-        let products = Products::new(&design, &readings);
         let mu = [[0.3, -0.2], [0.1, 0.4]];
         let direct = |mu: &[[f64; 2]]| {
             let h = design.at(mu);
@@ -266,9 +268,9 @@ mod tests {
             let factor = k.cholesky().unwrap();
             -0.5 * y.dot(&factor.solve(&y)) - factor.l().diagonal().map(f64::ln).sum()
         };
-        let posterior = products.at(&mu).unwrap();
+        let posterior = design.posterior(&readings, &mu).unwrap();
         assert!((posterior.value - direct(&mu)).abs() < 1e-12);
-        let slope = products.slope(&posterior);
+        let slope = design.slope(&readings, &posterior);
         for unknown in 0..4 {
             let moved = |by: f64| {
                 let mut mu = mu;

@@ -44,7 +44,7 @@ pub(super) fn ratio(readings: &Readings, counts: impl Fn(usize) -> bool, stress:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::evidence::model::{Design, Products};
+    use crate::estimate::evidence::model::Design;
     use crate::random::Random;
     use faer::Mat;
 
@@ -64,7 +64,8 @@ mod tests {
     #[test]
     fn noise_is_found_from_unclipped_readings() {
         let count = 400;
-        let s = Mat::from_fn(count, 6, |t, i| if i < 2 { ((t + 1) as f64 * (i + 1) as f64).sin() } else { 0.0 });
+        let of = |t: usize, i: usize| if t < count { ((t + 1) as f64 * (i + 1) as f64).sin() } else { 0.0 };
+        let s = Mat::from_fn(3 * count, 2, of);
         let design = Design { s, contact: vec![0, 0], baseline: 0 };
         let clipped: Vec<usize> = (0..count).step_by(4).collect();
         let mut random = Random::new(5);
@@ -73,8 +74,8 @@ mod tests {
         let precision = (0..count).map(|t| if t % 4 == 0 { 1e-9 } else { (3.0 / sigma).powi(2) }).collect();
         let readings = Readings { y, precision };
         let mu = [[0.0; 2]];
-        let posterior = Products::new(&design, &readings).at(&mu).unwrap();
-        let found = ratio(&readings, |t| clipped.binary_search(&t).is_err(), &design.stress(&posterior, &mu));
+        let posterior = design.posterior(&readings, &mu).unwrap();
+        let found = ratio(&readings, |t| clipped.binary_search(&t).is_err(), &posterior.stress(&readings));
         assert!((found / 3.0 - 1.0).abs() < 0.1, "{found}");
     }
 }

@@ -62,8 +62,12 @@ impl Screen {
     /// The taxel that its neighbours predict least.
     pub fn least_predicted(&self, b: &[f64]) -> Option<usize> {
         let n = self.taxels.len();
-        let weighted = |k: usize| -> f64 { (0..n).map(|j| self.inverse[(k, j)] * b[self.taxels[j]]).sum() };
-        let size = |k: usize| weighted(k).abs() / self.inverse[(k, k)].sqrt();
+        let mut weighted = vec![0.0; n];
+        for (j, &taxel) in self.taxels.iter().enumerate() {
+            let column = self.inverse.col_as_slice(j);
+            weighted.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * b[taxel]);
+        }
+        let size = |k: usize| weighted[k].abs() / self.inverse[(k, k)].sqrt();
         (0..n).map(|k| (size(k), self.taxels[k])).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, taxel)| taxel)
     }
 }

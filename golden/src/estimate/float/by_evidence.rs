@@ -7,7 +7,7 @@ use super::array::{Array, CaseOutcome, EngineInput};
 use super::estimator::{Clipped, Estimator};
 use super::forces::threshold;
 use crate::data::input::Input;
-use crate::estimate::evidence::Evidence;
+use crate::estimate::evidence::{Evidence, LastFit};
 use crate::estimate::learned::{Learned, LearnedError};
 use crate::result::checks::{largest_spread, relative_spread};
 use crate::result::flags::Flag;
@@ -34,11 +34,15 @@ pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<B
 
 impl Estimator for ByEvidence {
     fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+        self.estimate_after(array, input, &mut None)
+    }
+
+    fn estimate_after(&self, array: &Array, input: &EngineInput, last: &mut Option<LastFit>) -> Reconstruction {
         let noise_MPa = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
         // No force is worth a fit of readings that no contact causes, such as counts without calibration.
         let estimate = match input.frame.peak_MPa() > array.scene.input.plausible_MPa {
             true => self.0.without_fit(&input.frame.stress_MPa, noise_MPa),
-            false => self.0.solve_without(&input.frame.stress_MPa, &input.frame.missing, noise_MPa),
+            false => self.0.solve_after(last, &input.frame.stress_MPa, &input.frame.missing, noise_MPa),
         };
         let forces = threshold(estimate.forces_N.clone(), array.scene.threshold.min_force_N);
         let subarrays = vec![array.array_of(input, forces.resultant())];

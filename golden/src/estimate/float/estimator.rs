@@ -10,6 +10,7 @@
 //! the table in `golden`, and what refuses it in `Scene::require_golden`.
 
 use super::array::{Array, EngineInput};
+use crate::estimate::evidence::LastFit;
 use crate::result::reconstruct::Reconstruction;
 
 /// Estimates forces from the stress of one frame.
@@ -17,6 +18,11 @@ pub(super) trait Estimator: Send + Sync {
     /// The forces of a frame after the threshold, with subarrays or contacts and their figures. Flags that hold for every
     /// estimator are not among them.
     fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction;
+
+    /// The same of a frame of a stream; `last` is what the frame before left, and then what this one leaves.
+    fn estimate_after(&self, array: &Array, input: &EngineInput, _last: &mut Option<LastFit>) -> Reconstruction {
+        self.estimate(array, input)
+    }
 
     /// What the estimator takes for readings of a unipolar array that are zero or less.
     fn clipped_readings(&self) -> Clipped {

@@ -15,6 +15,7 @@ use crate::data::input::Input;
 use crate::data::quantise::quantise;
 use crate::data::reception::{full_scale, noise_floor_codes};
 use crate::estimate::deviations::Deviations;
+use crate::estimate::evidence::LastFit;
 use crate::estimate::learned::LearnedError;
 use crate::estimate::misfit::Misfit;
 use crate::physics::matrices::Matrices;
@@ -126,13 +127,18 @@ impl Golden {
     /// # Errors
     /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
     /// finite.
-    pub(super) fn reconstruct_stress(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+    pub(super) fn reconstruct_stress(
+        &self,
+        last: &mut Option<LastFit>,
+        frame: &Frame,
+        noise_MPa: f64,
+    ) -> Result<Reconstruction, GoldenError> {
         let scene = self.scene();
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
         let input = EngineInput { frame, codes: &codes.codes, floor, noise_MPa };
-        let mut result = self.estimator.estimate(&self.array, &input);
+        let mut result = self.estimator.estimate_after(&self.array, &input, last);
         if !result.resultant_N.iter().all(|sum| sum.is_finite()) {
             let (frame, peak_MPa) = (frame.id.clone(), frame.peak_MPa());
             return Err(GoldenError::TooStrong { frame, peak_MPa });

@@ -16,6 +16,7 @@ use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};
 use crate::data::frame::Frame;
 use crate::data::input::drift::Drift;
+use crate::estimate::evidence::LastFit;
 use crate::physics::matrices::Matrices;
 use crate::result::checks::Checks;
 use crate::result::reconstruct::{Reconstruction, Unipolar};
@@ -55,12 +56,13 @@ impl Golden {
     pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         frame.check(self.scene())?;
         let complete = self.input.complete(std::slice::from_ref(frame));
-        self.run_readings(std::slice::from_ref(frame), &complete[0], noise_MPa, None)
+        self.run_readings(&mut None, std::slice::from_ref(frame), &complete[0], noise_MPa, None)
     }
 
     /// Reconstructs `mean`, the average of the frames `readings`, which have been checked; `zero_share` as in [`Checks`].
     fn run_readings(
         &self,
+        last: &mut Option<LastFit>,
         readings: &[Frame],
         mean: &Frame,
         noise_MPa: f64,
@@ -73,7 +75,7 @@ impl Golden {
             (true, Clipped::Zero) => (clipped(&frame), None),
             (true, Clipped::Filled) => self.filled(&frame),
         };
-        let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
+        let mut result = self.reconstruct_stress(last, &filled, noise_MPa)?;
         let misfit = |report| Unipolar { misfit: misfit(scene, &frame, &result.forces_N), ..report };
         result.extra.unipolar = report.map(misfit);
         let compares_load = self.estimator.compares_load();
@@ -146,17 +148,23 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
-        self.run_after(&mut Drift::default(), frames)
+        self.run_after(&mut Drift::default(), &mut None, frames)
     }
 
-    /// The same where zeros have a `drift` before the frames, which is then that after them.
+    /// The same where zeros have a `drift` before the frames and the frame before left `last`; these are then what the frames
+    /// leave.
     ///
     /// # Errors
     /// As [`Golden::run_averaged`].
-    pub fn run_after(&self, drift: &mut Drift, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
+    pub fn run_after(
+        &self,
+        drift: &mut Drift,
+        last: &mut Option<LastFit>,
+        frames: &[Frame],
+    ) -> Result<Reconstruction, GoldenError> {
         let mean = self.input.average_after(drift, self.scene(), frames)?;
         let noise_MPa = self.input.noise_of_mean_MPa(frames.len());
-        let mut result = self.run_readings(self.scene().input.newest(frames), &mean, noise_MPa, drift.share())?;
+        let mut result = self.run_readings(last, self.scene().input.newest(frames), &mean, noise_MPa, drift.share())?;
         result.extra.mean_frames = self.scene().input.frames_held(frames.len());
         Ok(result)
     }

@@ -157,8 +157,8 @@ fn single_missing_readings_hardly_change_the_forces_of_both_engines() {
             with_zeros += usize::from(off[0] > bound[0] || off[1] > bound[1]);
         }
         assert!(worst[0] < bound[0] && worst[1] < bound[1], "{worst:?}");
-        // Of a zero beside loaded taxels the evidence finds half by itself, as stuck.
-        let least = if engine.estimator().has_evidence() { 3 } else { 6 };
+        // Of a zero beside loaded taxels the evidence finds three of four by itself, as stuck.
+        let least = if engine.estimator().has_evidence() { 2 } else { 6 };
         assert!(with_zeros >= least, "{with_zeros}");
     }
 }

@@ -18,11 +18,11 @@
 //! | out: the same at the new μ | – | – |
 
 use super::{Fit, Found, ENVELOPE_FACTOR};
+use crate::estimate::evidence::cholesky::Cholesky;
 use crate::estimate::evidence::estimator::Adviser;
-use crate::estimate::evidence::model::{Design, Products};
+use crate::estimate::evidence::model::Design;
 use crate::estimate::learned::{Gaussian, Learned, OneContact};
-use faer::linalg::solvers::{DenseSolveCore, Solve};
-use faer::{Col, Mat, Scale, Side};
+use faer::{Mat, Scale};
 
 /// Rounds with the network: the second takes the others' stress out with its own first answer.
 const ROUNDS: usize = 2;
@@ -43,13 +43,15 @@ impl Fit<'_> {
                 told
             };
             let told: Vec<Gaussian> = (0..own.len()).map(ask).collect();
-            (self.mu, found.covariance) = match adviser.combined {
+            (self.now.mu, found.covariance) = match adviser.combined {
                 true => combine(&own, &own_covariance, &told)?,
                 false => (told.iter().map(|told| told.mean).collect(), variances(&told)),
             };
-            found.regions = self.regions();
-            found.top = self.ascend(&mut found.regions.design, 0)?;
-            self.p = found.regions.pressure(&found.top.posterior.w, self.p.len());
+            found.regions = self.regions(0.0);
+            let design = &mut found.regions.design;
+            let top = self.ascend(design, 0)?;
+            found.top = self.with_rest(design, top, 0, 2)?;
+            self.take(&found.regions, &found.top);
         }
         Some(found)
     }
@@ -58,15 +60,12 @@ impl Fit<'_> {
     fn by_baseline(&self, found: &Found) -> Option<Vec<f64>> {
         let Found { regions, top, covariance } = found;
         let (design, kept) = (&regions.design, regions.design.of_baseline().start);
-        let rank = design.rank();
-        let mut s = Mat::zeros(design.s.nrows(), 3 * kept);
-        (0..3).for_each(|block| s.subcols_mut(block * kept, kept).copy_from(design.s.subcols(block * rank, kept)));
+        let without =
+            Design { s: design.s.subcols(0, kept).to_owned(), contact: design.contact[..kept].to_vec(), baseline: 0 };
         let mut readings = self.readings.clone();
-        let of = |k: usize| design.of_baseline().map(|i| design.s[(k, i)] * top.posterior.w[i]).sum::<f64>();
-        readings.y.iter_mut().enumerate().for_each(|(k, y)| *y -= of(k));
-        let without = Design { s, contact: design.contact[..kept].to_vec(), baseline: 0 };
-        let products = Products::new(&without, &readings);
-        let slope = products.slope(&products.at(&top.mu)?);
+        let stress = top.posterior.stress_of(|i| i >= kept);
+        readings.y.iter_mut().zip(stress).for_each(|(y, stress)| *y -= stress);
+        let slope = without.slope(&readings, &without.posterior(&readings, &top.mu)?);
         let known = self.scene.prior.covariance(&slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
         let added = |i: usize| (covariance[(i, i)] - known[(i, i)]).max(0.0).sqrt();
         Some((0..covariance.nrows()).map(added).collect())
@@ -75,15 +74,13 @@ impl Fit<'_> {
     /// What the network says of one contact.
     fn ask(&self, network: &Learned, found: &Found, contact: usize) -> Gaussian {
         let design = &found.regions.design;
-        let h = design.at(&found.top.mu);
+        let own = |i: usize| design.contact[i] == contact && !design.of_baseline().contains(&i);
+        let posterior = &found.top.posterior;
+        let (of_others, of_own) = (posterior.stress_of(|i| !own(i)), posterior.stress_of(own));
         let mut b = self.b.to_vec();
         for (row, &taxel) in self.taxels.iter().enumerate() {
-            let own = |i: &usize| design.contact[*i] == contact && !design.of_baseline().contains(i);
-            let sum = |of: &dyn Fn(&usize) -> bool| -> f64 {
-                (0..design.rank()).filter(of).map(|i| h[(row, i)] * found.top.posterior.w[i]).sum()
-            };
             // Of a missing reading, what the estimate says of it.
-            b[taxel] = if self.used[taxel] { b[taxel] - sum(&|i| !own(i)) } else { sum(&own) };
+            b[taxel] = if self.used[taxel] { b[taxel] - of_others[row] } else { of_own[row] };
         }
         network.shear(&OneContact {
             b: &b,
@@ -102,14 +99,14 @@ fn variances(told: &[Gaussian]) -> Mat<f64> {
 /// μ and covariance of two normal densities combined; `None` if they are not representable.
 fn combine(own: &[[f64; 2]], covariance: &Mat<f64>, told: &[Gaussian]) -> Option<(Vec<[f64; 2]>, Mat<f64>)> {
     let count = covariance.nrows();
-    let precision = OWN * covariance.llt(Side::Lower).ok()?.inverse();
+    let precision = OWN * Cholesky::new(covariance.clone())?.inverse();
     let known = |i: usize| 1.0 / told[i / 2].sigma[i % 2].powi(2);
-    let from_own = &precision * Col::from_fn(count, |i| own[i / 2][i % 2]);
-    let right = Col::from_fn(count, |i| from_own[i] + known(i) * told[i / 2].mean[i % 2]);
+    let of_own = |i: usize| (0..count).map(|j| precision[(i, j)] * own[j / 2][j % 2]).sum::<f64>();
+    let mut mu: Vec<f64> = (0..count).map(|i| of_own(i) + known(i) * told[i / 2].mean[i % 2]).collect();
     let sum = Mat::from_fn(count, count, |i, j| precision[(i, j)] + if i == j { known(i) } else { 0.0 });
-    let factor = sum.llt(Side::Lower).ok()?;
-    let mu = factor.solve(&right);
-    Some(((0..own.len()).map(|k| [mu[2 * k], mu[2 * k + 1]]).collect(), factor.inverse()))
+    let factor = Cholesky::new(sum)?;
+    factor.solve(&mut mu);
+    Some((mu.chunks_exact(2).map(|mu| [mu[0], mu[1]]).collect(), factor.inverse()))
 }
 
 #[cfg(test)]

@@ -1,0 +1,115 @@
+//! Regions: the contacts under their envelopes, as the prior and the model take them.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: pressure and contact of each cell | cells | N, – |
+//! | out: cells of each contact, F, S | – | –, N, MPa |
+
+use super::Fit;
+use crate::estimate::evidence::baseline::{terms, TERMS};
+use crate::estimate::evidence::model::Design;
+use crate::estimate::evidence::prior::remainder;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
+
+/// Largest variance of a pressure, in units of its own, that may be left out because there are more coefficients than
+/// readings: with more the shear counts as not known. On drawn contacts of up to 0.7 of a 6 × 6 or 8 × 8 array, which leave up to
+/// 0.09, the errors are those of smaller ones.
+const WIDE: f64 = 0.1;
+/// Coefficients of a contact beside which larger ones take none.
+const LEAST_RANK: usize = 8;
+
+/// The contacts under their envelopes.
+pub(super) struct Regions {
+    /// Cells of each contact.
+    pub cells: Vec<Vec<usize>>,
+    /// F of each contact.
+    factors: Vec<Mat<f64>>,
+    pub design: Design,
+    /// Whether a pressure has many more coefficients than the readings can tell, and was cut to as many.
+    pub wide: bool,
+}
+
+impl Regions {
+    /// p = F w on all `count` cells.
+    pub fn pressure(&self, w: &[f64], count: usize) -> Vec<f64> {
+        let (mut p, mut first) = (vec![0.0; count], 0);
+        for (cells, factor) in self.cells.iter().zip(&self.factors) {
+            for i in 0..factor.ncols() {
+                let weight = w[first + i];
+                cells.iter().zip(factor.col_as_slice(i)).for_each(|(&cell, share)| p[cell] += share * weight);
+            }
+            first += factor.ncols();
+        }
+        p
+    }
+
+    /// For each contact, the load of every coefficient.
+    pub fn loads(&self) -> Vec<Vec<f64>> {
+        let mut first = 0;
+        let load = |factor: &Mat<f64>| {
+            let mut own = vec![0.0; self.design.rank()];
+            for i in 0..factor.ncols() {
+                own[first + i] = factor.col(i).iter().sum();
+            }
+            first += factor.ncols();
+            own
+        };
+        self.factors.iter().map(load).collect()
+    }
+}
+
+impl Fit<'_> {
+    /// The contacts under envelopes of the last pressure, of which at least the variance `least` may be left out.
+    pub(super) fn regions(&self, least: f64) -> Regions {
+        let mut of_contact = Vec::new();
+        for contact in 0..self.now.mu.len() {
+            let own = |(p, label): (&f64, &usize)| if *label == contact { *p } else { 0.0 };
+            let e = self.scene.envelopes.of(self.now.p.iter().zip(&self.now.labels).map(own), self.now.sigma);
+            let own: Vec<usize> =
+                (0..e.len()).filter(|&cell| e[cell] > 0.0 && self.now.labels[cell] == contact).collect();
+            let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
+            of_contact.push((own, on_own));
+        }
+        let remainder = remainder(self.now.sigma).max(least);
+        let loaded: usize = of_contact.iter().map(|(own, _)| own.len()).sum();
+        let of = |(own, on_own): &(Vec<usize>, Vec<f64>)| {
+            let most = (self.taxels.len() * own.len() / loaded.max(1)).max(LEAST_RANK);
+            let (factor, rest) = self.scene.shape.factor(own, on_own, remainder, most);
+            (rest > WIDE, factor)
+        };
+        let (cut, factors): (Vec<bool>, Vec<Mat<f64>>) = of_contact.iter().map(of).unzip();
+        let of_contact: Vec<Vec<usize>> = of_contact.into_iter().map(|(own, _)| own).collect();
+        let design = self.design(&of_contact, &factors);
+        Regions { cells: of_contact, factors, design, wide: cut.contains(&true) }
+    }
+
+    /// S: the stress of every column of every factor, for normal force and shear along x and y, and of the baseline.
+    fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
+        let n = self.taxels.len();
+        let rank = TERMS + factors.iter().map(Mat::ncols).sum::<usize>();
+        let mut s = Mat::zeros(3 * n, rank);
+        let mut contact = Vec::with_capacity(rank);
+        for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
+            let mut influence = Mat::zeros(3 * n, own.len());
+            for (column, &cell) in own.iter().enumerate() {
+                self.scene.cells.influence(&self.offsets, cell, influence.col_as_slice_mut(column));
+            }
+            let columns = s.subcols_mut(contact.len(), factor.ncols());
+            matmul(columns, Accum::Replace, &influence, factor, 1.0, Par::Seq);
+            contact.extend(vec![k; factor.ncols()]);
+        }
+        contact.extend([0; TERMS]);
+        let mut design = Design { s, contact, baseline: TERMS };
+        self.baseline(&mut design);
+        design
+    }
+
+    /// The columns B S of the baseline.
+    pub(super) fn baseline(&self, design: &mut Design) {
+        for (column, term) in design.of_baseline().zip(0..) {
+            let of = |taxel: usize| self.now.sizes.of(term) * terms(&self.scene.cells.sensor, taxel)[term];
+            self.taxels.iter().enumerate().for_each(|(k, &taxel)| design.s[(k, column)] = of(taxel));
+        }
+    }
+}
