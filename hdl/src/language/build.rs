@@ -320,6 +320,7 @@ impl Builder {
             kernel.bind(&name, bits, output);
         }
         kernel.check();
+        kernel.check_reads();
         kernel
     }
 
