@@ -156,7 +156,8 @@ impl<'a> Fit<'a> {
         self.finish()
     }
 
-    /// Rounds with coarse pressures, until μ stands still.
+    /// Rounds until μ stands still, of one contact with coarse pressures. What these leave counts as noise, in which a weak contact
+    /// beside a strong one would be lost.
     fn approach(&mut self) -> Option<()> {
         let mut joined = false;
         loop {
@@ -168,7 +169,7 @@ impl<'a> Fit<'a> {
                 return None;
             }
             let before = self.now.mu.clone();
-            let mut regions = self.regions(COARSE);
+            let mut regions = self.regions(if before.len() > 1 { 0.0 } else { COARSE });
             let top = self.ascend(&mut regions.design, 1)?;
             let top = self.with_rest(&mut regions.design, top, 1, 0)?;
             self.take(&regions, &top);
