@@ -8,22 +8,13 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::EngineKind;
 
-use crate::block;
-use crate::language::{Block, Builder, Inside};
+use crate::language::{Block, Builder, Inside, Interface, Make, View, Visit, VisitMut};
 use crate::parallel::Parallel;
 use crate::serial::Serial;
+use crate::streams::{EnginePorts, Stage, Streams};
 
 /// Where blocks count that belong to no stage: what starts the stages and hands their results over.
 pub(crate) const CONTROL: &str = "engine";
-
-/// A stage of an engine: a block of its data flow.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stage {
-    /// Name of its instance.
-    pub(crate) name: &'static str,
-    /// Source of its block.
-    pub(crate) source: &'static str,
-}
 
 /// The stages of an engine in the order of the data flow.
 pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
@@ -33,60 +24,24 @@ pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
     }
 }
 
-/// Lists stages, each with the file of its block.
-macro_rules! stage_list {
-    ($($stage:ident: $source:literal,)+) => {
-        /// The stages in the order of the data flow.
-        pub(crate) const STAGES: &'static [$crate::engine::Stage] = &[
-            $($crate::engine::Stage { name: stringify!($stage), source: include_str!($source) },)+
-        ];
-    };
+/// The engine, the top module of the generated hardware.
+///
+/// ```text
+///                +---------+
+///  s_axis_t* --> | engine  | --> m_axis_t*
+///      clk, rst  +---------+
+/// ```
+/// | port | direction | width | meaning |
+/// |---|---|---|---|
+/// | `s_axis_tdata` | in | `stream_bits` | a taxel's code, two's complement; row-major, frame after frame; or a byte of an image of tables |
+/// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
+/// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
+///
+/// Reset is synchronous; it clears all control registers, not the data.
+pub struct Engine {
+    streams: Streams,
+    kind: Kind,
 }
-pub(crate) use stage_list;
-
-block! {
-    /// The engine, the top module of the generated hardware.
-    ///
-    /// ```text
-    ///                +---------+
-    ///  s_axis_t* --> | engine  | --> m_axis_t*
-    ///      clk, rst  +---------+
-    /// ```
-    /// | port | direction | width | meaning |
-    /// |---|---|---|---|
-    /// | `s_axis_tdata` | in | `stream_bits` | a taxel's code, two's complement; row-major, frame after frame; or a byte of an image of tables |
-    /// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
-    /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
-    ///
-    /// Reset is synchronous; it clears all control registers, not the data.
-    pub struct Engine {
-        stream_bits: usize,
-        kind: Kind,
-    }
-    ports EnginePorts {
-        clock;
-        reset;
-        /// A taxel's code, two's complement, or a byte of an image of tables; valid with `s_axis_tvalid`.
-        in s_axis_tdata: stream_bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
-        /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT_BITS;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
-    }
-}
-
-/// Width of a beat of the output.
-pub(crate) const BEAT_BITS: usize = 96;
 
 /// The stages of an engine.
 enum Kind {
@@ -101,7 +56,27 @@ impl Engine {
             EngineKind::Parallel => Kind::Parallel(Box::new(Parallel::new(model))),
             EngineKind::Serial => Kind::Serial(Box::new(Serial::new(model))),
         };
-        Engine { stream_bits: model.stream_bits() as usize, kind }
+        Engine { streams: Streams { bits: model.stream_bits() as usize }, kind }
+    }
+}
+
+impl Interface for Engine {
+    type Ports<V: View> = EnginePorts<V>;
+
+    const NAME: &'static str = "Engine";
+
+    const CLOCK: Option<&'static str> = Streams::CLOCK;
+
+    fn ports<V: View>(&self, make: &mut dyn Make<V>) -> EnginePorts<V> {
+        self.streams.ports(make)
+    }
+
+    fn visit<V: View>(ports: &EnginePorts<V>, visitor: &mut dyn Visit<V>) {
+        Streams::visit(ports, visitor);
+    }
+
+    fn visit_mut<V: View>(ports: &mut EnginePorts<V>, visitor: &mut dyn VisitMut<V>) {
+        Streams::visit_mut(ports, visitor);
     }
 }
 

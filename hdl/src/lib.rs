@@ -46,6 +46,7 @@ mod parallel;
 #[cfg(test)]
 mod scenes;
 mod simulate;
+mod streams;
 mod taps;
 mod testbench;
 mod vivado;

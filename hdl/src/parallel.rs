@@ -28,7 +28,6 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
 
-use crate::engine::{stage_list, EnginePorts};
 use crate::language::{Builder, Expr, Inside, Interface, Outside};
 use crate::primitives::{
     count_bits, largest, Arrival, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, OperandSource, StatusSource,
@@ -38,6 +37,7 @@ use crate::stages::{
     Contacts, Estimate, Fold, Forces, LabelBeats, Normalise, Pass, Prepare, Receive, Relax, Rescale, Resultants,
     Search, Segment, Send, Shear, Unfold, Window,
 };
+use crate::streams::{stage_list, EnginePorts};
 
 /// The parts of the engine that follow from the scene.
 pub(crate) struct Parallel {

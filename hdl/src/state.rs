@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::engine::Stage;
 use crate::language::Hierarchy;
+use crate::streams::Stage;
 use crate::usage::{stage, PlacedMemory};
 
 /// Kind of storage that holds a bit.

@@ -5,8 +5,9 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::{Board, EngineKind};
 use serde::Serialize;
 
-use crate::engine::{stages, Stage, CONTROL};
+use crate::engine::{stages, CONTROL};
 use crate::language::{distributed_luts, Hierarchy, Memory, SEPARATOR};
+use crate::streams::Stage;
 
 /// Resources of a part of the design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

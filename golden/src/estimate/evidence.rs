@@ -53,6 +53,7 @@ mod follow;
 mod model;
 mod noise;
 mod prior;
+mod regions;
 mod residual;
 mod screen;
 mod suspect;

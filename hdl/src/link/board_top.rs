@@ -6,11 +6,12 @@ use dermis_golden::wire::link::Identity;
 
 use super::{FrameGate, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::block;
-use crate::engine::{Engine, BEAT_BITS};
+use crate::engine::Engine;
 use crate::error::HdlError;
 use crate::language::{kernel_of, Block, Builder, Expr, Hierarchy, Inside, Net};
 use crate::primitives::{Dff, RegisterSlice};
 use crate::scan::ScanCore;
+use crate::streams::BEAT_BITS;
 
 block! {
     /// ```text

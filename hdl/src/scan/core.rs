@@ -6,10 +6,11 @@ use dermis_golden::fixed::Model;
 
 use super::{ScanCapture, ScanCodes, ScanSequencer, ScanStatus, ScanTables, Shape};
 use crate::block;
-use crate::engine::{Engine, BEAT_BITS};
+use crate::engine::Engine;
 use crate::error::HdlError;
 use crate::language::{kernel_of, Block, Builder, Hierarchy, Inside, Net};
 use crate::primitives::Dff;
+use crate::streams::BEAT_BITS;
 
 block! {
     /// An engine that reads the converters of its array by itself.

@@ -11,9 +11,9 @@ use super::{
     Banks, Candidates, CoefficientShift, Forces, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
     SerialButterfly, TaxelReorder, Unfold,
 };
-use crate::engine::{stage_list, EnginePorts};
 use crate::language::{Builder, Inside};
 use crate::primitives::{Dff, Ram, Slice};
+use crate::streams::{stage_list, EnginePorts};
 
 /// The parts of the engine that follow from the scene.
 pub(crate) struct Serial {

@@ -17,10 +17,10 @@ use super::baseline::{plane, terms, Sizes};
 use super::estimate::Estimate;
 use super::estimator::Evidence;
 use super::model::{Design, Readings};
+use super::regions::Regions;
 use super::{clipped, noise};
 use crate::estimate::segment::neighbours;
 use faer::{Mat, Scale};
-use regions::Regions;
 
 /// Smallest standard deviation of a reading.
 pub(super) const FLOOR: f64 = 1e-4;
@@ -156,7 +156,8 @@ impl<'a> Fit<'a> {
         self.finish()
     }
 
-    /// Rounds with coarse pressures, until μ stands still.
+    /// Rounds until μ stands still, of one contact with coarse pressures. What these leave counts as noise, in which a weak contact
+    /// beside a strong one would be lost.
     fn approach(&mut self) -> Option<()> {
         let mut joined = false;
         loop {
@@ -168,7 +169,7 @@ impl<'a> Fit<'a> {
                 return None;
             }
             let before = self.now.mu.clone();
-            let mut regions = self.regions(COARSE);
+            let mut regions = self.regions(if before.len() > 1 { 0.0 } else { COARSE });
             let top = self.ascend(&mut regions.design, 1)?;
             let top = self.with_rest(&mut regions.design, top, 1, 0)?;
             self.take(&regions, &top);

@@ -122,10 +122,7 @@ fn an_output_that_nothing_reads_is_said_to_be_unused_or_an_error() {
     assert_eq!(error(&kernel_of(&Both { reads: true })), "");
     let kernel = kernel_of(&Both { reads: false });
     assert!(matches!(kernel.errors(), [KernelError::Unread { .. }]), "{:?}", kernel.errors());
-    assert_eq!(
-        error(&kernel),
-        "block Both: nothing reads second__counted; say `unused` if that is on purpose"
-    );
+    assert_eq!(error(&kernel), "block Both: nothing reads second__counted; say `unused` if that is on purpose");
 }
 
 #[test]

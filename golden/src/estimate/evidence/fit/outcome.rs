@@ -5,11 +5,12 @@
 //! | in: posterior of the last round | – | – |
 //! | out: [`Estimate`], and what it leaves of the readings | – | N per MPa of the peak |
 
-use super::{Fit, Fitted, Found, Regions, FLOOR};
+use super::{Fit, Fitted, Found, FLOOR};
 use crate::data::frame::Forces;
 use crate::estimate::evidence::ascent::Top;
 use crate::estimate::evidence::contact::forces;
 use crate::estimate::evidence::estimate::Estimate;
+use crate::estimate::evidence::regions::Regions;
 use crate::estimate::evidence::residual::Residual;
 use crate::result::reconstruct::ContactEstimate;
 use std::f64::consts::FRAC_1_SQRT_2;

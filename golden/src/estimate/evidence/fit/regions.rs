@@ -1,4 +1,4 @@
-//! Regions: the contacts under their envelopes, as the prior and the model take them.
+//! The regions of a fit: the contacts under the envelopes of its last pressure.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -9,6 +9,7 @@ use super::Fit;
 use crate::estimate::evidence::baseline::{terms, TERMS};
 use crate::estimate::evidence::model::Design;
 use crate::estimate::evidence::prior::remainder;
+use crate::estimate::evidence::regions::Regions;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
@@ -18,46 +19,6 @@ use faer::{Accum, Mat, Par};
 const WIDE: f64 = 0.1;
 /// Coefficients of a contact beside which larger ones take none.
 const LEAST_RANK: usize = 8;
-
-/// The contacts under their envelopes.
-pub(super) struct Regions {
-    /// Cells of each contact.
-    pub cells: Vec<Vec<usize>>,
-    /// F of each contact.
-    factors: Vec<Mat<f64>>,
-    pub design: Design,
-    /// Whether a pressure has many more coefficients than the readings can tell, and was cut to as many.
-    pub wide: bool,
-}
-
-impl Regions {
-    /// p = F w on all `count` cells.
-    pub fn pressure(&self, w: &[f64], count: usize) -> Vec<f64> {
-        let (mut p, mut first) = (vec![0.0; count], 0);
-        for (cells, factor) in self.cells.iter().zip(&self.factors) {
-            for i in 0..factor.ncols() {
-                let weight = w[first + i];
-                cells.iter().zip(factor.col_as_slice(i)).for_each(|(&cell, share)| p[cell] += share * weight);
-            }
-            first += factor.ncols();
-        }
-        p
-    }
-
-    /// For each contact, the load of every coefficient.
-    pub fn loads(&self) -> Vec<Vec<f64>> {
-        let mut first = 0;
-        let load = |factor: &Mat<f64>| {
-            let mut own = vec![0.0; self.design.rank()];
-            for i in 0..factor.ncols() {
-                own[first + i] = factor.col(i).iter().sum();
-            }
-            first += factor.ncols();
-            own
-        };
-        self.factors.iter().map(load).collect()
-    }
-}
 
 impl Fit<'_> {
     /// The contacts under envelopes of the last pressure, of which at least the variance `least` may be left out.
