@@ -2,8 +2,8 @@
 //!
 //! | kind | for | stages |
 //! |---|---|---|
-//! | [`Parallel`] | devices with many multipliers | [`crate::stages`], in a pipeline |
-//! | [`Serial`] | small devices | [`crate::serial`], one after the other |
+//! | parallel | devices with many multipliers | [`crate::stages`], in a pipeline |
+//! | serial | small devices | [`crate::serial`], one after the other |
 
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::EngineKind;

@@ -8,56 +8,58 @@ use super::Choose;
 use crate::language::{Builder, Expr, Inside, Outside};
 use crate::primitives::expression_by_case;
 
-/// All `buffers` get what the stage gets; its outputs are those of the chosen one. `full` is high once the case has been
-/// chosen too.
-pub(super) fn build_banks<'k>(
-    k: &'k Builder,
-    io: ReceivePorts<Inside<'k>>,
-    choose: &'k Choose,
-    buffers: &'k [Receive],
-) {
-    let bank = |(number, buffer): (usize, &'k Receive)| k.instance(&format!("banks__{number}"), buffer);
-    let banks: Vec<ReceivePorts<Outside<'k>>> = buffers.iter().enumerate().map(bank).collect();
-    let choose = k.instance("choose", choose);
-    for bank in &banks {
-        bank.s_axis_tdata.set(io.s_axis_tdata);
-        bank.s_axis_tvalid.set(io.s_axis_tvalid);
-        bank.s_axis_tlast.set(io.s_axis_tlast);
-        bank.free.set(io.free);
-        // An address beyond a smaller buffer is meant for another one; its data are not used.
-        bank.quad_address.set(io.quad_address.low(bank.quad_address.bits()));
-        bank.part.set(io.part.low(bank.part.bits()));
-        bank.reported.set(io.reported);
-        bank.floor.set(io.floor);
-    }
-    // All buffers fill and become free together: the handshake of the first is that of all.
-    let Some(first) = banks.first() else { return };
-    choose.code.set(io.s_axis_tdata);
-    choose.accept.set(first.accept);
-    choose.tlast.set(io.s_axis_tlast);
-    choose.free.set(io.free);
-    io.s_axis_tready.set(first.s_axis_tready);
-    io.accept.set(first.accept);
-    io.taken_word.set(first.taken_word);
-    io.row_end.set(first.row_end);
-    io.dropped.set(first.dropped);
-    io.framing.set(first.framing);
-    for (number, bank) in banks.iter().enumerate() {
-        k.unused([bank.full, bank.which]);
-        if number > 0 {
-            k.unused([bank.s_axis_tready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
+impl Receive {
+    /// All `buffers` get what the stage gets; its outputs are those of the chosen one. `full` is high once the case has been
+    /// chosen too.
+    pub(super) fn build_banks<'k>(
+        k: &'k Builder,
+        io: ReceivePorts<Inside<'k>>,
+        choose: &'k Choose,
+        buffers: &'k [Receive],
+    ) {
+        let bank = |(number, buffer): (usize, &'k Receive)| k.instance(&format!("banks__{number}"), buffer);
+        let banks: Vec<ReceivePorts<Outside<'k>>> = buffers.iter().enumerate().map(bank).collect();
+        let choose = k.instance("choose", choose);
+        for bank in &banks {
+            bank.s_axis_tdata.set(io.s_axis_tdata);
+            bank.s_axis_tvalid.set(io.s_axis_tvalid);
+            bank.s_axis_tlast.set(io.s_axis_tlast);
+            bank.free.set(io.free);
+            // An address beyond a smaller buffer is meant for another one; its data are not used.
+            bank.quad_address.set(io.quad_address.low(bank.quad_address.bits()));
+            bank.part.set(io.part.low(bank.part.bits()));
+            bank.reported.set(io.reported);
+            bank.floor.set(io.floor);
         }
+        // All buffers fill and become free together: the handshake of the first is that of all.
+        let Some(first) = banks.first() else { return };
+        choose.code.set(io.s_axis_tdata);
+        choose.accept.set(first.accept);
+        choose.tlast.set(io.s_axis_tlast);
+        choose.free.set(io.free);
+        io.s_axis_tready.set(first.s_axis_tready);
+        io.accept.set(first.accept);
+        io.taken_word.set(first.taken_word);
+        io.row_end.set(first.row_end);
+        io.dropped.set(first.dropped);
+        io.framing.set(first.framing);
+        for (number, bank) in banks.iter().enumerate() {
+            k.unused([bank.full, bank.which]);
+            if number > 0 {
+                k.unused([bank.s_axis_tready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
+            }
+        }
+        io.full.set(choose.settled);
+        io.which.set(choose.which);
+        let chosen = |of: fn(&ReceivePorts<Outside<'k>>) -> Expr<'k>| {
+            let each: Vec<Expr> = banks.iter().map(of).collect();
+            expression_by_case(choose.which, &each).unwrap_or(each[0])
+        };
+        io.quad.set(chosen(|bank| bank.quad));
+        io.magnitude.set(chosen(|bank| bank.magnitude));
+        io.positive.set(chosen(|bank| bank.positive));
+        io.negative.set(chosen(|bank| bank.negative));
     }
-    io.full.set(choose.settled);
-    io.which.set(choose.which);
-    let chosen = |of: fn(&ReceivePorts<Outside<'k>>) -> Expr<'k>| {
-        let each: Vec<Expr> = banks.iter().map(of).collect();
-        expression_by_case(choose.which, &each).unwrap_or(each[0])
-    };
-    io.quad.set(chosen(|bank| bank.quad));
-    io.magnitude.set(chosen(|bank| bank.magnitude));
-    io.positive.set(chosen(|bank| bank.positive));
-    io.negative.set(chosen(|bank| bank.negative));
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
 
-use super::banks::build_banks;
 use super::Choose;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
@@ -137,7 +136,7 @@ impl Block for Receive {
     fn build<'k>(&'k self, k: &'k Builder, io: ReceivePorts<Inside<'k>>) {
         match &self.buffers {
             Buffers::One(buffer) => self.build_buffer(k, io, buffer),
-            Buffers::Several(choose, buffers) => build_banks(k, io, choose, buffers),
+            Buffers::Several(choose, buffers) => Receive::build_banks(k, io, choose, buffers),
         }
     }
 }

@@ -10,7 +10,6 @@ use dermis_golden::fixed::plan::cycles::{coarse_period, values_delay, SET_UP, SH
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
 
-use super::unsearched::unsearched;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
@@ -139,7 +138,7 @@ impl Block for Search {
     fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
         match &self.search {
             Some(search) => search.build(k, io),
-            None => unsearched(k, io, self.vectors),
+            None => io.unsearched(k, self.vectors),
         }
     }
 }

@@ -34,11 +34,12 @@ use dermis_golden::spec::quads::Quads;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::count_bits;
-use control::{Circuit, Shape};
+use shape::Shape;
 
 mod basins;
 mod control;
 mod labels;
+mod shape;
 mod walk;
 
 block! {
@@ -118,11 +119,7 @@ impl Block for Segment {
             }
             return;
         };
-        let circuit = Circuit::new(k, shape, io);
-        let order = circuit.order();
-        let list = circuit.tables(&order);
-        circuit.labels(&order);
-        circuit.begin_pairs(&list);
+        io.circuit(k, shape);
     }
 }
 

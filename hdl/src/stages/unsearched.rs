@@ -7,19 +7,22 @@
 use super::search::SearchPorts;
 use crate::language::{Builder, Inside};
 
-/// The `fill_quad`s of the last of `vectors` vectors leave as `values` in the same cycle; `settled`, `values_begin` and `done`
-/// are `start` one cycle later. The inputs that only a search needs are unused; the outputs that describe its result are
-/// constant 0.
-pub(super) fn unsearched<'k>(k: &'k Builder, io: SearchPorts<Inside<'k>>, vectors: usize) {
-    io.values.set(io.fill_quad);
-    io.values_valid.set(if vectors > 1 { io.fill & io.fill_index.is(vectors as u64 - 1) } else { io.fill });
-    let began = k.delay("began", io.start & !io.rst);
-    for output in [io.settled, io.values_begin, io.done] {
-        output.set(began);
-    }
-    let words = [io.best_x, io.best_y, io.score];
-    for output in words.into_iter().chain([io.found, io.compared, io.taken, io.stalled]) {
-        output.set(k.constant(output.bits(), 0));
+impl<'k> SearchPorts<Inside<'k>> {
+    /// The `fill_quad`s of the last of `vectors` vectors leave as `values` in the same cycle; `settled`, `values_begin` and `done`
+    /// are `start` one cycle later. The inputs that only a search needs are unused; the outputs that describe its result are
+    /// constant 0.
+    pub(super) fn unsearched(self, k: &'k Builder, vectors: usize) {
+        let io = self;
+        io.values.set(io.fill_quad);
+        io.values_valid.set(if vectors > 1 { io.fill & io.fill_index.is(vectors as u64 - 1) } else { io.fill });
+        let began = k.delay("began", io.start & !io.rst);
+        for output in [io.settled, io.values_begin, io.done] {
+            output.set(began);
+        }
+        let words = [io.best_x, io.best_y, io.score];
+        for output in words.into_iter().chain([io.found, io.compared, io.taken, io.stalled]) {
+            output.set(k.constant(output.bits(), 0));
+        }
     }
 }
 

@@ -4,8 +4,9 @@ use std::cell::RefCell;
 
 use dermis_golden::estimate::segment::{BASINS, SADDLE, WEIGHT_BITS, WORD_BITS};
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::fixed::stages::segment::cycles::{Segmentation, TAP_BITS};
+use dermis_golden::fixed::stages::segment::cycles::TAP_BITS;
 
+use super::shape::Shape;
 use super::SegmentPorts;
 use crate::language::{concat, Builder, Contents, Expr, Inside, MemoryPort, Net, Type};
 use crate::primitives::count_bits;
@@ -60,79 +61,6 @@ const STATES: [&str; 15] = [
     "label",
     "middle",
 ];
-
-/// Sizes of the circuit.
-#[derive(Clone, Debug)]
-pub(super) struct Shape {
-    pub(super) rows: usize,
-    pub(super) cols: usize,
-    /// Rows and columns of quads.
-    pub(super) quads: [usize; 2],
-    /// Largest number of contacts.
-    pub(super) most: usize,
-    /// Width of a lane of the quads that come in.
-    pub(super) lane: usize,
-    /// Lowest bit of a word in it.
-    pub(super) low: usize,
-    /// Width of a smoothed word.
-    pub(super) smoothed: usize,
-    /// Width of a load or a moment.
-    pub(super) sum: usize,
-    /// Inverse distances of neighbours along x, along y, of diagonal ones.
-    slopes: [u64; 3],
-    /// For each axis the taps of a line in their order: weight; `{end of the line, window moves on, last of the place}`.
-    taps: [Vec<(u64, u64)>; 2],
-}
-
-impl Shape {
-    /// Of a segmentation whose quads have lanes of `lane` bits, words from bit `low` on.
-    pub(super) fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
-        let (sensor, quads) = (segmentation.sensor, segmentation.quads());
-        let taps = |axis: usize| {
-            let places = segmentation.taps(axis);
-            let moves = |place: usize| places.get(place + 1).is_some_and(|next| next.0 > places[place].0);
-            let of_place = |(place, (_, weights)): (usize, &(usize, &[i64]))| {
-                let (last, ends, moves) = (weights.len() - 1, place + 1 == places.len(), moves(place));
-                let flag = |flag: bool, at: usize| u64::from(flag) << at;
-                let tap = |(k, weight): (usize, &i64)| {
-                    (*weight as u64, flag(k == last, 0) | flag(moves, 1) | flag(k == last && ends, 2))
-                };
-                weights.iter().enumerate().map(tap).collect::<Vec<_>>()
-            };
-            places.iter().enumerate().flat_map(of_place).collect::<Vec<_>>()
-        };
-        Shape {
-            rows: sensor.rows,
-            cols: sensor.cols,
-            quads: [quads.quad_rows(), quads.quad_cols()],
-            most: segmentation.most,
-            lane,
-            low,
-            smoothed: segmentation.smoothed_bits() as usize,
-            sum: segmentation.sum_bits() as usize,
-            slopes: segmentation.segmenter.slopes.map(|slope| slope as u64),
-            taps: [taps(0), taps(1)],
-        }
-    }
-
-    pub(super) fn taxels(&self) -> usize {
-        self.rows * self.cols
-    }
-
-    pub(super) fn quad_count(&self) -> usize {
-        self.quads[0] * self.quads[1]
-    }
-
-    /// Number of taps along a line of each axis.
-    pub(super) fn tap_counts(&self) -> [usize; 2] {
-        [0, 1].map(|axis| self.taps[axis].len())
-    }
-
-    /// Width of the contact of a taxel, 0 for none.
-    pub(super) fn label(&self) -> usize {
-        count_bits(self.most + 1)
-    }
-}
 
 /// Registers and memories that more than one part reads or sets.
 pub(super) struct Circuit<'k> {
@@ -206,8 +134,19 @@ pub(super) struct Circuit<'k> {
     pub(super) bars: MemoryPort<'k>,
 }
 
+impl<'k> SegmentPorts<Inside<'k>> {
+    /// The circuit between the ports.
+    pub(super) fn circuit(self, k: &'k Builder, shape: &'k Shape) {
+        let circuit = Circuit::new(k, shape, self);
+        let order = circuit.order();
+        let list = circuit.tables(&order);
+        circuit.labels(&order);
+        circuit.begin_pairs(&list);
+    }
+}
+
 impl<'k> Circuit<'k> {
-    pub(super) fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
+    fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
         let (taxel, quad) = (count_bits(shape.taxels()), count_bits(shape.quad_count()));
         let (row, col) = (count_bits(shape.rows), count_bits(shape.cols));
         let rst = io.rst;
