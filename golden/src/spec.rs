@@ -7,12 +7,14 @@
 //! | [`quads`], [`window`] | the mirror images of a taxel that share a memory word; the rectangle of taxels that a network reads |
 //! | [`sliding`] | gains and variance of a sliding mean |
 //! | [`adc`] | converters that the hardware reads by itself, and the timing of a scan |
+//! | [`mod@plain_text`] | doc comments as plain text |
 //! | [`board`], [`link_kind`] | the device for which hardware is generated, and the links to a host |
 
 pub mod adc;
 pub mod board;
 pub mod link_kind;
 pub mod partition;
+pub mod plain_text;
 pub mod quads;
 pub mod scene;
 pub mod sensor;

@@ -30,10 +30,11 @@ pub use error::FrameError;
 
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One force vector per taxel, row-major, in N.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Forces {
     /// Forces along x on the elastic body, N.
     pub fx: Vec<f64>,
@@ -57,7 +58,7 @@ impl Forces {
 }
 
 /// A contact as the author of a frame describes it: input of [`crate::data::generator`], passed through by everything else.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Contact {
     /// Name of the shape.

@@ -31,6 +31,7 @@ mod tests;
 use crate::data::frame::Frame;
 use crate::data::input::missing::open_share;
 use crate::spec::scene::Scene;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
@@ -90,7 +91,7 @@ pub(crate) fn largest_spread(contacts: &[(f64, Option<f64>)]) -> Option<f64> {
 }
 
 /// The figures behind the flags of one result.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Checks {
     /// Largest of the readings, the zeros and the calibrated readings of live taxels, each over the stated full scale;

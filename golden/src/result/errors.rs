@@ -8,13 +8,14 @@
 //! | out: errors | 5 | fraction | `None` where the reference is below 1 % of ‖ref‖ |
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Fraction of ‖ref‖ below which an axis or the shear has no meaningful relative error.
 pub const SMALLEST_SHARE: f64 = 0.01;
 
 /// Relative errors of the resultant as fractions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Errors {
     /// Along x, signed as in Eq. 3.
     pub x1: Option<f64>,

@@ -24,6 +24,7 @@ use crate::data::input::missing;
 use crate::data::quantise::Codes;
 use crate::result::checks::{Checks, CONSTANT, LINE, LOAD_MISMATCH, MU_AT_BOUND, NOT_RESOLVED, PLATEAU, PULL, TORN};
 use crate::spec::scene::{largest_code, EstimatorKind, ObjectiveKind, Scene};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -66,7 +67,7 @@ macro_rules! flags {
         /// | flag | raised when | what to do | by |
         /// |---|---|---|---|
         $(#[doc = concat!("| `", $name, "` | ", $raised_when, " | ", $remedy, " | ", $raised_by, " |")])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         pub enum Flag {
             $(
                 #[doc = concat!("`", $name, "`: ", $raised_when, ".")]

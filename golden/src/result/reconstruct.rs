@@ -35,13 +35,16 @@ use crate::result::checks::Checks;
 use crate::result::errors::Errors;
 use crate::result::flags::Flag;
 use crate::spec::partition::{Grid, Subarray};
+use crate::spec::plain_text::json_schema;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
+use schemars::generate::SchemaSettings;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Result of one subarray.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SubarrayResult {
     /// First row in the array.
     pub row0: usize,
@@ -73,7 +76,7 @@ pub struct SubarrayResult {
 }
 
 /// The result for one frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Reconstruction {
     /// The scene's name.
     pub scene: String,
@@ -99,6 +102,13 @@ pub struct Reconstruction {
     /// Fields that only some scenes have; in JSON they are at the same level as the others.
     #[serde(flatten)]
     pub extra: Extra,
+}
+
+impl Reconstruction {
+    /// JSON schema of a result as `dermis reconstruct --json` writes it.
+    pub fn json_schema() -> serde_json::Value {
+        json_schema::<Reconstruction>(SchemaSettings::default().for_serialize())
+    }
 }
 
 /// Assembles a result: adds the resultant, standard deviations of the shear of subarrays, the errors relative to the frame's

@@ -8,13 +8,14 @@
 //! | gather | rows·cols of the array → of the subarray | row-major in both |
 
 use crate::spec::sensor::{Sensor, MIN_SIDE};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
 /// Subarrays along the rows and along the columns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Grid {
     /// Number of rows of subarrays.
     pub rows: usize,

@@ -3,58 +3,40 @@
 //! Every table except `[sensor]` has defaults. An unknown field, a value out of range or a wrong type is an error that
 //! names the file, the field and what is allowed. Sizes are checked here, before anything of their size is allocated.
 //!
-//! | table | fields (default) |
-//! |---|---|
-//! | top | `name` (file name; 1 … 64 letters, digits, `-`, `_`, `.`, inner spaces) |
-//! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
-//! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
-//! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
-//! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
-//! | | `condition` ("loaded"; "both-signs"), `max_contacts` (for "contacts" with a network: 8; 1 … 8) |
-//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (not stated) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` (chosen: [`Scene::model_estimator`]; "search", "evidence", "network", |
-//! | | "evidence+network", "combined"), `degree` (none; 1 … 8) |
-//! | | `network` (none; a file, or one of the program: "dermis:sensor-1", …), `deviations` (none; a file) |
-//! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
-//! | `[threshold]` | `min_force_N` (0) |
-//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
-//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
-//! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
-//! | | `search_width` (the board's; 4, 2, 1), `tables` ("rom"; "writable") |
-//! | | `estimator` (chosen: [`Scene::choose_for_hardware`]; "search", "network") |
-//! | | `source` ("stream"; "adc-scan"): whether codes come as a stream or the hardware scans the array |
-//! | `[hardware.table_range]` | `gain` (that of the scene's table; \[least, largest\]), `thickness_mm` (the sensor's; \[least, largest\]) |
-//! | | `dead_taxels` (0; fewer than all): what writable tables may hold |
-//! | `[hardware.adc_scan]` | `converter` ("max11125", "ads8688"), `converters` (1), `channels` (cols / converters), `sclk_MHz` |
-//! | | `row_settling_us` (0), `channel_settling_us` (0), `samples` (1; 2, 4 … 256), `period_us` |
-//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
-//! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
-//! | | `plausible_MPa` (10), `missing_share` (0.2; 0 … 0.5) |
-//! | | `zero` ("fixed"; "running" with `zero_average`, 10; 1 … 16, and `zero_limit_MPa`, 1/64 of the full scale) |
-//! | `[output]` | `forces` ("taxels"; "resultants") |
+//! Each field is declared once, as a member of the struct of its table: [`Scene::fields`] lists them with the allowed values,
+//! the default and the meaning, [`Scene::json_schema`] gives them to editors, and the guide's page "your sensor" has the table.
 
 mod adc_scan;
 mod error;
 mod estimator;
 mod estimator_choice;
+mod field;
 pub mod inverse;
 mod inversion;
 mod load;
 mod parse;
 mod reader;
+mod schema;
 mod supported;
 #[cfg(test)]
 mod tests;
 
 pub use error::SceneError;
 pub use estimator::EstimatorKind;
+pub use field::Declared;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
 use crate::spec::adc::AdcScan;
+use crate::spec::board::SEARCH_WIDTHS;
 use crate::spec::link_kind::LinkKind;
 use crate::spec::partition::{subarrays, Case};
-use crate::spec::sensor::Sensor;
+use crate::spec::sensor::{Sensor, MAX_SIDE};
 use crate::spec::sliding;
+use adc_scan::ScanFields;
+use estimator::FORMER_NAMES;
+use field::{choice, nested, table, whole, File, Flag, Kind as _, Limits, Listed, Number};
+use parse::{BoardName, DeadTaxels, ZeroFields};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
@@ -87,7 +69,7 @@ pub struct Scene {
 }
 
 /// Elastic body over the taxels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Medium {
     /// Infinitely deep; the normal stress does not depend on the Poisson ratio.
@@ -103,12 +85,16 @@ pub enum Medium {
 impl Medium {
     /// Poisson ratio of a bonded layer for which none is stated: that of silicone and polyurethane.
     pub const ELASTOMER: f64 = 0.48;
-    /// The range of [`Medium::allows_poisson`] in words, for messages.
-    pub const POISSON_ALLOWED: &'static str = "a number above 0 and below 0.5";
+    const POISSON: Number = Number::Between(0.0, 0.5);
 
     /// Whether a bonded layer may have this Poisson ratio, in scenes and in frames.
     pub fn allows_poisson(poisson: f64) -> bool {
-        poisson > 0.0 && poisson < 0.5
+        Medium::POISSON.contains(poisson)
+    }
+
+    /// The allowed Poisson ratios in words, for messages.
+    pub fn allowed_poisson() -> String {
+        Medium::POISSON.allowed()
     }
 }
 
@@ -175,52 +161,76 @@ pub struct PartitionSpec {
 /// Largest and default number of contacts that get a μ of their own.
 pub const MAX_CONTACTS: usize = 8;
 
-/// Table `[search]`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SearchSpec {
-    /// The estimator of the floating-point model; `None` takes [`Scene::model_estimator`].
-    pub estimator: Option<EstimatorKind>,
-    /// The objective that is maximised.
-    pub objective: ObjectiveKind,
-    /// Largest ratio of shear to normal force, 0.001 to 2; 0 means no shear and no search.
-    pub mu_max: f64,
-    /// Standard deviation of the noise of one reading in MPa, and the stress up to which a reading counts as noise, ≥ 0; 0 for
-    /// a simulation without noise. `None`: not stated.
-    pub noise_floor_MPa: Option<f64>,
-    /// How Eq. 1 is computed.
-    pub form: Form,
-    /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::estimate::degree`].
-    pub degree: Option<usize>,
-    /// Path of a trained network, relative to the working folder, or ending in `dermis:NAME`: one of the program's own.
-    pub network: Option<PathBuf>,
-    /// Path of a table of standard deviations, relative to the working folder, see [`crate::estimate::deviations`].
-    pub deviations: Option<PathBuf>,
+table! {
+    /// Table `[search]`.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct SearchSpec in "search" with defaults {
+        /// Estimator of the floating-point model; left out, [`Scene::model_estimator`] takes one.
+        estimator: Option<EstimatorKind> = choice(&EstimatorKind::NAMES)
+            .formerly(&FORMER_NAMES)
+            .optional("chosen")
+            .hardware("any: see `hardware.estimator`")
+            .page("method");
+        /// Objective that the search maximises.
+        objective: ObjectiveKind = choice(&ObjectiveKind::NAMES)
+            .or(ObjectiveKind::Sparse)
+            .hardware("`\"sparse\"`")
+            .page("accuracy");
+        /// Largest ratio of shear to normal force; 0: no shear, no search.
+        mu_max: f64 = Number::ZeroOr(LEAST_MU_MAX, LARGEST_MU_MAX).or(0.6);
+        /// Standard deviation of the noise of one reading in MPa, up to which a stress counts as none; 0 for a simulation without
+        /// noise.
+        noise_floor_MPa: Option<f64> = Number::NotNegative.optional("not stated");
+        /// How Eq. 1 is computed: the series in μ, or as the paper prints it.
+        form: Form = choice(&[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])
+            .or(Form::Oblique)
+            .hardware("`\"oblique\"`");
+        /// Degree of the series in μ; left out, [`crate::estimate::degree`] takes one.
+        degree: Option<usize> = whole::<usize>(1, MAX_FLOAT_DEGREE as u32)
+            .optional("what the sensor needs")
+            .hardware("up to 3")
+            .page("method");
+        /// Trained network: a file of `dermis train`, relative to the scene, or `dermis:NAME`, one of the program.
+        network: Option<PathBuf> = File.optional("none").hardware("that of `\"network\"`");
+        /// Table of standard deviations of what a search finds: a file of `dermis deviations`, relative to the scene.
+        deviations: Option<PathBuf> = File
+            .optional("that of the program for the same sensor and partition, if any")
+            .page("accuracy");
+    }
 }
 
-/// Table `[threshold]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ThresholdSpec {
-    /// Smallest normal force in N that is reported, ≥ 0.
-    pub min_force_N: f64,
+table! {
+    /// Table `[threshold]`.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ThresholdSpec in "threshold" with defaults {
+        /// Smallest normal force in N that is reported; smaller ones are reported as zero.
+        min_force_N: f64 = Number::NotNegative.or(0.0);
+    }
 }
 
-/// Table `[fixed]`: widths in bits, signs included.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FixedSpec {
-    /// Width of the converter's codes, 8 to 24.
-    pub input_bits: u32,
-    /// Width of the vectors between the stages, 12 to 18.
-    pub data_bits: u32,
-    /// Width of the coefficients of Ax and Ay, 8 to 18.
-    pub coef_bits: u32,
-    /// Width of the coefficients of Cz⁺, `coef_bits` to 32; multiplied in two limbs.
-    pub inverse_bits: u32,
-    /// Columns whose coefficients are all below 2^−`prune_bits` of the largest are not stored; 8 to 31.
-    pub prune_bits: u32,
-    /// Matrix lanes, a multiple of 4 from 4 to 1024; `None` takes as many as the board's multipliers and block RAMs
-    /// allow.
-    pub lanes: Option<u32>,
+table! {
+    /// Table `[fixed]`: widths in bits, signs included.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct FixedSpec in "fixed" with defaults {
+        /// Width of the converter's codes.
+        input_bits: u32 = whole::<u32>(8, 24).or(20).page("formats");
+        /// Width of the vectors between the stages.
+        data_bits: u32 = whole::<u32>(12, 18).or(18).page("formats");
+        /// Width of the coefficients of Ax and Ay.
+        coef_bits: u32 = whole::<u32>(8, 18).or(18).page("formats");
+        /// Width of the coefficients of Cz⁺, at least `coef_bits`; multiplied in two limbs.
+        inverse_bits: u32 = whole::<u32>(8, 32).or(24).page("formats");
+        /// Columns whose coefficients are all below 2^−`prune_bits` of the largest are not stored.
+        prune_bits: u32 = whole::<u32>(8, 31).or(20).page("formats");
+        /// Multiply-accumulate lanes of the matrix products.
+        lanes: Option<u32> = whole::<u32>(4, 1024).multiple_of(4).optional("as many as the board's multipliers and block RAMs allow");
+    }
 }
+
+/// Smallest mu_max above 0: with a smaller one, the powers of μ vanish in the hardware's words.
+const LEAST_MU_MAX: f64 = 0.001;
+/// Largest mu_max, above the friction of any elastic cover.
+const LARGEST_MU_MAX: f64 = 2.0;
 
 /// Highest degree of the hardware and its bit-true model.
 pub const MAX_DEGREE: usize = 3;
@@ -256,16 +266,21 @@ pub enum TableStorage {
     Writable,
 }
 
-/// Table `[hardware.table_range]`: what the tables that are written may hold.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TableRange {
-    /// Least and largest |gain|, above 0, in MPa per unit of the readings; `None` takes those of the scene's table, without one 1.
-    pub gain: Option<[f64; 2]>,
-    /// Least and largest thickness of the cover in mm, above 0; `None` is that of the sensor alone.
-    pub thickness_mm: Option<[f64; 2]>,
-    /// Most dead taxels; 0 leaves those of the scene as they are.
-    pub dead_taxels: usize,
+table! {
+    /// Table `[hardware.table_range]`: what the tables that are written may hold.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct TableRange in "hardware.table_range" with defaults {
+        /// Least and largest |gain| in MPa per unit of the readings; the largest fixes what a code means.
+        gain: Option<[f64; 2]> = Limits.optional("those of the scene's table, without one 1");
+        /// Least and largest thickness of the cover in mm; coefficients are written too.
+        thickness_mm: Option<[f64; 2]> = Limits.optional("that of the sensor alone");
+        /// Most dead taxels, fewer than all; coefficients are written too. 0 leaves those of the scene as they are.
+        dead_taxels: usize = whole::<usize>(0, MOST_DEAD as u32).or(0).hardware("with one subarray");
+    }
 }
+
+/// Most dead taxels of the largest array.
+const MOST_DEAD: usize = MAX_SIDE * MAX_SIDE - 1;
 
 impl TableRange {
     /// Whether the coefficients differ between specimens: they are for another thickness, or for other dead taxels.
@@ -274,26 +289,40 @@ impl TableRange {
     }
 }
 
-/// Table `[hardware]`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HardwareSpec {
-    /// One of [`crate::spec::board::Board::names`], or the path of a board's file, relative to the working folder.
-    pub board: String,
-    /// The link between the board and its host.
-    pub link: LinkKind,
-    /// Whether the coefficient memory is checked.
-    pub coefficient_check: CoefficientCheck,
-    /// The estimator of the hardware, `search` or `network`; `None` takes [`Scene::choose_for_hardware`].
-    pub estimator: Option<EstimatorKind>,
-    /// Taxels that the search computes per cycle: 4, 2 or 1; `None` takes the board's.
-    pub search_width: Option<usize>,
-    /// Where the tables of a specimen stand.
-    pub tables: TableStorage,
-    /// What tables that are written may hold.
-    pub table_range: TableRange,
-    /// How the hardware scans the array by itself (`source = "adc-scan"`); `None` where codes come as a stream.
-    pub adc_scan: Option<AdcScan>,
+table! {
+    /// Table `[hardware]`.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct HardwareSpec in "hardware" with defaults {
+        /// Board: one of [`crate::spec::board::Board::names`], or a board's file, relative to the scene.
+        board: String = BoardName.or(DEFAULT_BOARD.to_owned()).page("boards");
+        /// Link between the board and its host.
+        link: LinkKind = choice(&LinkKind::NAMES).or(LinkKind::Uart).page("boards");
+        /// Whether damaged coefficients are reported.
+        coefficient_check: CoefficientCheck =
+            choice(&[("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)])
+                .or(CoefficientCheck::None)
+                .page("robustness");
+        /// Estimator of the hardware and its bit-true model; left out, [`Scene::choose_for_hardware`] takes one. A network takes up to
+        /// 144 taxels in one subarray, or `"contacts"`.
+        estimator: Option<EstimatorKind> = choice(&EstimatorKind::HARDWARE_NAMES)
+            .formerly(&FORMER_NAMES)
+            .optional("chosen")
+            .page("method");
+        /// Taxels that the search computes per cycle: fewer take fewer LUTs and more cycles, `dermis build --explain` says how many.
+        search_width: Option<usize> = Listed(SEARCH_WIDTHS).optional("that of the board").hardware("4 with `\"adaptive\"`");
+        /// Where the tables of a specimen stand: in the bitstream, or written while the engine rests.
+        tables: TableStorage = choice(&[("rom", TableStorage::Rom), ("writable", TableStorage::Writable)])
+            .or(TableStorage::Rom)
+            .page("in-your-soc");
+        /// What tables that are written may hold.
+        table_range: TableRange = nested::<TableRange>();
+        /// How the hardware scans the array by itself; none where codes come as a stream.
+        adc_scan: Option<AdcScan> = ScanFields;
+    }
 }
+
+/// The board of a scene that names none.
+const DEFAULT_BOARD: &str = "ulx3s-85f";
 
 impl HardwareSpec {
     /// Whether tables are written.
@@ -369,38 +398,38 @@ impl RunningZero {
     pub const LEAST_OVER_NOISE: f64 = 5.0;
 }
 
-/// Table `[input]`; its meaning is in [`crate::data::input`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct InputSpec {
-    /// Stress in MPa of the largest code, above 0; `None` takes each frame's peak.
-    pub full_scale_MPa: Option<f64>,
-    /// 2^average frames are averaged; 0 to 12.
-    pub average: u32,
-    /// How they are averaged.
-    pub mean: MeanKind,
-    /// Path of the table of offsets and gains, relative to the working folder.
-    pub calibration: Option<PathBuf>,
-    /// Path of a frame read without contact, relative to the working folder.
-    pub tare: Option<PathBuf>,
-    /// Dead taxels, left out of the inverse: [row, col], sorted, without duplicates, fewer than all.
-    pub dead: Vec<[usize; 2]>,
-    /// Whether the sensor reads tension as zero.
-    pub unipolar: bool,
-    /// Standard deviation of the taxels' gains about their calibration, a fraction from 0 to 1.
-    pub gain_spread: f64,
-    /// Stress in MPa above which a result is flagged `implausible-stress`, above 0.
-    pub plausible_MPa: f64,
-    /// Largest share of the live taxels whose readings may be missing in a frame, 0 to 0.5.
-    pub missing_share: f64,
-    /// What the zero of each taxel is.
-    pub zero: Zero,
+table! {
+    /// Table `[input]`; its meaning is in [`crate::data::input`].
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct InputSpec in "input" with defaults {
+        /// Stress in MPa of the largest code; hardware needs it beside a calibration, tare, threshold or noise floor.
+        full_scale_MPa: Option<f64> = Number::Positive.optional("each frame's peak");
+        /// 2^average frames are averaged; give `--frame` as often.
+        average: u32 = whole::<u32>(0, 12).or(0);
+        /// One result of 2^average frames, or one with every frame, of 1/√(2^(average+1) − 1) of the noise; give all frames since the
+        /// start.
+        mean: MeanKind = choice(&[("block", MeanKind::Block), ("sliding", MeanKind::Sliding)]).or(MeanKind::Block);
+        /// Table of the taxels' offsets and gains: a file, relative to the scene.
+        calibration: Option<PathBuf> = File.optional("none").page("files");
+        /// Frames without contact, a file or folder, relative to the scene: their mean is the zero, the spread of 8 or more the noise
+        /// of each taxel.
+        tare: Option<PathBuf> = File.optional("none").page("files");
+        /// Dead taxels, left out of the inverse: \[row, col\] each, from 0, fewer than all.
+        dead: Vec<[usize; 2]> = DeadTaxels.or(Vec::new()).hardware("with one subarray");
+        /// Whether the sensor reads tension as zero.
+        unipolar: bool = Flag.or(false).hardware("with `\"network\"`");
+        /// Standard deviation of the taxels' gains about their calibration, as a fraction.
+        gain_spread: f64 = Number::Within(0.0, 1.0).or(0.0).page("accuracy");
+        /// Stress in MPa above which a result is flagged `implausible-stress`, for example counts taken for MPa.
+        // Soft elastomers tear at about 10 MPa; feet, hands and grippers stay below 2.
+        plausible_MPa: f64 = Number::Positive.or(10.0);
+        /// Largest share of the live taxels whose readings may be missing in a frame.
+        // A row and a column of a 10 × 10 array.
+        missing_share: f64 = Number::Within(0.0, 0.5).or(0.2).page("files");
+        /// What the zero of each taxel is.
+        zero: Zero = ZeroFields;
+    }
 }
-
-/// Default of `input.plausible_MPa`: soft elastomers tear at about 10 MPa, and feet, hands and grippers stay below 2.
-pub const PLAUSIBLE_MPA: f64 = 10.0;
-
-/// Default of `input.missing_share`: a row and a column of a 10 × 10 array.
-pub const MISSING_SHARE: f64 = 0.2;
 
 /// The forces that a result holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -412,11 +441,14 @@ pub enum ForceOutput {
     Resultants,
 }
 
-/// Table `[output]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct OutputSpec {
-    /// Forces per taxel or resultants.
-    pub forces: ForceOutput,
+table! {
+    /// Table `[output]`.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct OutputSpec in "output" with defaults {
+        /// A force per taxel, or one with its centre of pressure per subarray or contact.
+        forces: ForceOutput = choice(&[("taxels", ForceOutput::Taxels), ("resultants", ForceOutput::Resultants)])
+            .or(ForceOutput::Taxels);
+    }
 }
 
 impl PartitionSpec {
@@ -509,24 +541,6 @@ impl InputSpec {
     }
 }
 
-impl Default for InputSpec {
-    fn default() -> Self {
-        InputSpec {
-            full_scale_MPa: None,
-            average: 0,
-            mean: MeanKind::default(),
-            calibration: None,
-            tare: None,
-            dead: Vec::new(),
-            unipolar: false,
-            gain_spread: 0.0,
-            plausible_MPa: PLAUSIBLE_MPA,
-            missing_share: MISSING_SHARE,
-            zero: Zero::default(),
-        }
-    }
-}
-
 impl Default for PartitionSpec {
     fn default() -> Self {
         let condition = Condition::default();
@@ -538,48 +552,6 @@ impl SearchSpec {
     /// The noise floor in MPa; 0 where it is not stated.
     pub fn noise_floor_MPa(&self) -> f64 {
         self.noise_floor_MPa.unwrap_or(0.0)
-    }
-}
-
-impl Default for SearchSpec {
-    fn default() -> Self {
-        SearchSpec {
-            estimator: None,
-            objective: ObjectiveKind::default(),
-            mu_max: 0.6,
-            noise_floor_MPa: None,
-            form: Form::default(),
-            degree: None,
-            network: None,
-            deviations: None,
-        }
-    }
-}
-
-impl Default for ThresholdSpec {
-    fn default() -> Self {
-        ThresholdSpec { min_force_N: 0.0 }
-    }
-}
-
-impl Default for FixedSpec {
-    fn default() -> Self {
-        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20, lanes: None }
-    }
-}
-
-impl Default for HardwareSpec {
-    fn default() -> Self {
-        HardwareSpec {
-            board: "ulx3s-85f".to_string(),
-            link: LinkKind::Uart,
-            coefficient_check: CoefficientCheck::None,
-            estimator: None,
-            search_width: None,
-            tables: TableStorage::Rom,
-            table_range: TableRange::default(),
-            adc_scan: None,
-        }
     }
 }
 

@@ -10,6 +10,7 @@
 //! | pitch over pitch | scalar | – | 1/16 … 16 |
 //! | thickness over pitch | scalar | – | 1/1000 … 1000 |
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use thiserror::Error;
@@ -27,7 +28,7 @@ pub const MAX_PITCH_RATIO: f64 = 16.0;
 pub const MAX_DEPTH_RATIO: f64 = 1e3;
 
 /// A regular rectangular array of taxels under an elastic cover.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sensor {
     /// Number of rows, along y.
     pub rows: usize,

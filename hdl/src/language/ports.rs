@@ -13,6 +13,8 @@
 use std::marker::PhantomData;
 use std::sync::Arc;
 
+use dermis_golden::spec::plain_text::plain_text;
+
 use super::build::{Builder, Net};
 use super::expression::Expr;
 use super::kernel::{Kernel, Port, Type, SEPARATOR};
@@ -218,18 +220,6 @@ impl From<&usize> for Width {
     }
 }
 
-/// The text of a doc comment: its lines, of which each begins with a space, without the targets of its links, which mean
-/// nothing outside the docs of the crate.
-fn text(doc: &[&str]) -> String {
-    let doc = doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ");
-    let mut parts = doc.split("](");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        text.push_str(part.split_once(')').map_or(part, |(_, behind)| behind));
-    }
-    text.replace("[`", "`")
-}
-
 struct MakeInside<'k>(&'k Builder);
 
 impl<'k> Make<Inside<'k>> for MakeInside<'k> {
@@ -245,13 +235,13 @@ impl<'k> Make<Inside<'k>> for MakeInside<'k> {
         if bits == 0 {
             return self.0.constant(1, 0);
         }
-        self.0.port(Port { name: name.to_owned(), bits, output: false, doc: text(doc) });
+        self.0.port(Port { name: name.to_owned(), bits, output: false, doc: plain_text(doc) });
         self.0.input(name, bits)
     }
 
     fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Output<'k> {
         if bits > 0 {
-            self.0.port(Port { name: name.to_owned(), bits, output: true, doc: text(doc) });
+            self.0.port(Port { name: name.to_owned(), bits, output: true, doc: plain_text(doc) });
         }
         Output { builder: self.0, name, bits }
     }

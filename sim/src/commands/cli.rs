@@ -102,6 +102,8 @@ enum Command {
     #[command(after_help = "Example:
   dermis flags                      a row per flag, then a row per field")]
     Flags,
+    /// Print the fields of scenes, frames and results: a JSON schema, or a table.
+    Schema(super::schema::Arguments),
     /// Print the converters that a scene can scan its array with.
     Converters(super::converters::Arguments),
     /// Make the image of a specimen's tables for hardware with writable tables.
@@ -217,6 +219,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
         Command::Registers(arguments) => Ok((super::registers::run(arguments)?, true)),
         Command::Flags => Ok((report::flags(), true)),
+        Command::Schema(arguments) => Ok((super::schema::run(arguments)?, true)),
         Command::Converters(arguments) => Ok((super::converters::run(arguments)?, true)),
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),

@@ -25,6 +25,7 @@
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
 //! | [`mod@converters`] | `dermis converters`: the converters of a scan |
 //! | [`mod@registers`] | `dermis registers`: the register map of a core |
+//! | [`mod@schema`] | `dermis schema`: the fields of scenes, frames and results |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
 //! | `sensor_faults` | `dermis study sensor-faults`: frames of faulty sensors, flagged or silently wrong |
@@ -61,6 +62,7 @@ mod reconstruct_stream;
 pub mod registers;
 pub mod replay;
 pub mod report;
+pub mod schema;
 mod sensor_faults;
 pub mod stability;
 pub mod stress;

@@ -12,7 +12,7 @@ use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::board::Board;
-use dermis_golden::spec::scene::{Medium, Scene, SearchSpec};
+use dermis_golden::spec::scene::{Medium, Scene};
 use dermis_golden::write::write;
 
 /// Arguments of `dermis new`.
@@ -165,42 +165,41 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let Pitch([x, y]) =
         asker.required(&arguments.pitch, "pitch", "pitch in mm, along columns and rows: X,Y or one number")?;
     let thickness = asker.required(&arguments.thickness, "thickness", "thickness of the cover in mm")?;
-    let medium = medium_text(arguments, asker)?;
+    let medium = medium_fields(arguments, asker)?;
     let noise = asker.optional(&arguments.noise, "standard deviation of one reading in MPa")?;
     let full_scale = asker.optional(&arguments.full_scale, "stress of the largest reading in MPa")?;
-    let mut text = format!(
-        "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n\n\
-         [sensor]\nrows = {rows}\ncols = {cols}\n\
-         pitch_x_mm = {x:?}       # along the columns\n\
-         pitch_y_mm = {y:?}       # along the rows\n\
-         thickness_mm = {thickness:?}     # of the cover: the depth at which stress is read\n\n{medium}"
-    );
-    text += "\n[search]\n";
-    match arguments.friction {
-        Some(friction) => writeln!(text, "mu_max = {friction:?}           # largest ratio of shear to normal force")?,
-        None => writeln!(
-            text,
-            "# mu_max = {:?}         # largest ratio of shear to normal force",
-            SearchSpec::default().mu_max
-        )?,
-    }
-    match noise {
-        Some(noise) => writeln!(text, "noise_floor_MPa = {noise:?}  # standard deviation of one reading")?,
-        None => {
-            text += "# noise_floor_MPa =    # standard deviation of one reading; `dermis check --stream` measures it\n"
+    let mut text =
+        "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
+            .to_owned();
+    let number = |value: f64| Some(format!("{value:?}"));
+    for (table, lines) in [
+        (
+            "sensor",
+            vec![
+                ("rows", Some(rows.to_string())),
+                ("cols", Some(cols.to_string())),
+                ("pitch_x_mm", number(x)),
+                ("pitch_y_mm", number(y)),
+                ("thickness_mm", number(thickness)),
+            ],
+        ),
+        ("medium", medium),
+        ("search", vec![("mu_max", arguments.friction.and_then(number)), ("noise_floor_MPa", noise.and_then(number))]),
+        (
+            "input",
+            vec![
+                ("full_scale_MPa", full_scale.and_then(number)),
+                ("calibration", None),
+                ("tare", None),
+                ("dead", None),
+            ],
+        ),
+    ] {
+        writeln!(text, "\n[{table}]")?;
+        for (field, value) in lines {
+            writeln!(text, "{}", line(&format!("{table}.{field}"), value)?)?;
         }
     }
-    text += "\n[input]\n";
-    match full_scale {
-        Some(full_scale) => writeln!(text, "full_scale_MPa = {full_scale:?}  # stress of the largest reading")?,
-        None => {
-            text +=
-                "# full_scale_MPa =     # stress of the largest reading; hardware needs it beside the fields below\n"
-        }
-    }
-    text += "# calibration = \"table.csv\"    # offset and gain of each taxel, from `dermis calibrate`\n\
-             # tare = \"zero.csv\"            # frames without contact: the zero, and the noise where it is not stated\n\
-             # dead = [[0, 0]]              # row and column, from 0, of taxels to leave out\n";
     if let Some(board) = &arguments.board {
         let board = board_beside(board, &arguments.file)?;
         write!(text, "\n[hardware]\nboard = {}\n", format_args!("{board:?}"))?;
@@ -208,30 +207,41 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     Ok(text)
 }
 
-/// The table of the medium, which says what would be another.
+/// A line of the scene: the field with its value and meaning; without a value what it is without it, as a comment.
+fn line(path: &str, value: Option<String>) -> Result<String> {
+    let known = Scene::fields().iter().find(|field| field.path == path);
+    let field = known.ok_or_else(|| anyhow!("a scene has no field {path}"))?;
+    let name = path.rsplit_once('.').map_or(path, |(_, name)| name);
+    let without = field.without.as_deref().unwrap_or_default();
+    let setting = match (value, field.schema.get("default")) {
+        (Some(value), _) => format!("{name} = {value}"),
+        (None, Some(default)) => format!("# {name} = {default}"),
+        (None, None) => format!("# {name} =    # without it: {without}"),
+    };
+    Ok(format!("{setting:<36}  # {}", field.meaning))
+}
+
+/// The fields of the medium.
 ///
 /// # Errors
 /// A Poisson ratio of a free cover.
-fn medium_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
+fn medium_fields(arguments: &Arguments, asker: &mut Asker) -> Result<Vec<(&'static str, Option<String>)>> {
     let question = "how the cover is held, bonded to a rigid base or free; empty: bonded, as nearly every array has it";
     let cover = match arguments.cover {
         Some(cover) => cover,
         None => asker.ask(question)?.unwrap_or_default(),
     };
-    Ok(match (cover, arguments.poisson) {
-        (Cover::Bonded, poisson) => format!(
-            "[medium]\n\
-             kind = \"bonded-layer\"  # the cover is bonded to a rigid base, as on nearly every array; a free one: \"half-space\"\n\
-             poisson = {:?}         # of silicone and polyurethane 0.48, of foams 0.3 and less\n",
-            poisson.unwrap_or(Medium::ELASTOMER)
-        ),
-        (Cover::Free, None) => {
-            "[medium]\nkind = \"half-space\"    # the cover is free; one on a rigid base: \"bonded-layer\"\n".to_owned()
+    let kind = |name: &str| ("kind", Some(format!("{name:?}")));
+    match (cover, arguments.poisson) {
+        (Cover::Bonded, poisson) => {
+            let poisson = poisson.unwrap_or(Medium::ELASTOMER);
+            Ok(vec![kind("bonded-layer"), ("poisson", Some(format!("{poisson:?}")))])
         }
+        (Cover::Free, None) => Ok(vec![kind("half-space")]),
         (Cover::Free, Some(poisson)) => {
             bail!("--poisson {poisson}: only with --cover bonded; stress under a free cover does not depend on it")
         }
-    })
+    }
 }
 
 /// The board as the scene `file` names it: the path of a board's file relative to the scene's folder, where that is the

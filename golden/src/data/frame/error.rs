@@ -58,7 +58,7 @@ pub enum FrameError {
         /// The value found.
         value: f64,
         /// The allowed values, in words.
-        allowed: &'static str,
+        allowed: String,
     },
     /// The file has no sensor, and no scene was given to take one from.
     #[error("{file}: no sensor in the file; name a scene")]

@@ -2,21 +2,34 @@
 //! missing reading.
 
 use super::{Contact, Forces, Frame, FrameError};
+use crate::spec::plain_text::json_schema;
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
+use schemars::generate::SchemaSettings;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The fields of a file as read.
-#[derive(Deserialize)]
+/// A frame: the stress on every taxel at one moment.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(title = "Frame of Dermis")]
 struct Raw {
+    /// Name in reports; else the file's name.
     id: Option<String>,
+    /// The medium for which the stress was computed; that of the scene, if it is stated.
     medium: Option<Medium>,
+    /// Origin of the stress.
     source: Option<String>,
+    /// The array, which must be the scene's; a frame with it needs no scene.
     sensor: Option<Sensor>,
+    /// Contacts as `dermis generate` takes them.
     contacts: Option<Vec<Contact>>,
+    /// True force in N, [x, y, normal]: errors are printed.
     resultant_N: Option<[f64; 3]>,
+    /// True force on each taxel in N.
     cell_forces_N: Option<Forces>,
+    /// Stress in MPa, or readings that a calibration table turns into it, of all taxels, row-major; `null` for a missing reading.
     stress_MPa: Vec<Option<f64>>,
+    /// Anything else.
     notes: Option<String>,
 }
 
@@ -40,6 +53,11 @@ struct Written<'a> {
 }
 
 impl Frame {
+    /// JSON schema of a frame's file; unknown fields are ignored.
+    pub fn json_schema() -> serde_json::Value {
+        json_schema::<Raw>(SchemaSettings::default().for_deserialize())
+    }
+
     /// The frame as JSON that [`Frame::load`] reads back unchanged, on one line.
     pub fn to_json(&self) -> String {
         let written = Written {
@@ -70,7 +88,7 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
     })?;
     reader.end().map_err(|error| wrong(file, None, &error))?;
     if let Some(Medium::BondedLayer { poisson: value }) = raw.medium.filter(|medium| !is_possible(medium)) {
-        let (file, allowed) = (file.to_string(), Medium::POISSON_ALLOWED);
+        let (file, allowed) = (file.to_string(), Medium::allowed_poisson());
         return Err(FrameError::WrongValue { file, field: "medium.poisson", value, allowed });
     }
     let sensor = raw.sensor.or_else(|| scene.map(|scene| scene.sensor.clone()));

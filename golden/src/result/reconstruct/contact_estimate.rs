@@ -1,9 +1,10 @@
 //! Contact estimate: a contact with the standard deviations and the covariance that `evidence` gives.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A contact as the estimator `evidence` found it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactEstimate {
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],

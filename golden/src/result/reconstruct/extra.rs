@@ -22,10 +22,11 @@ use super::suspect_taxel::SuspectTaxel;
 use crate::data::frame::Forces;
 use crate::result::checks::{largest_spread, relative_spread};
 use crate::spec::sensor::Sensor;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Optional fields of a result.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Extra {
     /// The case that `adaptive` chose.
@@ -70,7 +71,7 @@ pub struct Extra {
 }
 
 /// Statistics of the estimated tension.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unipolar {
     /// Number of readings of zero or less.
     pub clipped: usize,
@@ -84,7 +85,7 @@ pub struct Unipolar {
 }
 
 /// The choice of a case for one frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseChoice {
     /// The case, as a scene names it.
     pub case: String,
@@ -95,7 +96,7 @@ pub struct CaseChoice {
 }
 
 /// A rejected case.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RejectedCase {
     /// The case, as a scene names it.
     pub case: String,
@@ -144,7 +145,7 @@ pub(crate) fn shear_spread_of(regions: &[Region]) -> Option<f64> {
 }
 
 /// One contact and its region.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Region {
     /// Whether the region's taxels meet the scene's condition for a search.
     pub centroid_condition: bool,

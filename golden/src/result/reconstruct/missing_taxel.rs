@@ -2,10 +2,11 @@
 
 use crate::data::frame::Frame;
 use crate::spec::scene::Scene;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A live taxel without a reading in some frame of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MissingTaxel {
     /// Its row.
     pub row: usize,

@@ -12,10 +12,11 @@
 
 use crate::data::frame::Forces;
 use crate::spec::sensor::Sensor;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The resultant force on one subarray or contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Resultant {
     /// Sum of the forces in N, [x, y, normal].
     pub force_N: [f64; 3],
@@ -24,7 +25,7 @@ pub struct Resultant {
 }
 
 /// Force and moment of all taxels. Axes are x along the columns, y along the rows and the normal into the sensor: right-handed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Wrench {
     /// Sum of the forces in N, [x, y, normal].
     pub force_N: [f64; 3],

@@ -1,9 +1,10 @@
 //! Suspect taxel: one whose reading no force explains.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A taxel whose reading no force explains.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SuspectTaxel {
     /// Its row.
     pub row: usize,

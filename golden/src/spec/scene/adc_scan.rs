@@ -1,76 +1,132 @@
 //! Table `[hardware.adc_scan]`, which `hardware.source = "adc-scan"` needs.
 
+use super::field::{choice, table, whole, Declared, HasDefault, Kind, Member, Number, Power, Table};
 use super::reader::Reader;
 use super::SceneError;
-use crate::spec::adc::{AdcScan, CONVERTERS, MOST_AVERAGE, MOST_CONVERTERS};
-use crate::spec::sensor::Sensor;
+use crate::spec::adc::{AdcScan, Converter, CONVERTERS, MOST_AVERAGE, MOST_CONVERTERS};
+use serde_json::{json, Value as Json};
 use toml::Value;
 
-/// Fields of the table.
-pub(super) const FIELDS: [&str; 8] = [
-    "converter",
-    "converters",
-    "channels",
-    "sclk_MHz",
-    "row_settling_us",
-    "channel_settling_us",
-    "samples",
-    "period_us",
-];
+table! {
+    struct ScanTable in "hardware.adc_scan" {
+        /// Type of the converters, as `dermis converters` lists them.
+        converter: Converter = ConverterName.required().page("architecture/scan");
+        /// Number of converters on one CS.
+        converters: usize = whole::<usize>(1, MOST_CONVERTERS as u32).or(1).page("architecture/scan");
+        /// Channels that are used of each converter; times `converters` the columns of the array.
+        channels: Option<usize> = whole::<usize>(1, MOST_CHANNELS).optional("cols / converters").page("architecture/scan");
+        /// SCLK in MHz; the clock's next lower even fraction is taken.
+        sclk_MHz: f64 = Number::Positive.required().page("architecture/scan");
+        /// Time in µs from switching a row until its columns have settled.
+        row_settling_us: f64 = Number::NotNegative.or(0.0).page("architecture/scan");
+        /// Least time in µs between two samples where the channel changes.
+        channel_settling_us: f64 = Number::NotNegative.or(0.0).page("architecture/scan");
+        /// Samples of a taxel that are averaged.
+        samples: u32 = Power(MOST_AVERAGE).or(0).page("architecture/scan");
+        /// Time in µs from one scan to the next.
+        period_us: f64 = Number::Positive.required().page("architecture/scan");
+    }
+}
 
-/// The scan of a scene; `None` with `hardware.source = "stream"`.
-pub(super) fn adc_scan(reader: &Reader, sensor: &Sensor) -> Result<Option<AdcScan>, SceneError> {
-    let scans = reader.choice("hardware.source", &[("stream", false), ("adc-scan", true)])?;
-    match (reader.value("hardware.adc_scan"), scans) {
-        (Some(value), false) => {
-            return Err(reader.wrong("hardware.adc_scan", value, "left out, or hardware.source = \"adc-scan\""));
+/// Most channels of any converter.
+const MOST_CHANNELS: u32 = {
+    let (mut most, mut k) = (0, 0);
+    while k < CONVERTERS.len() {
+        if CONVERTERS[k].channels > most {
+            most = CONVERTERS[k].channels;
         }
-        (_, false) => return Ok(None),
-        (_, true) => {}
+        k += 1;
     }
-    let path = |field: &str| format!("hardware.adc_scan.{field}");
-    let names = CONVERTERS.map(|converter| format!("{:?}", converter.name)).join(" or ");
-    let named = |value: &Value| CONVERTERS.into_iter().find(|converter| value.as_str() == Some(converter.name));
-    let converter = reader.typed(&path("converter"), named, &names)?;
-    let converter = converter.ok_or_else(|| reader.missing(&path("converter"), names))?;
-    // In range, so that the casts keep the values.
-    let converters = reader.integer(&path("converters"), 1..=MOST_CONVERTERS as i64, Some(1))? as usize;
-    let least = sensor.cols.div_ceil(converters);
-    let all = converter.channels.min(least);
-    let channels = reader.integer(&path("channels"), 1..=converter.channels as i64, Some(all as i64))? as usize;
-    if converters * channels != sensor.cols {
-        let exact = converters * least == sensor.cols && least <= converter.channels;
-        let expected = match exact {
-            true => format!("{least}, for {} columns with {converters} converters", sensor.cols),
-            false => format!(
-                "columns / hardware.adc_scan.converters, a whole number up to {}; there are {} columns and {converters} \
+    most as u32
+};
+
+struct ConverterName;
+
+impl Kind for ConverterName {
+    type Value = Converter;
+
+    fn read(&self, value: &Value, _: &str) -> Option<Converter> {
+        CONVERTERS.into_iter().find(|converter| value.as_str() == Some(converter.name))
+    }
+
+    fn allowed(&self) -> String {
+        CONVERTERS.map(|converter| format!("{:?}", converter.name)).join(" or ")
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "enum": CONVERTERS.map(|converter| converter.name) })
+    }
+}
+
+table! {
+    struct SourceTable in "hardware" {
+        /// Whether codes come as a stream or the hardware reads the converters of the array, `hardware.adc_scan`.
+        source: bool = choice(&[("stream", false), ("adc-scan", true)]).or(false).page("architecture/scan");
+    }
+}
+
+/// `hardware.source` and the table of the scan, which only `"adc-scan"` has.
+pub(super) struct ScanFields;
+
+impl Member for ScanFields {
+    type Value = Option<AdcScan>;
+
+    fn read(&self, reader: &Reader, path: &str) -> Result<Option<AdcScan>, SceneError> {
+        let SourceTable { source: scans } = SourceTable::read(reader)?;
+        if !scans {
+            return match reader.value(path) {
+                Some(value) => Err(reader.wrong(path, value, "left out, or hardware.source = \"adc-scan\"")),
+                None => Ok(None),
+            };
+        }
+        let scan = ScanTable::read(reader)?;
+        // The sensor has been read.
+        let cols = reader.value("sensor.cols").and_then(Value::as_integer).map_or(0, |cols| cols as usize);
+        Ok(Some(AdcScan {
+            converter: scan.converter,
+            converters: scan.converters,
+            channels: scan.channels(reader, cols)?,
+            sclk_MHz: scan.sclk_MHz,
+            row_settling_us: scan.row_settling_us,
+            channel_settling_us: scan.channel_settling_us,
+            average: scan.samples,
+            period_us: scan.period_us,
+        }))
+    }
+
+    fn declare(&self, _: &str, _: &[&str], fields: &mut Vec<Declared>) {
+        SourceTable::declare(fields);
+        ScanTable::declare(fields);
+    }
+}
+
+impl HasDefault for ScanFields {
+    fn default_value(&self) -> Option<AdcScan> {
+        None
+    }
+}
+
+impl ScanTable {
+    /// The channels that are used of each converter: as many as make up the columns.
+    fn channels(&self, reader: &Reader, cols: usize) -> Result<usize, SceneError> {
+        let (path, most) = ("hardware.adc_scan.channels", self.converter.channels);
+        let least = cols.div_ceil(self.converters);
+        let channels = self.channels.unwrap_or(most.min(least));
+        let allowed = if channels > most {
+            format!("a whole number from 1 to {most}")
+        } else if self.converters * channels == cols {
+            return Ok(channels);
+        } else if self.converters * least == cols && least <= most {
+            format!("{least}, for {cols} columns with {} converters", self.converters)
+        } else {
+            format!(
+                "columns / hardware.adc_scan.converters, a whole number up to {most}; there are {cols} columns and {} \
                  converters",
-                converter.channels, sensor.cols
-            ),
+                self.converters
+            )
         };
-        return Err(reader.wrong(&path("channels"), &Value::Integer(channels as i64), expected));
+        Err(reader.wrong(path, &Value::Integer(channels as i64), allowed))
     }
-    let above = |field: &str| {
-        let allowed = "a number above 0";
-        let number = reader.number(&path(field), |number| number > 0.0, allowed)?;
-        number.ok_or_else(|| reader.missing(&path(field), allowed))
-    };
-    let time = |field: &str| {
-        let number = reader.number(&path(field), |number| number >= 0.0, "a number of at least 0")?;
-        Ok::<f64, SceneError>(number.unwrap_or(0.0))
-    };
-    let power = |value: &Value| (0..=MOST_AVERAGE).find(|power| value.as_integer() == Some(1 << power));
-    let allowed = format!("a power of two from 1 to {}", 1 << MOST_AVERAGE);
-    Ok(Some(AdcScan {
-        converter,
-        converters,
-        channels,
-        sclk_MHz: above("sclk_MHz")?,
-        row_settling_us: time("row_settling_us")?,
-        channel_settling_us: time("channel_settling_us")?,
-        average: reader.typed(&path("samples"), power, &allowed)?.unwrap_or(0),
-        period_us: above("period_us")?,
-    }))
 }
 
 #[cfg(test)]

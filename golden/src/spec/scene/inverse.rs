@@ -24,6 +24,8 @@
 //! | in: level | fraction of the largest singular value | above 0, below 1 |
 //! | out: f(λ) | 1/λ | at most 1/α, with `tikhonov` 1/(2α) |
 
+use super::field::{choice, table, Kind as _, Number};
+
 /// Kind of pseudo-inverse.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InverseKind {
@@ -51,13 +53,15 @@ impl InverseKind {
     }
 }
 
-/// Table `[inverse]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct InverseSpec {
-    /// Kind of pseudo-inverse.
-    pub kind: InverseKind,
-    /// Level relative to the largest singular value, above 0 and below 1; `None` takes the floor of format and noise.
-    pub level: Option<f64>,
+table! {
+    /// Table `[inverse]`.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct InverseSpec in "inverse" with defaults {
+        /// Kind of pseudo-inverse.
+        kind: InverseKind = choice(&InverseKind::NAMES).or(InverseKind::Tsvd).page("stability");
+        /// Level relative to the largest singular value; left out with `"exact"`.
+        level: Option<f64> = Number::Between(0.0, 1.0).optional("the floor of format and noise").page("stability");
+    }
 }
 
 /// A kind of pseudo-inverse with its level: the rule that maps λ to f(λ).

@@ -1,59 +1,20 @@
-//! Parsing and checking scene text: the schema, and one function per table.
+//! Parsing of scene text: the tables whose fields do not stand for themselves, and what goes beyond one field.
 
-use super::adc_scan::{adc_scan, FIELDS as ADC_SCAN_FIELDS};
-use super::estimator::FORMER_NAMES;
-use super::reader::{number_of, Reader};
-use super::{
-    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
-    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, RunningZero, Scene, SceneError,
-    SearchSpec, TableRange, TableStorage, ThresholdSpec, Zero, MAX_CONTACTS, MISSING_SHARE, PLAUSIBLE_MPA,
+use super::field::{
+    choice, number_of, table, whole, Declared, Field, HasDefault, Kind, Member, Number, Optional, Table,
 };
-use crate::spec::board::{Board, SEARCH_WIDTHS};
-use crate::spec::link_kind::LinkKind;
+use super::reader::Reader;
+use super::{
+    Condition, FixedSpec, HardwareSpec, InputSpec, InverseKind, InverseSpec, MeanKind, Medium, OutputSpec,
+    PartitionSpec, RunningZero, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, Zero, MAX_CONTACTS,
+};
+use crate::spec::board::Board;
 use crate::spec::partition::{subarrays, Case, Grid};
-use crate::spec::scene::MAX_FLOAT_DEGREE;
 use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
-use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
-use toml::{Table, Value};
+use serde_json::{json, Value as Json};
+use std::path::Path;
+use toml::Value;
 
-/// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 13] = [
-    ("", &["name"]),
-    ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
-    ("medium", &["kind", "poisson"]),
-    ("partition", &["case", "cases", "condition", "rows", "cols", "max_contacts"]),
-    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree", "network", "deviations"]),
-    ("inverse", &["kind", "level"]),
-    ("threshold", &["min_force_N"]),
-    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check", "estimator", "search_width", "tables", "source"]),
-    ("hardware.adc_scan", &ADC_SCAN_FIELDS),
-    ("hardware.table_range", &["gain", "thickness_mm", "dead_taxels"]),
-    (
-        "input",
-        &[
-            "full_scale_MPa",
-            "average",
-            "mean",
-            "calibration",
-            "tare",
-            "dead",
-            "unipolar",
-            "gain_spread",
-            "plausible_MPa",
-            "missing_share",
-            "zero",
-            "zero_average",
-            "zero_limit_MPa",
-        ],
-    ),
-    ("output", &["forces"]),
-];
-/// Smallest mu_max above 0: with a smaller one, the powers of μ vanish in the hardware's words.
-const LEAST_MU_MAX: f64 = 0.001;
-/// Largest mu_max, above the friction of any elastic cover.
-const LARGEST_MU_MAX: f64 = 2.0;
 /// Longest scene name in characters; the name becomes part of file names and reports.
 const LONGEST_NAME: usize = 64;
 
@@ -75,24 +36,43 @@ impl Scene {
     /// # Errors
     /// Any [`SceneError`] except those of finding and reading a file.
     pub fn parse(text: &str, origin: &str) -> Result<Scene, SceneError> {
-        let root: Table = toml::from_str(text).map_err(|error| syntax(text, origin, &error))?;
+        let root: toml::Table = toml::from_str(text).map_err(|error| syntax(text, origin, &error))?;
         let reader = Reader::new(origin, &root);
-        reader.check_names(&SCHEMA)?;
+        reader.check_names(Scene::fields())?;
         let sensor = sensor(&reader)?;
-        let input = input(&reader, origin, &sensor)?;
-        Ok(Scene {
+        let input = InputSpec::read(&reader)?;
+        check_input(&reader, &input, &sensor)?;
+        let scene = Scene {
             name: name(&reader, origin)?,
-            medium: medium(&reader)?,
-            partition: partition(&reader, &sensor)?,
-            search: search(&reader, origin)?,
-            inverse: inverse(&reader)?,
-            threshold: threshold(&reader)?,
-            fixed: fixed(&reader)?,
-            hardware: hardware(&reader, origin, &sensor, input.dead.len())?,
+            medium: MediumFields::read(&reader)?.medium(&reader)?,
+            partition: PartitionFields::read(&reader)?.partition(&reader, &sensor)?,
+            search: SearchSpec::read(&reader)?,
+            inverse: InverseSpec::read(&reader)?,
+            threshold: ThresholdSpec::read(&reader)?,
+            fixed: FixedSpec::read(&reader)?,
+            hardware: HardwareSpec::read(&reader)?,
             input,
-            output: output(&reader)?,
+            output: OutputSpec::read(&reader)?,
             sensor,
-        })
+        };
+        check_inverse(&reader, &scene)?;
+        check_table_range(&reader, &scene)?;
+        Ok(scene)
+    }
+
+    /// The declarations of all fields, table by table.
+    pub(super) fn declare(fields: &mut Vec<Declared>) {
+        name_field().declare("name", &["Name in reports and files."], fields);
+        SensorFields::declare(fields);
+        MediumFields::declare(fields);
+        PartitionFields::declare(fields);
+        SearchSpec::declare(fields);
+        InverseSpec::declare(fields);
+        ThresholdSpec::declare(fields);
+        FixedSpec::declare(fields);
+        HardwareSpec::declare(fields);
+        InputSpec::declare(fields);
+        OutputSpec::declare(fields);
     }
 }
 
@@ -109,23 +89,39 @@ fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
     }
 }
 
-fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
-    let stem = || {
-        let stem = std::path::Path::new(origin).file_stem();
-        Value::String(stem.map_or("scene".into(), |stem| stem.to_string_lossy().into_owned()))
-    };
-    let value = reader.value("name").cloned().unwrap_or_else(stem);
-    match value.as_str() {
-        Some(name) if is_name(name) => Ok(name.to_string()),
-        _ => Err(reader.wrong(
-            "name",
-            &value,
-            format!(
-                "1 to {LONGEST_NAME} letters, digits, '-', '_', '.' and spaces, without a dot in front or a space at \
-                 either end"
-            ),
-        )),
+/// A scene's name.
+struct SceneName;
+
+impl Kind for SceneName {
+    type Value = String;
+
+    fn read(&self, value: &Value, _: &str) -> Option<String> {
+        value.as_str().filter(|name| is_name(name)).map(str::to_owned)
     }
+
+    fn allowed(&self) -> String {
+        format!(
+            "1 to {LONGEST_NAME} letters, digits, '-', '_', '.' and spaces, without a dot in front or a space at either end"
+        )
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "type": "string", "minLength": 1, "maxLength": LONGEST_NAME })
+    }
+}
+
+fn name_field() -> Field<SceneName, Optional> {
+    SceneName.optional("the file's name")
+}
+
+/// A name that is not stated is the file's, and as safe.
+fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
+    if let Some(name) = name_field().read(reader, "name")? {
+        return Ok(name);
+    }
+    let stem = Path::new(origin).file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let value = Value::String(stem.into_owned());
+    SceneName.read(&value, origin).ok_or_else(|| reader.wrong("name", &value, SceneName.allowed()))
 }
 
 /// Whether a name is safe in paths, reports and comments of generated files.
@@ -138,364 +134,329 @@ fn is_name(name: &str) -> bool {
         && name.trim() == name
 }
 
+table! {
+    struct SensorFields in "sensor" {
+        /// Rows of taxels.
+        rows: usize = whole::<usize>(MIN_SIDE as u32, MAX_SIDE as u32).required();
+        /// Columns of taxels.
+        cols: usize = whole::<usize>(MIN_SIDE as u32, MAX_SIDE as u32).required();
+        /// Distance in mm of neighbouring columns.
+        pitch_x_mm: f64 = Number::UpTo(MAX_LENGTH_MM).required();
+        /// Distance in mm of neighbouring rows.
+        pitch_y_mm: f64 = Number::UpTo(MAX_LENGTH_MM).required();
+        /// Thickness of the cover in mm: the depth at which stress is read.
+        thickness_mm: f64 = Number::UpTo(MAX_LENGTH_MM).required();
+    }
+}
+
 fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
-    let lines = |path| {
-        let range = MIN_SIDE as i64..=MAX_SIDE as i64;
-        // In range, so that the cast keeps the value.
-        reader.integer(path, range, None).map(|lines| lines as usize)
-    };
-    let length = |path| {
-        let allowed = format!("a number above 0, at most {MAX_LENGTH_MM}");
-        let number = reader.number(path, |mm| mm > 0.0 && mm <= MAX_LENGTH_MM, &allowed)?;
-        number.ok_or_else(|| reader.missing(path, allowed))
-    };
-    let sensor = Sensor {
-        rows: lines("sensor.rows")?,
-        cols: lines("sensor.cols")?,
-        pitch_x_mm: length("sensor.pitch_x_mm")?,
-        pitch_y_mm: length("sensor.pitch_y_mm")?,
-        thickness_mm: length("sensor.thickness_mm")?,
-    };
+    let SensorFields { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm } = SensorFields::read(reader)?;
+    let sensor = Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm };
     // The lengths are in range, each by itself; their ratios are not yet.
-    sensor.check().map(|()| sensor).map_err(|SensorError { field, allowed, .. }| {
-        let path = format!("sensor.{field}");
-        match reader.value(&path) {
-            Some(value) => reader.wrong(&path, value, allowed),
-            None => reader.missing(&path, allowed),
+    match sensor.check() {
+        Ok(()) => Ok(sensor),
+        Err(SensorError { field, allowed, .. }) => Err(reader.wrong_field(&format!("sensor.{field}"), allowed)),
+    }
+}
+
+table! {
+    struct MediumFields in "medium" {
+        /// What lies between surface and taxels: an infinitely deep body, or a layer of the sensor's thickness on a rigid base.
+        kind: Medium = choice(&[
+            ("half-space", Medium::HalfSpace),
+            ("bonded-layer", Medium::BondedLayer { poisson: Medium::ELASTOMER }),
+        ])
+        .or(Medium::HalfSpace);
+        /// Poisson ratio of a bonded layer: of silicone and polyurethane 0.48, of foams 0.3 and less.
+        poisson: Option<f64> = Medium::POISSON.optional("0.48 with `\"bonded-layer\"`");
+    }
+}
+
+impl MediumFields {
+    fn medium(self, reader: &Reader) -> Result<Medium, SceneError> {
+        match (self.kind, self.poisson) {
+            (Medium::HalfSpace, Some(_)) => {
+                Err(reader.wrong_field("medium.poisson", "left out unless medium.kind = \"bonded-layer\""))
+            }
+            (Medium::BondedLayer { .. }, Some(poisson)) => Ok(Medium::BondedLayer { poisson }),
+            (kind, None) => Ok(kind),
         }
-    })
+    }
 }
 
-fn medium(reader: &Reader) -> Result<Medium, SceneError> {
-    let layer = Medium::BondedLayer { poisson: Medium::ELASTOMER };
-    let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
-    let kind = reader.choice("medium.kind", &names)?;
-    let poisson = reader.number("medium.poisson", Medium::allows_poisson, Medium::POISSON_ALLOWED)?;
-    match (kind, poisson, reader.value("medium.poisson")) {
-        (Medium::HalfSpace, _, Some(value)) => {
-            Err(reader.wrong("medium.poisson", value, "left out unless medium.kind = \"bonded-layer\""))
+table! {
+    struct PartitionFields in "partition" {
+        /// Regions with a μ each: the paper's cases, the best of them per frame, or one region for each contact.
+        case: Option<Case> = CaseName.optional("0").hardware("all but `\"contacts\"` with a search").page("partitions");
+        /// Of `"adaptive"`: the cases to build.
+        cases: Option<[bool; 4]> = CaseList.optional("all that fit").page("partitions");
+        /// In place of a case: rows of subarrays.
+        rows: Option<usize> = whole::<usize>(1, MOST_PARTS).optional("that of the case").page("partitions");
+        /// In place of a case: columns of subarrays.
+        cols: Option<usize> = whole::<usize>(1, MOST_PARTS).optional("that of the case").page("partitions");
+        /// When a subarray is searched: where it is loaded, or, as in the paper, where compression and tension both exceed the
+        /// noise.
+        condition: Condition =
+            choice(&[("loaded", Condition::Loaded), ("both-signs", Condition::BothSigns)]).or(Condition::Loaded);
+        /// Of `"contacts"` with a network: how many contacts get a μ; of more those with the largest loads.
+        max_contacts: Option<usize> = whole::<usize>(1, MAX_CONTACTS as u32).optional("8");
+    }
+}
+
+/// Most rows or columns of subarrays.
+const MOST_PARTS: u32 = (MAX_SIDE / MIN_SIDE) as u32;
+
+/// One of the paper's cases, or a rule.
+struct CaseName;
+
+impl Kind for CaseName {
+    type Value = Case;
+
+    fn read(&self, value: &Value, _: &str) -> Option<Case> {
+        match value {
+            Value::Integer(number) => Case::numbered(*number),
+            Value::String(name) if name == "adaptive" => Some(Case::Adaptive),
+            Value::String(name) if name == "contacts" => Some(Case::Contacts),
+            _ => None,
         }
-        (Medium::BondedLayer { .. }, Some(poisson), _) => Ok(Medium::BondedLayer { poisson }),
-        (kind, _, _) => Ok(kind),
+    }
+
+    fn allowed(&self) -> String {
+        "0, 1, 2, 3, \"adaptive\" or \"contacts\"".to_owned()
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "enum": [0, 1, 2, 3, "adaptive", "contacts"] })
     }
 }
 
-fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneError> {
-    let names = [("loaded", Condition::Loaded), ("both-signs", Condition::BothSigns)];
-    let condition = reader.choice("partition.condition", &names)?;
-    let max_contacts = match reader.value("partition.max_contacts") {
-        Some(value) if reader.value("partition.case").and_then(Value::as_str) != Some("contacts") => {
-            return Err(reader.wrong("partition.max_contacts", value, "left out beside any case but \"contacts\""));
+/// Which of the cases 0 to 3 are listed.
+struct CaseList;
+
+impl Kind for CaseList {
+    type Value = [bool; 4];
+
+    fn read(&self, value: &Value, _: &str) -> Option<[bool; 4]> {
+        let mut listed = [false; 4];
+        for entry in value.as_array()? {
+            let listed = listed.get_mut(usize::try_from(entry.as_integer()?).ok()?)?;
+            if std::mem::replace(listed, true) {
+                return None;
+            }
         }
-        _ => reader.integer("partition.max_contacts", 1..=MAX_CONTACTS as i64, Some(MAX_CONTACTS as i64))? as usize,
-    };
-    let own = ["partition.rows", "partition.cols"].map(|path| reader.value(path));
-    if let Some(value) = reader.value("partition.cases") {
-        let listed = Some(listed_cases(reader, value, sensor)?);
-        return Ok(PartitionSpec { case: Case::Adaptive, listed, condition, max_contacts });
+        (listed[0] && listed[1..].contains(&true)).then_some(listed)
     }
-    let (field, case) = match (reader.value("partition.case"), own) {
-        (None, [None, None]) => return Ok(PartitionSpec { condition, ..Default::default() }),
-        (Some(value), [None, None]) => ("partition.case", named_case(reader, value)?),
-        (None, _) => {
-            let parts = |path| {
-                let parts = reader.integer(path, 1..=(MAX_SIDE / MIN_SIDE) as i64, None)?;
-                Ok::<_, SceneError>(parts as usize)
-            };
-            let (rows, cols) = (parts("partition.rows")?, parts("partition.cols")?);
-            ("partition.rows", Case::Grid(Grid { rows, cols }))
+
+    fn allowed(&self) -> String {
+        "a list of 0 and others of 1, 2 and 3, each once".to_owned()
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "type": "array", "items": { "enum": [0, 1, 2, 3] }, "contains": { "const": 0 }, "uniqueItems": true,
+                "minItems": 2 })
+    }
+}
+
+impl PartitionFields {
+    fn partition(self, reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneError> {
+        let PartitionFields { case, cases, rows, cols, condition, max_contacts } = self;
+        if max_contacts.is_some() && case != Some(Case::Contacts) {
+            let allowed = "left out beside any case but \"contacts\"";
+            return Err(reader.wrong_field("partition.max_contacts", allowed));
         }
-        (Some(value), _) => return Err(reader.wrong("partition.case", value, "left out beside rows and cols")),
-    };
-    if case.grid().is_some() {
-        subarrays(case, sensor).map_err(|error| {
-            let value = reader.value(field).unwrap_or(&Value::Boolean(false));
-            reader.wrong(field, value, format!("a partition of {sensor} ({error})"))
-        })?;
-    }
-    Ok(PartitionSpec { case, listed: None, condition, max_contacts })
-}
-
-/// The cases 0 to 3 that `partition.cases` lists.
-fn listed_cases(reader: &Reader, value: &Value, sensor: &Sensor) -> Result<[bool; 4], SceneError> {
-    let path = "partition.cases";
-    let adaptive = |case: &Value| case.as_str() == Some("adaptive");
-    if ["rows", "cols"].iter().any(|field| reader.value(&format!("partition.{field}")).is_some())
-        || reader.value("partition.case").is_some_and(|case| !adaptive(case))
-    {
-        return Err(reader.wrong(path, value, "left out beside rows, cols and any case but \"adaptive\""));
-    }
-    let wrong = || reader.wrong(path, value, "a list of 0 and others of 1, 2 and 3, each once");
-    let mut listed = [false; 4];
-    for entry in value.as_array().ok_or_else(wrong)? {
-        let number = entry.as_integer().filter(|number| (0..4).contains(number)).ok_or_else(wrong)?;
-        // In range, so that the cast keeps the value.
-        if std::mem::replace(&mut listed[number as usize], true) {
-            return Err(wrong());
+        let spec = |case, listed| PartitionSpec {
+            case,
+            listed,
+            condition,
+            max_contacts: max_contacts.unwrap_or(MAX_CONTACTS),
+        };
+        if let Some(listed) = cases {
+            if rows.or(cols).is_some() || case.is_some_and(|case| case != Case::Adaptive) {
+                let allowed = "left out beside rows, cols and any case but \"adaptive\"";
+                return Err(reader.wrong_field("partition.cases", allowed));
+            }
+            let numbered = (0..4).filter(|&number| listed[number as usize]).filter_map(Case::numbered);
+            for case in numbered {
+                subarrays(case, sensor).map_err(|error| {
+                    reader.wrong_field("partition.cases", format!("partitions of {sensor} ({error})"))
+                })?;
+            }
+            return Ok(spec(Case::Adaptive, Some(listed)));
         }
-        let case = Case::numbered(number).ok_or_else(wrong)?;
-        let refused = |error| reader.wrong(path, value, format!("partitions of {sensor} ({error})"));
-        subarrays(case, sensor).map_err(refused)?;
-    }
-    match listed {
-        [true, rest @ ..] if rest.contains(&true) => Ok(listed),
-        _ => Err(wrong()),
-    }
-}
-
-fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {
-    let case = match value {
-        Value::Integer(number) => Case::numbered(*number),
-        Value::String(name) if name == "adaptive" => Some(Case::Adaptive),
-        Value::String(name) if name == "contacts" => Some(Case::Contacts),
-        _ => None,
-    };
-    case.ok_or_else(|| reader.wrong("partition.case", value, "0, 1, 2, 3, \"adaptive\" or \"contacts\""))
-}
-
-fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
-    let default = SearchSpec::default();
-    let allowed = format!("0, or a number from {LEAST_MU_MAX} to {LARGEST_MU_MAX}");
-    let in_range = |mu| mu == 0.0 || (LEAST_MU_MAX..=LARGEST_MU_MAX).contains(&mu);
-    let mu_max = reader.number("search.mu_max", in_range, &allowed)?;
-    let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
-    Ok(SearchSpec {
-        estimator: estimator(reader, "search.estimator", &EstimatorKind::NAMES)?,
-        objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
-        mu_max: mu_max.unwrap_or(default.mu_max),
-        noise_floor_MPa: floor,
-        form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
-        degree: degree(reader)?,
-        network: file(reader, origin, "search.network")?,
-        deviations: file(reader, origin, "search.deviations")?,
-    })
-}
-
-/// A stated estimator. The error for a name of an earlier version says what takes its place.
-fn estimator(
-    reader: &Reader,
-    path: &str,
-    names: &[(&str, EstimatorKind)],
-) -> Result<Option<EstimatorKind>, SceneError> {
-    let Some(value) = reader.value(path) else { return Ok(None) };
-    match FORMER_NAMES.iter().find(|(former, _)| value.as_str() == Some(former)) {
-        Some((_, now)) => Err(reader.wrong(path, value, *now)),
-        None => reader.one_of(path, value, names).map(Some),
-    }
-}
-
-fn degree(reader: &Reader) -> Result<Option<usize>, SceneError> {
-    let in_range =
-        |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|d| (1..=MAX_FLOAT_DEGREE).contains(d));
-    reader.typed("search.degree", in_range, &format!("a whole number from 1 to {MAX_FLOAT_DEGREE}"))
-}
-
-fn inverse(reader: &Reader) -> Result<InverseSpec, SceneError> {
-    let kind = reader.choice("inverse.kind", &InverseKind::NAMES)?;
-    let level = reader.number("inverse.level", |level| level > 0.0 && level < 1.0, "a number above 0 and below 1")?;
-    match (kind, reader.value("inverse.level")) {
-        (InverseKind::Exact, Some(value)) => {
-            Err(reader.wrong("inverse.level", value, "left out with inverse.kind = \"exact\""))
+        let (field, case) = match (case, rows, cols) {
+            (case, None, None) => ("partition.case", case.unwrap_or(Case::WHOLE)),
+            (Some(_), _, _) => return Err(reader.wrong_field("partition.case", "left out beside rows and cols")),
+            (None, Some(rows), Some(cols)) => ("partition.rows", Case::Grid(Grid { rows, cols })),
+            (None, rows, _) => {
+                let missing = if rows.is_some() { "partition.cols" } else { "partition.rows" };
+                return Err(reader.missing(missing, whole::<usize>(1, MOST_PARTS).allowed()));
+            }
+        };
+        if case.grid().is_some() {
+            subarrays(case, sensor)
+                .map_err(|error| reader.wrong_field(field, format!("a partition of {sensor} ({error})")))?;
         }
-        _ => Ok(InverseSpec { kind, level }),
+        Ok(spec(case, None))
     }
-}
-
-fn threshold(reader: &Reader) -> Result<ThresholdSpec, SceneError> {
-    let force = reader.number("threshold.min_force_N", |n| n >= 0.0, "a number of at least 0")?;
-    let default = ThresholdSpec::default().min_force_N;
-    Ok(ThresholdSpec { min_force_N: force.unwrap_or(default) })
-}
-
-fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
-    let default = FixedSpec::default();
-    // All ranges are within u32.
-    let bits = |path, range: RangeInclusive<i64>, default: u32| {
-        let bits = reader.integer(path, range, Some(i64::from(default)))?;
-        Ok::<_, SceneError>(bits as u32)
-    };
-    let coef_bits = bits("fixed.coef_bits", 8..=18, default.coef_bits)?;
-    Ok(FixedSpec {
-        input_bits: bits("fixed.input_bits", 8..=24, default.input_bits)?,
-        data_bits: bits("fixed.data_bits", 12..=18, default.data_bits)?,
-        coef_bits,
-        inverse_bits: bits("fixed.inverse_bits", i64::from(coef_bits)..=32, default.inverse_bits)?,
-        prune_bits: bits("fixed.prune_bits", 8..=31, default.prune_bits)?,
-        lanes: lanes(reader)?,
-    })
-}
-
-fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
-    let read = |value: &Value| value.as_integer().filter(|n| (4..=1024).contains(n) && n % 4 == 0);
-    // In range, so that the cast keeps the value.
-    Ok(reader.typed("fixed.lanes", read, "a multiple of 4 from 4 to 1024")?.map(|lanes| lanes as u32))
-}
-
-fn hardware(reader: &Reader, origin: &str, sensor: &Sensor, dead: usize) -> Result<HardwareSpec, SceneError> {
-    let tables = [("rom", TableStorage::Rom), ("writable", TableStorage::Writable)];
-    let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
-    Ok(HardwareSpec {
-        board: board(reader, origin)?,
-        link: reader.choice("hardware.link", &LinkKind::NAMES)?,
-        coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
-        estimator: estimator(reader, "hardware.estimator", &EstimatorKind::HARDWARE_NAMES)?,
-        search_width: search_width(reader)?,
-        tables: reader.choice("hardware.tables", &tables)?,
-        table_range: table_range(reader, sensor, dead)?,
-        adc_scan: adc_scan(reader, sensor)?,
-    })
-}
-
-/// Without writable tables a range has no meaning. The scene itself, with its number of `dead` taxels, is within it.
-fn table_range(reader: &Reader, sensor: &Sensor, dead: usize) -> Result<TableRange, SceneError> {
-    let table = "hardware.table_range";
-    if let (Some(value), None | Some("rom")) =
-        (reader.value(table), reader.value("hardware.tables").map_or(Some("rom"), Value::as_str))
-    {
-        return Err(reader.wrong(table, value, "left out, or hardware.tables = \"writable\""));
-    }
-    let field = "hardware.table_range.thickness_mm";
-    let thickness_mm = range(reader, field)?;
-    let holds_own = |[least, most]: [f64; 2]| (least..=most).contains(&sensor.thickness_mm);
-    if let (Some(value), Some(false)) = (reader.value(field), thickness_mm.map(holds_own)) {
-        return Err(reader.wrong(
-            field,
-            value,
-            format!("a range that contains sensor.thickness_mm = {}", sensor.thickness_mm),
-        ));
-    }
-    let field = "hardware.table_range.dead_taxels";
-    let most = sensor.taxels() - 1;
-    // In range, so that the cast keeps the value.
-    let dead_taxels = reader.integer(field, 0..=most as i64, Some(0))? as usize;
-    if let Some(value) = reader.value(field).filter(|_| (1..dead).contains(&dead_taxels)) {
-        return Err(reader.wrong(field, value, format!("{dead} to {most}: input.dead has {dead}")));
-    }
-    Ok(TableRange { gain: range(reader, "hardware.table_range.gain")?, thickness_mm, dead_taxels })
-}
-
-/// Two numbers above 0 in ascending order.
-fn range(reader: &Reader, path: &str) -> Result<Option<[f64; 2]>, SceneError> {
-    let read = |value: &Value| {
-        let [least, most] = value.as_array()?.as_slice() else { return None };
-        let range = [number_of(least)?, number_of(most)?];
-        (0.0 < range[0] && range[0] <= range[1]).then_some(range)
-    };
-    reader.typed(path, read, "[least, largest], numbers above 0")
 }
 
 /// A built-in board's name, or the path of a file, which the scene gives relative to its own folder.
-fn board(reader: &Reader, origin: &str) -> Result<String, SceneError> {
-    let Some(value) = reader.value("hardware.board") else { return Ok(HardwareSpec::default().board) };
-    match value.as_str() {
-        Some(name) if Board::names().contains(&name) => Ok(name.to_owned()),
-        Some(file) if Board::is_file(file) => Ok(Path::new(origin).with_file_name(file).display().to_string()),
-        _ => {
-            let names: Vec<_> = Board::names().into_iter().map(|name| format!("{name:?}")).collect();
-            let own = "or the path of a board's file, which ends with .toml";
-            Err(reader.wrong("hardware.board", value, format!("{}, {own}", names.join(" or "))))
+pub(super) struct BoardName;
+
+impl Kind for BoardName {
+    type Value = String;
+
+    fn read(&self, value: &Value, file: &str) -> Option<String> {
+        match value.as_str()? {
+            name if Board::names().contains(&name) => Some(name.to_owned()),
+            path if Board::is_file(path) => Some(Path::new(file).with_file_name(path).display().to_string()),
+            _ => None,
         }
+    }
+
+    fn allowed(&self) -> String {
+        let names: Vec<_> = Board::names().into_iter().map(|name| format!("{name:?}")).collect();
+        format!("{}, or the path of a board's file, which ends with .toml", names.join(" or "))
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "type": "string", "anyOf": [{ "enum": Board::names() }, { "pattern": "\\.toml$" }] })
+    }
+
+    fn show(&self, value: &String) -> Option<Value> {
+        Some(Value::String(value.clone()))
     }
 }
 
-fn search_width(reader: &Reader) -> Result<Option<usize>, SceneError> {
-    let read = |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|width| SEARCH_WIDTHS.contains(width));
-    reader.typed("hardware.search_width", read, "4, 2 or 1")
+fn check_inverse(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
+    if scene.inverse.kind == InverseKind::Exact && scene.inverse.level.is_some() {
+        return Err(reader.wrong_field("inverse.level", "left out with inverse.kind = \"exact\""));
+    }
+    let FixedSpec { coef_bits, inverse_bits, .. } = scene.fixed;
+    if inverse_bits < coef_bits {
+        let allowed = format!("a whole number from {coef_bits} to 32, at least fixed.coef_bits");
+        return Err(reader.wrong_field("fixed.inverse_bits", allowed));
+    }
+    Ok(())
 }
 
-fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
-    let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
-    let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
-    let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
-    let half = |share: f64| (0.0..=0.5).contains(&share);
-    let missing_share = reader.number("input.missing_share", half, "a number from 0 to 0.5")?;
-    // In range, so that the cast keeps the value.
-    let average = reader.integer("input.average", 0..=12, Some(0))? as u32;
-    Ok(InputSpec {
-        full_scale_MPa,
-        average,
-        mean: mean(reader, average)?,
-        calibration: file(reader, origin, "input.calibration")?,
-        tare: file(reader, origin, "input.tare")?,
-        dead: dead(reader, sensor)?,
-        unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
-        gain_spread: spread.unwrap_or(0.0),
-        plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
-        missing_share: missing_share.unwrap_or(MISSING_SHARE),
-        zero: zero(reader, full_scale_MPa)?,
-    })
+/// Without writable tables a range has no meaning. The scene itself, with its dead taxels, is within it.
+fn check_table_range(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
+    let Scene { sensor, hardware, input, .. } = scene;
+    let TableRange { thickness_mm, dead_taxels, .. } = hardware.table_range;
+    if !hardware.has_writable_tables() && reader.value("hardware.table_range").is_some() {
+        return Err(reader.wrong_field("hardware.table_range", "left out, or hardware.tables = \"writable\""));
+    }
+    if thickness_mm.is_some_and(|[least, most]| !(least..=most).contains(&sensor.thickness_mm)) {
+        let allowed = format!("a range that contains sensor.thickness_mm = {}", sensor.thickness_mm);
+        return Err(reader.wrong_field("hardware.table_range.thickness_mm", allowed));
+    }
+    let (dead, most) = (input.dead.len(), sensor.taxels() - 1);
+    if dead_taxels > most || (1..dead).contains(&dead_taxels) {
+        let allowed = format!("0, or a whole number from {dead} to {most}: input.dead has {dead}");
+        return Err(reader.wrong_field("hardware.table_range.dead_taxels", allowed));
+    }
+    Ok(())
 }
 
-/// A fixed zero has neither rate nor limit. The limit of a running one is beyond the noise, so that noise is no touch.
-fn zero(reader: &Reader, full_scale_MPa: Option<f64>) -> Result<Zero, SceneError> {
-    let (path, limit) = ("input.zero", "input.zero_limit_MPa");
-    let average = "input.zero_average";
-    if !reader.choice(path, &[("fixed", false), ("running", true)])? {
-        return match [average, limit].into_iter().find_map(|field| Some((field, reader.value(field)?))) {
-            Some((field, value)) => Err(reader.wrong(field, value, "left out, or input.zero = \"running\"")),
-            None => Ok(Zero::Fixed),
+/// Taxels, [row, col] each; sorted, without duplicates.
+pub(super) struct DeadTaxels;
+
+impl Kind for DeadTaxels {
+    type Value = Vec<[usize; 2]>;
+
+    fn read(&self, value: &Value, _: &str) -> Option<Vec<[usize; 2]>> {
+        let index = |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|index| *index < MAX_SIDE);
+        let taxel = |value: &Value| match value.as_array()?.as_slice() {
+            [row, col] => Some([index(row)?, index(col)?]),
+            _ => None,
         };
+        let mut taxels = value.as_array()?.iter().map(taxel).collect::<Option<Vec<_>>>()?;
+        taxels.sort_unstable();
+        taxels.dedup();
+        Some(taxels)
     }
-    // In range, so that the cast keeps the value.
-    let average = reader.integer(average, 1..=16, Some(i64::from(RunningZero::AVERAGE)))? as u32;
-    let noise_MPa = reader.value("search.noise_floor_MPa").and_then(number_of).unwrap_or(0.0);
-    let least = RunningZero::LEAST_OVER_NOISE * noise_MPa;
-    let in_range = |mpa: f64| mpa > 0.0 && mpa >= least && full_scale_MPa.is_none_or(|most| mpa <= most);
-    let allowed = "a number above 0, at least 5 times search.noise_floor_MPa, at most input.full_scale_MPa";
-    let stated = reader.number(limit, in_range, allowed)?;
-    let by_full_scale = full_scale_MPa.map(|most| RunningZero::LIMIT_SHARE * most).filter(|mpa| in_range(*mpa));
-    let limit_MPa = stated.or(by_full_scale).ok_or_else(|| reader.missing(limit, allowed))?;
-    Ok(Zero::Running(RunningZero { average, limit_MPa }))
-}
 
-/// A sliding mean of one frame is no mean.
-fn mean(reader: &Reader, average: u32) -> Result<MeanKind, SceneError> {
-    let path = "input.mean";
-    let kind = reader.choice(path, &[("block", MeanKind::Block), ("sliding", MeanKind::Sliding)])?;
-    match (reader.value(path), average) {
-        (Some(value), 0) if kind == MeanKind::Sliding => {
-            Err(reader.wrong(path, value, "\"block\", or input.average from 1 to 12"))
-        }
-        _ => Ok(kind),
+    fn allowed(&self) -> String {
+        "a list of [row, col], from 0".to_owned()
+    }
+
+    fn schema(&self) -> Json {
+        let index = json!({ "type": "integer", "minimum": 0, "maximum": MAX_SIDE - 1 });
+        json!({ "type": "array", "items": { "type": "array", "items": index, "minItems": 2, "maxItems": 2 } })
+    }
+
+    fn show(&self, value: &Vec<[usize; 2]>) -> Option<Value> {
+        value.is_empty().then(|| Value::Array(Vec::new()))
     }
 }
 
-/// A path relative to the folder of the scene's file.
-fn file(reader: &Reader, origin: &str, field: &str) -> Result<Option<PathBuf>, SceneError> {
-    match reader.value(field) {
-        None => Ok(None),
-        Some(Value::String(name)) if !name.is_empty() => Ok(Some(Path::new(origin).with_file_name(name))),
-        Some(value) => Err(reader.wrong(field, value, "the name of a file")),
-    }
-}
-
-fn dead(reader: &Reader, sensor: &Sensor) -> Result<Vec<[usize; 2]>, SceneError> {
-    let path = "input.dead";
-    let Some(value) = reader.value(path) else {
-        return Ok(Vec::new());
-    };
+/// Dead taxels are of the array, and fewer than all; a sliding mean of one frame is no mean.
+fn check_input(reader: &Reader, input: &InputSpec, sensor: &Sensor) -> Result<(), SceneError> {
     let (rows, cols) = (sensor.rows, sensor.cols);
-    let wrong = |value| {
+    if input.dead.iter().any(|&[row, col]| row >= rows || col >= cols) || input.dead.len() == sensor.taxels() {
         let ranges = format!("row 0 to {}, col 0 to {}", rows - 1, cols - 1);
-        reader.wrong(path, value, format!("a list of [row, col], {ranges}, fewer than all taxels"))
-    };
-    let taxel = |value: &Value| {
-        let [row, col] = value.as_array()?.as_slice() else { return None };
-        let index =
-            |value: &Value, count: usize| usize::try_from(value.as_integer()?).ok().filter(|index| *index < count);
-        Some([index(row, rows)?, index(col, cols)?])
-    };
-    let list = value.as_array().ok_or_else(|| wrong(value))?;
-    let mut dead = list.iter().map(|value| taxel(value).ok_or_else(|| wrong(value))).collect::<Result<Vec<_>, _>>()?;
-    dead.sort_unstable();
-    dead.dedup();
-    if dead.len() == sensor.taxels() {
-        return Err(wrong(value));
+        return Err(reader.wrong_field("input.dead", format!("a list of [row, col], {ranges}, fewer than all taxels")));
     }
-    Ok(dead)
+    if input.mean == MeanKind::Sliding && input.average == 0 {
+        return Err(reader.wrong_field("input.mean", "\"block\", or input.average from 1 to 12"));
+    }
+    Ok(())
 }
 
-fn output(reader: &Reader) -> Result<OutputSpec, SceneError> {
-    let names = [("taxels", ForceOutput::Taxels), ("resultants", ForceOutput::Resultants)];
-    Ok(OutputSpec { forces: reader.choice("output.forces", &names)? })
+table! {
+    struct ZeroTable in "input" {
+        /// The zero of each taxel is that of tare or table, or follows the readings while nothing presses; give all frames since the
+        /// start.
+        zero: bool = choice(&[("fixed", false), ("running", true)])
+            .or(false)
+            .hardware("yes, without a link")
+            .page("architecture/prepare");
+        /// A running zero takes 2^−zero_average of what a reading is off.
+        zero_average: Option<u32> = whole::<u32>(1, 16).optional("10");
+        /// How far in MPa a running zero may go, and what is no touch: more than the zeros drift, less than the lightest press; at
+        /// least 5 times the noise floor, at most the full scale.
+        zero_limit_MPa: Option<f64> = Number::Positive.optional("1/64 of the full scale");
+    }
+}
+
+/// The fields of the zero of each taxel. A fixed one has neither rate nor limit. The limit of a running one is beyond the noise,
+/// so that noise is no touch.
+pub(super) struct ZeroFields;
+
+impl Member for ZeroFields {
+    type Value = Zero;
+
+    fn read(&self, reader: &Reader, _: &str) -> Result<Zero, SceneError> {
+        let ZeroTable { zero: runs, zero_average, zero_limit_MPa } = ZeroTable::read(reader)?;
+        let limit = "input.zero_limit_MPa";
+        if !runs {
+            let stated = [("input.zero_average", zero_average.is_some()), (limit, zero_limit_MPa.is_some())];
+            return match stated.into_iter().find(|(_, stated)| *stated) {
+                Some((field, _)) => Err(reader.wrong_field(field, "left out, or input.zero = \"running\"")),
+                None => Ok(Zero::Fixed),
+            };
+        }
+        let number = |path| reader.value(path).and_then(number_of);
+        let full_scale_MPa = number("input.full_scale_MPa");
+        let least = RunningZero::LEAST_OVER_NOISE * number("search.noise_floor_MPa").unwrap_or(0.0);
+        let in_range = |mpa: &f64| *mpa >= least && full_scale_MPa.is_none_or(|most| *mpa <= most);
+        let allowed = "a number above 0, at least 5 times search.noise_floor_MPa, at most input.full_scale_MPa";
+        if zero_limit_MPa.is_some_and(|mpa| !in_range(&mpa)) {
+            return Err(reader.wrong_field(limit, allowed));
+        }
+        let by_full_scale = full_scale_MPa.map(|most| RunningZero::LIMIT_SHARE * most).filter(in_range);
+        let limit_MPa = zero_limit_MPa.or(by_full_scale).ok_or_else(|| reader.missing(limit, allowed))?;
+        Ok(Zero::Running(RunningZero { average: zero_average.unwrap_or(RunningZero::AVERAGE), limit_MPa }))
+    }
+
+    fn declare(&self, _: &str, _: &[&str], fields: &mut Vec<Declared>) {
+        ZeroTable::declare(fields);
+    }
+}
+
+impl HasDefault for ZeroFields {
+    fn default_value(&self) -> Zero {
+        Zero::Fixed
+    }
 }

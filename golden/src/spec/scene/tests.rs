@@ -138,7 +138,7 @@ fn unknown_fields_name_the_nearest() {
         ("[input]\nfull_scale = 1", "unknown field input.full_scale; the nearest valid field is input.full_scale_MPa"),
         // As near to pitch_x_mm as to pitch_y_mm.
         ("[threshold]\npitch_mm = 1", "unknown field threshold.pitch_mm; [threshold] has min_force_N"),
-        ("[taxel]\nrows = 1", "unknown field taxel; a scene has name, [sensor], [medium], [partition], [search], [inverse], [threshold], [fixed], [hardware], [hardware.adc_scan], [hardware.table_range], [input], [output]"),
+        ("[taxel]\nrows = 1", "unknown field taxel; a scene has name, [sensor], [medium], [partition], [search], [inverse], [threshold], [fixed], [hardware], [hardware.table_range], [hardware.adc_scan], [input], [output]"),
     ];
     for (more, wanted) in cases {
         assert_eq!(message(more), format!("my.toml: {wanted}"));
