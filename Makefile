@@ -20,7 +20,7 @@ VENV       = $(BUILD)/python
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick python buses c docs bench build cosim bitstream gateware report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python buses c docs bench build cosim bitstream gateware report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -36,37 +36,43 @@ tools: setup ## install place and route: iCE40 from Debian, ECP5 in the version 
 	@$(TOOLS)/bin/pip install -q --disable-pip-version-check -r constraints/tools.txt
 
 program: setup
-	$(CARGO) build --release --bins
+	$(CARGO) build --locked --release --bins
 
 run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit quick python buses docs ## run all checks, as .ci/run does
+test: setup fmt spelling clippy unit quick python buses docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
 	$(CARGO) fmt --all --check
 
+spelling: ## check the spelling of code and pages
+	@echo '== spelling'
+	python3 -m venv $(BUILD)/spelling
+	$(BUILD)/spelling/bin/pip install -q --disable-pip-version-check -r tests/spelling.txt
+	$(BUILD)/spelling/bin/typos
+
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
-	$(CARGO) clippy --workspace --all-targets -- -D warnings
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 
 unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
-	$(CARGO) test --workspace --no-fail-fast
+	$(CARGO) test --locked --workspace --no-fail-fast
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
-	$(CARGO) test -p dermis-tests --test integration -- words:: lint::
+	$(CARGO) test --locked -p dermis-tests --test integration -- words:: lint::
 
 quick: setup ## write the short report to build/report-quick
 	@echo '== quick report'
-	$(CARGO) run --quiet --bin dermis -- --build-dir $(BUILD) report --quick --out $(BUILD)/report-quick
+	$(CARGO) run --locked --quiet --bin dermis -- --build-dir $(BUILD) report --quick --out $(BUILD)/report-quick
 
 # The profile of the other tests, whose compiled crates are used again; `pip install ./python` alone takes release.
 python: setup ## build the Python package, install it into a new environment, build/python, and test it there
 	@echo '== python'
-	$(CARGO) build --quiet --bin dermis
+	$(CARGO) build --locked --quiet --bin dermis
 	python3 -m venv --clear $(VENV)
 	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
@@ -74,26 +80,26 @@ python: setup ## build the Python package, install it into a new environment, bu
 
 buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
-	$(CARGO) build --quiet --bin dermis
+	$(CARGO) build --locked --quiet --bin dermis
 	python3 -m venv --clear $(BUILD)/soc-tools
 	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt './python/litex[gateware]'
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
 	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
-	$(CARGO) build --release --package dermis-c
-	$(CARGO) test --release --package dermis-c
+	$(CARGO) build --locked --release --package dermis-c
+	$(CARGO) test --locked --release --package dermis-c
 
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps
 
 bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, and the drawing of the live page
-	$(CARGO) bench --package dermis-golden
-	$(CARGO) bench --package dermis-sim
+	$(CARGO) bench --locked --package dermis-golden
+	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
 	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
-	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --package dermis-python
+	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --locked --package dermis-python
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)
@@ -122,20 +128,20 @@ guide: program ## write the tables and pictures of README and guide (20 minutes)
 	$(DERMIS) --build-dir $(BUILD) guide --pictures
 
 netlist: setup ## co-simulate the synthesised netlist of a small scene with search (several minutes)
-	$(CARGO) test --release -p dermis-tests --test integration -- netlist:: --include-ignored
+	$(CARGO) test --locked --release -p dermis-tests --test integration -- netlist:: --include-ignored
 
 fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
 	@echo '== fuzz'
-	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
+	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --locked --release -p dermis-tests --test fuzz -- --nocapture
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
-	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
+	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release -p dermis-tests --test integration -- streams:: --nocapture
 
 # Without examples in documentation, of which --include-ignored would run those that are no programs. The Python module is left
 # out by name, since --lib links a test program of it even with `test = false`.
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out (70 minutes)
 	@echo '== all tests'
-	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release --workspace --exclude dermis-python --lib --bins --examples --tests --no-fail-fast -- --include-ignored
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release --workspace --exclude dermis-python --lib --bins --examples --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check

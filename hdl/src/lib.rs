@@ -19,7 +19,6 @@
 //!   second description, and nothing reads Verilog back.
 //! - Names, directions, widths and meanings of ports in Verilog and guide come from their declaration ([`describe`]).
 //! - [`language::RustHdl`] carries any block in a design of rust-hdl, with its ports as signals (`examples/rust_hdl.rs`).
-#![deny(missing_docs)]
 
 pub mod bus;
 pub mod describe;

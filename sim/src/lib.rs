@@ -21,7 +21,6 @@
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`mod@run_log`] | counts of long test runs, saved for the report |
-#![deny(missing_docs)]
 // Field names end in their SI unit: `full_scale_MPa`.
 #![allow(non_snake_case)]
 

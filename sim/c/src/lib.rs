@@ -16,8 +16,11 @@
 //! | [`result`] | results: forces, contacts with error bars, flags |
 //! | [`mod@stream`] | frames in the order of time |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
-#![deny(missing_docs)]
 // Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
+#![allow(
+    unsafe_code,
+    reason = "the boundary to C: pointers are checked for null, their targets are the caller's promise"
+)]
 #![allow(non_snake_case)]
 // Types have the names that C gives them.
 #![allow(non_camel_case_types)]

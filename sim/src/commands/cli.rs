@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{anyhow, Result};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::cache;
 use dermis_golden::spec::scene::Scene;
@@ -128,6 +128,22 @@ enum Command {
     Study(super::study::Arguments),
     /// Write the tables and pictures of README.md and the guide with the commands named there, or report stale ones.
     Guide(super::guide_pages::Arguments),
+    /// Print the completions of a shell for this command line.
+    #[command(after_help = "Examples:
+  dermis completions bash >~/.local/share/bash-completion/completions/dermis
+  dermis completions fish >~/.config/fish/completions/dermis.fish
+  dermis completions zsh >~/.zfunc/_dermis           in a folder of fpath")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Write manual pages, one for the program and one for each command.
+    #[command(after_help = "Example:
+  dermis man ~/.local/share/man/man1                 then `man dermis`, `man dermis-reconstruct`")]
+    Man {
+        /// Folder to write to; it is made.
+        folder: PathBuf,
+    },
     /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
     Table(super::table::Arguments),
     /// Train a network for the estimators that have one on frames drawn from the scene's own physics.
@@ -226,6 +242,17 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stress(arguments) => super::stress::run(arguments, build_dir),
         Command::Study(arguments) => Ok((super::study::run(arguments)?, true)),
         Command::Guide(arguments) => super::guide_pages::run(arguments, build_dir),
+        Command::Completions { shell } => {
+            let mut text = Vec::new();
+            clap_complete::generate(*shell, &mut Arguments::command(), "dermis", &mut text);
+            Ok((String::from_utf8(text)?, true))
+        }
+        Command::Man { folder } => {
+            let file = |error| anyhow!("{}: {error}", folder.display());
+            std::fs::create_dir_all(folder).map_err(file)?;
+            clap_mangen::generate_to(Arguments::command(), folder).map_err(file)?;
+            Ok((format!("{}\n", folder.display()), true))
+        }
         Command::Table(arguments) => super::table::run(arguments, build_dir),
         Command::Train(arguments) => super::train::run(arguments),
         Command::Deviations(arguments) => super::deviations::run(arguments),

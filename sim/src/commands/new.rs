@@ -212,13 +212,14 @@ fn line(path: &str, value: Option<String>) -> Result<String> {
     let known = Scene::fields().iter().find(|field| field.path == path);
     let field = known.ok_or_else(|| anyhow!("a scene has no field {path}"))?;
     let name = path.rsplit_once('.').map_or(path, |(_, name)| name);
-    let without = field.without.as_deref().unwrap_or_default();
-    let setting = match (value, field.schema.get("default")) {
-        (Some(value), _) => format!("{name} = {value}"),
-        (None, Some(default)) => format!("# {name} = {default}"),
-        (None, None) => format!("# {name} =    # without it: {without}"),
+    let (setting, note) = match (value, field.schema.get("default"), &field.without) {
+        (Some(value), ..) => (format!("{name} = {value}"), String::new()),
+        (None, Some(default), _) => (format!("# {name} = {default}"), String::new()),
+        (None, None, without) => {
+            (format!("# {name} ="), format!(" Without it: {}.", without.as_deref().unwrap_or("an error")))
+        }
     };
-    Ok(format!("{setting:<36}  # {}", field.meaning))
+    Ok(format!("{setting:<22} # {}{note}", field.meaning))
 }
 
 /// The fields of the medium.

@@ -8,6 +8,7 @@
 //! The cache key is a fingerprint of all Verilog, waiver and shim texts, of Verilator's version and of how much the
 //! compiler optimises; memory files are read at start and need no rebuild. Libraries are built in a staging folder and
 //! renamed when complete (`artifact_cache`).
+#![allow(unsafe_code, reason = "calls the functions of a shared library that Verilator's C++ was compiled into")]
 
 use std::ffi::{c_char, c_void, CString};
 use std::fs;

@@ -1,4 +1,5 @@
 //! A counting allocator, to detect input that allocates too much memory. Each thread has its own count.
+#![allow(unsafe_code, reason = "an allocator that counts")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

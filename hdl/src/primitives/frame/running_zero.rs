@@ -66,7 +66,7 @@ pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat
     k.when(moves & offered & end, || first.set(k.constant(1, 0)));
     let taxels_held = held("taxel_1", taxel);
     let ends = held("end_1", end);
-    let earlies = held("early_1", early);
+    let early_held = held("early_1", early);
     let firsts = held("first_1", *first);
     let dead = (!zero.dead.is_empty()).then(|| {
         let table: Vec<u64> = (0..1 << taxel.bits()).map(|at| u64::from(zero.dead.contains(&at))).collect();
@@ -84,8 +84,8 @@ pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat
     let silent = gain.map(|gain| gain.unsigned().is(0));
     let dead = dead.into_iter().chain(silent).reduce(|dead, silent| dead | silent).map(|dead| held("dead_2", dead));
     let gain = gain.map(|gain| held("gain_2", gain));
-    let [taxels_held, ends, earlies] =
-        [("taxel_2", taxels_held), ("end_2", ends), ("early_2", earlies)].map(|(name, value)| held(name, value));
+    let [taxels_held, ends, early_held] =
+        [("taxel_2", taxels_held), ("end_2", ends), ("early_2", early_held)].map(|(name, value)| held(name, value));
 
     let average = zero.average as usize;
     let [rest_stay, rest_go] =
@@ -94,7 +94,7 @@ pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat
     let dead = dead.map(|dead| held("dead_3", dead));
     let gain = gain.map(|gain| held("gain_3", gain));
     let [taxel, end, early] =
-        [("taxel_3", taxels_held), ("end_3", ends), ("early_3", earlies)].map(|(name, value)| held(name, value));
+        [("taxel_3", taxels_held), ("end_3", ends), ("early_3", early_held)].map(|(name, value)| held(name, value));
 
     let state = |name: &str| k.state(name, bit, rst, 0);
     let rests = state("rests").comment("Nothing pressed in the frame before.");
