@@ -90,12 +90,6 @@ fn error(kernel: &Kernel) -> String {
 }
 
 #[test]
-fn docs_of_ports_have_no_links() {
-    let doc = [" As `a` of", " [`Ram`](super::Ram), or [`b`](B); then."];
-    assert_eq!(text(&doc), "As `a` of `Ram`, or `b`; then.");
-}
-
-#[test]
 fn a_port_of_width_0_is_left_out() {
     let ports = |stepped| {
         let kernel = kernel_of(&Count { bits: 3, stepped, way: Way::Right });
