@@ -170,8 +170,12 @@ impl Influence {
 
     /// The matrices of an array on any medium; the mirror symmetry of the array holds to the bit.
     pub fn through(sensor: &Sensor, medium: Medium) -> Influence {
+        Influence::of(sensor, &table(sensor, medium))
+    }
+
+    /// The matrices of an array with this [`table`].
+    pub(crate) fn of(sensor: &Sensor, table: &[[f64; 3]]) -> Influence {
         let Sensor { rows, cols, .. } = *sensor;
-        let table = table(sensor, medium);
         let fill = |axis: usize, odd_x: bool, odd_y: bool| {
             Mat::from_fn(rows * cols, rows * cols, |taxel, force| {
                 let (r, c) = (taxel / cols, taxel % cols);

@@ -27,7 +27,7 @@ mod masked;
 #[cfg(test)]
 mod tests;
 
-use crate::physics::influence::Influence;
+use crate::physics::influence::{table, Influence};
 use crate::physics::symmetry::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::spec::scene::{Inversion, Medium};
 use crate::spec::sensor::{Sensor, SensorError};
@@ -93,13 +93,15 @@ pub enum MatricesError {
     /// A size of the sensor is out of range.
     #[error("sensor.{0}")]
     Sensor(#[from] SensorError),
-    /// The subarray has more than [`MAX_TAXELS`] taxels.
-    #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {MAX_TAXELS}; cut it by [partition]")]
+    /// The subarray has more taxels than the estimator takes: a search [`MAX_TAXELS`].
+    #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {most}; cut it by [partition]")]
     TooLarge {
         /// The subarray as a sensor.
         sensor: Box<Sensor>,
         /// Its number of taxels.
         taxels: usize,
+        /// The largest number.
+        most: usize,
     },
     /// The lengths are so far apart that the influence of a cell is zero or not a finite number.
     #[error("{sensor}: the influence of a cell on its taxel is not representable")]
@@ -140,6 +142,23 @@ pub enum MatricesError {
     },
 }
 
+/// The [`table`] of an array of at most `most` taxels whose influence under a medium is representable.
+///
+/// # Errors
+/// [`MatricesError::Sensor`], [`MatricesError::TooLarge`], [`MatricesError::NotFinite`].
+pub(crate) fn influence_table(sensor: &Sensor, medium: Medium, most: usize) -> Result<Vec<[f64; 3]>, MatricesError> {
+    sensor.check()?;
+    let (boxed, taxels) = (|| Box::new(sensor.clone()), sensor.taxels());
+    if taxels > most {
+        return Err(MatricesError::TooLarge { sensor: boxed(), taxels, most });
+    }
+    let table = table(sensor, medium);
+    match table[0][2] > 0.0 && table.iter().flatten().all(|c| c.is_finite()) {
+        true => Ok(table),
+        false => Err(MatricesError::NotFinite { sensor: boxed() }),
+    }
+}
+
 impl Matrices {
     /// The matrices without a degree, which is 0; [`Matrices::of`] gives them the degree that the series needs.
     pub(crate) fn solved(
@@ -148,25 +167,14 @@ impl Matrices {
         mu_max: f64,
         inversion: Inversion,
     ) -> Result<Matrices, MatricesError> {
-        sensor.check()?;
-        let boxed = || Box::new(sensor.clone());
-        let n = sensor.taxels();
-        if n > MAX_TAXELS {
-            let sensor = boxed();
-            return Err(MatricesError::TooLarge { sensor, taxels: n });
-        }
-        let Influence { cx, cy, cz } = Influence::through(sensor, medium);
-        let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
-        if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
-            return Err(MatricesError::NotFinite { sensor: boxed() });
-        }
+        let Influence { cx, cy, cz } = Influence::of(sensor, &influence_table(sensor, medium, MAX_TAXELS)?);
         let basis = Basis::parities(sensor.rows, sensor.cols);
         let file = CacheFile::of(sensor, medium, mu_max, inversion);
         let cached = match file.as_ref().and_then(CacheFile::read) {
             Some(cached) => cached,
             None => {
                 let cached = compute(&basis, [&cx, &cy, &cz], mu_max, inversion)
-                    .ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
+                    .ok_or_else(|| MatricesError::NotConverged { sensor: Box::new(sensor.clone()) })?;
                 file.iter().for_each(|file| file.write(&cached));
                 cached
             }
