@@ -27,7 +27,7 @@ mod masked;
 #[cfg(test)]
 mod tests;
 
-use crate::physics::influence::{table, Influence};
+use crate::physics::influence::Influence;
 use crate::physics::symmetry::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::spec::scene::{Inversion, Medium};
 use crate::spec::sensor::{Sensor, SensorError};
@@ -142,20 +142,16 @@ pub enum MatricesError {
     },
 }
 
-/// The [`table`] of an array of at most `most` taxels whose influence under a medium is representable.
+/// Refuses an array of sizes out of range, or of more than `most` taxels.
 ///
 /// # Errors
-/// [`MatricesError::Sensor`], [`MatricesError::TooLarge`], [`MatricesError::NotFinite`].
-pub(crate) fn influence_table(sensor: &Sensor, medium: Medium, most: usize) -> Result<Vec<[f64; 3]>, MatricesError> {
+/// [`MatricesError::Sensor`], [`MatricesError::TooLarge`].
+pub(crate) fn check_size(sensor: &Sensor, most: usize) -> Result<(), MatricesError> {
     sensor.check()?;
-    let (boxed, taxels) = (|| Box::new(sensor.clone()), sensor.taxels());
-    if taxels > most {
-        return Err(MatricesError::TooLarge { sensor: boxed(), taxels, most });
-    }
-    let table = table(sensor, medium);
-    match table[0][2] > 0.0 && table.iter().flatten().all(|c| c.is_finite()) {
-        true => Ok(table),
-        false => Err(MatricesError::NotFinite { sensor: boxed() }),
+    let taxels = sensor.taxels();
+    match taxels > most {
+        true => Err(MatricesError::TooLarge { sensor: Box::new(sensor.clone()), taxels, most }),
+        false => Ok(()),
     }
 }
 
@@ -167,14 +163,20 @@ impl Matrices {
         mu_max: f64,
         inversion: Inversion,
     ) -> Result<Matrices, MatricesError> {
-        let Influence { cx, cy, cz } = Influence::of(sensor, &influence_table(sensor, medium, MAX_TAXELS)?);
+        check_size(sensor, MAX_TAXELS)?;
+        let boxed = || Box::new(sensor.clone());
+        let Influence { cx, cy, cz } = Influence::through(sensor, medium);
+        let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
+        if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
+            return Err(MatricesError::NotFinite { sensor: boxed() });
+        }
         let basis = Basis::parities(sensor.rows, sensor.cols);
         let file = CacheFile::of(sensor, medium, mu_max, inversion);
         let cached = match file.as_ref().and_then(CacheFile::read) {
             Some(cached) => cached,
             None => {
                 let cached = compute(&basis, [&cx, &cy, &cz], mu_max, inversion)
-                    .ok_or_else(|| MatricesError::NotConverged { sensor: Box::new(sensor.clone()) })?;
+                    .ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
                 file.iter().for_each(|file| file.write(&cached));
                 cached
             }

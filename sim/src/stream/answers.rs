@@ -572,7 +572,7 @@ mod tests {
         fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
             let bytes = self.0.read(buffer)?;
             if bytes == 0 {
-                // Nobody waits for it a second time.
+                // The receiver takes only the first.
                 let _ = self.1.send(());
             }
             Ok(bytes)

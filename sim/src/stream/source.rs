@@ -187,6 +187,9 @@ mod tests {
         assert_eq!(source("udp:[::1]:9000"), Ok(Source::Udp("[::1]:9000".into())));
         assert_eq!(source("udp:9000"), Err("udp:9000: wanted udp:HOST:PORT".into()));
         assert_eq!(source("/dev/ttyUSB0"), Ok(Source::Path("/dev/ttyUSB0".into())));
+        // A character device and datagrams do not wait.
+        let loses = ["-", "udp:9000:1", "/dev/null", "/"].map(|text| source(text).unwrap().loses_lines());
+        assert_eq!(loses, [false, true, true, false]);
         let absent = source("absent.csv").unwrap().open(Some(9600)).err().unwrap().to_string();
         assert!(absent.starts_with("absent.csv: No such file"), "{absent}");
     }

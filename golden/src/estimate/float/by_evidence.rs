@@ -10,7 +10,7 @@ use super::forces::threshold;
 use crate::data::input::Input;
 use crate::estimate::evidence::{Evidence, LastFit};
 use crate::estimate::learned::Learned;
-use crate::physics::matrices::{influence_table, MatricesError};
+use crate::physics::matrices::{check_size, MatricesError};
 use crate::result::checks::{largest_spread, relative_spread};
 use crate::result::flags::Flag;
 use crate::result::reconstruct::{ContactEstimate, Reconstruction};
@@ -27,12 +27,15 @@ struct ByEvidence(Evidence);
 /// # Errors
 /// As [`Learned::of_scene`], where the estimator has a network; [`MatricesError`] for an array that has no influence or no reading.
 pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, GoldenError> {
-    influence_table(&scene.sensor, scene.medium, MOST_TAXELS)?;
+    let sensor = || Box::new(scene.sensor.clone());
+    check_size(&scene.sensor, MOST_TAXELS)?;
     if !scene.input.alive(&scene.sensor).contains(&true) {
-        let (sensor, dead) = (Box::new(scene.sensor.clone()), scene.input.dead.len());
-        return Err(MatricesError::TooManyDead { sensor, dead }.into());
+        return Err(MatricesError::TooManyDead { sensor: sensor(), dead: scene.input.dead.len() }.into());
     }
     let mut evidence = Evidence::new(scene);
+    if !evidence.is_representable() {
+        return Err(MatricesError::NotFinite { sensor: sensor() }.into());
+    }
     if kind.has_network() {
         evidence = evidence.advised_by(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
     }
