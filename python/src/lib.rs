@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! array (rows, cols) or (time, rows, cols) ── frame ── Golden, Model ── reconstruction ── arrays, contacts, flags
+//!             frame by frame ── tracker ───────────────────┘
 //! ```
 //! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says
 //! is what the program `dermis` says of the same input.
@@ -15,6 +16,7 @@
 //! | [`contact`] | contacts as dictionaries |
 //! | [`reconstruction`] | results |
 //! | [`scene`] | scenes, and what is computed of them |
+//! | [`tracker`] | frames in the order of time, one by one |
 //! | [`trace`] | the stages of a frame, integers beside floating point |
 //! | [`noise`] | errors under noise |
 //! | [`board`] | a board on a serial port |
@@ -34,6 +36,7 @@ pub mod noise;
 pub mod reconstruction;
 pub mod scene;
 pub mod trace;
+pub mod tracker;
 
 /// What Python imports as `dermis._dermis`; the package `dermis` hands it on.
 #[pyo3::pymodule]
@@ -52,4 +55,6 @@ mod _dermis {
     use crate::scene::Scene;
     #[pymodule_export]
     use crate::trace::Stage;
+    #[pymodule_export]
+    use crate::tracker::Tracker;
 }

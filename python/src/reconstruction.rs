@@ -149,6 +149,12 @@ impl Reconstruction {
         array(py, self.result.resultant_N)
     }
 
+    /// Standard deviation of resultant_N in N, shape (3,); None where the estimator gives none.
+    #[getter]
+    fn sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.result.sigma_N().map(|sigma| array(py, sigma))
+    }
+
     /// Moment of the forces about the array's centre in N mm, shape (3,): about x, y, and the normal into the sensor; None where a
     /// device sends sums of subarrays.
     #[getter]
@@ -199,7 +205,7 @@ impl Reconstruction {
     }
 }
 
-/// The results of frames in the order of time.
+/// The results of frames, in their order.
 #[pyclass(frozen, module = "dermis")]
 pub struct Reconstructions {
     results: Vec<Arc<Solved>>,
@@ -254,6 +260,14 @@ impl Reconstructions {
     fn resultant_N<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let forces: Vec<f64> = self.results.iter().flat_map(|result| result.resultant_N).collect();
         grid(py, &forces, [self.results.len(), 3])
+    }
+
+    /// Standard deviation of resultant_N in N, shape (time, 3); NaN in the results that have none.
+    #[getter]
+    fn sigma_N<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let own = |result: &Arc<Solved>| result.sigma_N().unwrap_or([f64::NAN; 3]);
+        let sigma: Vec<f64> = self.results.iter().flat_map(own).collect();
+        grid(py, &sigma, [self.results.len(), 3])
     }
 
     /// The contacts of each result, as in Reconstruction.

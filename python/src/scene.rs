@@ -7,16 +7,19 @@ use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::spec::scene::Scene as Spec;
+use dermis_sim::batch::Batch;
 use dermis_sim::engine::{self, EngineName, Engines};
-use numpy::PyArray3;
+use dermis_sim::stream::require_blocks;
+use numpy::{PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-use crate::arrays::cube;
+use crate::arrays::{cube, readings, shape};
 use crate::contact::contacts;
 use crate::exceptions::{input, model, not_allowed};
 use crate::frame::{frames, Frame, Frames};
 use crate::reconstruction::{Reconstruction, Reconstructions};
+use crate::tracker::Tracker;
 
 /// A sensor and the method that reconstructs its forces.
 #[pyclass(frozen, module = "dermis")]
@@ -233,6 +236,84 @@ impl Scene {
             py.check_signals()?;
         }
         Ok(Bound::new(py, Reconstructions::new(results, self.lengths()))?.into_any())
+    }
+
+    /// Reconstruct frames that do not depend on each other, on all cores.
+    ///
+    /// Parameters
+    /// ----------
+    /// frames : array of shape (frames, rows, cols)
+    ///     As for `reconstruct`. A contiguous array of float64 is read where it stands, without the interpreter's lock: nothing may
+    ///     write to it meanwhile.
+    /// engine : "golden" or "fixed", default "golden"
+    ///     As for `reconstruct`.
+    /// cross_check : bool, default True
+    ///     Whether the estimator evidence reads every frame too, where the engine has another estimator. This takes longer than a
+    ///     search.
+    ///
+    /// Returns
+    /// -------
+    /// Reconstructions
+    ///     Those of each frame alone, in the order of the frames; with input.average = k one per 2^k frames. Frames of a sensor in the
+    ///     order of time show more, and take less time with evidence: `reconstruct` and `tracker`.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     An argument of another shape or type, a scene or frame that the model refuses; a scene whose results depend on the frames
+    ///     before.
+    #[pyo3(signature = (frames, engine = "golden", *, cross_check = true))]
+    fn reconstruct_many(
+        &self,
+        py: Python<'_>,
+        frames: &Bound<'_, PyAny>,
+        engine: &str,
+        cross_check: bool,
+    ) -> PyResult<Reconstructions> {
+        let name = EngineName::software(engine).map_err(model)?;
+        let (array, [rows, cols]) = (readings("frames", frames)?, self.lengths());
+        if array.ndim() != 3 || array.shape()[1..] != [rows, cols] {
+            let (found, scene) = (shape(array.shape()), &self.spec.name);
+            return Err(input(format!("frames has shape {found}, scene {scene} wants (frames, {rows}, {cols})")));
+        }
+        let stress_MPa = array.as_slice()?;
+        let batch = py.detach(|| Batch::new(&self.engines, name, &self.spec, stress_MPa, cross_check));
+        let (mut batch, mut results) = (batch.map_err(model)?, Vec::new());
+        while let Some(chunk) = py.detach(|| batch.next()) {
+            results.extend(chunk.map_err(model)?.into_iter().map(Arc::new));
+            // Ctrl-C ends a long call.
+            py.check_signals()?;
+        }
+        Ok(Reconstructions::new(results, self.lengths()))
+    }
+
+    /// Begin to reconstruct the frames of a sensor in the order of time, one by one.
+    ///
+    /// Parameters
+    /// ----------
+    /// engine : "golden" or "fixed", default "golden"
+    ///     As for `reconstruct`; "fixed" of a scene that needs a full scale wants it stated.
+    /// cross_check : int, default 1
+    ///     As for `reconstruct`.
+    ///
+    /// Returns
+    /// -------
+    /// Tracker
+    ///     Also a context manager.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     A scene that the model refuses, or with a sliding mean.
+    #[pyo3(signature = (engine = "golden", *, cross_check = 1))]
+    fn tracker(&self, py: Python<'_>, engine: &str, cross_check: u64) -> PyResult<Tracker> {
+        let name = EngineName::software(engine).map_err(model)?;
+        require_blocks(&self.spec).map_err(model)?;
+        let begin = || {
+            let engine = self.engines.of_stream(name, &self.spec)?;
+            anyhow::Ok(Tracker::new(&self.spec, engine, CheckPace::Every(cross_check)))
+        };
+        py.detach(begin).map_err(model)
     }
 
     /// Compute a frame with known forces, as the scene's sensor reads it.

@@ -2,6 +2,7 @@
 
 import threading
 import time
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -178,3 +179,74 @@ def test_the_interpreter_is_free_while_a_model_computes() -> None:
     longest = max(longest, time.perf_counter() - last)
     # Were it held, this thread would stand still until the frame is done.
     assert longest < times[0] / 3, (longest, times)
+
+
+def growing(count: int) -> np.ndarray:
+    """Frames of a press that grows, of the array of SMALL."""
+    frame = dermis.Scene.from_name("eight-by-eight").frames[1]
+    return np.stack([frame.stress_MPa * (1 + k / count) for k in range(count)])
+
+
+@pytest.mark.parametrize("engine", ["golden", "fixed"])
+def test_many_frames_have_the_results_of_each_alone(engine: str) -> None:
+    scene = dermis.Scene.from_toml(SMALL + "[input]\nfull_scale_MPa = 4.0\n")
+    stress = growing(40)
+    stress[3, 2, 5] = np.nan
+    results = scene.reconstruct_many(stress, engine, cross_check=False)
+    assert (len(results), results.sigma_N.shape) == (40, (40, 3))
+    for k in (0, 3, 39):
+        alone = scene.reconstruct(stress[k], engine, cross_check=0)
+        assert (results[k].forces_N == alone.forces_N).all() and results[k].flags == alone.flags
+        assert np.array_equal(results.sigma_N[k], np.full(3, np.nan) if alone.sigma_N is None else alone.sigma_N, equal_nan=True)
+    assert np.isnan(results.sigma_N[0]).any() == (engine == "fixed")
+    assert ["taxel-missing" in flags for flags in results.flags] == [k == 3 for k in range(40)]
+    # Masked values and other kinds of arrays are taken, with a copy.
+    masked = np.ma.masked_invalid(stress)
+    assert (scene.reconstruct_many(masked, engine, cross_check=False).resultant_N == results.resultant_N).all()
+    checked = scene.reconstruct_many(stress[:2], engine)
+    assert ("cross_check_age" in checked[0].checks) == (engine == "fixed")
+
+
+def test_a_batch_of_another_shape_or_of_frames_that_depend_on_each_other_is_refused() -> None:
+    scene = dermis.Scene.from_toml(SMALL)
+    with pytest.raises(dermis.InputError, match=r"frames has shape \(8, 8\), scene .* wants \(frames, 8, 8\)"):
+        scene.reconstruct_many(np.zeros((8, 8)))
+    stress = growing(3)
+    stress[2, 0, 0] = np.inf
+    with pytest.raises(dermis.InputError, match="frame 2"):
+        scene.reconstruct_many(stress)
+    sliding = dermis.Scene.from_toml(SMALL + '[input]\naverage = 1\nmean = "sliding"\n')
+    for refused in (lambda: sliding.reconstruct_many(stress), lambda: sliding.tracker()):
+        with pytest.raises(dermis.InputError, match=r'input.mean = "sliding"'):
+            refused()
+
+
+def test_a_batch_reads_the_array_where_it_stands() -> None:
+    scene = dermis.Scene.from_toml(SMALL + SEARCH)
+    stress = np.zeros((4000, 8, 8))
+    tracemalloc.start()
+    results = scene.reconstruct_many(stress, cross_check=False)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # NumPy reports its arrays; a copy would be as large as the argument.
+    assert len(results) == 4000 and most < stress.nbytes / 10, most
+
+
+def test_a_tracker_has_the_history_of_a_stream() -> None:
+    scene = dermis.Scene.from_toml(SMALL)
+    stress = growing(12)
+    stress[:, 3, 3] = stress[0].max()
+    wanted = scene.reconstruct(stress)
+    with scene.tracker() as tracker:
+        results = [tracker.push(frame) for frame in stress]
+        assert [result.flags for result in results] == wanted.flags
+        assert all((result.forces_N == other.forces_N).all() for result, other in zip(results, wanted))
+        assert "taxel-constant" in results[-1].flags and "taxel-constant" not in results[0].flags
+        tracker.reset()
+        assert "taxel-constant" not in tracker.push(dermis.Scene.from_name("eight-by-eight").frames[1]).flags
+        with pytest.raises(dermis.InputError, match="a tracker takes one at a time"):
+            tracker.push(stress)
+    with pytest.raises(dermis.InputError, match="the tracker is closed"):
+        tracker.push(stress[0])
+    blocks = dermis.Scene.from_toml(SMALL + SEARCH + "[input]\naverage = 1\n").tracker()
+    assert [blocks.push(frame) is None for frame in stress[:4]] == [True, False, True, False]

@@ -58,7 +58,19 @@ fn main() -> anyhow::Result<()> {
     let newest = Arc::new(Newest::default());
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
     let (frames, received) = (std::slice::from_ref(frame), &[received_s][..]);
-    let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
+    let (estimator, estimator_change) = ("search", None);
+    let answer = Answer {
+        sequence,
+        line,
+        received_s,
+        answered_s,
+        dropped,
+        estimator,
+        estimator_change,
+        frames,
+        received,
+        result,
+    };
     Show::new(&newest).outcome(&Outcome::Answer(answer))?;
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let url = format!("http://{}/", listener.local_addr()?);

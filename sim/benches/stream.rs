@@ -14,7 +14,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::CheckPace;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
-use dermis_sim::stream::{as_lines, run, Policy, StreamOptions};
+use dermis_sim::stream::{as_lines, run, Estimators, Policy, StreamOptions};
 
 /// Least rate of the search, in frames per second.
 const LEAST: f64 = 2000.0;
@@ -25,9 +25,14 @@ fn rate(scene: &Scene, name: EngineName, frames: usize) -> anyhow::Result<f64> {
     let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     let text: String = shipped.iter().cycle().take(frames).map(line).collect();
     let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
-    let options = StreamOptions { queue: 64, policy: Policy::All, pace: CheckPace::Never };
+    let options = StreamOptions { queue: 64, policy: Policy::All, live: false };
     let begin = Instant::now();
-    let counts = run(&*engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink(), false))?;
+    let counts = run(
+        Estimators::only(&*engine, CheckPace::Never),
+        (input, "memory"),
+        options,
+        &mut as_lines(&mut std::io::sink(), false),
+    )?;
     ensure!(counts.answered == frames as u64, "{counts:?}");
     Ok(frames as f64 / begin.elapsed().as_secs_f64())
 }

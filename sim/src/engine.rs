@@ -136,4 +136,15 @@ impl Engines {
             EngineName::Rtl => bail!("engine = \"rtl\" is not allowed; it must be \"golden\" or \"fixed\""),
         }
     }
+
+    /// A software engine of a scene for frames that are not known yet.
+    ///
+    /// # Errors
+    /// As [`Engines::engine`]; the bit-true model of a scene that needs a full scale and states none.
+    pub fn of_stream(&self, name: EngineName, scene: &Scene) -> Result<Arc<CheckedEngine<SharedEngine>>> {
+        match name {
+            EngineName::Fixed => cached(&self.fixed, || Ok((Box::new(Model::new(scene)?), true))),
+            _ => self.engine(name, scene, &[]),
+        }
+    }
 }

@@ -16,6 +16,7 @@
 //!
 //! | beside them | does |
 //! |---|---|
+//! | [`batch`] | results of frames that do not depend on each other, on all cores |
 //! | [`compare`] | differences between two force fields |
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
@@ -25,6 +26,7 @@
 #![allow(non_snake_case)]
 
 mod artifact_cache;
+pub mod batch;
 pub mod commands;
 pub mod compare;
 pub mod cosim;

@@ -77,7 +77,7 @@ impl Worker {
     }
 }
 
-/// The checks of the results of one engine in the order of time.
+/// The checks of the results of an engine in the order of time.
 pub struct StreamChecks {
     scene: Scene,
     /// That after the frames of the last result of [`StreamChecks::next`].
@@ -98,29 +98,46 @@ pub struct StreamChecks {
 impl StreamChecks {
     /// Nothing received yet by `engine`.
     pub fn new(engine: &(impl Engine + ?Sized), pace: CheckPace) -> StreamChecks {
-        let check = match pace {
+        let mut checks = StreamChecks {
+            scene: engine.scene().clone(),
+            state: State::default(),
+            history: History::new(engine.scene()),
+            waiting: Vec::new(),
+            checked: None,
+            check: None,
+            pace,
+            worker: None,
+            next: 0,
+            found: None,
+        };
+        checks.change(engine);
+        checks
+    }
+
+    /// Takes the results of another `engine` of the same scene from now on. What the frames so far show stays; the cross-check begins
+    /// anew.
+    pub fn change(&mut self, engine: &(impl Engine + ?Sized)) {
+        self.close();
+        self.check = match self.pace {
             CheckPace::Never | CheckPace::Every(0) => None,
             CheckPace::Every(_) | CheckPace::Beside => CrossCheck::of(engine).map(Arc::new),
         };
-        let worker = check.as_ref().filter(|_| pace == CheckPace::Beside).map(|check| {
+        self.worker = self.check.as_ref().filter(|_| self.pace == CheckPace::Beside).map(|check| {
             let (worker, check) = (Arc::new(Worker::default()), Arc::clone(check));
             let own = Arc::clone(&worker);
             // Not joined: the stream does not wait for a finding after its end.
             std::thread::spawn(move || own.work(&check));
             worker
         });
-        let (scene, history) = (engine.scene().clone(), History::new(engine.scene()));
-        StreamChecks {
-            scene,
-            state: State::default(),
-            history,
-            waiting: Vec::new(),
-            checked: None,
-            check,
-            pace,
-            worker,
-            next: 0,
-            found: None,
+        self.scene = engine.scene().clone();
+        (self.state.last, self.checked, self.found) = (None, None, None);
+    }
+
+    /// Ends the thread of the cross-check.
+    fn close(&self) {
+        if let Some(worker) = &self.worker {
+            worker.exchange().closed = true;
+            worker.changed.notify_one();
         }
     }
 
@@ -193,9 +210,6 @@ impl StreamChecks {
 
 impl Drop for StreamChecks {
     fn drop(&mut self) {
-        if let Some(worker) = &self.worker {
-            worker.exchange().closed = true;
-            worker.changed.notify_one();
-        }
+        self.close();
     }
 }

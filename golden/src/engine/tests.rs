@@ -114,3 +114,38 @@ fn findings_beside_a_stream_come_with_later_results() {
     });
     assert!(found.flatten() >= Some(1), "{found:?}");
 }
+
+/// A taxel that stood still before the estimator changed is found after it; the cross-check is that of the new engine.
+#[test]
+fn another_estimator_goes_on_with_the_same_stream() {
+    let (search, [exact, stuck]) = stream();
+    let evidence = Golden::with(search.scene(), EstimatorKind::Evidence).unwrap();
+    let peak = (0..64).max_by(|a, b| exact.stress_MPa[*a].total_cmp(&exact.stress_MPa[*b])).unwrap();
+    let grown = |moment: usize| {
+        let mut frame = exact.clone();
+        frame.stress_MPa.iter_mut().for_each(|b| *b *= moment as f64);
+        frame.stress_MPa[peak] = exact.stress_MPa[peak];
+        frame
+    };
+    let constant = |changes: bool| {
+        let mut checks = StreamChecks::new(&evidence, CheckPace::Every(1));
+        let mut flagged = Vec::new();
+        for moment in 1..=10 {
+            if changes && moment == 6 {
+                checks.change(&search);
+            }
+            let engine = if changes && moment >= 6 { &search } else { &evidence };
+            let result = checks.next(engine, &[grown(moment)]).unwrap();
+            assert_eq!(result.checks.cross_check_age, (changes && moment >= 6).then_some(0));
+            flagged.push(result.flags.contains(&Flag::TaxelConstant));
+        }
+        flagged
+    };
+    assert_eq!(constant(true), constant(false));
+    assert_eq!(constant(true).iter().filter(|flagged| **flagged).count(), 3);
+    // Findings of the engine before are no longer given.
+    let mut checks = StreamChecks::new(&search, CheckPace::Every(100));
+    assert_eq!(next(&mut checks, &search, &stuck), (Some(0), true));
+    checks.change(&search);
+    assert_eq!(next(&mut checks, &search, &exact), (None, false));
+}

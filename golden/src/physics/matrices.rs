@@ -93,13 +93,15 @@ pub enum MatricesError {
     /// A size of the sensor is out of range.
     #[error("sensor.{0}")]
     Sensor(#[from] SensorError),
-    /// The subarray has more than [`MAX_TAXELS`] taxels.
-    #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {MAX_TAXELS}; cut it by [partition]")]
+    /// The subarray has more taxels than the estimator takes: a search [`MAX_TAXELS`].
+    #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {most}; cut it by [partition]")]
     TooLarge {
         /// The subarray as a sensor.
         sensor: Box<Sensor>,
         /// Its number of taxels.
         taxels: usize,
+        /// The largest number.
+        most: usize,
     },
     /// The lengths are so far apart that the influence of a cell is zero or not a finite number.
     #[error("{sensor}: the influence of a cell on its taxel is not representable")]
@@ -140,6 +142,19 @@ pub enum MatricesError {
     },
 }
 
+/// Refuses an array of sizes out of range, or of more than `most` taxels.
+///
+/// # Errors
+/// [`MatricesError::Sensor`], [`MatricesError::TooLarge`].
+pub(crate) fn check_size(sensor: &Sensor, most: usize) -> Result<(), MatricesError> {
+    sensor.check()?;
+    let taxels = sensor.taxels();
+    match taxels > most {
+        true => Err(MatricesError::TooLarge { sensor: Box::new(sensor.clone()), taxels, most }),
+        false => Ok(()),
+    }
+}
+
 impl Matrices {
     /// The matrices without a degree, which is 0; [`Matrices::of`] gives them the degree that the series needs.
     pub(crate) fn solved(
@@ -148,13 +163,8 @@ impl Matrices {
         mu_max: f64,
         inversion: Inversion,
     ) -> Result<Matrices, MatricesError> {
-        sensor.check()?;
+        check_size(sensor, MAX_TAXELS)?;
         let boxed = || Box::new(sensor.clone());
-        let n = sensor.taxels();
-        if n > MAX_TAXELS {
-            let sensor = boxed();
-            return Err(MatricesError::TooLarge { sensor, taxels: n });
-        }
         let Influence { cx, cy, cz } = Influence::through(sensor, medium);
         let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
         if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {

@@ -128,7 +128,7 @@ pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
 
 /// Fills the row of a scene that the golden model accepts.
 fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<(), GoldenError> {
-    let matrices = golden.matrices();
+    let Some(matrices) = golden.matrices() else { return Ok(()) };
     let Matrices { condition, rank, gain, spectral_radius: radius, degree, .. } = *matrices;
     row.spectrum = Some(Spectrum { condition, rank, gain, radius, degree });
     let normal_only = Polynomial::of_degree(matrices, &truth.unsheared.stress_MPa, 0);

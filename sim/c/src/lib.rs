@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! stress, doubles ── dermis_reconstruct ── dermis_result ── forces, contacts, flags
+//!        ├── dermis_reconstruct_many ── arrays of the caller
 //!        ├── dermis_stream_push, frame by frame ──────────────────────────┤
 //!        └── dermis_link_frame ── bytes ── port, board ── bytes ── dermis_link_receive ──┘
 //! ```
@@ -14,6 +15,7 @@
 //! | [`guard`] | no panic reaches C: status codes, texts of errors, checks of pointers |
 //! | [`scene`] | scenes, and reconstruction of their frames |
 //! | [`result`] | results: forces, contacts with error bars, flags |
+//! | [`batch`] | frames that do not depend on each other |
 //! | [`mod@stream`] | frames in the order of time |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
 // Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
@@ -27,6 +29,7 @@
 // The text of a function is also that of the header; what holds for all pointers stands at the header's top.
 #![allow(clippy::missing_safety_doc)]
 
+pub mod batch;
 pub mod guard;
 pub mod link;
 pub mod result;

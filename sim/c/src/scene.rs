@@ -12,7 +12,7 @@ use crate::result::dermis_result;
 /// A sensor and the method that reconstructs its forces. Any number of threads may use one at the same time.
 pub struct dermis_scene {
     pub(crate) spec: Scene,
-    engines: Engines,
+    pub(crate) engines: Engines,
 }
 
 impl dermis_scene {

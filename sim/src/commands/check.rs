@@ -11,12 +11,14 @@ use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::physics::matrices::Matrices;
 use dermis_golden::result::checks::pull::tare_load;
-use dermis_golden::spec::scene::Scene;
+use dermis_golden::spec::scene::{Scene, MAX_FLOAT_DEGREE};
 use dermis_golden::study::noise::expected::{expected, of_other_medium, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
 
 use super::check_noise::NoiseArguments;
+use super::check_rate::rates;
 use super::inputs::{estimator_instead, noise_not_stated, BoardOverride};
 use crate::progress::Progress;
 use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
@@ -36,6 +38,9 @@ pub struct Arguments {
     /// Seed of the drawn frames and their noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Measure the frames per second that this machine holds with each estimator of the scene, 0.3 s each, on one core.
+    #[arg(long)]
+    rate: bool,
     /// Print JSON and nothing else.
     #[arg(long)]
     json: bool,
@@ -49,6 +54,7 @@ const EXAMPLES: &str = "Examples:
   dermis check my-scene.toml                         degree, expected errors, whether the board holds it
   dermis check my-scene.toml --peak 0.1 --draws 10   presses of 0.1 MPa
   dermis check eight-by-eight --target-board icebreaker --json
+  dermis check my-scene.toml --rate --draws 1        frames per second of each estimator on this machine
   dermis check my-scene.toml --stream=/dev/ttyUSB0   measures the noise while nothing presses, and writes it into the scene
   dermis check build/sensor-1/rtl                    the files of a build against manifest.json
 
@@ -107,14 +113,20 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         Ok(errors) => (errors, None),
         Err(reason) => (Default::default(), Some(reason.to_string())),
     };
-    let matrices = golden.matrices();
+    // An estimator with evidence has none.
+    let matrices =
+        golden.matrices().is_none().then(|| Matrices::of(&scene, &scene.sensor, MAX_FLOAT_DEGREE).ok()).flatten();
+    let matrices = golden.matrices().or(matrices.as_ref());
+    // No contact fits a tiny array.
+    let rates = arguments.rate.then(|| rates(&scene)).transpose();
+    let (rates, not_measured) = rates.map_or_else(|reason| (None, Some(reason.to_string())), |rates| (rates, None));
     Ok(SceneCheck {
         target: arguments.target.clone(),
         checked_as: "scene",
         medium: scene.medium.to_string(),
         estimator: golden.estimator().name(),
-        degree: matrices.degree,
-        spectral_radius: matrices.spectral_radius,
+        degree: matrices.map(|own| own.degree),
+        spectral_radius: matrices.map(|own| own.spectral_radius),
         mu_max: scene.search.mu_max,
         dead: scene.input.dead.clone(),
         board: scene.hardware.board.clone(),
@@ -124,6 +136,8 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         hardware_refused,
         noise,
         noise_not_stated,
+        rates,
+        not_measured,
         tare_load,
         errors,
         other_medium,

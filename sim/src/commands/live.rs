@@ -2,24 +2,25 @@
 
 use std::io::Read;
 use std::net::{SocketAddr, TcpListener};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
-use clap::{value_parser, Args};
+use clap::Args;
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_hardware, BoardOverride};
-use super::reconstruct_stream::{open, software_engine, stream_engine};
+use super::reconstruct_stream::{faster, open, rate_Hz, software_engine, stream_engine};
 use crate::engine::EngineName;
 use crate::link::{open_board, BoardEngine, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
 use crate::recording::{Lines, Pace};
-use crate::stream::{run as run_stream, Outcome, Policy, Source, StreamOptions};
+use crate::stream::{run as run_stream, Clock, Estimators, Outcome, Policy, Source, StreamOptions};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]
@@ -60,10 +61,10 @@ pub struct Arguments {
     /// Standard deviation of the noise on the finger's frames over the largest |b|.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0005, conflicts_with_all = ["stream", "recording"])]
     noise: f64,
-    /// Largest number of the finger's frames per second.
-    #[arg(long, value_name = "N", default_value_t = 60, conflicts_with_all = ["stream", "recording"],
-          value_parser = value_parser!(u32).range(1..=1000))]
-    rate: u32,
+    /// Frames per second that the estimator has to hold, of the finger 1 to 1000; the best one that does is taken. Default: of a stream as many as
+    /// arrive, unless the scene states search.estimator; of the finger at most 60, by the scene's estimator.
+    #[arg(long, value_name = "HZ", value_parser = rate_Hz, conflicts_with = "board")]
+    rate: Option<f64>,
     /// Address and port of the page; port 0 takes a free one.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8317")]
     listen: SocketAddr,
@@ -71,6 +72,10 @@ pub struct Arguments {
     target: BoardOverride,
 }
 
+/// Frames of the finger per second without `--rate`.
+const DEFAULT_FINGER_HZ: f64 = 60.0;
+/// Values of `--rate`.
+const FINGER_HZ: RangeInclusive<f64> = 1.0..=1000.0;
 /// Time without a board's answer after which a request is sent again.
 const BOARD_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -122,6 +127,9 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
             );
         }
     }
+    if let Some(rate) = rate.filter(|rate| arguments.finger() && !FINGER_HZ.contains(rate)) {
+        bail!("--rate = {rate} is not allowed: {} to {}", FINGER_HZ.start(), FINGER_HZ.end());
+    }
     if !(0.0..=1.0).contains(noise) {
         bail!("--noise = {noise} is not allowed: 0 to 1");
     }
@@ -142,15 +150,25 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
     let serving = std::thread::spawn(move || server.run(&listener));
     print(&format!("http://{address}/\n"))?;
     let mut show = Show::new(&newest);
-    let mut output = |outcome: &Outcome| show.outcome(outcome);
+    let mut output = |outcome: &Outcome| {
+        if let Outcome::Note(text) = outcome {
+            eprintln!("{}: {text}", scene.name);
+        }
+        show.outcome(outcome)
+    };
+    let chosen = board.is_none() && (hand.is_none() || rate.is_some());
+    let faster = if chosen { faster(&scene, arguments.engine, *rate) } else { Vec::new() };
+    let estimators = Estimators::new(&*engine, faster, CheckPace::Beside, *rate, Clock::default());
     match (hand, input) {
         (Some(hand), _) => {
-            hand.run(&*engine, *noise, Duration::from_secs(1) / *rate, &mut output)?;
+            let period = Duration::from_secs_f64(1.0 / rate.unwrap_or(DEFAULT_FINGER_HZ));
+            hand.run(estimators, *noise, period, &mut output)?;
         }
         (None, Some((input, name))) => {
-            let options = StreamOptions { queue: 1, policy: Policy::Latest, pace: CheckPace::Beside };
-            let counts = run_stream(&*engine, (input, &name), options, &mut output)?;
-            eprintln!("{}: {name} has ended after {} results; the last one is shown", scene.name, counts.answered);
+            let options = StreamOptions { queue: 1, policy: Policy::Latest, live: true };
+            let counts = run_stream(estimators, (input, &name), options, &mut output)?;
+            let answered = counts.answered;
+            eprintln!("{}: {name} has ended after {answered} results; {counts}; the last one is shown", scene.name);
         }
         (None, None) => (),
     }

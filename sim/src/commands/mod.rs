@@ -42,6 +42,7 @@ pub mod build;
 pub mod calibrate;
 pub mod check;
 mod check_noise;
+mod check_rate;
 mod cli;
 pub mod converters;
 pub mod cosim;

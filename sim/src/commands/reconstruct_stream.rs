@@ -14,10 +14,14 @@ use super::inputs::note_hardware;
 use crate::engine::EngineName;
 use crate::jobs::{Interrupt, Interrupted};
 use crate::recording::Recorder;
-use crate::stream::{as_lines, require_blocks, run_until, Outcome, Policy, Source, Stop, StreamOptions};
+use crate::stream::{
+    as_lines, require_blocks, run_until, Clock, Estimators, Faster, Outcome, Policy, Source, Stop, StreamOptions,
+};
 
-/// Lines that wait with `--all`: a hundredth of a second at several kilohertz.
+/// Lines that wait with `--all` while the source waits too: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;
+/// Lines that wait with `--all` of a source that does not wait.
+const LONGEST_QUEUE: u32 = 4096;
 /// Lines that wait with `--latest`.
 const QUEUE_OF_LATEST: u32 = 1;
 
@@ -29,17 +33,23 @@ pub(super) struct StreamArguments {
     #[arg(long, value_name = "SOURCE", num_args = 0..=1, require_equals = true, default_missing_value = "-",
           conflicts_with_all = ["frames", "json"])]
     stream: Option<Source>,
-    /// Answer every line; reading waits while the queue is full. The default.
+    /// Answer every line, in order, by the scene's estimator. While the queue is full, reading waits; of a serial port and UDP, which
+    /// do not wait, the oldest line is dropped and counted. The default of standard input, pipes and files.
     #[arg(long, requires = "stream")]
     all: bool,
-    /// Drop the oldest waiting line while the queue is full, and count it.
+    /// Answer the newest line: the oldest one that waits is dropped while the queue is full, and counted. The best estimator is
+    /// taken that keeps up with the lines. The default of a serial port and UDP.
     #[arg(long, requires = "stream", conflicts_with = "all")]
     latest: bool,
-    /// Lines that may wait; default: 64, with --latest 1.
-    #[arg(long, value_name = "N", requires = "stream", value_parser = value_parser!(u32).range(1..=4096))]
+    /// Frames per second that the estimator has to hold; the best one that does is taken. Default: with --latest as many as
+    /// arrive, unless the scene states search.estimator; with --all the scene's estimator whatever its rate.
+    #[arg(long, value_name = "HZ", requires = "stream", value_parser = rate_Hz)]
+    rate: Option<f64>,
+    /// Lines that may wait; default: with --latest 1; with --all 64, of a serial port and UDP 4096.
+    #[arg(long, value_name = "N", requires = "stream", value_parser = value_parser!(u32).range(1..=i64::from(LONGEST_QUEUE)))]
     queue: Option<u32>,
     /// Cross-check every N-th result with the estimator evidence, before it is written, where the engine has another
-    /// estimator; 0: none. Default: every one; with --latest the newest ones, as often as there is time.
+    /// estimator; 0: none. Default: every one; with --latest or --rate the newest ones, as often as there is time.
     #[arg(long, value_name = "N", requires = "stream")]
     check_every: Option<u64>,
     /// Leave out the forces of the taxels.
@@ -67,15 +77,24 @@ impl StreamArguments {
     pub(super) fn run(&self, scene: &Scene, name: EngineName) -> Result<String> {
         let Some(source) = &self.stream else { return Ok(String::new()) };
         let engine = stream_engine(scene, name)?;
-        let policy = if self.latest { Policy::Latest } else { Policy::All };
-        let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
-        let (input, name) = open(source, scene, self.baud)?;
-        let pace = match (self.check_every, self.latest) {
+        let loses = source.loses_lines();
+        let latest = self.latest || loses && !self.all;
+        let (policy, queue) = match (latest, loses) {
+            (true, _) => (Policy::Latest, QUEUE_OF_LATEST),
+            // Who does not wait must be read.
+            (false, true) => (Policy::Latest, LONGEST_QUEUE),
+            (false, false) => (Policy::All, QUEUE_OF_ALL),
+        };
+        let queue = self.queue.unwrap_or(queue) as usize;
+        let options = StreamOptions { queue, policy, live: source.is_live() };
+        let pace = match (self.check_every, latest || self.rate.is_some()) {
             (Some(period), _) => CheckPace::Every(period),
             (None, true) => CheckPace::Beside,
             (None, false) => CheckPace::Every(1),
         };
-        let options = StreamOptions { queue: queue as usize, policy, pace };
+        let faster = if latest || self.rate.is_some() { faster(scene, name, self.rate) } else { Vec::new() };
+        let estimators = Estimators::new(&*engine, faster, pace, self.rate, Clock::default());
+        let (input, name) = open(source, scene, self.baud)?;
         let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, &scene.sensor)).transpose()?;
         let stop = Stop::default();
         // Without a recording there is nothing to complete.
@@ -90,12 +109,15 @@ impl StreamArguments {
         let mut stdout = std::io::stdout().lock();
         let mut lines = as_lines(&mut stdout, self.brief);
         let mut output = |outcome: &Outcome| {
+            if let Outcome::Note(text) = outcome {
+                eprintln!("{}: {text}", scene.name);
+            }
             if let Some(recorder) = &mut recorder {
                 recorder.outcome(outcome).map_err(|error| Error::other(error.to_string()))?;
             }
             lines(outcome)
         };
-        let counts = run_until(&stop, &*engine, (input, &name), options, &mut output);
+        let counts = run_until(&stop, estimators, (input, &name), options, &mut output);
         // Completed whatever ended the stream.
         if let (Some(recorder), Some(path)) = (recorder, &self.record) {
             let results = recorder.finish()?;
@@ -103,11 +125,8 @@ impl StreamArguments {
         }
         let counts = counts?;
         let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
-        let (answered, refused, dropped) = (counts.answered, counts.refused, counts.dropped);
-        eprintln!(
-            "{}: {answered} results, {rate:.1} per second; {refused} lines refused, {dropped} dropped",
-            scene.name
-        );
+        let (answered, refused) = (counts.answered, counts.refused);
+        eprintln!("{}: {answered} results, {rate:.1} per second; {counts}", scene.name);
         interrupted.check().map_err(|_| Interrupted("the recording is complete"))?;
         if refused > 0 {
             bail!("{name}: {refused} of {} lines were refused", refused + answered);
@@ -129,6 +148,24 @@ pub(super) fn stream_engine(scene: &Scene, name: EngineName) -> Result<Box<dyn E
         note_hardware(scene)?;
     }
     name.engine(scene, None, Path::new(""))
+}
+
+/// The estimators that a stream takes where the scene's one does not keep up. What the scene states holds, unless a rate is wanted.
+pub(super) fn faster(scene: &Scene, name: EngineName, wanted_Hz: Option<f64>) -> Vec<Faster<'_>> {
+    let free = scene.search.estimator.is_none() || wanted_Hz.is_some();
+    if free && name == EngineName::Golden {
+        Faster::of_scene(scene)
+    } else {
+        Vec::new()
+    }
+}
+
+/// Parses a number of frames per second.
+pub(super) fn rate_Hz(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate > 0.0 && rate.is_finite() => Ok(rate),
+        _ => Err("wanted a finite number of frames per second above 0".into()),
+    }
 }
 
 /// Parses the name of a software engine.

@@ -13,12 +13,11 @@ use anyhow::Result;
 use dermis_golden::data::frame::{Contact, Forces, Frame};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::generate;
-use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
 use crate::engine::typed;
-use crate::stream::{seconds, Answer, Outcome, Output};
+use crate::stream::{seconds, Answer, Estimators, Note, Outcome, Output};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
 const RADIUS_IN_PITCHES: f64 = 2.0;
@@ -85,20 +84,32 @@ impl Hand {
     ///
     /// # Errors
     /// A scene that generator or engine refuse, an output that fails.
-    pub fn run(&self, engine: &dyn Engine, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
-        let scene = engine.scene();
-        let mut checks = StreamChecks::new(engine, CheckPace::Beside);
+    pub fn run(&self, mut estimators: Estimators, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
+        let (scene, mut change) = (estimators.scene(), None);
         for sequence in 0.. {
             let begun = Instant::now();
-            let received_s = seconds(SystemTime::now());
+            let (received_s, received_at) = (seconds(SystemTime::now()), estimators.clock().now());
             let frame = self.frame(scene, noise, sequence)?;
             let frames = vec![frame; scene.input.frames_per_result()];
-            let result = checks.next(engine, &frames).map_err(typed)?;
+            let result = estimators.next(&frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
-            let (line, dropped, received) = (sequence + 1, 0, vec![received_s; frames.len()]);
-            let (frames, received, result) = (&frames[..], &received[..], &result);
-            let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
-            output(&Outcome::Answer(answer))?;
+            let (line, received): (u64, Vec<f64>) = (sequence + 1, vec![received_s; frames.len()]);
+            output(&Outcome::Answer(Answer {
+                sequence,
+                line,
+                received_s,
+                answered_s,
+                dropped: 0,
+                estimator: estimators.name(),
+                estimator_change: change.take().as_deref(),
+                frames: &frames,
+                received: &received,
+                result: &result,
+            }))?;
+            if let Some(Note { text, changed }) = estimators.after(line, received_at, 0) {
+                output(&Outcome::Note(&text))?;
+                change = changed.then_some(text);
+            }
             std::thread::sleep(period.saturating_sub(begun.elapsed()));
         }
         Ok(())

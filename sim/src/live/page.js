@@ -146,7 +146,7 @@ function draw(picture, now) {
 function state(picture, now, drawing) {
   const recent = history.filter(h => now - h.drawn <= RATE_SECONDS), [first, last] = [recent[0], recent.at(-1)];
   const per = (count, seconds) => seconds > 0 ? (count / seconds).toFixed(1) : "–";
-  text(at("state"), `frame ${picture.sequence} · ${picture.result.engine} · `
+  text(at("state"), `frame ${picture.sequence} · ${picture.result.engine}, ${picture.estimator} · `
     + `${per(last.sequence - first.sequence, last.received - first.received)} results/s · `
     + `${per(recent.length - 1, last.drawn - first.drawn)} drawn/s · `
     + `reconstruction ${(1e3 * (picture.answered_s - picture.received_s)).toFixed(1)} ms · `

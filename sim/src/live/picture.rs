@@ -19,6 +19,8 @@ pub struct Picture<'a> {
     pub answered_s: f64,
     /// Lines dropped so far, because a newer one was there.
     pub dropped: u64,
+    /// Name of the estimator.
+    pub estimator: &'a str,
     /// Lines refused so far.
     pub refused: u64,
     /// Number and error of the last refused line.
@@ -80,13 +82,18 @@ impl<'a> Show<'a> {
                 let error = refusal.error.strip_prefix(&line).unwrap_or(refusal.error);
                 self.refusal = Some(line.clone() + error);
             }
-            Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frames, result, .. }) => {
+            // Said on standard error; the picture has the estimator.
+            Outcome::Note(_) => (),
+            Outcome::Answer(Answer {
+                sequence, received_s, answered_s, dropped, estimator, frames, result, ..
+            }) => {
                 let Some(frame) = frames.last() else { return Ok(()) };
                 let picture = Picture {
                     sequence: *sequence,
                     received_s: *received_s,
                     answered_s: *answered_s,
                     dropped: *dropped,
+                    estimator,
                     refused: self.refused,
                     refusal: self.refusal.as_deref(),
                     stress_MPa: frame.readings(),

@@ -111,6 +111,8 @@ mod tests {
                 received_s,
                 answered_s: received_s,
                 dropped: 0,
+                estimator: "search",
+                estimator_change: None,
                 frames,
                 received,
                 result,

@@ -75,6 +75,7 @@ impl Recorder {
                 self.results += 1;
                 self.line(outcome, stamp)
             }
+            Outcome::Note(_) => Ok(()),
             // Numbered as the result that follows it.
             Outcome::Refusal(_) => {
                 let logged = nanoseconds(seconds(SystemTime::now()));

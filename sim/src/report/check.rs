@@ -44,10 +44,10 @@ pub struct SceneCheck {
     pub medium: String,
     /// The floating-point model's estimator, by its name in scenes.
     pub estimator: &'static str,
-    /// Degree of the series in μ.
-    pub degree: usize,
+    /// Degree of a search's series in μ; `None` if no degree is enough, or the array is too large for it.
+    pub degree: Option<usize>,
     /// r, which tells how fast the series converges.
-    pub spectral_radius: f64,
+    pub spectral_radius: Option<f64>,
     /// Largest ratio of shear to normal force.
     pub mu_max: f64,
     /// Taxels that are left out, [row, col].
@@ -63,6 +63,12 @@ pub struct SceneCheck {
     pub noise: StatedNoise,
     /// Whether every result of the hardware carries `noise-not-stated`.
     pub noise_not_stated: bool,
+    /// The rates of the estimators on this machine, where they were measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rates: Option<Vec<RateRow>>,
+    /// Why they were not, though that was wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_measured: Option<String>,
     /// What seems to have pressed while the tare was taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tare_load: Option<TareLoad>,
@@ -72,6 +78,21 @@ pub struct SceneCheck {
     pub other_medium: Vec<SensitivityRow>,
     /// Why there are none.
     pub not_drawn: Option<String>,
+}
+
+/// The rate that a machine holds with an estimator.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RateRow {
+    /// Name of the estimator.
+    pub estimator: &'static str,
+    /// Number of frames that were measured.
+    pub frames: usize,
+    /// Frames per second, on one core.
+    pub frames_per_s: f64,
+    /// Time of the slowest frame in ms.
+    pub slowest_ms: f64,
+    /// Why the estimator is refused.
+    pub refused: Option<String>,
 }
 
 /// A scene's hardware on its board.
@@ -150,16 +171,18 @@ pub fn build_check(build: &BuildCheck) -> String {
 
 /// What was found of a scene.
 pub fn scene_check(check: &SceneCheck) -> String {
-    let SceneCheck { scene, sensor, estimator, degree, spectral_radius: r, mu_max, board, .. } = check;
+    let SceneCheck { scene, sensor, estimator, degree, mu_max, board, .. } = check;
     let mut text = format!("scene       {scene}: {sensor}, {}\n", check.medium);
-    text += &format!("model       estimator {estimator}, degree {degree} (r = {r:.3} at mu_max = {mu_max})\n");
+    let series = degree.zip(check.spectral_radius);
+    let series = series.map(|(degree, r)| format!(", degree {degree} (r = {r:.3} at mu_max = {mu_max})"));
+    text += &format!("model       estimator {estimator}{}\n", series.unwrap_or_default());
     if !check.dead.is_empty() {
         let dead: Vec<String> = check.dead.iter().map(|[row, col]| format!("{row},{col}")).collect();
         text += &format!("left out    dead taxels {}\n", dead.join(" "));
     }
     match (&check.hardware, &check.hardware_refused) {
         (Some(hardware), _) => {
-            if hardware.degree != *degree {
+            if degree.is_none_or(|degree| degree != hardware.degree) {
                 text += &format!("hardware    degree {}\n", hardware.degree);
             }
             text += &hardware.text(board);
@@ -171,6 +194,7 @@ pub fn scene_check(check: &SceneCheck) -> String {
             "tare        something pressed: {stress_MPa:.4} MPa above the table's offset at row {row}, column {col}; take it again\n"
         );
     }
+    text += &rates(check);
     text += &noise(&check.noise);
     if check.noise_not_stated {
         text += &format!("            {NOISE_NOT_STATED}\n");
@@ -181,6 +205,22 @@ pub fn scene_check(check: &SceneCheck) -> String {
     }
     text += &other_medium(check);
     text
+}
+
+/// The rates on this machine, where they were measured.
+fn rates(check: &SceneCheck) -> String {
+    let row = |row: &RateRow| match &row.refused {
+        Some(reason) => format!("{:17} none: {reason}", row.estimator),
+        None => format!("{:17} {:.1} frames/s, slowest {:.1} ms", row.estimator, row.frames_per_s, row.slowest_ms),
+    };
+    match (&check.rates, &check.not_measured) {
+        (Some(rows), _) => {
+            let rows: Vec<String> = rows.iter().map(|own| format!("            {}\n", row(own))).collect();
+            format!("rate        of a moving contact, on this machine, one core:\n{}", rows.concat())
+        }
+        (None, Some(reason)) => format!("rate        none: {reason}\n"),
+        (None, None) => String::new(),
+    }
 }
 
 /// What it costs if the cover is held otherwise; nothing where no frames could be drawn.

@@ -53,7 +53,7 @@ pub use bitstream_report::{bitstream, summaries, BitstreamReport, Summary};
 pub use board_list::{boards, BoardList, NamedBoard};
 pub use calibration::calibration;
 pub use cases::cases;
-pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, SceneCheck, NOISE_NOT_STATED};
+pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, RateRow, SceneCheck, NOISE_NOT_STATED};
 pub use converters::converters;
 pub use deviations::{deviations, deviations_covered};
 pub use errors::errors;

@@ -1,18 +1,20 @@
 //! Reconstruction of a stream: one result or refusal per line, in the order of the lines.
 
+use std::fmt;
 use std::io::{BufReader, ErrorKind, Read, Write};
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
-use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
 
+use super::estimators::{Estimators, Note};
 use super::line;
 use super::queue::{Policy, Queue};
+use super::rate::Clock;
 use super::stop::Stop;
 use crate::engine::typed;
 
@@ -23,12 +25,12 @@ pub struct StreamOptions {
     pub queue: usize,
     /// What happens where that many wait.
     pub policy: Policy,
-    /// When results are cross-checked.
-    pub pace: CheckPace,
+    /// Whether frames arrive in their own time, so that a stream can fall behind them; a file waits.
+    pub live: bool,
 }
 
 /// What a stream had.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Results.
     pub answered: u64,
@@ -36,12 +38,43 @@ pub struct Counts {
     pub refused: u64,
     /// Lines dropped by [`Policy::Latest`].
     pub dropped: u64,
+    /// Largest time from a line to its result.
+    pub largest_lag: Duration,
+    /// Results of each estimator, by name, in the order in which they were taken.
+    pub by_estimator: Vec<(&'static str, u64)>,
+}
+
+impl Counts {
+    /// Counts a result.
+    fn answer(&mut self, estimator: &'static str, lag: Duration) {
+        self.answered += 1;
+        self.largest_lag = self.largest_lag.max(lag);
+        match self.by_estimator.iter_mut().find(|(name, _)| *name == estimator) {
+            Some((_, results)) => *results += 1,
+            None => self.by_estimator.push((estimator, 1)),
+        }
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Counts { refused, dropped, largest_lag, by_estimator, .. } = self;
+        let lag_ms = 1e3 * largest_lag.as_secs_f64();
+        write!(f, "{refused} lines refused, {dropped} dropped; largest lag {lag_ms:.1} ms")?;
+        let own: Vec<String> = by_estimator.iter().map(|(name, results)| format!("{results} by {name}")).collect();
+        match own.is_empty() {
+            true => Ok(()),
+            false => write!(f, "; {}", own.join(", ")),
+        }
+    }
 }
 
 /// A line as it was received.
 struct Received {
     number: u64,
     time: SystemTime,
+    /// The same by the stream's clock.
+    at: Duration,
     /// `None` if it is too long.
     bytes: Option<Vec<u8>>,
 }
@@ -54,6 +87,8 @@ pub enum Outcome<'a> {
     Answer(Answer<'a>),
     /// Of a line without a result.
     Refusal(Refusal<'a>),
+    /// What is to be said of the stream; no output line.
+    Note(&'a str),
 }
 
 /// A result.
@@ -69,6 +104,11 @@ pub struct Answer<'a> {
     pub answered_s: f64,
     /// Lines dropped so far.
     pub dropped: u64,
+    /// Name of the estimator.
+    pub estimator: &'a str,
+    /// Why the estimator is another one than that of the result before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimator_change: Option<&'a str>,
     /// The frames of the block, the last one of that line; no part of the output line.
     #[serde(skip)]
     pub frames: &'a [Frame],
@@ -96,6 +136,7 @@ pub type Output<'a> = dyn FnMut(&Outcome) -> std::io::Result<()> + 'a;
 pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> std::io::Result<()> + '_ {
     move |outcome| {
         let text = match outcome {
+            Outcome::Note(_) => return Ok(()),
             Outcome::Answer(answer) if brief => {
                 let result = &Reconstruction { forces_N: Forces::default(), ..answer.result.clone() };
                 serde_json::to_string(&Answer { result, ..*answer })?
@@ -123,12 +164,12 @@ pub fn require_blocks(scene: &Scene) -> Result<()> {
 /// # Errors
 /// Input or output that fails; a bad line is none.
 pub fn run(
-    engine: &dyn Engine,
+    estimators: Estimators,
     input: (Box<dyn Read + Send>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
-    run_until(&Stop::default(), engine, input, options, output)
+    run_until(&Stop::default(), estimators, input, options, output)
 }
 
 /// As [`run`], or until `stop`.
@@ -137,31 +178,32 @@ pub fn run(
 /// As [`run`].
 pub fn run_until(
     stop: &Stop,
-    engine: &dyn Engine,
+    estimators: Estimators,
     (input, name): (Box<dyn Read + Send>, &str),
     options: StreamOptions,
     output: &mut Output,
 ) -> Result<Counts> {
     let queue = Arc::new(Queue::new(options.queue, options.policy));
     let reader = {
-        let queue = Arc::clone(&queue);
+        let (queue, clock) = (Arc::clone(&queue), estimators.clock().clone());
         // Not joined where the output is closed first: the read may never return.
         std::thread::spawn(move || {
-            let outcome = read_all(input, &queue);
+            let outcome = read_all(input, &clock, &queue);
             queue.close();
             outcome
         })
     };
     stop.add(&queue);
     let (times, counts) = (Vec::new(), Counts::default());
-    let mut stream = Stream { engine, checks: StreamChecks::new(engine, options.pace), times, counts };
+    let mut stream = Stream { estimators, change: None, times, counts };
+    stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
     loop {
         if stop.stopped() {
             queue.close();
             return Ok(stream.counts);
         }
-        let (received, dropped) = queue.pop();
-        stream.counts.dropped = dropped;
+        let (received, full) = queue.pop();
+        stream.counts.dropped = if options.policy == Policy::Latest { full } else { 0 };
         let Some(received) = received else {
             // A reader that was stopped may never return.
             if stop.stopped() {
@@ -169,7 +211,7 @@ pub fn run_until(
             }
             break;
         };
-        match stream.answer(&received, output) {
+        match stream.answer(&received, if options.live { full } else { 0 }, output) {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => {
                 queue.close();
                 return Ok(stream.counts);
@@ -186,7 +228,7 @@ pub fn run_until(
 }
 
 /// Reads all lines into the queue; blank ones only count.
-fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Result<()> {
+fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>) -> std::io::Result<()> {
     let (mut input, mut line) = (BufReader::new(input), Vec::new());
     for number in 1.. {
         let Some(complete) = line::read(&mut input, &mut line)? else { break };
@@ -194,7 +236,7 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
             continue;
         }
         let bytes = complete.then(|| std::mem::take(&mut line));
-        if !queue.push(Received { number, time: SystemTime::now(), bytes }) {
+        if !queue.push(Received { number, time: SystemTime::now(), at: clock.now(), bytes }) {
             break;
         }
     }
@@ -203,46 +245,66 @@ fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Re
 
 /// The state of a stream.
 struct Stream<'a> {
-    engine: &'a dyn Engine,
-    checks: StreamChecks,
+    estimators: Estimators<'a>,
+    /// Why the next result has another estimator than the last one.
+    change: Option<String>,
     /// Seconds since 1970 when the line of each frame of a block that is not complete was read.
     times: Vec<f64>,
     counts: Counts,
 }
 
 impl Stream<'_> {
-    /// Hands on what a line gave; nothing for a frame that does not complete its block.
-    fn answer(&mut self, received: &Received, output: &mut Output) -> std::io::Result<()> {
+    /// Says between which estimators is chosen.
+    fn choice(&self, output: &mut Output) -> std::io::Result<()> {
+        let text = |all| format!("{}, or what of {all} keeps up", self.estimators.name());
+        self.estimators.choice().map_or(Ok(()), |all| output(&Outcome::Note(&text(all))))
+    }
+
+    /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
+    fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
             self.times.push(seconds(received.time));
-            self.checks.push(self.engine, frame).map_err(|error| {
+            self.estimators.push(frame).map_err(|error| {
                 self.times.clear();
                 typed(error).to_string()
             })
         });
         let line = received.number;
-        match result {
-            Ok(None) => Ok(()),
-            Ok(Some((frames, result))) => {
-                let times = std::mem::take(&mut self.times);
-                let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
-                self.counts.answered += 1;
-                let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
-                let (frames, received, result) = (&frames[..], &times[..], &result);
-                let answer = Answer { sequence, line, received_s, answered_s, dropped, frames, received, result };
-                output(&Outcome::Answer(answer))
-            }
+        let (frames, result) = match result {
+            Ok(None) => return Ok(()),
+            Ok(Some(complete)) => complete,
             Err(error) => {
                 self.counts.refused += 1;
-                output(&Outcome::Refusal(Refusal { line, error: &error }))
+                return output(&Outcome::Refusal(Refusal { line, error: &error }));
             }
-        }
+        };
+        let (times, change) = (std::mem::take(&mut self.times), self.change.take());
+        let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
+        let estimator = self.estimators.name();
+        self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(received.at));
+        let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
+        output(&Outcome::Answer(Answer {
+            sequence,
+            line,
+            received_s,
+            answered_s,
+            dropped,
+            estimator,
+            estimator_change: change.as_deref(),
+            frames: &frames,
+            received: &times,
+            result: &result,
+        }))?;
+        let Some(Note { text, changed }) = self.estimators.after(line, received.at, full) else { return Ok(()) };
+        output(&Outcome::Note(&text))?;
+        self.change = changed.then_some(text);
+        Ok(())
     }
 
     fn frame(&self, received: &Received) -> Result<Frame, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
         let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-        match line::frame(text, received.number, &self.engine.scene().sensor) {
+        match line::frame(text, received.number, &self.estimators.scene().sensor) {
             Ok((_, frame)) => Ok(frame),
             Err(none) => Err(none.reason),
         }
@@ -258,11 +320,15 @@ pub fn seconds(time: SystemTime) -> f64 {
 mod tests {
     use super::*;
     use crate::engine::EngineName;
-    use dermis_golden::engine::CheckedEngine;
+    use crate::stream::Faster;
+    use dermis_golden::data::input::Input;
+    use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::EstimatorKind;
     use serde_json::Value;
     use std::path::Path;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::mpsc::{channel, Receiver, Sender};
 
     fn engine_of(scene: &Scene, name: EngineName) -> Box<dyn Engine> {
         name.engine(scene, None, Path::new("")).unwrap()
@@ -278,12 +344,13 @@ mod tests {
         let engine = engine_of(scene, name);
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
         let mut output = Vec::new();
-        let counts = run(&*engine, (input, "memory"), options, &mut as_lines(&mut output, brief)).unwrap();
+        let estimators = Estimators::only(&*engine, CheckPace::Every(1));
+        let counts = run(estimators, (input, "memory"), options, &mut as_lines(&mut output, brief)).unwrap();
         let text = String::from_utf8(output).unwrap();
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }
 
-    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, pace: CheckPace::Every(1) };
+    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, live: false };
 
     fn scene() -> Scene {
         Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search)
@@ -299,7 +366,7 @@ mod tests {
         let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
         for name in EngineName::SOFTWARE {
             let (counts, answers) = answers(&scene, name, input.clone(), ALL, false);
-            assert_eq!(counts, Counts { answered: 2, refused: 2, dropped: 0 });
+            assert_eq!((counts.answered, counts.refused, counts.dropped), (2, 2, 0));
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
             assert_eq!(answers[1]["error"], "value 1: \"x\" is not a finite number");
@@ -359,7 +426,7 @@ mod tests {
     #[test]
     fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let options = StreamOptions { queue: 1, policy: Policy::Latest, pace: CheckPace::Beside };
+        let options = StreamOptions { queue: 1, policy: Policy::Latest, live: true };
         let (counts, answers) = answers(&scene, EngineName::Golden, csv(&frames[0]).repeat(2000), options, true);
         assert_eq!(counts.answered + counts.dropped, 2000);
         assert!(counts.dropped > 0);
@@ -382,7 +449,8 @@ mod tests {
         let (scene, stop) = (scene(), Stop::default());
         let run = || {
             let engine = engine_of(&scene, EngineName::Golden);
-            run_until(&stop, &*engine, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
+            let estimators = Estimators::only(&*engine, CheckPace::Never);
+            run_until(&stop, estimators, (Box::new(Endless), "memory"), ALL, &mut |_| Ok(()))
         };
         std::thread::scope(|scope| {
             let running = scope.spawn(run);
@@ -408,9 +476,134 @@ mod tests {
             Ok(())
         };
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
-        run(&*engine, (input, "memory"), ALL, &mut output).unwrap();
+        run(Estimators::only(&*engine, CheckPace::Never), (input, "memory"), ALL, &mut output).unwrap();
         let [(stress, received, last)] = &seen[..] else { panic!("{} answers", seen.len()) };
         assert_eq!(*stress, [frames[0].stress_MPa.clone(), frames[1].stress_MPa.clone()]);
         assert!(received.len() == 2 && received[0] <= received[1] && received[1] == *last, "{received:?}, {last}");
+    }
+
+    /// An engine whose results take a millisecond, and any time by a clock of its own.
+    struct Slow {
+        engine: Box<dyn Engine>,
+        now_ms: Arc<AtomicU64>,
+        cost_ms: u64,
+    }
+
+    impl Engine for Slow {
+        fn scene(&self) -> &Scene {
+            self.engine.scene()
+        }
+
+        fn input(&self) -> &Input {
+            self.engine.input()
+        }
+
+        fn estimator(&self) -> EstimatorKind {
+            self.engine.estimator()
+        }
+
+        fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
+            std::thread::sleep(Duration::from_millis(1));
+            self.now_ms.fetch_add(self.cost_ms, Ordering::Relaxed);
+            self.engine.reconstruct_after(state, frames)
+        }
+    }
+
+    /// The lines and notes of a stream whose first estimator takes 20 ms, the next one 1 ms, of `lines` that all wait.
+    fn slow_stream(lines: usize, wanted_Hz: Option<f64>, broken: bool) -> (Counts, Vec<Value>, Vec<String>) {
+        let (evidence, search) = (Scene::builtin("eight-by-eight").unwrap(), scene());
+        let now_ms = Arc::new(AtomicU64::new(0));
+        let slow = |scene: &Scene, cost_ms: u64| -> Box<dyn Engine> {
+            Box::new(Slow { engine: engine_of(scene, EngineName::Golden), now_ms: Arc::clone(&now_ms), cost_ms })
+        };
+        let first = slow(&evidence, 20);
+        let build = || if broken { bail!("no memory") } else { Ok(slow(&search, 1)) };
+        let clock = Arc::clone(&now_ms);
+        let clock = Clock::new(move || Duration::from_millis(clock.load(Ordering::Relaxed)));
+        let faster = if wanted_Hz.is_some() { vec![Faster::new("search", build)] } else { Vec::new() };
+        let estimators = Estimators::new(&*first, faster, CheckPace::Never, wanted_Hz, clock);
+        let input: Box<dyn Read + Send> =
+            Box::new(std::io::Cursor::new(csv(&Frame::shipped(&search)[1]).repeat(lines).into_bytes()));
+        let (mut text, mut notes) = (Vec::new(), Vec::new());
+        let mut written = as_lines(&mut text, true);
+        let mut output = |outcome: &Outcome| {
+            if let Outcome::Note(note) = outcome {
+                notes.push(note.to_string());
+            }
+            written(outcome)
+        };
+        let counts = run(estimators, (input, "memory"), StreamOptions { live: true, ..ALL }, &mut output).unwrap();
+        drop(written);
+        let lines = String::from_utf8(text).unwrap();
+        (counts, lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), notes)
+    }
+
+    #[test]
+    fn an_estimator_that_does_not_keep_up_gives_way_and_the_line_says_why() {
+        // Of 20 ms a result, half a second has 25.
+        let (counts, lines, notes) = slow_stream(60, Some(100.0), false);
+        assert_eq!(counts.by_estimator, [("evidence", 25), ("search", 35)]);
+        let why = "search from now on: evidence takes 20.000 ms a result, 100.0 frames per second leave 10.000 ms";
+        for (number, line) in lines.iter().enumerate() {
+            assert_eq!(line["estimator"], if number < 25 { "evidence" } else { "search" });
+            assert_eq!(line["estimator_change"].as_str(), (number == 25).then_some(why));
+        }
+        assert_eq!(notes, ["evidence, or what of evidence, search keeps up", why]);
+        assert!(counts.to_string().ends_with("; 25 by evidence, 35 by search"), "{counts}");
+        // Fast enough, and one that cannot be built.
+        let (counts, ..) = slow_stream(60, Some(50.0), false);
+        assert_eq!(counts.by_estimator, [("evidence", 60)]);
+        let (counts, _, notes) = slow_stream(60, Some(100.0), true);
+        assert_eq!((counts.by_estimator, &notes[1][..]), (vec![("evidence", 60)], "search is left out: no memory"));
+    }
+
+    #[test]
+    fn a_stream_that_answers_all_lines_says_while_it_runs_that_it_is_behind() {
+        let (counts, lines, notes) = slow_stream(600, None, false);
+        assert_eq!((counts.answered, counts.dropped, lines.len()), (600, 0, 600));
+        // Twelve seconds: once, and again after ten.
+        assert!(notes.len() == 2 && notes[0].starts_with("behind: evidence takes 20.000 ms a result"), "{notes:?}");
+    }
+
+    /// Lines that say when they have all been read.
+    struct Drained(std::io::Cursor<Vec<u8>>, Sender<()>);
+
+    impl Read for Drained {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            let bytes = self.0.read(buffer)?;
+            if bytes == 0 {
+                // The receiver takes only the first.
+                let _ = self.1.send(());
+            }
+            Ok(bytes)
+        }
+    }
+
+    /// Who sends is never refused: lines are read while a result is computed, however long that takes.
+    #[test]
+    fn every_line_is_read_while_a_result_is_computed() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let drained = |options: StreamOptions, patience: Duration| {
+            let engine = engine_of(&scene, EngineName::Golden);
+            let (sender, receiver): (_, Receiver<()>) = channel();
+            let lines = std::io::Cursor::new(csv(&frames[0]).repeat(600).into_bytes());
+            let mut all_read = None;
+            let mut output = |_: &Outcome| {
+                all_read = all_read.or_else(|| Some(receiver.recv_timeout(patience).is_ok()));
+                Ok(())
+            };
+            let input: Box<dyn Read + Send> = Box::new(Drained(lines, sender));
+            let estimators = Estimators::only(&*engine, CheckPace::Never);
+            (run(estimators, (input, "memory"), options, &mut output).unwrap(), all_read)
+        };
+        for queue in [1, 16] {
+            let options = StreamOptions { queue, policy: Policy::Latest, live: true };
+            let (counts, all_read) = drained(options, Duration::from_secs(60));
+            assert_eq!((all_read, counts.answered + counts.dropped), (Some(true), 600));
+            assert!(counts.answered <= queue as u64 + 1, "{counts:?}");
+        }
+        // A source that waits is not read.
+        let (counts, all_read) = drained(ALL, Duration::from_millis(100));
+        assert_eq!((all_read, counts.answered, counts.dropped), (Some(false), 600, 0));
     }
 }

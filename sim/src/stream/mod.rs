@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! standard input, growing file, serial port, UDP ── lines ── queue of N lines ── frames ── engine ── NDJSON
-//!                          own thread                 full: wait, or drop the oldest
+//!                          own thread                 full: wait, or drop the oldest       the best that keeps up
 //! ```
 //!
 //! | in, one line each | |
@@ -12,7 +12,7 @@
 //!
 //! | out, one line each | |
 //! |---|---|
-//! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far; then the fields of [`Reconstruction`](dermis_golden::result::reconstruct::Reconstruction) |
+//! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far, `estimator`, where that changes `estimator_change`; then the fields of [`Reconstruction`](dermis_golden::result::reconstruct::Reconstruction) |
 //! | refusal | `line`, `error`; the stream goes on |
 //!
 //! With `input.average = k` 2^k frames give one result. A line is at most [`LONGEST_LINE`] bytes, so a queue of N lines
@@ -24,18 +24,24 @@
 //! | [`queue`] | the queue between the two threads |
 //! | [`source`] | where lines come from |
 //! | [`stop`] | the end that another thread asks for |
-//! | [`answers`] | reconstruction, results and refusals |
+//! | [`rate`] | whether results keep up with the frames, and which estimator does |
+//! | [`estimators`] | the estimator that is taken, and its results |
+//! | [`answers`] | results and refusals |
 
 pub mod answers;
+pub mod estimators;
 pub(crate) mod line;
 pub mod queue;
+pub mod rate;
 pub mod source;
 pub mod stop;
 
 pub use answers::{
     as_lines, require_blocks, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions,
 };
+pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
+pub use rate::Clock;
 pub use source::Source;
 pub use stop::Stop;

@@ -22,14 +22,15 @@ pub(super) struct Queue<T> {
 
 struct State<T> {
     items: VecDeque<T>,
-    dropped: u64,
+    /// Number of items that found it full.
+    full: u64,
     closed: bool,
 }
 
 impl<T> Queue<T> {
     /// An empty queue; `length` is at least one.
     pub(super) fn new(length: usize, policy: Policy) -> Self {
-        let state = State { items: VecDeque::new(), dropped: 0, closed: false };
+        let state = State { items: VecDeque::new(), full: 0, closed: false };
         Queue { state: Mutex::new(state), changed: Condvar::new(), length: length.max(1), policy }
     }
 
@@ -40,12 +41,12 @@ impl<T> Queue<T> {
     /// Adds an item; returns whether the queue still takes any.
     pub(super) fn push(&self, item: T) -> bool {
         let mut state = self.lock();
+        state.full += u64::from(state.items.len() >= self.length);
         while self.policy == Policy::All && state.items.len() >= self.length && !state.closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         if state.items.len() >= self.length {
             state.items.pop_front();
-            state.dropped += 1;
         }
         state.items.push_back(item);
         self.changed.notify_all();
@@ -58,7 +59,8 @@ impl<T> Queue<T> {
         self.changed.notify_all();
     }
 
-    /// The oldest item and the number dropped so far; waits for one, `None` once the queue is closed and empty.
+    /// The oldest item and the number of items so far that found the queue full; waits for one, `None` once the queue is closed and
+    /// empty.
     pub(super) fn pop(&self) -> (Option<T>, u64) {
         let mut state = self.lock();
         while state.items.is_empty() && !state.closed {
@@ -66,7 +68,7 @@ impl<T> Queue<T> {
         }
         let item = state.items.pop_front();
         self.changed.notify_all();
-        (item, state.dropped)
+        (item, state.full)
     }
 }
 

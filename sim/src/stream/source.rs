@@ -1,16 +1,17 @@
 //! Where lines come from: standard input, a file that grows, a serial port, UDP; all are read as bytes.
 //!
-//! | written | source | ends |
-//! |---|---|---|
-//! | `-` | standard input | with it |
-//! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never |
-//! | a character device | a serial port | with an error, when it is unplugged |
-//! | a regular file | the file from its start, then what is added; from its start again if it becomes shorter | never |
-//! | a pipe | the pipe | with it |
+//! | written | source | ends | while nothing reads it |
+//! |---|---|---|---|
+//! | `-` | standard input | with it | waits |
+//! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never | loses lines |
+//! | a character device | a serial port | with an error, when it is unplugged | loses lines |
+//! | a regular file | the file from its start, then what is added; from its start again if it becomes shorter | never | waits |
+//! | a pipe | the pipe | with it | waits |
 
 use std::fs::File;
 use std::io::{Cursor, Error, ErrorKind, Read, Result, Seek};
 use std::net::UdpSocket;
+use std::os::fd::AsFd;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use std::str::FromStr;
@@ -82,6 +83,21 @@ impl Source {
                 Ok((opened, None))
             }
         }
+    }
+
+    /// Whether lines that are not read in time are lost: the program reads them whatever waits.
+    pub fn loses_lines(&self) -> bool {
+        match self {
+            Source::StandardInput => false,
+            Source::Udp(_) => true,
+            Source::Path(path) => std::fs::metadata(path).is_ok_and(|own| own.file_type().is_char_device()),
+        }
+    }
+
+    /// Whether lines come in their own time; standard input from a file has them all at once.
+    pub fn is_live(&self) -> bool {
+        let file = |stdin: std::os::fd::OwnedFd| File::from(stdin).metadata().is_ok_and(|own| own.is_file());
+        *self != Source::StandardInput || !std::io::stdin().as_fd().try_clone_to_owned().is_ok_and(file)
     }
 
     /// The source's name in messages.
@@ -171,6 +187,9 @@ mod tests {
         assert_eq!(source("udp:[::1]:9000"), Ok(Source::Udp("[::1]:9000".into())));
         assert_eq!(source("udp:9000"), Err("udp:9000: wanted udp:HOST:PORT".into()));
         assert_eq!(source("/dev/ttyUSB0"), Ok(Source::Path("/dev/ttyUSB0".into())));
+        // A character device and datagrams do not wait.
+        let loses = ["-", "udp:9000:1", "/dev/null", "/"].map(|text| source(text).unwrap().loses_lines());
+        assert_eq!(loses, [false, true, true, false]);
         let absent = source("absent.csv").unwrap().open(Some(9600)).err().unwrap().to_string();
         assert!(absent.starts_with("absent.csv: No such file"), "{absent}");
     }

@@ -12,7 +12,7 @@ use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 use dermis_sim::recording::{Lines, Pace, Recorder};
-use dermis_sim::stream::{run, Outcome, Policy, StreamOptions};
+use dermis_sim::stream::{run, Estimators, Outcome, Policy, StreamOptions};
 
 /// Missing taxels of eight-by-eight, [row, col].
 const MISSING: [[usize; 2]; 3] = [[3, 3], [3, 4], [6, 2]];
@@ -82,15 +82,16 @@ fn lines(stress: &[f64]) -> Vec<String> {
 
 /// The results of a stream, all but the frame's name; and the recording of it.
 fn streamed(engine: &dyn Engine, input: Box<dyn Read + Send>, recorder: &mut Recorder) -> Vec<Reconstruction> {
-    let (options, mut all) = (StreamOptions { queue: 4, policy: Policy::All, pace: CheckPace::Never }, Vec::new());
+    let (options, mut all) = (StreamOptions { queue: 4, policy: Policy::All, live: false }, Vec::new());
     let mut output = |outcome: &Outcome| match outcome {
         Outcome::Answer(answer) => {
             all.push(answer.result.clone());
             recorder.outcome(outcome).map_err(std::io::Error::other)
         }
         Outcome::Refusal(refusal) => panic!("line {}: {}", refusal.line, refusal.error),
+        Outcome::Note(text) => panic!("{text}"),
     };
-    run(engine, (input, "memory"), options, &mut output).unwrap();
+    run(Estimators::only(engine, CheckPace::Never), (input, "memory"), options, &mut output).unwrap();
     all
 }
 

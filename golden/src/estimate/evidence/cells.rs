@@ -48,7 +48,7 @@ impl Cells {
             |step: usize, per_taxel: usize| step as f64 + if per_taxel.is_multiple_of(2) { 0.5 } else { 0.0 };
         let at = |index: usize| {
             let (row, col) = (index / grid.cols, index % grid.cols);
-            by_point.at([distance(col, fx) * side[0], distance(row, fy) * side[1]])
+            by_point.in_table([distance(col, fx) * side[0], distance(row, fy) * side[1]])
         };
         // The other quadrants are mirror images.
         let quadrant: Vec<[f64; 3]> = (0..grid.taxels()).map(at).collect();
@@ -65,6 +65,12 @@ impl Cells {
             }
         }
         Cells { sensor: sensor.clone(), grid, per_taxel: [fx, fy], influence }
+    }
+
+    /// Whether every influence is a finite number, and the largest along z is above 0.
+    pub fn is_representable(&self) -> bool {
+        let [along_z, ..] = &self.influence;
+        self.influence.iter().flatten().all(|own| own.is_finite()) && along_z.iter().any(|own| *own > 0.0)
     }
 
     /// Number of distances in taxels along x, for each line of cells within a taxel.

@@ -68,6 +68,11 @@ impl Evidence {
         }
     }
 
+    /// Whether the influence of every cell is a finite number, and presses on the taxel below it.
+    pub fn is_representable(&self) -> bool {
+        self.cells.is_representable()
+    }
+
     /// The same estimator with noise that differs between taxels: `shares` is the standard deviation of each one over
     /// the root mean square of all, a value per taxel.
     pub fn with_noise_shares(self, shares: Vec<f64>) -> Evidence {

@@ -27,6 +27,7 @@
 use super::array::{Array, CaseOutcome, EngineInput};
 use super::by_contacts::taxels;
 use super::contacts::Contacts;
+use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::objective::taxels::Taxels;
 use super::objective::Sparse;
@@ -114,17 +115,21 @@ fn not_nearest_reason(off: f64) -> String {
 /// The search in the case that fits the contacts; `taxels` for fits of ellipses.
 struct Adaptive {
     taxels: Option<Taxels>,
+    array: Array,
 }
 
 /// The adaptive search of a scene.
-pub(super) fn new(scene: &Scene) -> Box<dyn Estimator> {
-    Box::new(Adaptive { taxels: taxels(scene) })
+///
+/// # Errors
+/// As [`Array::new`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, GoldenError> {
+    Ok(Box::new(Adaptive { taxels: taxels(scene), array: Array::new(scene)? }))
 }
 
 impl Estimator for Adaptive {
     /// Solves all admissible cases and returns the one whose shear is nearest to that of the contacts.
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
-        let sensor = &array.scene.sensor;
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        let (array, sensor) = (&self.array, &input.scene.sensor);
         let whole = array.subarrays(input, array.whole(), &Sparse::default());
         let solved = array.find_contacts(self.taxels.as_ref(), input);
         let target = solved.as_ref().map(Contacts::forces);
@@ -137,7 +142,7 @@ impl Estimator for Adaptive {
         let mut refused: Vec<(Case, String)> = Vec::new();
         let mut best = (off(&whole), Case::WHOLE, whole, nothing);
         for tiling in array.tilings.iter().rev().filter(|tiling| tiling.case != Case::WHOLE) {
-            let received: Vec<Received> = tiling.parts.iter().map(|part| array.receive(input, part)).collect();
+            let received: Vec<Received> = tiling.parts.iter().map(|part| input.receive(part)).collect();
             if let Some(reason) = rejection_reason(sensor, &tiling.parts, &received, &contacts) {
                 refused.push((tiling.case, reason));
                 continue;
@@ -159,9 +164,13 @@ impl Estimator for Adaptive {
             .filter_map(|tiling| refused.iter().find(|(other, _)| *other == tiling.case))
             .map(|(case, reason)| RejectedCase { case: case.to_string(), reason: reason.clone() })
             .collect();
-        let mut result = array.finish(input.frame, outcome);
+        let mut result = input.finish(outcome);
         result.extra.taken = Some(CaseChoice { case: case.to_string(), reason, refused });
         result
+    }
+
+    fn array(&self) -> Option<&Array> {
+        Some(&self.array)
     }
 }
 

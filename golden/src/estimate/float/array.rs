@@ -1,4 +1,4 @@
-//! Array: a scene's array in its partitions with their matrices, with which the estimators compute.
+//! Array: a scene's array in its partitions with their matrices, with which the searches compute.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -22,8 +22,6 @@ use crate::spec::scene::{Form, Scene};
 
 /// The array of a scene, its matrices computed.
 pub(super) struct Array {
-    /// The scene.
-    pub scene: Scene,
     /// The case; for `adaptive` all cases that divide the array, the finest first, the whole array last.
     pub tilings: Vec<Tiling>,
 }
@@ -71,6 +69,8 @@ impl Tiling {
 
 /// A frame in the forms that the stages need.
 pub(super) struct EngineInput<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
     /// Calibrated stress.
     pub frame: &'a Frame,
     /// Its converter's codes.
@@ -120,7 +120,7 @@ impl Array {
             grid @ Case::Grid(_) => vec![grid],
         };
         let tilings = cases.into_iter().map(tiling).collect::<Result<_, _>>()?;
-        Ok(Array { scene: scene.clone(), tilings })
+        Ok(Array { tilings })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
@@ -139,36 +139,20 @@ impl Array {
         whole.parts.iter().enumerate().map(|(index, part)| (part, whole.matrices(index)))
     }
 
-    /// The result of a case.
-    pub fn finish(&self, frame: &Frame, outcome: CaseOutcome) -> Reconstruction {
-        let CaseOutcome { subarrays, forces, flags, truncation, shape_misfit, shear_spread } = outcome;
-        let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
-        result.checks.shape_misfit = shape_misfit;
-        result.checks.shear_spread = shear_spread;
-        result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
-        result
-    }
-
-    /// What `receive` finds of a subarray.
-    pub fn receive(&self, input: &EngineInput, part: &Subarray) -> Received {
-        let codes = part.gather(&self.scene.sensor, input.codes);
-        receive(&self.scene.sensor, part, &codes, input.floor, self.scene.partition.condition)
-    }
-
     /// Solves every subarray of a partition on its own, by the μ that maximises `objective`.
     pub fn subarrays(&self, input: &EngineInput, tiling: &Tiling, objective: &dyn Objective) -> CaseOutcome {
-        let sensor = &self.scene.sensor;
+        let Scene { sensor, search, threshold: least, .. } = input.scene;
         let mut outcome = CaseOutcome { forces: Forces::zeros(sensor.taxels()), ..CaseOutcome::default() };
         for (index, part) in tiling.parts.iter().enumerate() {
-            let received = self.receive(input, part);
+            let received = input.receive(part);
             let b = part.gather(sensor, &input.frame.stress_MPa);
             // With mu_max = 0 nothing is searched: there is no score and no test for compression.
-            let searched = received.condition_met && self.scene.search.mu_max > 0.0;
+            let searched = received.condition_met && search.mu_max > 0.0;
             let objective = searched.then_some(objective);
-            let (estimate, w) = self.solve(tiling.matrices(index), objective, &b, input.noise_MPa);
+            let (estimate, w) = solve(tiling.matrices(index), objective, &b, search.mu_max, input.noise_MPa);
             let (x, truncation) = tiling.apply_form(&b, w);
             outcome.truncation.extend(truncation);
-            let own = threshold(x, self.scene.threshold.min_force_N);
+            let own = threshold(x, least.min_force_N);
             let misfit = estimate.and_then(|estimate| estimate.shape_misfit(&b, input.noise_MPa));
             outcome.shape_misfit = [outcome.shape_misfit, misfit].into_iter().flatten().reduce(f64::max);
             let spread = estimate.and_then(|estimate| estimate.shear_spread());
@@ -187,31 +171,48 @@ impl Array {
         }
         outcome
     }
+}
 
-    /// Solves one subarray: polynomial, search where there is an objective, forces before the threshold.
-    fn solve(
-        &self,
-        matrices: &Matrices,
-        objective: Option<&dyn Objective>,
-        b: &[f64],
-        noise_MPa: f64,
-    ) -> (Option<Estimate>, Forces) {
-        let Some(objective) = objective else {
-            let family = Polynomial::of_degree(matrices, b, 0);
-            return (None, force(family.v(0, 0), [0.0; 2], 0.0));
-        };
-        let family = Polynomial::new(matrices, b);
-        let (sensor, mu_max) = (&matrices.sensor, self.scene.search.mu_max);
-        let estimate = objective.find(&SearchInput { sensor, b, family: &family, mu_max, noise_MPa });
-        let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
-        let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
-        (estimate, force(&p, mu, 0.0))
+/// Solves one subarray: polynomial, search where there is an objective, forces before the threshold.
+fn solve(
+    matrices: &Matrices,
+    objective: Option<&dyn Objective>,
+    b: &[f64],
+    mu_max: f64,
+    noise_MPa: f64,
+) -> (Option<Estimate>, Forces) {
+    let Some(objective) = objective else {
+        let family = Polynomial::of_degree(matrices, b, 0);
+        return (None, force(family.v(0, 0), [0.0; 2], 0.0));
+    };
+    let family = Polynomial::new(matrices, b);
+    let estimate = objective.find(&SearchInput { sensor: &matrices.sensor, b, family: &family, mu_max, noise_MPa });
+    let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
+    let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
+    (estimate, force(&p, mu, 0.0))
+}
+
+impl EngineInput<'_> {
+    /// The result of a case.
+    pub fn finish(&self, outcome: CaseOutcome) -> Reconstruction {
+        let CaseOutcome { subarrays, forces, flags, truncation, shape_misfit, shear_spread } = outcome;
+        let mut result = assemble(self.scene, self.frame, "golden", subarrays, forces, flags);
+        result.checks.shape_misfit = shape_misfit;
+        result.checks.shear_spread = shear_spread;
+        result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
+        result
+    }
+
+    /// What `receive` finds of a subarray.
+    pub fn receive(&self, part: &Subarray) -> Received {
+        let sensor = &self.scene.sensor;
+        receive(sensor, part, &part.gather(sensor, self.codes), self.floor, self.scene.partition.condition)
     }
 
     /// The array as one subarray that is not searched; its μ is the ratio of the resultants.
-    pub fn array_of(&self, input: &EngineInput, resultant_N: [f64; 3]) -> SubarrayResult {
+    pub fn array_of(&self, resultant_N: [f64; 3]) -> SubarrayResult {
         let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
         let part = Subarray { row0: 0, col0: 0, rows, cols };
-        SubarrayResult::of_regions(&part, &self.receive(input, &part), resultant_N)
+        SubarrayResult::of_regions(&part, &self.receive(&part), resultant_N)
     }
 }

@@ -13,6 +13,7 @@
 use super::array::{Array, CaseOutcome, EngineInput};
 use super::contacts::by_network::Told;
 use super::contacts::{Contacts, MeasuredStress, Solver};
+use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::forces::threshold;
 use super::objective::taxels::Taxels;
@@ -30,11 +31,15 @@ use crate::spec::sensor::Sensor;
 /// The search by contacts; `taxels` for fits of ellipses.
 struct ByContacts {
     taxels: Option<Taxels>,
+    array: Array,
 }
 
 /// The search by contacts of a scene.
-pub(super) fn new(scene: &Scene) -> Box<dyn Estimator> {
-    Box::new(ByContacts { taxels: taxels(scene) })
+///
+/// # Errors
+/// As [`Array::new`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, GoldenError> {
+    Ok(Box::new(ByContacts { taxels: taxels(scene), array: Array::new(scene)? }))
 }
 
 /// The taxels for fits of ellipses: of an array without dead taxels and with mu_max > 0.
@@ -46,24 +51,14 @@ pub(super) fn taxels(scene: &Scene) -> Option<Taxels> {
 impl Array {
     /// The contacts of a frame with their μ; `None` if no candidate is compressive.
     pub(super) fn find_contacts(&self, taxels: Option<&Taxels>, input: &EngineInput) -> Option<Contacts> {
-        let (scene, matrices, b) = (&self.scene, self.matrices(), &input.frame.stress_MPa);
+        let (scene, matrices, b) = (input.scene, self.matrices(), &input.frame.stress_MPa);
         let family = Polynomial::new(matrices, b);
         let found = search(&family, scene.search.mu_max, &|p| Sparse::default().score(p))?;
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
         let stress = taxels.map(|taxels| MeasuredStress { taxels, b, noise_MPa: input.noise_MPa });
-        let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
+        let searched = |segments: &Segments, region: usize| input.meets_condition(segments, region);
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
         Some(solver.solve(&family, found))
-    }
-
-    /// Whether the taxels of a region meet the scene's condition.
-    fn meets_condition(&self, input: &EngineInput, segments: &Segments, region: usize) -> bool {
-        let own = || segments.taxels(region).map(|k| input.codes[k]);
-        let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
-        match self.scene.partition.condition {
-            Condition::Loaded => above || below,
-            Condition::BothSigns => above && below,
-        }
     }
 
     /// The result with one region per contact; `sigma` is the standard deviation of the μ of each, where it is known.
@@ -76,17 +71,17 @@ impl Array {
     ) -> Reconstruction {
         let (x, truncation) = self.whole().apply_form(&input.frame.stress_MPa, contacts.forces());
         outcome.truncation = truncation.into_iter().collect();
-        let forces = threshold(x, self.scene.threshold.min_force_N);
+        let forces = threshold(x, input.scene.threshold.min_force_N);
         let met: Vec<bool> =
-            (0..contacts.segments.count).map(|k| self.meets_condition(input, &contacts.segments, k)).collect();
-        let mut own = regions(&self.scene.sensor, contacts, &met, &forces);
+            (0..contacts.segments.count).map(|k| input.meets_condition(&contacts.segments, k)).collect();
+        let mut own = regions(&input.scene.sensor, contacts, &met, &forces);
         outcome.forces = forces;
         if let Some(sigma) = sigma {
-            outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
+            outcome.subarrays = vec![input.array_of(outcome.forces.resultant())];
             own = own.into_iter().zip(sigma).map(|(region, sigma)| region.with_sigma(sigma)).collect();
             outcome.shear_spread = shear_spread_of(&own);
         }
-        let mut result = self.finish(input.frame, outcome);
+        let mut result = input.finish(outcome);
         result.extra.regions = Some(own);
         result.extra.sweeps = Some(contacts.sweeps);
         result.extra.converged = Some(contacts.converged);
@@ -94,22 +89,39 @@ impl Array {
     }
 }
 
+impl EngineInput<'_> {
+    /// Whether the taxels of a region meet the scene's condition.
+    fn meets_condition(&self, segments: &Segments, region: usize) -> bool {
+        let own = || segments.taxels(region).map(|k| self.codes[k]);
+        let (above, below) = (own().any(|code| code > self.floor), own().any(|code| code < -self.floor));
+        match self.scene.partition.condition {
+            Condition::Loaded => above || below,
+            Condition::BothSigns => above && below,
+        }
+    }
+}
+
 impl Estimator for ByContacts {
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        let array = &self.array;
         let outcome = array.subarrays(input, array.whole(), &Sparse::default());
         match array.find_contacts(self.taxels.as_ref(), input) {
             Some(contacts) => array.by_region(input, outcome, &contacts, None),
-            None => array.finish(input.frame, outcome),
+            None => input.finish(outcome),
         }
+    }
+
+    fn array(&self) -> Option<&Array> {
+        Some(&self.array)
     }
 }
 
 /// The result with the μ of each contact that `network` gives; `alive` says which taxels are not dead.
 pub(super) fn by_network(array: &Array, input: &EngineInput, network: &Learned, alive: &[bool]) -> Reconstruction {
-    let (scene, matrices, b) = (&array.scene, array.matrices(), &input.frame.stress_MPa);
+    let (scene, matrices, b) = (input.scene, array.matrices(), &input.frame.stress_MPa);
     let family = Polynomial::of_degree(matrices, b, 0);
     let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-    let searched = |segments: &Segments, region: usize| array.meets_condition(input, segments, region);
+    let searched = |segments: &Segments, region: usize| input.meets_condition(segments, region);
     let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
     let Told { contacts, sigma, too_many } = solver.by_network(network, b, alive, scene.partition.max_contacts);
     let flags = too_many.then_some(Flag::TooManyContacts).into_iter().collect();

@@ -3,16 +3,21 @@
 //! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
 //! scene states none: it is found from the frame.
 
-use super::array::{Array, CaseOutcome, EngineInput};
+use super::array::{CaseOutcome, EngineInput};
+use super::error::GoldenError;
 use super::estimator::{Clipped, Estimator};
 use super::forces::threshold;
 use crate::data::input::Input;
 use crate::estimate::evidence::{Evidence, LastFit};
-use crate::estimate::learned::{Learned, LearnedError};
+use crate::estimate::learned::Learned;
+use crate::physics::matrices::{check_size, MatricesError};
 use crate::result::checks::{largest_spread, relative_spread};
 use crate::result::flags::Flag;
 use crate::result::reconstruct::{ContactEstimate, Reconstruction};
 use crate::spec::scene::{EstimatorKind, Scene};
+
+/// Most taxels of an array: with a press on all of them a frame takes half a minute and a gigabyte.
+const MOST_TAXELS: usize = 64 * 64;
 
 /// The estimator `evidence`, with or without a network.
 struct ByEvidence(Evidence);
@@ -20,9 +25,17 @@ struct ByEvidence(Evidence);
 /// The estimator `kind`, one with evidence.
 ///
 /// # Errors
-/// As [`Learned::of_scene`], where the estimator has a network.
-pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, LearnedError> {
+/// As [`Learned::of_scene`], where the estimator has a network; [`MatricesError`] for an array that has no influence or no reading.
+pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dyn Estimator>, GoldenError> {
+    let sensor = || Box::new(scene.sensor.clone());
+    check_size(&scene.sensor, MOST_TAXELS)?;
+    if !scene.input.alive(&scene.sensor).contains(&true) {
+        return Err(MatricesError::TooManyDead { sensor: sensor(), dead: scene.input.dead.len() }.into());
+    }
     let mut evidence = Evidence::new(scene);
+    if !evidence.is_representable() {
+        return Err(MatricesError::NotFinite { sensor: sensor() }.into());
+    }
     if kind.has_network() {
         evidence = evidence.advised_by(Learned::of_scene(scene, kind)?, !kind.mu_of_network());
     }
@@ -33,20 +46,20 @@ pub(super) fn new(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<B
 }
 
 impl Estimator for ByEvidence {
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
-        self.estimate_after(array, input, &mut None)
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        self.estimate_after(input, &mut None)
     }
 
-    fn estimate_after(&self, array: &Array, input: &EngineInput, last: &mut Option<LastFit>) -> Reconstruction {
+    fn estimate_after(&self, input: &EngineInput, last: &mut Option<LastFit>) -> Reconstruction {
         let noise_MPa = (input.noise_MPa > 0.0).then_some(input.noise_MPa);
         // No force is worth a fit of readings that no contact causes, such as counts without calibration.
-        let estimate = match input.frame.peak_MPa() > array.scene.input.plausible_MPa {
+        let estimate = match input.frame.peak_MPa() > input.scene.input.plausible_MPa {
             true => self.0.without_fit(&input.frame.stress_MPa, noise_MPa),
             false => self.0.solve_after(last, &input.frame.stress_MPa, &input.frame.missing, noise_MPa),
         };
-        let forces = threshold(estimate.forces_N.clone(), array.scene.threshold.min_force_N);
-        let subarrays = vec![array.array_of(input, forces.resultant())];
-        let mut result = array.finish(input.frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
+        let forces = threshold(estimate.forces_N.clone(), input.scene.threshold.min_force_N);
+        let subarrays = vec![input.array_of(forces.resultant())];
+        let mut result = input.finish(CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
@@ -64,11 +77,6 @@ impl Estimator for ByEvidence {
 
     fn clipped_readings(&self) -> Clipped {
         Clipped::AsRead
-    }
-
-    /// Its load does not come from Cz⁺b.
-    fn compares_load(&self) -> bool {
-        false
     }
 }
 

@@ -10,9 +10,10 @@
 
 use super::array::{Array, EngineInput};
 use super::by_contacts;
+use super::error::GoldenError;
 use super::estimator::{Clipped, Estimator};
 use super::objective::{Estimate, Objective, SearchInput};
-use crate::estimate::learned::{Learned, LearnedError, OneContact};
+use crate::estimate::learned::{Learned, OneContact};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Scene};
@@ -21,30 +22,36 @@ use crate::spec::scene::{EstimatorKind, Scene};
 struct ByNetwork {
     network: Learned,
     alive: Vec<bool>,
+    array: Array,
 }
 
 /// A network that gives each contact a μ.
 struct ByNetworkOfContacts {
     network: Learned,
     alive: Vec<bool>,
+    array: Array,
 }
 
 /// The estimator with the network that a scene names.
 ///
 /// # Errors
-/// As [`Learned::of_scene`].
-pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, LearnedError> {
+/// As [`Learned::of_scene`] and [`Array::new`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, GoldenError> {
     let network = Learned::of_scene(scene, EstimatorKind::Network)?;
-    let alive = scene.input.alive(&scene.sensor);
+    let (alive, array) = (scene.input.alive(&scene.sensor), Array::new(scene)?);
     Ok(match scene.partition.case {
-        Case::Contacts => Box::new(ByNetworkOfContacts { network, alive }),
-        _ => Box::new(ByNetwork { network, alive }),
+        Case::Contacts => Box::new(ByNetworkOfContacts { network, alive, array }),
+        _ => Box::new(ByNetwork { network, alive, array }),
     })
 }
 
 impl Estimator for ByNetwork {
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
-        array.finish(input.frame, array.subarrays(input, array.whole(), self))
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        input.finish(self.array.subarrays(input, self.array.whole(), self))
+    }
+
+    fn array(&self) -> Option<&Array> {
+        Some(&self.array)
     }
 
     /// The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
@@ -54,8 +61,12 @@ impl Estimator for ByNetwork {
 }
 
 impl Estimator for ByNetworkOfContacts {
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
-        by_contacts::by_network(array, input, &self.network, &self.alive)
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        by_contacts::by_network(&self.array, input, &self.network, &self.alive)
+    }
+
+    fn array(&self) -> Option<&Array> {
+        Some(&self.array)
     }
 
     /// As with one μ.

@@ -6,26 +6,35 @@
 //! | out: forces, μ of each subarray | 3 × n, 2 per subarray | N, – |
 
 use super::array::{Array, EngineInput};
+use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::objective::{of_kind, Objective};
 use crate::result::reconstruct::Reconstruction;
-use crate::spec::partition::{subarrays, PartitionError};
+use crate::spec::partition::subarrays;
 use crate::spec::scene::Scene;
 
 /// The search by subarray.
-struct BySubarray(Box<dyn Objective + Send + Sync>);
+struct BySubarray {
+    objective: Box<dyn Objective + Send + Sync>,
+    array: Array,
+}
 
 /// The search with the scene's objective.
 ///
 /// # Errors
-/// [`PartitionError`] if the partition does not fit the array.
-pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, PartitionError> {
+/// As [`Array::new`].
+pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, GoldenError> {
     let shape = subarrays(scene.partition.case, &scene.sensor)?[0].sensor(&scene.sensor);
-    Ok(Box::new(BySubarray(of_kind(scene.search.objective, &shape, scene.medium))))
+    let objective = of_kind(scene.search.objective, &shape, scene.medium);
+    Ok(Box::new(BySubarray { objective, array: Array::new(scene)? }))
 }
 
 impl Estimator for BySubarray {
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction {
-        array.finish(input.frame, array.subarrays(input, array.whole(), &*self.0))
+    fn estimate(&self, input: &EngineInput) -> Reconstruction {
+        input.finish(self.array.subarrays(input, self.array.whole(), &*self.objective))
+    }
+
+    fn array(&self) -> Option<&Array> {
+        Some(&self.array)
     }
 }

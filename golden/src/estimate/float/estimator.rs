@@ -17,21 +17,21 @@ use crate::result::reconstruct::Reconstruction;
 pub(super) trait Estimator: Send + Sync {
     /// The forces of a frame after the threshold, with subarrays or contacts and their figures. Flags that hold for every
     /// estimator are not among them.
-    fn estimate(&self, array: &Array, input: &EngineInput) -> Reconstruction;
+    fn estimate(&self, input: &EngineInput) -> Reconstruction;
 
     /// The same of a frame of a stream; `last` is what the frame before left, and then what this one leaves.
-    fn estimate_after(&self, array: &Array, input: &EngineInput, _last: &mut Option<LastFit>) -> Reconstruction {
-        self.estimate(array, input)
+    fn estimate_after(&self, input: &EngineInput, _last: &mut Option<LastFit>) -> Reconstruction {
+        self.estimate(input)
+    }
+
+    /// The matrices with which it computes, if it needs any.
+    fn array(&self) -> Option<&Array> {
+        None
     }
 
     /// What the estimator takes for readings of a unipolar array that are zero or less.
     fn clipped_readings(&self) -> Clipped {
         Clipped::Filled
-    }
-
-    /// Whether its load can be compared with that of the stress without shear, Σ Cz⁺b.
-    fn compares_load(&self) -> bool {
-        true
     }
 }
 

@@ -24,10 +24,10 @@ use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Scene};
 
-/// The golden engine of one scene, its matrices computed.
+/// The golden engine of one scene.
 pub struct Golden {
-    /// The scene's array and its matrices; the scene states the estimator.
-    pub(super) array: Array,
+    /// The scene; it states the estimator.
+    scene: Scene,
     /// The scene's input options.
     pub(super) input: Input,
     /// Name of the estimator.
@@ -45,8 +45,8 @@ fn estimator(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dy
     Ok(match kind {
         EstimatorKind::Search => match scene.partition.case {
             Case::Grid(_) => by_subarray::new(scene)?,
-            Case::Adaptive => adaptive::new(scene),
-            Case::Contacts => by_contacts::new(scene),
+            Case::Adaptive => adaptive::new(scene)?,
+            Case::Contacts => by_contacts::new(scene)?,
         },
         EstimatorKind::Network => by_network::new(scene)?,
         EstimatorKind::Evidence | EstimatorKind::EvidenceNetwork | EstimatorKind::Combined => {
@@ -56,8 +56,8 @@ fn estimator(kind: EstimatorKind, scene: &Scene, input: &Input) -> Result<Box<dy
 }
 
 impl Golden {
-    /// The engine with the scene's estimator, [`Scene::model_estimator`]. Computes the matrices of the scene: milliseconds
-    /// for 20 × 20 taxels, two seconds for the largest subarrays.
+    /// The engine with the scene's estimator, [`Scene::model_estimator`]. A search computes the matrices of the scene:
+    /// milliseconds for 20 × 20 taxels, two seconds for the largest subarrays.
     ///
     /// Where the scene does not state the estimator and its network was trained for something else, `evidence` takes the
     /// place of `combined`; [`Golden::estimator`] says so.
@@ -99,7 +99,7 @@ impl Golden {
         scene.require_golden()?;
         let estimator = estimator(kind, scene, &input)?;
         let (misfit, deviations) = (Misfit::of_scene(scene, kind)?, Deviations::of_scene(scene, kind)?);
-        Ok(Golden { array: Array::new(scene)?, input, kind, estimator, misfit, deviations })
+        Ok(Golden { scene: scene.clone(), input, kind, estimator, misfit, deviations })
     }
 
     /// The estimator.
@@ -109,7 +109,7 @@ impl Golden {
 
     /// The scene; it states the estimator.
     pub fn scene(&self) -> &Scene {
-        &self.array.scene
+        &self.scene
     }
 
     /// The scene's input options with their files.
@@ -117,9 +117,10 @@ impl Golden {
         &self.input
     }
 
-    /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
-    pub fn matrices(&self) -> &Matrices {
-        self.array.matrices()
+    /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array. `None` of an estimator with
+    /// evidence, which needs none.
+    pub fn matrices(&self) -> Option<&Matrices> {
+        self.estimator.array().map(Array::matrices)
     }
 
     /// Reconstructs calibrated stress. The forces come from the stress, the condition from its codes.
@@ -137,8 +138,8 @@ impl Golden {
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
-        let input = EngineInput { frame, codes: &codes.codes, floor, noise_MPa };
-        let mut result = self.estimator.estimate_after(&self.array, &input, last);
+        let input = EngineInput { scene, frame, codes: &codes.codes, floor, noise_MPa };
+        let mut result = self.estimator.estimate_after(&input, last);
         if !result.resultant_N.iter().all(|sum| sum.is_finite()) {
             let (frame, peak_MPa) = (frame.id.clone(), frame.peak_MPa());
             return Err(GoldenError::TooStrong { frame, peak_MPa });

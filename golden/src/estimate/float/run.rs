@@ -8,6 +8,7 @@
 //! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
 //! | `output.forces` | resultants instead of forces per taxel |
 
+use super::array::Array;
 use super::error::GoldenError;
 use super::estimator::Clipped;
 use super::forces::force;
@@ -78,10 +79,9 @@ impl Golden {
         let mut result = self.reconstruct_stress(last, &filled, noise_MPa)?;
         let misfit = |report| Unipolar { misfit: misfit(scene, &frame, &result.forces_N), ..report };
         result.extra.unipolar = report.map(misfit);
-        let compares_load = self.estimator.compares_load();
         let checks = Checks {
             network_misfit: self.misfit.as_ref().and_then(|misfit| misfit.of(&result, &frame, noise_MPa)),
-            load_ratio: if compares_load { self.load_ratio(&filled, &result) } else { None },
+            load_ratio: self.load_ratio(&filled, &result),
             zero_share,
             ..result.figures(scene, &frame).with_readings(&self.input, readings)
         };
@@ -96,14 +96,15 @@ impl Golden {
         })
     }
 
-    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless the latter presses.
+    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless the latter presses, and of an estimator
+    /// whose load does not come from Cz⁺b.
     fn load_ratio(&self, frame: &Frame, result: &Reconstruction) -> Option<f64> {
         let scene = self.scene();
         let normal = |(part, matrices): (&Subarray, &Matrices)| {
             let family = Polynomial::of_degree(matrices, &part.gather(&scene.sensor, &frame.stress_MPa), 0);
             force(family.v(0, 0), [0.0; 2], scene.threshold.min_force_N).fz.iter().sum::<f64>()
         };
-        let without_shear: f64 = self.array.parts().map(normal).sum();
+        let without_shear: f64 = self.estimator.array()?.parts().map(normal).sum();
         let ratio = result.resultant_N[2] / without_shear;
         (without_shear > 0.0).then_some(ratio)
     }
@@ -113,7 +114,7 @@ impl Golden {
         let Scene { sensor, input, search, .. } = self.scene();
         let mut filled = clipped(frame);
         let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
-        for (part, matrices) in self.array.parts() {
+        for (part, matrices) in self.estimator.array().into_iter().flat_map(Array::parts) {
             let b = part.gather(sensor, &filled.stress_MPa);
             let dead = part.local_indices(&input.dead);
             let clipped: Vec<usize> = (0..b.len()).filter(|k| b[*k] == 0.0 && !dead.contains(k)).collect();

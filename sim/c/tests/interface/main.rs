@@ -3,6 +3,7 @@
 // Names carry their unit, as in the library.
 #![allow(non_snake_case)]
 
+mod batch;
 mod example;
 mod header;
 mod input;

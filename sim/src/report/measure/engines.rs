@@ -79,7 +79,7 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
         }
         Err(error) => return Err(error.into()),
     };
-    let too_slow = options.quick && engine.matrices().sensor.taxels() > QUICK_LITERAL;
+    let too_slow = options.quick && engine.matrices().is_some_and(|own| own.sensor.taxels() > QUICK_LITERAL);
     let literal = match too_slow {
         true => Err("left out of the quick variant".to_owned()),
         false => Baseline::new(&scene).map_err(|error| error.to_string()),

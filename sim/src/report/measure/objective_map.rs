@@ -47,7 +47,7 @@ pub fn objective_map(measured: &Measured, index: usize) -> Option<ObjectiveMap> 
     let [part] = &result.subarrays[..] else { return None };
     let best = part.objective_value?;
     let mu_max = measured.scene.search.mu_max;
-    let family = Polynomial::new(measured.engine.matrices(), &frame.stress_MPa);
+    let family = Polynomial::new(measured.engine.matrices()?, &frame.stress_MPa);
     let objective = Sparse::default();
     let mu = |i: i32, j: i32| [i, j].map(|k| f64::from(k) * mu_max / f64::from(HALF));
     let at = |[x, y]: [f64; 2]| (x.hypot(y) <= mu_max).then(|| objective.score(&family.eval([x, y]))).flatten();

@@ -190,7 +190,7 @@ impl<'a> FloatReference<'a> {
     ) -> Self {
         let stress =
             |part: &dermis_golden::spec::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
-        let family = |b: Vec<f64>| Polynomial::of_degree(engine.matrices(), &b, model.formats().degree);
+        let family = |b: Vec<f64>| Some(Polynomial::of_degree(engine.matrices()?, &b, model.formats().degree));
         FloatReference {
             model,
             frame,
@@ -198,7 +198,7 @@ impl<'a> FloatReference<'a> {
             trace,
             status: Status::all(&trace.status).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
-            families: model.parts().iter().map(|part| family(stress(part))).collect(),
+            families: model.parts().iter().filter_map(|part| family(stress(part))).collect(),
         }
     }
 

@@ -218,8 +218,8 @@ fn operations(measured: &[Measured]) -> Table {
         "ours per frame, folded, all subarrays",
         "Eq. 1 per candidate / ours per frame",
     ];
-    let rows = measured.iter().filter(|m| m.scene.name == "sensor-4").map(|m| {
-        let matrices = m.engine.matrices();
+    let of_sensor_4 = measured.iter().filter(|m| m.scene.name == "sensor-4");
+    let rows = of_sensor_4.filter_map(|m| Some((m, m.engine.matrices()?))).map(|(m, matrices)| {
         let n = matrices.sensor.taxels() as u64;
         let parts = m.scene.sensor.taxels() as u64 / n;
         let literal = parts * (3 * n * n + 9 * n * n);
