@@ -4,9 +4,9 @@ use std::fmt::{Display, Write};
 
 use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_SHIFT};
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
-use dermis_golden::fixed::stages::prepare::GAIN_FRACTION;
+use dermis_golden::fixed::stages::prepare::{Prepared, GAIN_FRACTION};
 use dermis_golden::fixed::stages::search::{log_table, COARSE_CENTRES};
-use dermis_golden::fixed::stages::send::{status_fields, CYCLES, LN_SIGMA_BITS};
+use dermis_golden::fixed::stages::send::{status_fields, CYCLES, LN_SIGMA_BITS, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::{
     EPSILON_SHIFT, FORCE_BITS, FORCE_SHIFT_MAX, HALVINGS, LOG_FRACTION, LOG_TABLE_BITS, MU_ROUND, MU_STEPS,
     SEARCH_EXTRA_BITS,
@@ -14,11 +14,21 @@ use dermis_golden::fixed::words::formats::{
 use dermis_golden::fixed::words::network::{LAST_SHIFT, ONE, OUTPUT_BITS, POSITION_BITS};
 use dermis_golden::fixed::words::schedule::EXPONENTS;
 use dermis_golden::fixed::Model;
+use dermis_golden::result::flags::StatusField;
 use dermis_golden::spec::quads::Quads;
 use dermis_golden::spec::scene::{largest_code, Condition};
 
 use super::tables::{table, Layout};
-use super::STATUS_WORDS;
+
+/// Words of a beat.
+const BEAT_WORDS: usize = 3;
+/// Words of a status.
+pub(super) const STATUS_WORDS: usize = BEAT_WORDS * STATUS_BEATS;
+
+/// The word of a status that holds a field.
+pub(super) fn status_word(field: &StatusField) -> usize {
+    BEAT_WORDS * field.beat + field.word
+}
 
 /// Definitions of C constants.
 #[derive(Default)]
@@ -143,18 +153,17 @@ fn add_forces(all: &mut Definitions, model: &Model) {
 fn add_status(all: &mut Definitions, model: &Model) {
     all.unsigned("STATUS_WORDS", STATUS_WORDS);
     for field in status_fields().into_iter().filter(|field| field.feature.is_in(&model.scene)) {
-        let word = STATUS_WORDS / dermis_golden::fixed::stages::send::STATUS_BEATS * field.beat + field.word;
-        all.add(&format!("STATUS_{}", field.name.to_uppercase()), format!("{word}U, {}U", field.low));
+        let name = format!("STATUS_{}", field.name.to_uppercase());
+        all.add(&name, format!("{}U, {}U", status_word(&field), field.low));
     }
     all.option("HAS_SCORE_LIMIT", model.score_limit.is_some());
     all.add("SCORE_LIMIT", format!("({})", model.score_limit.unwrap_or_default()));
-    let [searched, not_searched] = [loaded(model), vec![0; model.scene.sensor.taxels()]];
-    let cycles = |codes: &[i32]| CYCLES.get(&model.run(codes).status);
-    all.unsigned("CYCLES_SEARCHED", cycles(&searched));
-    all.unsigned("CYCLES_NOT_SEARCHED", cycles(&not_searched));
+    let cycles = |words: Vec<i32>| CYCLES.get(&model.run_prepared(&Prepared { words, ..model.prepare.empty() }).status);
+    all.unsigned("CYCLES_SEARCHED", cycles(loaded(model)));
+    all.unsigned("CYCLES_NOT_SEARCHED", cycles(vec![0; model.scene.sensor.taxels()]));
 }
 
-/// Codes of a frame that meets any condition.
+/// Words of the frame buffer that meet any condition.
 fn loaded(model: &Model) -> Vec<i32> {
     let most = largest_code(model.formats().code_bits);
     (0..model.scene.sensor.taxels()).map(|taxel| if taxel % 2 == 0 { most } else { -most }).collect()

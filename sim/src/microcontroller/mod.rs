@@ -22,7 +22,7 @@ pub mod target;
 use std::path::Path;
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::fixed::stages::send::{status_fields, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::status_fields;
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::flags::{Flag, StatusField};
@@ -30,11 +30,9 @@ use dermis_golden::spec::scene::{Scene, SceneError};
 use dermis_hdl::GeneratedFile;
 use serde::Serialize;
 
-use constants::constants;
+use constants::{constants, status_word, STATUS_WORDS};
 use tables::{table, Layout, Tables};
 
-/// Words of a status.
-pub(crate) const STATUS_WORDS: usize = 3 * STATUS_BEATS;
 /// Terms of a polynomial of degree 3.
 const TERMS: usize = 10;
 /// Words of the work memory beside its arrays: position, score, condition, found, two shifts, saturations.
@@ -274,7 +272,7 @@ fn status(model: &Model, prefix: &str) -> String {
 }
 
 fn accessor(field: &StatusField, prefix: &str) -> String {
-    let (name, word) = (field.name.to_uppercase(), 3 * field.beat + field.word);
+    let (name, word) = (field.name.to_uppercase(), status_word(field));
     let flag = Flag::ALL.into_iter().find(|flag| flag.status_bit() == Some(*field));
     let flag = flag.map_or_else(String::new, |flag| format!("flag {}: ", flag.name()));
     let value = match field.bits {

@@ -10,7 +10,8 @@ use anyhow::{bail, Result};
 use dermis_golden::fixed::{Model, Trace};
 use serde::Serialize;
 
-use super::{CSource, STATUS_WORDS};
+use super::constants::STATUS_WORDS;
+use super::CSource;
 use crate::flow::tools::{Tool, ToolError};
 
 /// The compiler.

@@ -73,7 +73,6 @@ impl Scene {
         self.require([
             rule(self.partition.case != Case::WHOLE, "partition.case", self.partition.case.to_string(), "0, in C"),
             rule(input.average > 0, "input.average", input.average.to_string(), "0, in C: average the readings before"),
-            rule(input.slides(), "input.mean", "sliding".to_string(), "block, in C"),
             rule(input.running_zero().is_some(), "input.zero", "running".to_string(), "fixed, in C"),
             rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, in C"),
             rule(
