@@ -87,6 +87,7 @@ fn add_input(all: &mut Definitions, model: &Model, layout: &Layout) {
     all.option("HAS_ZERO", model.prepare.zero.is_some());
     all.option("HAS_GAIN", model.prepare.gain.is_some());
     all.unsigned("GAIN_FRACTION", GAIN_FRACTION);
+    all.option("HAS_FULL_SCALE", scene.input.full_scale_MPa.is_some());
     all.option("UNIPOLAR", scene.input.unipolar);
     all.add("DEAD_TAXELS", model.dead.len());
     all.add("NOISE_FLOOR", model.noise_floor);

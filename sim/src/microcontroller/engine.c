@@ -112,27 +112,51 @@ static void hadamard(int32_t quad[PARITIES])
     quad[3] = odd - odd_below;
 }
 
-/* Calibration: the code of a reading, 0 for dead taxels and for what the array cannot read. */
+/* Largest code. */
+#define LARGEST_CODE ((int32_t)((1U << (CODE_BITS - 1U)) - 1U))
+
+/* Whether a code is at an end of its range. */
+static uint32_t at_end(int32_t code)
+{
+    return ((code >= LARGEST_CODE) || (code <= -LARGEST_CODE)) ? 1U : 0U;
+}
+
+/* The calibrated code of a reading; counts those at the end of their range, before or after. */
+static int32_t calibrate(int32_t reading, uint32_t taxel, uint32_t *ends)
+{
+    int32_t code = reading;
+#if HAS_GAIN
+    uint32_t clipped = 0U;
+
+    code = saturate(round_shift(((int64_t)reading - ZERO[taxel]) * GAIN[taxel], GAIN_FRACTION), CODE_BITS, &clipped);
+#elif HAS_ZERO
+    uint32_t clipped = 0U;
+
+    code = saturate((int64_t)reading - ZERO[taxel], CODE_BITS, &clipped);
+#else
+    (void)taxel;
+#endif
+    *ends += at_end(reading) | at_end(code);
+    return code;
+}
+
+/* The codes of a frame, 0 for dead taxels and for what the array cannot read. */
 static void prepare(struct @NAME@_work *work, const int32_t readings[TAXELS])
 {
     uint32_t taxel;
 
+    work->ends = 0U;
     for (taxel = 0U; taxel < TAXELS; taxel++) {
-        int64_t code = readings[taxel];
-#if HAS_GAIN
-        uint32_t clipped = 0U;
-        code = saturate(round_shift((code - ZERO[taxel]) * GAIN[taxel], GAIN_FRACTION), CODE_BITS, &clipped);
-#elif HAS_ZERO
-        uint32_t clipped = 0U;
-        code = saturate(code - ZERO[taxel], CODE_BITS, &clipped);
-#endif
-#if UNIPOLAR
-        code = (code < 0) ? 0 : code;
-#endif
-        work->codes[taxel] = (int32_t)code;
+        const int32_t code = calibrate(readings[taxel], taxel, &work->ends);
+
+        work->codes[taxel] = ((UNIPOLAR != 0) && (code < 0)) ? 0 : code;
     }
 #if DEAD_TAXELS > 0
     for (taxel = 0U; taxel < DEAD_TAXELS; taxel++) {
+        uint32_t ends = 0U;
+
+        (void)calibrate(readings[DEAD[taxel]], DEAD[taxel], &ends);
+        work->ends -= ends;
         work->codes[DEAD[taxel]] = 0;
     }
 #endif
@@ -765,13 +789,13 @@ static void send(const struct @NAME@_work *work, struct @NAME@_result *result)
     put(result, STATUS_CYCLES, (work->condition != 0U) ? CYCLES_SEARCHED : CYCLES_NOT_SEARCHED);
 }
 
-int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[TAXELS], struct @NAME@_result *result)
+int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[TAXELS],
+                       struct @NAME@_result *result)
 {
-    const int32_t most = (int32_t)((1U << (CODE_BITS - 1U)) - 1U);
     uint32_t k;
 
     for (k = 0U; k < TAXELS; k++) {
-        if ((readings[k] > most) || (readings[k] < (-most - 1))) {
+        if ((readings[k] > LARGEST_CODE) || (readings[k] < (-LARGEST_CODE - 1))) {
             return @MACRO@_OUTSIDE;
         }
     }
@@ -789,5 +813,5 @@ int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[TAXELS],
     work->saturations = 0U;
     solve(work);
     send(work, result);
-    return 0;
+    return ((HAS_FULL_SCALE != 0) && (work->ends > 0U)) ? @MACRO@_SATURATED : 0;
 }

@@ -24,35 +24,37 @@ extern "C" {
 /* Fields of the status, for a pointer to a result. Those of 32 bits are signed. */
 @STATUS@
 
-/* Memory that a call works in: @WORK_BYTES@ bytes. It needs no content, and has none of use afterwards. */
-@POLYNOMIALS@struct @NAME@_work {
-    int64_t sums[@SUMS@];         /* accumulators, four parities of rows */
-@WORK64@    int32_t codes[@TAXELS@];        /* calibrated readings, row-major */
-    int32_t operands[@OPERANDS@];     /* what the products multiply, one vector of four parities after the other */
-    int32_t scaled[@PARITIES@];       /* an operand times mu, or with x and y exchanged */
-    int32_t words[@PARITIES@];        /* a vector of four parities after its shift */
-@WORK32@    int32_t p[@TAXELS@];            /* pressure of each taxel, row-major */
-    int32_t position[2];      /* mu over mu_max, in @MU_STEPS@ths, x and y */
-    int32_t score;            /* the status word of that name */
-    uint32_t condition;       /* the frame meets the condition of the scene */
-    uint32_t found;           /* mu was found */
-    uint32_t normalise;       /* left shift of the codes */
-    uint32_t rescale;         /* right shift of v_00 */
-    uint32_t saturations;     /* words that did not fit */
+@POLYNOMIALS@/* Memory that a call works in: @WORK_BYTES@ bytes. It needs no content, and has none of use afterwards. */
+struct @NAME@_work {
+    int64_t sums[@SUMS@]; /* accumulators, four parities of rows */
+@WORK64@    int32_t codes[@TAXELS@]; /* calibrated readings, row-major */
+    int32_t operands[@OPERANDS@]; /* what the products multiply, one vector of four parities after the other */
+    int32_t scaled[@PARITIES@]; /* an operand times mu, or with x and y exchanged */
+    int32_t words[@PARITIES@]; /* a vector of four parities after its shift */
+@WORK32@    int32_t p[@TAXELS@]; /* pressure of each taxel, row-major */
+    int32_t position[2]; /* mu over mu_max, in @MU_STEPS@ths, x and y */
+    int32_t score; /* the status word of that name */
+    uint32_t condition; /* the frame meets the condition of the scene */
+    uint32_t found; /* mu was found */
+    uint32_t normalise; /* left shift of the codes */
+    uint32_t rescale; /* right shift of v_00 */
+    uint32_t saturations; /* words that did not fit */
+    uint32_t ends; /* readings of live taxels at the end of their range */
 };
 
 /* Forces on the surface and the status. */
 struct @NAME@_result {
     int32_t force[@TAXELS@][3]; /* fx along the columns, fy along the rows, fz into the cover; row-major */
-    uint32_t status[@STATUS_WORDS@];     /* the status of the hardware, by the macros above */
+    uint32_t status[@STATUS_WORDS@]; /* the status of the hardware, by the macros above */
 };
 
 /*
  * The forces of one frame of `readings`, row-major, signed, of @MACRO@_READING_BITS bits.
  *
- * Returns 0, or @MACRO@_OUTSIDE if a reading needs more bits; then there is no result.
+ * Returns 0, or @MACRO@_SATURATED, or @MACRO@_OUTSIDE, with which there is no result.
  */
-int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[@TAXELS@], struct @NAME@_result *result);
+int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[@MACRO@_TAXELS],
+                       struct @NAME@_result *result);
 
 #ifdef __cplusplus
 }

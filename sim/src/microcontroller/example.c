@@ -1,5 +1,6 @@
 /*
- * Prints the forces and the status of the frames in @NAME@_frames.h, one line per taxel and one per status, as CSV.
+ * Prints the forces and the status of the frames in @NAME@_frames.h, one line per taxel and one per status, as CSV. A
+ * frame with a reading outside its range, or at the end of it, has a line that says so.
  *
  *   cc -std=c99 -O2 -o example @NAME@_example.c @NAME@.c && ./example
  */
@@ -17,9 +18,14 @@ int main(void)
     int k;
 
     for (frame = 0; frame < @MACRO@_FRAMES; frame++) {
-        if (@NAME@_reconstruct(&work, &@NAME@_frames[frame * @MACRO@_TAXELS], &result) != 0) {
-            printf("%d,a reading is outside its range\n", frame);
+        const int returned = @NAME@_reconstruct(&work, &@NAME@_frames[frame * @MACRO@_TAXELS], &result);
+
+        if (returned == @MACRO@_OUTSIDE) {
+            printf("%d,outside\n", frame);
             continue;
+        }
+        if (returned == @MACRO@_SATURATED) {
+            printf("%d,saturated\n", frame);
         }
         for (k = 0; k < @MACRO@_TAXELS; k++) {
             const int32_t *force = result.force[k];

@@ -33,10 +33,14 @@ use serde::Serialize;
 use constants::{constants, status_word, STATUS_WORDS};
 use tables::{table, Layout, Tables};
 
+/// What a call returns that refuses its readings.
+const OUTSIDE: u32 = 1;
+/// What a call returns whose readings are at the end of the stated full scale.
+const SATURATED: u32 = 2;
 /// Terms of a polynomial of degree 3.
 const TERMS: usize = 10;
-/// Words of the work memory beside its arrays: position, score, condition, found, two shifts, saturations.
-const SINGLE_WORDS: usize = 8;
+/// Words of the work memory beside its arrays: position, score, condition, found, two shifts, saturations, ends.
+const SINGLE_WORDS: usize = 9;
 
 /// The C of a scene.
 #[derive(Clone, Debug)]
@@ -166,7 +170,7 @@ pub fn generate_for(model: &Model, readings: Vec<Vec<i32>>) -> Result<CSource, F
         true => (polynomials(&name, taxels, formats.vectors()), search_memory(&name)),
         false => Default::default(),
     };
-    let first = format!("    int32_t first[{quads}];        /* v_00 */\n");
+    let first = format!("    int32_t first[{quads}]; /* v_00 */\n");
     let values = [
         ("NAME", name.clone()),
         ("MACRO", name.to_uppercase()),
@@ -202,9 +206,12 @@ pub fn generate_for(model: &Model, readings: Vec<Vec<i32>>) -> Result<CSource, F
     Ok(CSource { name, files, readings, needs })
 }
 
-/// A template with its values in the places of `@KEY@`.
+/// A template with its values in the places of `@KEY@`, in ASCII, which every compiler reads.
 fn fill(template: &str, values: &[(&str, String)]) -> String {
-    values.iter().fold(template.to_owned(), |text, (key, value)| text.replace(&format!("@{key}@"), value))
+    let text = values.iter().fold(template.to_owned(), |text, (key, value)| text.replace(&format!("@{key}@"), value));
+    let letters = [("μ", "mu"), ("σ", "sigma"), ("Σ", "sum of "), ("×", "x"), ("−", "-")];
+    let text = letters.iter().fold(text, |text, (letter, name)| text.replace(letter, name));
+    text.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect()
 }
 
 /// The memory of a search.
@@ -217,7 +224,7 @@ fn polynomials(name: &str, taxels: usize, vectors: usize) -> String {
 
 fn search_memory(name: &str) -> String {
     format!(
-        "    struct {name}_polynomials kept;    /* about the best centre so far */\n    \
+        "    struct {name}_polynomials kept; /* about the best centre so far */\n    \
          struct {name}_polynomials current; /* about the centre of the coarse grid */\n"
     )
 }
@@ -260,8 +267,13 @@ fn defines(model: &Model, prefix: &str) -> String {
         lines.push("/* Stress of the largest code in MPa. */".to_owned());
         lines.push(format!("#define {prefix}_FULL_SCALE_MPA {full_scale_MPa:?}"));
     }
-    lines.push("/* Returned if a reading needs more bits. */".to_owned());
-    lines.push(format!("#define {prefix}_OUTSIDE 1"));
+    lines.push("/* Returned without a result: a reading needs more bits. */".to_owned());
+    lines.push(format!("#define {prefix}_OUTSIDE {OUTSIDE}"));
+    let saturated = Flag::Saturated.name();
+    lines.push(format!(
+        "/* Flag {saturated}, returned with a result: a reading is at the end of the stated full scale. */"
+    ));
+    lines.push(format!("#define {prefix}_SATURATED {SATURATED}"));
     lines.join("\n")
 }
 

@@ -11,7 +11,7 @@ use dermis_golden::fixed::{Model, Trace};
 use serde::Serialize;
 
 use super::constants::STATUS_WORDS;
-use super::CSource;
+use super::{CSource, OUTSIDE};
 use crate::flow::tools::{Tool, ToolError};
 
 /// The compiler.
@@ -145,7 +145,7 @@ pub fn measure(source: &CSource, core: Core, folder: &Path) -> std::result::Resu
         return Err(wrong("not as many words in qemu.log as the frames have"));
     }
     let frames = || words.chunks(of_frame);
-    if frames().any(|frame| frame[0] != 0) {
+    if frames().any(|frame| frame[0] == OUTSIDE) {
         return Err(wrong("qemu.log: a frame was refused"));
     }
     let most = |at: usize| frames().map(|frame| u64::from(frame[at])).max().unwrap_or_default();
