@@ -11,9 +11,11 @@ VERILATOR ?= verilator
 # Cargo's own variable: a target folder outside the repository is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv $(LITEX)
+PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv $(LITEX) $(CORTEX)
 # What LiteX's simulation is built with, and the compiler of its processor.
 LITEX      = gcc-riscv64-unknown-elf libevent-dev libjson-c-dev zlib1g-dev
+# What compiles C for a Cortex-M and runs it.
+CORTEX     = gcc-arm-none-eabi qemu-system-arm
 # A clean environment for the Python package and its tests.
 VENV       = $(BUILD)/python
 # The short report: make report QUICK=1

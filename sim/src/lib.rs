@@ -1,11 +1,12 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Eight folders and `engine`; each uses only those above it and the files beside them.
+//! Nine folders and `engine`; each uses only those above it and the files beside them.
 //!
 //! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
 //! | [`cosim`] | co-simulation: the hardware under Verilator and in kernel simulation, compared with the bit-true model, stressed, with faults |
+//! | [`microcontroller`] | the bit-true engine of a scene as C99, compiled and run for a Cortex-M |
 //! | [`mod@engine`] | engines by name, models and simulated hardware, and the one way to their results |
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`recording`] | frames and results of a stream in an MCAP file, with the message types of ROS 2 |
@@ -38,6 +39,7 @@ pub mod guide;
 pub mod jobs;
 pub mod link;
 pub mod live;
+pub mod microcontroller;
 mod progress;
 pub mod recording;
 pub mod report;

@@ -22,6 +22,7 @@
 //! | `features` | tests, program and Python package compile the same crates once |
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = kernel simulation, pin by pin |
+//! | `microcontroller` | C: every word, with the host's compiler and on a Cortex-M7 and M4 under QEMU; a wrong table found |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `tables` | images of tables between frames: equality before, after, and while tables are not whole |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |

@@ -1,9 +1,10 @@
-//! `dermis build`: generates the Verilog of a scene.
+//! `dermis build`: generates the Verilog of a scene, or its C for a microcontroller.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, Result};
+use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
+use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
@@ -12,8 +13,10 @@ use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;
+use dermis_hdl::GeneratedFile;
 
 use super::inputs::{note_hardware, BoardOverride};
+use crate::microcontroller::{self, target::measure_all};
 use crate::progress::Progress;
 use crate::report;
 
@@ -25,13 +28,18 @@ use crate::report;
   dermis build sensor-1 --bus axi --stream-bits 64   a core for a SoC: registers on AXI4-Lite, streams of whole words
   dermis build sensor-1 --board                      engine, link and packets, ready for place and route
   dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices
-  dermis build eight-by-eight --target-board ./my-board.toml      a board of your own")]
+  dermis build eight-by-eight --target-board ./my-board.toml      a board of your own
+  dermis build sensor-1-noisy --target c             the same words in C99, for a microcontroller")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,
-    /// Folder for the files; default: `<build-dir>/<scene>/rtl`.
+    /// Folder for the files; default: `<build-dir>/<scene>/rtl`, of C `<build-dir>/<scene>/c`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Generate hardware, or its arithmetic in C99 for a microcontroller; C is compiled for a Cortex-M and run in QEMU where
+    /// arm-none-eabi-gcc and qemu-system-arm are installed, and its words are compared with the bit-true model's.
+    #[arg(long, value_enum, default_value_t = Target::Verilog)]
+    target: Target,
     /// Print which optional features the scene uses, which are left out, and what that saves.
     #[arg(long)]
     explain: bool,
@@ -45,7 +53,15 @@ pub struct Arguments {
     #[arg(long, value_name = "BITS", default_value_t = 32, requires = "bus", value_parser = stream_bits)]
     stream_bits: usize,
     #[command(flatten)]
-    target: BoardOverride,
+    target_board: BoardOverride,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Target {
+    /// Hardware, in Verilog.
+    Verilog,
+    /// A microcontroller, in C99.
+    C,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -75,8 +91,15 @@ enum What {
 /// # Errors
 /// A scene that cannot be loaded or has no hardware, files that cannot be written.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
-    let Arguments { scene, out, explain, board, bus, stream_bits, target } = arguments;
-    let scene = target.apply(Scene::load(scene)?);
+    let Arguments { scene, out, target, explain, board, bus, stream_bits, target_board } = arguments;
+    let scene = target_board.apply(Scene::load(scene)?);
+    if *target == Target::C {
+        let of_hardware = [("--board", *board), ("--bus", bus.is_some()), ("--explain", *explain)];
+        if let Some((option, _)) = of_hardware.iter().find(|(_, given)| *given) {
+            bail!("{option} is of hardware, not of --target c");
+        }
+        return build_c(&scene, &out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join("c")));
+    }
     let (what, folder) = match bus {
         None if *board => (What::Board, "board"),
         None => (What::Engine, "rtl"),
@@ -110,13 +133,7 @@ fn build(scene: &Scene, out: &Path, what: What, with_features: bool) -> Result<S
     let explained = explain(&model)?;
     generated.add_explained(&model, &explained);
     drop(progress);
-    std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
-    let mut text = String::new();
-    for file in &generated.files {
-        let path = out.join(&file.name);
-        write(&path, file.text.as_bytes())?;
-        text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
-    }
+    let mut text = write_files(out, &generated.files)?;
     text.push_str(&report::resources(&model, &generated.usage));
     text.push_str(&report::cases(&model, &generated.dropped));
     if let What::Board = what {
@@ -127,4 +144,36 @@ fn build(scene: &Scene, out: &Path, what: What, with_features: bool) -> Result<S
         text.push_str(&report::program(&model));
     }
     Ok(text)
+}
+
+/// Writes files, each completely or not at all; returns their list.
+fn write_files(out: &Path, files: &[GeneratedFile]) -> Result<String> {
+    std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
+    let mut text = String::new();
+    for file in files {
+        let path = out.join(&file.name);
+        write(&path, file.text.as_bytes())?;
+        text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
+    }
+    Ok(text)
+}
+
+/// Frames of the example and of the measurement.
+const FRAMES: usize = 2;
+
+/// Writes the C of a scene; returns the list of its files and what it needs on microcontrollers.
+fn build_c(scene: &Scene, out: &Path) -> Result<String> {
+    note_hardware(scene)?;
+    let progress = Progress::start(&format!("{}: model and C", scene.name));
+    let model = Model::new(scene)?;
+    let mut frames = Frame::shipped(scene);
+    frames.truncate(FRAMES);
+    if frames.is_empty() {
+        frames.push(Frame::eq2(&scene.sensor));
+    }
+    let source = microcontroller::generate(&model, &frames)?;
+    let text = write_files(out, &source.files)?;
+    let measured = measure_all(&model, &source)?;
+    drop(progress);
+    Ok(text + &report::microcontrollers(&source, &measured))
 }

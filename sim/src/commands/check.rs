@@ -20,6 +20,7 @@ use dermis_hdl::{explain::explain, generate, manifest};
 use super::check_noise::NoiseArguments;
 use super::check_rate::rates;
 use super::inputs::{estimator_instead, noise_not_stated, BoardOverride};
+use crate::microcontroller;
 use crate::progress::Progress;
 use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
 
@@ -97,10 +98,15 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     let golden = Golden::new(&scene).map_err(|error| refused(error.into()))?;
     let noise = StatedNoise::of(&scene, arguments.peak)?;
     let tare_load = tare_load(&scene)?;
-    let (hardware, hardware_refused) = match Model::new(&scene) {
-        Ok(model) => (Some(hardware(&scene, &model)?), None),
+    let (hardware, hardware_refused, in_c) = match Model::new(&scene) {
+        Ok(model) => (Some(hardware(&scene, &model)?), None, Some(microcontroller::needs(&model))),
         Err(defect @ (FixedError::Internal(_) | FixedError::Beats { .. })) => return Err(defect.into()),
-        Err(reason) => (None, Some(reason.to_string())),
+        Err(reason) => (None, Some(reason.to_string()), None),
+    };
+    let (microcontroller, microcontroller_refused) = match in_c {
+        Some(Ok(needs)) => (Some(needs), None),
+        Some(Err(reason)) => (None, Some(reason.to_string())),
+        None => (None, None),
     };
     let noise_not_stated = noise_not_stated(&scene)?;
     let (peak_MPa, with_hardware) = (arguments.peak, hardware.is_some());
@@ -134,6 +140,8 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         sensor: scene.sensor,
         hardware,
         hardware_refused,
+        microcontroller,
+        microcontroller_refused,
         noise,
         noise_not_stated,
         rates,

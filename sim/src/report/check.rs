@@ -10,8 +10,10 @@ use dermis_hdl::usage::{total, StageUsage, Usage};
 use serde::Serialize;
 
 use super::document::percent_text;
+use super::microcontroller::microcontroller_needs;
 use super::table::markdown;
 use super::BUDGET_US;
+use crate::microcontroller::Needs;
 
 /// Warning of a search in hardware whose noise is not stated.
 pub const NOISE_NOT_STATED: &str =
@@ -58,6 +60,10 @@ pub struct SceneCheck {
     pub hardware: Option<HardwareCheck>,
     /// Why the hardware is refused.
     pub hardware_refused: Option<String>,
+    /// What the same arithmetic needs in C; `None` if it is refused, or the hardware is.
+    pub microcontroller: Option<Needs>,
+    /// Why C is refused where the hardware is not.
+    pub microcontroller_refused: Option<String>,
     /// Noise, and the stress that it is compared with.
     #[serde(flatten)]
     pub noise: StatedNoise,
@@ -188,6 +194,11 @@ pub fn scene_check(check: &SceneCheck) -> String {
             text += &hardware.text(board);
         }
         (None, reason) => text += &format!("hardware    none: {}\n", reason.as_deref().unwrap_or_default()),
+    }
+    match (&check.microcontroller, &check.microcontroller_refused) {
+        (Some(needs), _) => text += &format!("in C        {}\n", microcontroller_needs(needs)),
+        (None, Some(reason)) => text += &format!("in C        none: {reason}\n"),
+        (None, None) => {}
     }
     if let Some(TareLoad { row, col, stress_MPa }) = check.tare_load {
         text += &format!(

@@ -23,6 +23,7 @@ mod flipped_bit;
 mod framing;
 mod link;
 mod lint;
+mod microcontroller;
 mod missing;
 mod netlist;
 mod power;

@@ -61,6 +61,30 @@ const LARGEST_PITCH: f64 = 3.0;
 const LARGEST_PITCH_BONDED: f64 = 1.5;
 
 impl Scene {
+    /// Checks that C for a microcontroller serves every value of a scene that hardware serves: one subarray with one μ, a
+    /// frame at a time.
+    ///
+    /// # Errors
+    /// [`SceneError::NotAvailable`] for the first value that it does not serve.
+    pub fn require_c(&self) -> Result<(), SceneError> {
+        let input = &self.input;
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        let resultants = self.output.forces == ForceOutput::Resultants;
+        self.require([
+            rule(self.partition.case != Case::WHOLE, "partition.case", self.partition.case.to_string(), "0, in C"),
+            rule(input.average > 0, "input.average", input.average.to_string(), "0, in C: average the readings before"),
+            rule(input.running_zero().is_some(), "input.zero", "running".to_string(), "fixed, in C"),
+            rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, in C"),
+            rule(
+                self.hardware.adc_scan.is_some(),
+                "hardware.source",
+                "adc-scan".to_string(),
+                "stream, in C: it takes readings",
+            ),
+            rule(resultants, "output.forces", "resultants".to_string(), "taxels, in C: add up the forces"),
+        ])
+    }
+
     /// Checks that the hardware implements every value of the scene.
     ///
     /// # Errors

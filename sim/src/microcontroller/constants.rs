@@ -1,0 +1,186 @@
+//! Constants: widths, shifts and options of a scene as `engine.c` takes them, from the bit-true model's own.
+
+use std::fmt::{Display, Write};
+
+use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_SHIFT};
+use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
+use dermis_golden::fixed::stages::prepare::{Prepared, GAIN_FRACTION};
+use dermis_golden::fixed::stages::search::{log_table, COARSE_CENTRES};
+use dermis_golden::fixed::stages::send::{status_fields, CYCLES, LN_SIGMA_BITS, STATUS_BEATS};
+use dermis_golden::fixed::words::formats::{
+    EPSILON_SHIFT, FORCE_BITS, FORCE_SHIFT_MAX, HALVINGS, LOG_FRACTION, LOG_TABLE_BITS, MU_ROUND, MU_STEPS,
+    SEARCH_EXTRA_BITS,
+};
+use dermis_golden::fixed::words::network::{LAST_SHIFT, ONE, OUTPUT_BITS, POSITION_BITS};
+use dermis_golden::fixed::words::schedule::EXPONENTS;
+use dermis_golden::fixed::Model;
+use dermis_golden::result::flags::StatusField;
+use dermis_golden::spec::quads::Quads;
+use dermis_golden::spec::scene::{largest_code, Condition};
+
+use super::tables::{table, Layout};
+
+/// Words of a beat.
+const BEAT_WORDS: usize = 3;
+/// Words of a status.
+pub(super) const STATUS_WORDS: usize = BEAT_WORDS * STATUS_BEATS;
+
+/// The word of a status that holds a field.
+pub(super) fn status_word(field: &StatusField) -> usize {
+    BEAT_WORDS * field.beat + field.word
+}
+
+/// Definitions of C constants.
+#[derive(Default)]
+struct Definitions(String);
+
+impl Definitions {
+    /// A `name` that stands for `value`.
+    fn add(&mut self, name: &str, value: impl Display) {
+        let _ = writeln!(self.0, "#define {name} {value}");
+    }
+
+    /// A number without sign.
+    fn unsigned(&mut self, name: &str, value: impl Display) {
+        self.add(name, format!("{value}U"));
+    }
+
+    /// A number of 64 bits.
+    fn long(&mut self, name: &str, value: i64) {
+        self.add(name, format!("INT64_C({value})"));
+    }
+
+    /// What the preprocessor asks for.
+    fn option(&mut self, name: &str, present: bool) {
+        self.add(name, u8::from(present));
+    }
+}
+
+/// The constants and small tables of a scene, in C.
+pub(super) fn constants(model: &Model, layout: &Layout) -> String {
+    let mut all = Definitions::default();
+    add_input(&mut all, model, layout);
+    add_passes(&mut all, model);
+    add_forces(&mut all, model);
+    add_status(&mut all, model);
+    let mut text = all.0 + "\n" + &quads_table(model.layout()) + &input_tables(model);
+    if model.has_network() {
+        text += &table("uint32_t", "OUTPUT_PARITY", &OUTPUTS.map(|(parity, _)| parity));
+        text += &table("uint32_t", "OUTPUT_ROW", &OUTPUTS.map(|(_, row)| row));
+    }
+    if model.searches() {
+        text += &table("int32_t", "CENTRE_X", &COARSE_CENTRES.map(|[x, _]| x));
+        text += &table("int32_t", "CENTRE_Y", &COARSE_CENTRES.map(|[_, y]| y));
+        text += &table("uint32_t", "DEGREE_OF", &EXPONENTS.map(|(i, j)| i + j));
+        text += &table("int32_t", "LOG_TABLE", log_table());
+    }
+    text
+}
+
+fn add_input(all: &mut Definitions, model: &Model, layout: &Layout) {
+    let (formats, scene) = (model.formats(), &model.scene);
+    all.unsigned("TAXELS", scene.sensor.taxels());
+    all.unsigned("COLUMNS", scene.sensor.cols);
+    all.unsigned("QUADS", formats.quads);
+    all.unsigned("QUAD_COLUMNS", model.layout().quad_cols());
+    all.unsigned("CODE_BITS", formats.code_bits);
+    all.option("HAS_ZERO", model.prepare.zero.is_some());
+    all.option("HAS_GAIN", model.prepare.gain.is_some());
+    all.unsigned("GAIN_FRACTION", GAIN_FRACTION);
+    all.option("HAS_FULL_SCALE", scene.input.full_scale_MPa.is_some());
+    all.option("UNIPOLAR", scene.input.unipolar);
+    all.add("DEAD_TAXELS", model.dead.len());
+    all.add("NOISE_FLOOR", model.noise_floor);
+    all.add("CONDITION_BOTH_SIGNS", u8::from(scene.partition.condition == Condition::BothSigns));
+    all.add("INPUT_LOW_BITS", formats.input_low_bits);
+    all.add("LIMB_ALIGN", formats.limb_align);
+    all.unsigned("INPUT_HIGH", layout.input_high);
+    all.unsigned("INPUT_LOW", layout.input_low);
+    all.unsigned("BIAS", layout.bias);
+    all.add("BIAS_WORD", ONE);
+}
+
+fn add_passes(all: &mut Definitions, model: &Model) {
+    let formats = model.formats();
+    all.option("HAS_NETWORK", model.has_network());
+    all.option("HAS_SEARCH", model.searches());
+    all.option("SHARES_A", formats.shared_a);
+    all.unsigned("VECTOR_COUNT", formats.vectors());
+    all.unsigned("VECTOR_BITS", formats.vector_bits);
+    all.unsigned("FULL_LENGTH", formats.full_length());
+    all.unsigned("A_SHIFT", formats.a_shift);
+    all.unsigned("EXTRA_BITS", SEARCH_EXTRA_BITS);
+    all.unsigned("DATA_BITS", formats.data_bits);
+    if let Some(network) = &model.quantised().network {
+        let [least, most] = ln_sigma_range();
+        all.unsigned("LAYER_COUNT", network.layers.len());
+        all.unsigned("LAYER_SHIFT", network.shift);
+        all.unsigned("LAST_SHIFT", LAST_SHIFT);
+        all.add("LARGEST_IMAGE", (1i64 << formats.image_bits()) - 1);
+        all.unsigned("POSITION_BITS", POSITION_BITS);
+        all.unsigned("OUTPUT_BITS", OUTPUT_BITS);
+        all.add("LN_SIGMA_LEAST", format!("({least})"));
+        all.add("LN_SIGMA_MOST", most);
+        all.unsigned("LN_SIGMA_BITS", LN_SIGMA_BITS);
+        all.unsigned("REDUCTIONS", REDUCTIONS);
+        all.unsigned("REDUCTION_SHIFT", REDUCTION_SHIFT);
+        all.add("MU_STEPS", MU_STEPS);
+        all.unsigned("POSITION_SHIFT", POSITION_SHIFT);
+    }
+    if model.searches() {
+        all.unsigned("OPERAND_VECTORS", formats.operand_vectors());
+        all.unsigned("COARSE_CENTRES", COARSE_CENTRES.len());
+        all.unsigned("HALVINGS", HALVINGS);
+        all.unsigned("EPSILON_SHIFT", EPSILON_SHIFT);
+        all.unsigned("LOG_FRACTION", LOG_FRACTION);
+        all.unsigned("LOG_TABLE_BITS", LOG_TABLE_BITS);
+    }
+}
+
+fn add_forces(all: &mut Definitions, model: &Model) {
+    let formats = model.formats();
+    let rescale_most = formats.raw_length_max.saturating_sub(formats.full_length());
+    all.long("MU_STEP", formats.mu_step);
+    all.unsigned("MU_ROUND", MU_ROUND);
+    all.unsigned("MU_FRACTION", formats.mu_fraction);
+    all.unsigned("FORCE_SHIFT", formats.mu_fraction + rescale_most);
+    all.unsigned("FORCE_HEADROOM", FORCE_BITS - formats.search_bits[0]);
+    all.unsigned("FORCE_SHIFT_MOST", FORCE_SHIFT_MAX);
+    all.unsigned("FORCE_BITS", FORCE_BITS);
+    all.long("THRESHOLD", model.threshold);
+}
+
+/// Word and lowest bit of each field of the status, and the words that are constant.
+fn add_status(all: &mut Definitions, model: &Model) {
+    all.unsigned("STATUS_WORDS", STATUS_WORDS);
+    for field in status_fields().into_iter().filter(|field| field.feature.is_in(&model.scene)) {
+        let name = format!("STATUS_{}", field.name.to_uppercase());
+        all.add(&name, format!("{}U, {}U", status_word(&field), field.low));
+    }
+    all.option("HAS_SCORE_LIMIT", model.score_limit.is_some());
+    all.add("SCORE_LIMIT", format!("({})", model.score_limit.unwrap_or_default()));
+    let cycles = |words: Vec<i32>| CYCLES.get(&model.run_prepared(&Prepared { words, ..model.prepare.empty() }).status);
+    all.unsigned("CYCLES_SEARCHED", cycles(loaded(model)));
+    all.unsigned("CYCLES_NOT_SEARCHED", cycles(vec![0; model.scene.sensor.taxels()]));
+}
+
+/// Words of the frame buffer that meet any condition.
+fn loaded(model: &Model) -> Vec<i32> {
+    let most = largest_code(model.formats().code_bits);
+    (0..model.scene.sensor.taxels()).map(|taxel| if taxel % 2 == 0 { most } else { -most }).collect()
+}
+
+/// The taxel of each lane of each quad.
+fn quads_table(quads: Quads) -> String {
+    let of = |quad| (0..Quads::LANES).map(move |lane| quads.taxel(quad, lane));
+    table("uint16_t", "TAXEL_OF", &(0..quads.len()).flat_map(of).collect::<Vec<_>>())
+}
+
+/// Zero, gain, dead taxels, where there are any.
+fn input_tables(model: &Model) -> String {
+    let of = |kind, name, values: &Option<Vec<i32>>| values.as_ref().map(|values| table(kind, name, values));
+    let zero = of("int32_t", "ZERO", &model.prepare.zero);
+    let gain = of("int32_t", "GAIN", &model.prepare.gain);
+    let dead = Some(&model.dead).filter(|dead| !dead.is_empty()).map(|dead| table("uint16_t", "DEAD", dead));
+    [zero, gain, dead].into_iter().flatten().collect()
+}
