@@ -126,7 +126,7 @@ fn parallel(model: &Model) -> Vec<Stream> {
         (network, of("relax", &["relax__sums_valid"], &[signed("relax__sums")]).fields(&PARITIES)),
         (true, of("unfold", &["unfold__taxels_valid"], &[signed("unfold__taxels")]).fields(&TAXELS)),
         (
-            true,
+            model.searches(),
             of(
                 "search",
                 &["search__compared"],
@@ -139,7 +139,7 @@ fn parallel(model: &Model) -> Vec<Stream> {
             )
             .field_bits(SEARCH_FIELD),
         ),
-        (true, of("forces", &["search__values_valid"], &[signed("search__values")]).fields(&TAXELS[..width])),
+        (true, of("forces", &["values_valid"], &[signed("values")]).fields(&TAXELS[..width])),
     ];
     all.into_iter().filter(|(present, _)| *present).map(|(_, stream)| stream).collect()
 }
