@@ -49,7 +49,7 @@ use crate::stages::{
     Search, Segment, Send, Shear, Unfold, Window,
 };
 use crate::streams::{stage_list, EnginePorts};
-use crate::taps::streams;
+use crate::taps::observe;
 
 stage_list! {
     |model| {}
@@ -90,7 +90,8 @@ pub(crate) fn build<'k>(model: &Model, k: &'k Builder, io: EnginePorts<Inside<'k
     engine.find_contacts(&c);
     engine.search(&c);
     engine.send(&io, &c);
-    engine.observe();
+    engine.unused();
+    observe(k, model);
 }
 
 /// The engine under construction.
@@ -128,11 +129,9 @@ impl<'k> Parallel<'k, '_> {
         input.set(stage.as_ref().map_or_else(|| self.zero(input.bits()), of));
     }
 
-    /// The test bench reads the signals of the observed streams. Others are read only where a scene has the stages for them.
-    fn observe(&self) {
+    /// Signals that are read only where a scene has the stages for them.
+    fn unused(&self) {
         let (k, s) = (self.k, &self.s);
-        let observed = streams(self.model);
-        k.unused(observed.iter().flat_map(|stream| stream.signals()).map(|name| k.named(name)));
         k.unused([
             s.receive.row_end,
             s.receive.dropped,
