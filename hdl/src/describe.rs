@@ -96,11 +96,16 @@ pub struct BlockText {
     pub instance: &'static str,
     /// First sentence of its source.
     pub purpose: String,
-    /// The ports in the order of the source.
+    /// The ports in the order of the source; none where the scene's engine does not have the block.
     pub ports: Vec<PortText>,
 }
 
-/// The described blocks of the engine of `model`, in the order of the data flow.
+/// Names of the stages in the order of the data flow, then of the described blocks inside them.
+pub fn names() -> Vec<&'static str> {
+    entries().iter().map(Entry::name).collect()
+}
+
+/// The described blocks in the order of the data flow, with the ports of those that the engine of `model` has.
 ///
 /// # Errors
 /// [`DescribeError::Serial`]; an engine that cannot be built.
@@ -113,7 +118,7 @@ pub fn blocks(model: &Model) -> Result<Vec<BlockText>, DescribeError> {
 /// # Errors
 /// As [`blocks`]; [`DescribeError::Unknown`].
 pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
-    let all = blocks(model)?;
+    let all = present(blocks(model)?);
     let known: Vec<&str> = all.iter().map(|block| block.name).collect();
     let unknown = DescribeError::Unknown { scene: model.scene.name.clone(), name: name.to_owned(), known };
     all.into_iter().find(|block| block.name == name).ok_or(unknown)
@@ -147,19 +152,24 @@ fn engine(model: &Model) -> Result<Hierarchy, DescribeError> {
     }
 }
 
-/// The described blocks that an engine has.
+/// Those of `blocks` that the engine has.
+fn present(blocks: Vec<BlockText>) -> Vec<BlockText> {
+    blocks.into_iter().filter(|block| !block.ports.is_empty()).collect()
+}
+
+/// The described blocks, with the ports of those that `engine` has.
 fn describe(engine: &Hierarchy) -> Vec<BlockText> {
     let described = |entry: &Entry| {
-        let (_, kernel) = engine.kernels().find(|(path, _)| *path == entry.instance)?;
+        let kernel = engine.kernels().find(|(path, _)| *path == entry.instance);
         let purpose = entry.source.lines().next().and_then(|line| line.strip_prefix("//! ")).unwrap_or_default();
-        Some(BlockText {
+        BlockText {
             name: entry.name(),
             instance: entry.instance,
             purpose: purpose.to_owned(),
-            ports: ports(kernel),
-        })
+            ports: kernel.map(|(_, kernel)| ports(kernel)).unwrap_or_default(),
+        }
     };
-    entries().iter().filter_map(described).collect()
+    entries().iter().map(described).collect()
 }
 
 /// The ports of a block, the clock first.
@@ -196,7 +206,7 @@ impl Recorder {
     /// As [`blocks`].
     pub fn new(model: &Model) -> Result<Self, DescribeError> {
         let hierarchy = engine(model)?;
-        let blocks = describe(&hierarchy);
+        let blocks = present(describe(&hierarchy));
         let ports = blocks.iter().flat_map(|block| block.ports.iter().map(|port| (block.instance, port.name.as_str())));
         let engine = Running::new(&hierarchy, &ports.collect::<Vec<_>>());
         let slot =
@@ -227,7 +237,7 @@ impl crate::device::Device for Recorder {
 mod tests {
     use super::*;
     use dermis_golden::spec::partition::Case;
-    use dermis_golden::spec::scene::Scene;
+    use dermis_golden::spec::scene::{ForceOutput, Scene};
 
     fn model(adaptive: bool) -> Model {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
@@ -239,8 +249,13 @@ mod tests {
 
     #[test]
     fn every_port_has_its_meaning_and_says_when_it_is_valid() {
-        let all = blocks(&model(true)).unwrap();
-        assert_eq!(all.len(), entries().len());
+        let mut sums = Scene::builtin("eight-by-eight").unwrap();
+        (sums.input.average, sums.output.forces) = (1, ForceOutput::Resultants);
+        let contacts = Scene::builtin("eight-by-eight-contacts").unwrap();
+        let models = [model(true), Model::new(&sums).unwrap(), Model::new(&contacts).unwrap()];
+        let all: Vec<BlockText> = models.iter().flat_map(|model| present(blocks(model).unwrap())).collect();
+        let missing = entries().into_iter().find(|entry| all.iter().all(|block| block.instance != entry.instance));
+        assert!(missing.is_none(), "{:?}", missing.map(|entry| entry.instance));
         for block in &all {
             assert!(!block.purpose.is_empty() && block.ports.len() >= 3, "{block:?}");
             for port in &block.ports {
@@ -257,7 +272,7 @@ mod tests {
         assert_eq!(port("folded").bits, 4 * model.formats().fold_bits as usize);
         assert!(port("folded").output && !port("normalised").output);
         let error = block(&model, "choose").unwrap_err().to_string();
-        assert!(error.contains("no block \"choose\"; its blocks: prepare, receive, normalise, fold"), "{error}");
+        assert!(error.contains("no block \"choose\"; its blocks: receive, normalise, fold"), "{error}");
     }
 
     #[test]

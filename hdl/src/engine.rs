@@ -9,9 +9,8 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::EngineKind;
 
 use crate::language::{Block, Builder, Inside, Interface, Make, View, Visit, VisitMut};
-use crate::parallel::Parallel;
-use crate::serial::Serial;
 use crate::streams::{EnginePorts, Stage, Streams};
+use crate::{parallel, serial};
 
 /// Where blocks count that belong to no stage: what starts the stages and hands their results over.
 pub(crate) const CONTROL: &str = "engine";
@@ -19,8 +18,8 @@ pub(crate) const CONTROL: &str = "engine";
 /// The stages of an engine in the order of the data flow.
 pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
     match engine {
-        EngineKind::Parallel => Parallel::STAGES,
-        EngineKind::Serial => Serial::STAGES,
+        EngineKind::Parallel => parallel::STAGES,
+        EngineKind::Serial => serial::STAGES,
     }
 }
 
@@ -40,23 +39,13 @@ pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
 /// Reset is synchronous; it clears all control registers, not the data.
 pub struct Engine {
     streams: Streams,
-    kind: Kind,
-}
-
-/// The stages of an engine.
-enum Kind {
-    Parallel(Box<Parallel>),
-    Serial(Box<Serial>),
+    model: Model,
 }
 
 impl Engine {
     /// The engine of `model`.
     pub fn new(model: &Model) -> Self {
-        let kind = match model.board.engine {
-            EngineKind::Parallel => Kind::Parallel(Box::new(Parallel::new(model))),
-            EngineKind::Serial => Kind::Serial(Box::new(Serial::new(model))),
-        };
-        Engine { streams: Streams { bits: model.stream_bits() as usize }, kind }
+        Engine { streams: Streams { bits: model.stream_bits() as usize }, model: model.clone() }
     }
 }
 
@@ -82,9 +71,9 @@ impl Interface for Engine {
 
 impl Block for Engine {
     fn build<'k>(&'k self, k: &'k Builder, io: EnginePorts<Inside<'k>>) {
-        match &self.kind {
-            Kind::Parallel(parallel) => parallel.build(k, io),
-            Kind::Serial(serial) => serial.build(k, io),
+        match self.model.board.engine {
+            EngineKind::Parallel => parallel::build(&self.model, k, io),
+            EngineKind::Serial => serial::build(&self.model, k, io),
         }
     }
 }

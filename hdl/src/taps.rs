@@ -6,7 +6,7 @@ use dermis_golden::spec::board::EngineKind;
 use dermis_golden::spec::quads::Quads;
 
 use crate::device::{Tap, TapSignal};
-use crate::language::{Hierarchy, Run, Slot};
+use crate::language::{Builder, Hierarchy, Run, Slot};
 
 /// Field width of the tap of `search`, in bits: at least that of each of its signals.
 const SEARCH_FIELD: u32 = 32;
@@ -126,7 +126,7 @@ fn parallel(model: &Model) -> Vec<Stream> {
         (network, of("relax", &["relax__sums_valid"], &[signed("relax__sums")]).fields(&PARITIES)),
         (true, of("unfold", &["unfold__taxels_valid"], &[signed("unfold__taxels")]).fields(&TAXELS)),
         (
-            true,
+            model.searches(),
             of(
                 "search",
                 &["search__compared"],
@@ -139,7 +139,7 @@ fn parallel(model: &Model) -> Vec<Stream> {
             )
             .field_bits(SEARCH_FIELD),
         ),
-        (true, of("forces", &["search__values_valid"], &[signed("search__values")]).fields(&TAXELS[..width])),
+        (true, of("forces", &["values_valid"], &[signed("values")]).fields(&TAXELS[..width])),
     ];
     all.into_iter().filter(|(present, _)| *present).map(|(_, stream)| stream).collect()
 }
@@ -167,6 +167,12 @@ fn serial() -> Vec<Stream> {
         .field_bits(SEARCH_FIELD),
         of("forces", &["search_sequencer__value_valid"], &[signed("coefficient_shift__value")]),
     ]
+}
+
+/// The test bench reads the signals of these streams in the engine of `model`, and perhaps nothing else does.
+pub(crate) fn observe(k: &Builder, model: &Model) {
+    let streams = streams(model);
+    k.unused(streams.iter().flat_map(|stream| stream.signals()).map(|name| k.named(name)));
 }
 
 /// The taps of the engine of `model`, in pipeline order; `hierarchy` is its blocks.

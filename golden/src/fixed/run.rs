@@ -153,6 +153,7 @@ impl Model {
         let choice = if self.chooses() { choose::LATENCY } else { 0 };
         stages.retain(|stage| match stage.name {
             "choose" => self.chooses(),
+            "search" => self.searches() || self.board.engine == EngineKind::Serial,
             "estimate" | "relax" => self.has_network(),
             "segment" | "window" | "shear" => self.by_contact.is_some(),
             _ => true,

@@ -11,13 +11,14 @@ use crate::error::HdlError;
 use crate::language::{kernel_of, Block, Builder, Hierarchy, Inside};
 use crate::primitives::{Dff, Queue};
 use crate::scan::require_stream;
+use crate::streams::{arrive_at, sent_by, through};
 
 block! {
     /// An engine with streams of whole words and registers on a bus; all ports change on the rising edge of `aclk`.
     pub struct Core {
         shape: CoreShape,
         stream_in: StreamIn,
-        tables_in: TablesIn,
+        tables_in: Option<TablesIn>,
         engine: Engine,
         stream_out: StreamOut,
         registers: Registers,
@@ -126,7 +127,7 @@ impl Core {
         Core {
             shape,
             stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits),
-            tables_in: TablesIn::new(code_bits, writable),
+            tables_in: writable.then(|| TablesIn::new(code_bits)),
             engine: Engine::new(model),
             stream_out: StreamOut::new(shape.words, model.force_triples()),
             registers: Registers::new(&constants, writable),
@@ -154,7 +155,7 @@ impl Block for Core {
     fn build<'k>(&'k self, k: &'k Builder, io: CorePorts<Inside<'k>>) {
         let restart = k.instance("restart", Dff {});
         let stream_in = k.instance("stream_in", &self.stream_in);
-        let tables_in = k.instance("tables_in", &self.tables_in);
+        let tables_in = k.instance("tables_in", self.tables_in.as_ref());
         let labels = k.instance("labels", Queue::new(ID_BITS + 1));
         let engine = k.instance("engine", &self.engine);
         let stream_out = k.instance("stream_out", &self.stream_out);
@@ -163,9 +164,7 @@ impl Block for Core {
         k.comment("Registered, because the engine is large and its reset has a long route.");
         restart.d.set(rst | registers.restart);
         registers.rst.set(rst);
-        [&stream_in.rst, &tables_in.rst, &labels.rst, &engine.rst, &stream_out.rst]
-            .iter()
-            .for_each(|rst| rst.set(restart.q));
+        k.reset_instances(restart.q);
 
         stream_in.s_axis_tdata.set(io.s_axis_tdata);
         stream_in.s_axis_tkeep.set(io.s_axis_tkeep);
@@ -173,17 +172,18 @@ impl Block for Core {
         stream_in.s_axis_tvalid.set(io.s_axis_tvalid & !restart.q);
         stream_in.s_axis_tlast.set(io.s_axis_tlast);
         io.s_axis_tready.set(stream_in.s_axis_tready & !restart.q);
-        tables_in.s_axis_tdata.set(stream_in.m_axis_tdata);
-        tables_in.s_axis_tvalid.set(stream_in.m_axis_tvalid);
-        tables_in.s_axis_tlast.set(stream_in.m_axis_tlast);
-        stream_in.m_axis_tready.set(tables_in.s_axis_tready);
-        tables_in.octet.set(registers.octet);
-        tables_in.octet_valid.set(registers.octet_valid);
-        registers.octet_taken.set(tables_in.octet_taken);
-        engine.s_axis_tdata.set(tables_in.m_axis_tdata);
-        engine.s_axis_tvalid.set(tables_in.m_axis_tvalid);
-        engine.s_axis_tlast.set(tables_in.m_axis_tlast);
-        tables_in.m_axis_tready.set(engine.s_axis_tready);
+        match &tables_in {
+            None => {
+                registers.octet_taken.set(k.constant(1, 0));
+                k.unused([registers.octet, registers.octet_valid]);
+            }
+            Some(tables_in) => {
+                tables_in.octet.set(registers.octet);
+                tables_in.octet_valid.set(registers.octet_valid);
+                registers.octet_taken.set(tables_in.octet_taken);
+            }
+        }
+        arrive_at!(through!(sent_by!(stream_in), tables_in), engine);
 
         stream_in.room.set(labels.room);
         labels.reserve.set(stream_in.complete);
@@ -193,10 +193,7 @@ impl Block for Core {
         labels.m_axis_tready.set(stream_out.sent);
         k.unused([labels.m_axis_tlast, labels.m_axis_tvalid]);
 
-        stream_out.s_axis_tdata.set(engine.m_axis_tdata);
-        stream_out.s_axis_tvalid.set(engine.m_axis_tvalid);
-        stream_out.s_axis_tlast.set(engine.m_axis_tlast);
-        engine.m_axis_tready.set(stream_out.s_axis_tready);
+        arrive_at!(sent_by!(engine), stream_out);
         stream_out.label.set(labels.m_axis_tdata);
         io.m_axis_tdata.set(stream_out.m_axis_tdata);
         io.m_axis_tkeep.set(stream_out.m_axis_tkeep);

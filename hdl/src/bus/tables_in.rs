@@ -10,12 +10,9 @@ block! {
     /// octet  -----------'
     /// ```
     /// A byte waits for the end of the frame under way; from an image's first byte to its last the next frame waits.
-    /// Without writable tables the stream passes through.
     pub struct TablesIn {
         /// Width of a code.
         code_bits: usize,
-        /// The tables of the engine are writable.
-        writable: bool,
     }
     ports TablesInPorts {
         clock;
@@ -35,7 +32,7 @@ block! {
         /// The byte is accepted in this cycle.
         out octet_taken;
         /// A code, or a byte of an image; valid with `m_axis_tvalid`.
-        out m_axis_tdata: code_bits + usize::from(*writable);
+        out m_axis_tdata: code_bits + 1;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -49,23 +46,14 @@ block! {
 pub(super) const OCTET_BITS: usize = 9;
 
 impl TablesIn {
-    /// For codes of `code_bits` bits, with bytes between them if the tables are `writable`.
-    pub fn new(code_bits: usize, writable: bool) -> Self {
-        TablesIn { code_bits, writable }
+    /// For codes of `code_bits` bits, with bytes between them.
+    pub fn new(code_bits: usize) -> Self {
+        TablesIn { code_bits }
     }
 }
 
 impl Block for TablesIn {
     fn build<'k>(&self, k: &'k Builder, io: TablesInPorts<Inside<'k>>) {
-        if !self.writable {
-            k.comment("The tables are in the bitstream.");
-            io.s_axis_tready.set(io.m_axis_tready);
-            io.octet_taken.set(k.constant(1, 0));
-            io.m_axis_tdata.set(io.s_axis_tdata);
-            io.m_axis_tvalid.set(io.s_axis_tvalid);
-            io.m_axis_tlast.set(io.s_axis_tlast);
-            return;
-        }
         let bit = Type::unsigned(1);
         let in_frame = k.state("in_frame", bit, io.rst, 0).comment("A frame has begun and not ended.");
         let in_image = k.state("in_image", bit, io.rst, 0).comment("An image has begun and not ended.");
@@ -91,7 +79,7 @@ mod tests {
 
     use super::*;
     use crate::language::kernel_of;
-    use crate::language::testbench::{check, random_word, random_words, Pipeline, Reference};
+    use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
     const BITS: usize = 12;
@@ -162,13 +150,6 @@ mod tests {
                 ]
             })
             .collect();
-        check(&kernel_of(&TablesIn::new(BITS, true)), &stimulus, &mut Turns::default());
-    }
-
-    #[test]
-    fn without_writable_tables_the_stream_passes() {
-        let stimulus = random_words(300, &[1, BITS, 1, 1, OCTET_BITS, 1, 1]);
-        let of = |inputs: &[Word]| [inputs[6], Word::default(), inputs[1], inputs[2], inputs[3]].map(Some).into();
-        check(&kernel_of(&TablesIn::new(BITS, false)), &stimulus, &mut Pipeline::new(0, 5, of));
+        check(&kernel_of(&TablesIn::new(BITS)), &stimulus, &mut Turns::default());
     }
 }

@@ -23,6 +23,8 @@ pub struct Builder {
     scope: RefCell<String>,
     /// Domain of the registers declared now.
     domain: Cell<Option<usize>>,
+    /// What resets the instances in place of the input `rst`.
+    instance_reset: Cell<Option<NodeId>>,
 }
 
 /// A declared signal, which is assigned with [`Net::set`].
@@ -75,7 +77,9 @@ impl Builder {
 
     /// Says that nothing reads these signals, on purpose: outputs of instances that nothing reads are otherwise an error.
     pub fn unused<'k>(&'k self, signals: impl IntoIterator<Item = Expr<'k>>) {
-        self.kernel.borrow_mut().unused.extend(signals.into_iter().map(|signal| signal.id));
+        // First all signals: an iterator may look them up in the kernel.
+        let ids: Vec<NodeId> = signals.into_iter().map(|signal| signal.id).collect();
+        self.kernel.borrow_mut().unused.extend(ids);
     }
 
     /// Declares a port.
@@ -109,13 +113,26 @@ impl Builder {
         self.kernel.borrow_mut().instances.push(Instance { name, kernel });
     }
 
+    /// Every instance whose reset is not assigned is reset by `reset`, of one bit, in place of the input `rst`.
+    pub fn reset_instances(&self, reset: Expr<'_>) {
+        if reset.bits() != 1 {
+            reset.width_error(format!("a reset of {} bits", reset.bits()));
+        }
+        self.instance_reset.set(Some(reset.id));
+    }
+
+    /// The input `rst`, if there is one.
+    fn reset_input(&self) -> Option<NodeId> {
+        let kernel = self.kernel.borrow();
+        let rst = kernel.signal_of(RESET).filter(|&id| kernel.signals[id].role == Role::Input)?;
+        Some(kernel.interned[&(Node::Signal(rst), kernel.signals[rst].ty)])
+    }
+
     /// Connects the reset of every instance whose reset is not assigned.
     fn connect_resets(&self) {
+        let Some(node) = self.instance_reset.get().or_else(|| self.reset_input()) else { return };
         let resets: Vec<(SignalId, NodeId)> = {
             let kernel = self.kernel.borrow();
-            let input = |id: SignalId| kernel.signals[id].role == Role::Input;
-            let Some(rst) = kernel.signal_of(RESET).filter(|&id| input(id)) else { return };
-            let node = kernel.interned[&(Node::Signal(rst), kernel.signals[rst].ty)];
             let names = kernel.instances.iter().map(|instance| format!("{}{SEPARATOR}{RESET}", instance.name));
             let open = names.filter_map(|name| kernel.signal_of(&name));
             let driven = |id: SignalId| kernel.signals[id].role.is_driven_outside();

@@ -51,7 +51,9 @@ pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
 pub use hierarchy::{Attributes, Hierarchy};
 pub use kernel::{Contents, Kernel, Memory, Type, SEPARATOR};
-pub use ports::{kernel_of, Block, Inside, Interface, Make, Output, Outside, View, Visit, VisitMut, Width, Widths};
+pub use ports::{
+    kernel_of, Block, Inside, Instantiate, Interface, Make, Output, Outside, View, Visit, VisitMut, Width, Widths,
+};
 pub(crate) use resources::distributed_luts;
 pub use run::{Run, Slot};
 pub use rust_hdl::{RustHdl, Signals};

@@ -308,14 +308,39 @@ pub fn kernel_of<B: Block>(block: &B) -> Kernel {
     k.finish()
 }
 
-impl Builder {
-    /// An instance of `block`: its ports, of which the inputs are to be assigned. The clock is that of the block around it,
-    /// and so is the reset, an input `rst`, unless it is assigned.
-    pub fn instance<B: Block>(&self, name: &str, block: B) -> B::Ports<Outside<'_>> {
-        let kernel = Arc::new(kernel_of(&block));
-        let ports = block.ports(&mut MakeOutside { builder: self, instance: name });
-        self.place(name, kernel);
+/// What an instance is made of: a block, or one that only some scenes have, an `Option`.
+pub trait Instantiate {
+    /// The ports as the block around the instance sees them; `None` where there is no instance.
+    type Ports<'k>;
+
+    /// Adds the instance `name` to `k`.
+    fn instantiate<'k>(self, k: &'k Builder, name: &str) -> Self::Ports<'k>;
+}
+
+impl<B: Block> Instantiate for B {
+    type Ports<'k> = <B as Interface>::Ports<Outside<'k>>;
+
+    fn instantiate<'k>(self, k: &'k Builder, name: &str) -> Self::Ports<'k> {
+        let kernel = Arc::new(kernel_of(&self));
+        let ports = self.ports(&mut MakeOutside { builder: k, instance: name });
+        k.place(name, kernel);
         ports
+    }
+}
+
+impl<B: Block> Instantiate for Option<B> {
+    type Ports<'k> = Option<<B as Interface>::Ports<Outside<'k>>>;
+
+    fn instantiate<'k>(self, k: &'k Builder, name: &str) -> Self::Ports<'k> {
+        self.map(|block| block.instantiate(k, name))
+    }
+}
+
+impl Builder {
+    /// An instance of `block`, or of none: its ports, of which the inputs are to be assigned. The clock is that of the block
+    /// around it, and so is the reset, an input `rst` or that of [`Builder::reset_instances`], unless it is assigned.
+    pub fn instance<I: Instantiate>(&self, name: &str, block: I) -> I::Ports<'_> {
+        block.instantiate(self, name)
     }
 }
 

@@ -211,7 +211,7 @@ impl Block for BoardTop {
                 let engine = k.instance("engine", &**scan);
                 let gate = k.instance("gate", FrameGate::default());
                 k.comment("Registers the way back of `ready` from the link's requests to the engine.");
-                let slice = k.instance("slice", RegisterSlice::new(BEAT_BITS, true));
+                let slice = k.instance("slice", RegisterSlice::new(BEAT_BITS));
                 engine.rst.set(engine_rst.q);
                 slice.rst.set(power_on.rst);
                 gate.rst.set(power_on.rst);

@@ -11,6 +11,7 @@ use super::{
 use crate::block;
 use crate::language::{Block, Builder, Inside, Outside};
 use crate::primitives::RegisterSlice;
+use crate::streams::{through, Beats, BEAT_BITS};
 
 block! {
     /// ```text
@@ -79,7 +80,8 @@ impl Block for PacketLink {
         let decoder = k.instance("decoder", SlipDecoder::default());
         let parser = k.instance("parser", Parser::new(&self.shape));
         let ingress = k.instance("ingress", FrameIngress::new(&self.shape));
-        let towards = k.instance("towards", RegisterSlice::new(self.shape.stream_bits(), registered));
+        let towards = registered.then(|| RegisterSlice::new(self.shape.stream_bits()));
+        let towards = k.instance("towards", towards);
         let requests = k.instance("requests", Requests::new(&self.shape));
         let packer = k.instance("packer", Packer::new(self.shape.payloads()));
         let encoder = k.instance("encoder", SlipEncoder::new(registered));
@@ -107,14 +109,12 @@ impl Block for PacketLink {
         ingress.content.set(decoder.content);
         ingress.good.set(parser.good);
         ingress.bad.set(parser.bad);
-        ingress.ready.set(towards.s_axis_tready);
-        towards.s_axis_tdata.set(ingress.code);
-        towards.s_axis_tvalid.set(ingress.valid);
-        towards.s_axis_tlast.set(ingress.last);
-        towards.m_axis_tready.set(io.s_axis_tready);
-        io.s_axis_tdata.set(towards.m_axis_tdata);
-        io.s_axis_tvalid.set(towards.m_axis_tvalid);
-        io.s_axis_tlast.set(towards.m_axis_tlast);
+        let codes = Beats { data: ingress.code, valid: ingress.valid, last: ingress.last, ready: ingress.ready };
+        let codes = through!(codes, towards);
+        io.s_axis_tdata.set(codes.data);
+        io.s_axis_tvalid.set(codes.valid);
+        io.s_axis_tlast.set(codes.last);
+        codes.ready.set(io.s_axis_tready);
 
         k.comment("Requests and counters.");
         requests.good.set(parser.good);
@@ -163,22 +163,20 @@ impl PacketLink {
         packer: &PackerPorts<Outside<'k>>,
     ) {
         let registered = self.shape.answers.are_fast();
-        let back = k.instance("back", RegisterSlice::new(96, registered));
+        let back = k.instance("back", registered.then(|| RegisterSlice::new(BEAT_BITS)));
         let resultants = k.instance("resultants", Resultants::new(&self.shape));
         let sources = k.instance("sources", Sources::new(registered));
 
         resultants.run.set(sources.answer_wanted);
         resultants.summarise.set(sources.summarise);
         resultants.taken.set(packer.taken & sources.answer_wanted);
-        back.s_axis_tdata.set(io.m_axis_tdata);
-        back.s_axis_tvalid.set(io.m_axis_tvalid);
-        back.s_axis_tlast.set(io.m_axis_tlast);
-        io.m_axis_tready.set(back.s_axis_tready);
-        resultants.beat.set(back.m_axis_tdata);
-        resultants.beat_valid.set(back.m_axis_tvalid);
-        resultants.beat_last.set(back.m_axis_tlast);
-        back.m_axis_tready.set(resultants.beat_ready);
-        requests.answered.set(back.m_axis_tvalid);
+        let (data, valid, last) = (io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast);
+        let beats = through!(Beats { data, valid, last, ready: io.m_axis_tready.net() }, back);
+        resultants.beat.set(beats.data);
+        resultants.beat_valid.set(beats.valid);
+        resultants.beat_last.set(beats.last);
+        beats.ready.set(resultants.beat_ready);
+        requests.answered.set(beats.valid);
         sources.source.set(packer.source);
         sources.begun.set(packer.begun);
         sources.wanted.set(packer.wanted);

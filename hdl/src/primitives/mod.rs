@@ -5,7 +5,7 @@
 //! that carry a handshake.
 //!
 //! The other modules hold what several blocks share: expressions of kernels in `constant_product`, `half_up`,
-//! `leading_one`, `logarithm`, `pass_through`, `polynomial_word`, `sweep`.
+//! `leading_one`, `logarithm`, `polynomial_word`, `sweep`.
 
 mod address;
 mod arithmetic;
@@ -38,12 +38,12 @@ pub(crate) use frame::average::tests::Sums;
 pub use frame::average::{Average, FrameMarks};
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
-pub use frame::calibrate::Calibrate;
+pub use frame::calibrate::{Calibrate, CalibratePorts};
 pub use frame::frame_stats::FrameStats;
 pub(crate) use frame::frame_stats::{beyond, magnitude_of};
 pub use frame::input_mask::InputMask;
 pub(crate) use frame::load::table_beat;
-pub use frame::load::{CoefficientPlaces, Load, PAIR_BITS, REST, THRESHOLD_BITS, VERSION_WORD_BITS};
+pub use frame::load::{CoefficientPlaces, Load, LoadPorts, PAIR_BITS, REST, THRESHOLD_BITS, VERSION_WORD_BITS};
 pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;
 pub use memory::enable_register::EnableRegister;
@@ -55,9 +55,8 @@ pub use output::frame_cycles::{FrameCycles, CYCLE_BITS};
 pub use output::parts_begun::PartsBegun;
 pub(crate) use output::status_bits::status_bits;
 pub use output::status_code::StatusCode;
-pub use output::status_source::StatusSource;
 pub use pass::limb_sum::LimbSum;
-pub use pass::operand_scale::OperandScale;
+pub use pass::operand_scale::{OperandScale, SCALE_LATENCY};
 pub use pass::operand_select::OperandSelect;
 pub use pass::operand_source::{OperandSource, MASK_BITS};
 pub use pass::operand_writer::OperandWriter;
@@ -73,9 +72,7 @@ pub use search::store::{latency as store_latency, Store};
 pub use search::sum::Sum;
 pub use search::sweep::{position_bits, BUFFER_BITS};
 pub use search::taylor::{Taylor, LATENCY as TAYLOR_LATENCY};
-pub use stream::lane_broadcast::LaneBroadcast;
 #[cfg(test)]
 pub(crate) use stream::queue::tests::List;
 pub use stream::queue::{Queue, PLACES as QUEUE_PLACES};
 pub use stream::register_slice::RegisterSlice;
-pub use stream::slice::Slice;

@@ -11,264 +11,202 @@ use super::{
     Banks, Candidates, CoefficientShift, Forces, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
     SerialButterfly, TaxelReorder, Unfold,
 };
-use crate::language::{Builder, Inside};
-use crate::primitives::{Dff, Ram, Slice};
+use crate::language::{Builder, Expr, Inside};
+use crate::primitives::{Dff, Ram};
 use crate::streams::{stage_list, EnginePorts};
+use crate::taps::observe;
 
-/// The parts of the engine that follow from the scene.
-pub(crate) struct Serial {
-    receive: Receive,
-    reorder: TaxelReorder,
-    pass_sequencer: PassSequencer,
-    rounder: Rounder,
-    butterfly: SerialButterfly,
-    pass: Pass,
-    raw: Ram,
-    unfold: Unfold,
-    banks: Banks,
-    search_sequencer: SearchSequencer,
-    along_x: Horner,
-    transposed: Ram,
-    along_y: Horner,
-    coefficient_shift: CoefficientShift,
-    candidates: Candidates,
-    score: Score,
-    floors: Ram,
-    totals: Ram,
-    forces: Forces,
-    shifted: Slice,
-    both_signs: bool,
-}
-
-impl Serial {
-    stage_list! {
-        receive: "receive.rs",
-        reorder: "taxel_reorder.rs",
-        pass_sequencer: "pass_sequencer.rs",
-        rounder: "rounder.rs",
-        butterfly: "serial_butterfly.rs",
-        pass: "pass.rs",
-        raw: "../primitives/memory/ram.rs",
-        unfold: "unfold.rs",
-        banks: "banks.rs",
-        search_sequencer: "search_sequencer.rs",
-        along_x: "horner.rs",
-        transposed: "../primitives/memory/ram.rs",
-        along_y: "horner.rs",
-        coefficient_shift: "coefficient_shift.rs",
-        candidates: "candidates.rs",
-        score: "score.rs",
-        floors: "../primitives/memory/ram.rs",
-        totals: "../primitives/memory/ram.rs",
-        forces: "forces.rs",
-    }
-
-    /// The serial engine of `model`.
-    pub(crate) fn new(model: &Model) -> Self {
+stage_list! {
+    |model| {
         let f = model.formats();
         let word = word_bits(f);
         let code = f.input_bits as usize;
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
-        let rounded = f.input_bits.max(f.vector_bits) as usize;
-        Serial {
-            receive: Receive::new(f, model.noise_floor),
-            reorder: TaxelReorder::new(model.layout()),
-            pass_sequencer: PassSequencer::new(f, unrounded, rounded),
-            rounder: Rounder::new(unrounded, rounded),
-            butterfly: SerialButterfly::new(rounded),
-            pass: Pass::new(model),
-            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw]),
-            unfold: Unfold::new(f, rounded + 2),
-            banks: Banks::new(f),
-            search_sequencer: SearchSequencer::new(f),
-            along_x: Horner::new(word),
-            transposed: Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed]),
-            along_y: Horner::new(word),
-            coefficient_shift: CoefficientShift::new(word, f.search_bits[0] as usize),
-            candidates: Candidates::new(f),
-            score: Score::new(f),
-            floors: Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]),
-            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
-            forces: Forces::new(model, unrounded),
-            shifted: Slice::new(32, rounded),
-            both_signs: model.scene.partition.condition == Condition::BothSigns,
-        }
+        let rounded = rounded_bits(model);
     }
+    receive: Receive = Receive::new(f, model.noise_floor), "receive.rs";
+    reorder: TaxelReorder = TaxelReorder::new(model.layout()), "taxel_reorder.rs";
+    pass_sequencer: PassSequencer = PassSequencer::new(f, unrounded, rounded), "pass_sequencer.rs";
+    rounder: Rounder = Rounder::new(unrounded, rounded), "rounder.rs";
+    butterfly: SerialButterfly = SerialButterfly::new(rounded), "serial_butterfly.rs";
+    pass: Pass = Pass::new(model), "pass.rs";
+    raw: Ram = Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw]), "../primitives/memory/ram.rs";
+    unfold: Unfold = Unfold::new(f, rounded + 2), "unfold.rs";
+    banks: Banks = Banks::new(f), "banks.rs";
+    search_sequencer: SearchSequencer = SearchSequencer::new(f), "search_sequencer.rs";
+    along_x: Horner = Horner::new(word), "horner.rs";
+    transposed: Ram = Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed]), "../primitives/memory/ram.rs";
+    along_y: Horner = Horner::new(word), "horner.rs";
+    coefficient_shift: CoefficientShift = CoefficientShift::new(word, f.search_bits[0] as usize),
+        "coefficient_shift.rs";
+    candidates: Candidates = Candidates::new(f), "candidates.rs";
+    score: Score = Score::new(f), "score.rs";
+    floors: Ram = Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]), "../primitives/memory/ram.rs";
+    totals: Ram = Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
+        "../primitives/memory/ram.rs";
+    forces: Forces = Forces::new(model, unrounded), "forces.rs";
+}
 
-    /// Connects the stages.
-    pub(crate) fn build<'k>(&'k self, k: &'k Builder, io: EnginePorts<Inside<'k>>) {
-        let receive = k.instance("receive", &self.receive);
-        let reorder = k.instance("reorder", &self.reorder);
-        let pass_sequencer = k.instance("pass_sequencer", &self.pass_sequencer);
-        let rounder = k.instance("rounder", &self.rounder);
-        let butterfly = k.instance("butterfly", &self.butterfly);
-        let pass = k.instance("pass", &self.pass);
-        let raw = k.instance("raw", &self.raw);
-        let unfold = k.instance("unfold", &self.unfold);
-        let banks = k.instance("banks", &self.banks);
-        let search_sequencer = k.instance("search_sequencer", &self.search_sequencer);
-        let along_x = k.instance("along_x", &self.along_x);
-        let transposed = k.instance("transposed", &self.transposed);
-        let along_y = k.instance("along_y", &self.along_y);
-        let coefficient_shift = k.instance("coefficient_shift", &self.coefficient_shift);
-        let candidates = k.instance("candidates", &self.candidates);
-        let score = k.instance("score", &self.score);
-        let floors = k.instance("floors", &self.floors);
-        let totals = k.instance("totals", &self.totals);
-        let forces = k.instance("forces", &self.forces);
-        let shifted = k.instance("shifted", &self.shifted);
-        let computing = k.instance("computing", Dff {});
-        let condition = k.instance("condition", Dff {});
-        let framing = k.instance("framing", Dff {});
+/// Width of a rounded word.
+fn rounded_bits(model: &Model) -> usize {
+    let formats = model.formats();
+    formats.input_bits.max(formats.vector_bits) as usize
+}
 
-        k.comment("A frame starts when the buffer is full and the engine idle");
-        let begin_frame = k.wire("begin_frame", receive.full & !computing.q & !io.rst);
-        computing.d.set((begin_frame | (computing.q & !forces.done)) & !io.rst);
-        let signs = [receive.positive, receive.negative];
-        let meets = if self.both_signs { signs[0] & signs[1] } else { signs[0] | signs[1] };
-        condition.d.set(begin_frame.mux(meets, condition.q));
-        framing.d.set(begin_frame.mux(receive.framing, framing.q));
-        receive.s_axis_tdata.set(io.s_axis_tdata);
-        receive.s_axis_tvalid.set(io.s_axis_tvalid);
-        receive.s_axis_tlast.set(io.s_axis_tlast);
-        io.s_axis_tready.set(receive.s_axis_tready);
-        receive.free.set(pass_sequencer.free);
-        receive.reported.set(begin_frame);
+/// Connects the stages of `model` between the ports `io`.
+pub(crate) fn build<'k>(model: &Model, k: &'k Builder, io: EnginePorts<Inside<'k>>) {
+    let s = &Stages::new(k, model);
+    let computing = k.instance("computing", Dff {});
+    let condition = k.instance("condition", Dff {});
+    let framing = k.instance("framing", Dff {});
 
-        k.comment("Taxel reorder: row-major or by quads");
-        reorder.back.set(!pass_sequencer.busy);
-        reorder.index.set(pass_sequencer.busy.mux(pass_sequencer.index, forces.index));
-        receive.read_address.set(reorder.place);
+    k.comment("A frame starts when the buffer is full and the engine idle");
+    let begin_frame = k.wire("begin_frame", s.receive.full & !computing.q & !io.rst);
+    computing.d.set((begin_frame | (computing.q & !s.forces.done)) & !io.rst);
+    let signs = [s.receive.positive, s.receive.negative];
+    let meets =
+        if model.scene.partition.condition == Condition::BothSigns { signs[0] & signs[1] } else { signs[0] | signs[1] };
+    condition.d.set(begin_frame.mux(meets, condition.q));
+    framing.d.set(begin_frame.mux(s.receive.framing, framing.q));
+    s.receive.s_axis_tdata.set(io.s_axis_tdata);
+    s.receive.s_axis_tvalid.set(io.s_axis_tvalid);
+    s.receive.s_axis_tlast.set(io.s_axis_tlast);
+    io.s_axis_tready.set(s.receive.s_axis_tready);
+    s.receive.free.set(s.pass_sequencer.free);
+    s.receive.reported.set(begin_frame);
+    passes(model, k, s, begin_frame);
+    search(k, s, begin_frame, condition.q);
 
-        k.comment("Rounder, shared by normalise, rescale and forces");
-        pass_sequencer.start.set(begin_frame);
-        pass_sequencer.magnitude.set(receive.magnitude);
-        pass_sequencer.code.set(receive.word);
-        rounder.word.set(pass_sequencer.busy.mux(pass_sequencer.unrounded, forces.product));
-        rounder.shift.set(pass_sequencer.busy.mux(pass_sequencer.round_shift, forces.round_shift));
-        rounder.valid.set(pass_sequencer.round);
-        rounder.wide.set(!pass_sequencer.busy);
-        shifted.word.set(rounder.rounded);
-        pass_sequencer.rounded.set(shifted.low);
-        pass_sequencer.clipped.set(rounder.clipped);
-        pass_sequencer.round_done.set(rounder.done);
+    k.comment("Forces");
+    s.forces.start.set(s.search_sequencer.done);
+    s.forces.place.set(s.reorder.place);
+    s.forces.value.set(s.banks.word);
+    s.forces.best_x.set(s.search_sequencer.best_x);
+    s.forces.best_y.set(s.search_sequencer.best_y);
+    s.forces.score.set(s.search_sequencer.score);
+    s.forces.found.set(s.search_sequencer.found);
+    s.forces.condition.set(condition.q);
+    s.forces.framing.set(framing.q);
+    s.forces.normalise.set(s.pass_sequencer.normalise);
+    s.forces.rescale.set(s.pass_sequencer.rescale);
+    s.forces.saturations.set(s.pass_sequencer.saturations);
+    s.forces.frame_begin.set(begin_frame);
+    s.forces.rounded.set(s.rounder.rounded);
+    s.forces.clipped.set(s.rounder.clipped);
+    io.m_axis_tdata.set(s.forces.m_axis_tdata);
+    io.m_axis_tvalid.set(s.forces.m_axis_tvalid);
+    io.m_axis_tlast.set(s.forces.m_axis_tlast);
+    s.forces.m_axis_tready.set(io.m_axis_tready);
 
-        k.comment("Butterfly, shared by fold and unfold");
-        butterfly.word.set(shifted.low);
-        butterfly.valid.set(pass_sequencer.transform);
-        pass_sequencer.transformed.set(butterfly.transformed);
-        pass_sequencer.transformed_valid.set(butterfly.transformed_valid);
+    observe(k, model);
+}
 
-        k.comment("Matrix passes");
-        pass.valid.set(pass_sequencer.issue);
-        pass.last.set(pass_sequencer.last);
-        pass.address.set(pass_sequencer.address);
-        pass.low.set(pass_sequencer.low);
-        pass.operand_address.set(pass_sequencer.operand_address);
-        pass.flip.set(pass_sequencer.flip);
-        pass.align.set(pass_sequencer.align);
-        pass.write.set(pass_sequencer.write);
-        pass.write_address.set(pass_sequencer.write_address);
-        pass.write_lane.set(pass_sequencer.write_lane);
-        pass.write_data.set(pass_sequencer.write_data);
-        pass_sequencer.row_word.set(pass.word);
-        pass_sequencer.row_valid.set(pass.word_valid);
-        raw.write.set(pass_sequencer.raw_write);
-        raw.write_address.set(pass_sequencer.raw_write_address);
-        raw.write_data.set(pass.word);
-        raw.read.set(k.constant(1, 1));
-        raw.read_address.set(pass_sequencer.raw_read_address);
-        pass_sequencer.raw_word.set(raw.read_data);
+/// Receives, multiplies, rounds.
+fn passes<'k>(model: &Model, k: &'k Builder, s: &Stages<'k>, begin_frame: Expr<'k>) {
+    k.comment("Taxel reorder: row-major or by quads");
+    s.reorder.back.set(!s.pass_sequencer.busy);
+    s.reorder.index.set(s.pass_sequencer.busy.mux(s.pass_sequencer.index, s.forces.index));
+    s.receive.read_address.set(s.reorder.place);
 
-        k.comment("Polynomials: unfold, search, banks");
-        unfold.start.set(begin_frame);
-        unfold.transformed.set(butterfly.transformed);
-        unfold.valid.set(butterfly.transformed_valid & pass_sequencer.unfolding);
-        search_sequencer.filling.set(pass_sequencer.busy);
-        search_sequencer.start.set(pass_sequencer.done);
-        search_sequencer.enabled.set(condition.q);
-        search_sequencer.wanted.set(forces.wanted);
-        banks.odd.set(search_sequencer.odd);
-        banks.read_address.set(search_sequencer.read_address);
-        banks.write.set(pass_sequencer.busy.mux(unfold.write, search_sequencer.write));
-        banks.write_address.set(pass_sequencer.busy.mux(unfold.address, search_sequencer.write_address));
-        banks.data.set(pass_sequencer.busy.mux(unfold.data, coefficient_shift.halved));
+    k.comment("Rounder, shared by normalise, rescale and forces");
+    s.pass_sequencer.start.set(begin_frame);
+    s.pass_sequencer.magnitude.set(s.receive.magnitude);
+    s.pass_sequencer.code.set(s.receive.word);
+    s.rounder.word.set(s.pass_sequencer.busy.mux(s.pass_sequencer.unrounded, s.forces.product));
+    s.rounder.shift.set(s.pass_sequencer.busy.mux(s.pass_sequencer.round_shift, s.forces.round_shift));
+    s.rounder.valid.set(s.pass_sequencer.round);
+    s.rounder.wide.set(!s.pass_sequencer.busy);
+    let shifted = k.wire("shifted", s.rounder.rounded.low(rounded_bits(model)));
+    s.pass_sequencer.rounded.set(shifted);
+    s.pass_sequencer.clipped.set(s.rounder.clipped);
+    s.pass_sequencer.round_done.set(s.rounder.done);
 
-        k.comment("Taylor shift along x, then along y");
-        along_x.word.set(banks.word);
-        along_x.element.set(search_sequencer.x_element);
-        along_x.top.set(search_sequencer.x_top);
-        along_x.moves.set(search_sequencer.x_moves);
-        along_x.down.set(search_sequencer.x_down);
-        transposed.write.set(k.constant(1, 1));
-        transposed.write_address.set(search_sequencer.turn_write);
-        transposed.write_data.set(along_x.moved);
-        transposed.read.set(k.constant(1, 1));
-        transposed.read_address.set(search_sequencer.turn_read);
-        along_y.word.set(transposed.read_data);
-        along_y.element.set(search_sequencer.y_element);
-        along_y.top.set(search_sequencer.y_top);
-        along_y.moves.set(search_sequencer.y_moves);
-        along_y.down.set(search_sequencer.y_down);
-        coefficient_shift.word.set(along_y.moved);
-        coefficient_shift.halvings.set(search_sequencer.halvings);
+    k.comment("Butterfly, shared by fold and unfold");
+    s.butterfly.word.set(shifted);
+    s.butterfly.valid.set(s.pass_sequencer.transform);
+    s.pass_sequencer.transformed.set(s.butterfly.transformed);
+    s.pass_sequencer.transformed_valid.set(s.butterfly.transformed_valid);
 
-        k.comment("Candidates, scores and their comparison");
-        candidates.word.set(coefficient_shift.halved);
-        candidates.cycle.set(search_sequencer.cycle);
-        candidates.present.set(search_sequencer.present);
-        candidates.sums.set(search_sequencer.sums);
-        score.value.set(candidates.value);
-        score.index.set(candidates.index);
-        score.valid.set(candidates.valid);
-        score.sum.set(candidates.sum);
-        floors.read.set(k.constant(1, 1));
-        floors.read_address.set(candidates.index);
-        score.floor.set(floors.read_data);
-        floors.write.set(score.floor_write);
-        floors.write_address.set(score.floor_index);
-        floors.write_data.set(score.floor_data);
-        totals.read.set(k.constant(1, 1));
-        totals.read_address.set(search_sequencer.comparing.mux(search_sequencer.candidate, score.read_index));
-        score.total.set(totals.read_data);
-        search_sequencer.total.set(totals.read_data);
-        totals.write.set(score.write);
-        totals.write_address.set(score.write_index);
-        totals.write_data.set(score.write_data);
+    k.comment("Matrix passes");
+    s.pass.valid.set(s.pass_sequencer.issue);
+    s.pass.last.set(s.pass_sequencer.last);
+    s.pass.address.set(s.pass_sequencer.address);
+    s.pass.low.set(s.pass_sequencer.low);
+    s.pass.operand_address.set(s.pass_sequencer.operand_address);
+    s.pass.flip.set(s.pass_sequencer.flip);
+    s.pass.align.set(s.pass_sequencer.align);
+    s.pass.write.set(s.pass_sequencer.write);
+    s.pass.write_address.set(s.pass_sequencer.write_address);
+    s.pass.write_lane.set(s.pass_sequencer.write_lane);
+    s.pass.write_data.set(s.pass_sequencer.write_data);
+    s.pass_sequencer.row_word.set(s.pass.word);
+    s.pass_sequencer.row_valid.set(s.pass.word_valid);
+    s.raw.write.set(s.pass_sequencer.raw_write);
+    s.raw.write_address.set(s.pass_sequencer.raw_write_address);
+    s.raw.write_data.set(s.pass.word);
+    s.raw.read.set(k.constant(1, 1));
+    s.raw.read_address.set(s.pass_sequencer.raw_read_address);
+    s.pass_sequencer.raw_word.set(s.raw.read_data);
+}
 
-        k.comment("Forces");
-        forces.start.set(search_sequencer.done);
-        forces.place.set(reorder.place);
-        forces.value.set(banks.word);
-        forces.best_x.set(search_sequencer.best_x);
-        forces.best_y.set(search_sequencer.best_y);
-        forces.score.set(search_sequencer.score);
-        forces.found.set(search_sequencer.found);
-        forces.condition.set(condition.q);
-        forces.framing.set(framing.q);
-        forces.normalise.set(pass_sequencer.normalise);
-        forces.rescale.set(pass_sequencer.rescale);
-        forces.saturations.set(pass_sequencer.saturations);
-        forces.frame_begin.set(begin_frame);
-        forces.rounded.set(rounder.rounded);
-        forces.clipped.set(rounder.clipped);
-        io.m_axis_tdata.set(forces.m_axis_tdata);
-        io.m_axis_tvalid.set(forces.m_axis_tvalid);
-        io.m_axis_tlast.set(forces.m_axis_tlast);
-        forces.m_axis_tready.set(io.m_axis_tready);
+/// The search and what it shares.
+fn search<'k>(k: &'k Builder, s: &Stages<'k>, begin_frame: Expr<'k>, condition: Expr<'k>) {
+    k.comment("Polynomials: unfold, search, banks");
+    s.unfold.start.set(begin_frame);
+    s.unfold.transformed.set(s.butterfly.transformed);
+    s.unfold.valid.set(s.butterfly.transformed_valid & s.pass_sequencer.unfolding);
+    s.search_sequencer.filling.set(s.pass_sequencer.busy);
+    s.search_sequencer.start.set(s.pass_sequencer.done);
+    s.search_sequencer.enabled.set(condition);
+    s.search_sequencer.wanted.set(s.forces.wanted);
+    s.banks.odd.set(s.search_sequencer.odd);
+    s.banks.read_address.set(s.search_sequencer.read_address);
+    s.banks.write.set(s.pass_sequencer.busy.mux(s.unfold.write, s.search_sequencer.write));
+    s.banks.write_address.set(s.pass_sequencer.busy.mux(s.unfold.address, s.search_sequencer.write_address));
+    s.banks.data.set(s.pass_sequencer.busy.mux(s.unfold.data, s.coefficient_shift.halved));
 
-        k.comment("What only the test bench reads");
-        k.unused([
-            receive.accept,
-            pass_sequencer.normalised_valid,
-            pass_sequencer.folding,
-            pass_sequencer.rescaled_valid,
-        ]);
-        k.unused([butterfly.quad, butterfly.quad_valid, pass.quad, pass.quad_valid, unfold.taxel, unfold.taxel_valid]);
-        k.unused([search_sequencer.value_valid, search_sequencer.taken, search_sequencer.compared]);
-        k.unused([coefficient_shift.value]);
-    }
+    k.comment("Taylor shift along x, then along y");
+    s.along_x.word.set(s.banks.word);
+    s.along_x.element.set(s.search_sequencer.x_element);
+    s.along_x.top.set(s.search_sequencer.x_top);
+    s.along_x.moves.set(s.search_sequencer.x_moves);
+    s.along_x.down.set(s.search_sequencer.x_down);
+    s.transposed.write.set(k.constant(1, 1));
+    s.transposed.write_address.set(s.search_sequencer.turn_write);
+    s.transposed.write_data.set(s.along_x.moved);
+    s.transposed.read.set(k.constant(1, 1));
+    s.transposed.read_address.set(s.search_sequencer.turn_read);
+    s.along_y.word.set(s.transposed.read_data);
+    s.along_y.element.set(s.search_sequencer.y_element);
+    s.along_y.top.set(s.search_sequencer.y_top);
+    s.along_y.moves.set(s.search_sequencer.y_moves);
+    s.along_y.down.set(s.search_sequencer.y_down);
+    s.coefficient_shift.word.set(s.along_y.moved);
+    s.coefficient_shift.halvings.set(s.search_sequencer.halvings);
+
+    k.comment("Candidates, scores and their comparison");
+    s.candidates.word.set(s.coefficient_shift.halved);
+    s.candidates.cycle.set(s.search_sequencer.cycle);
+    s.candidates.present.set(s.search_sequencer.present);
+    s.candidates.sums.set(s.search_sequencer.sums);
+    s.score.value.set(s.candidates.value);
+    s.score.index.set(s.candidates.index);
+    s.score.valid.set(s.candidates.valid);
+    s.score.sum.set(s.candidates.sum);
+    s.floors.read.set(k.constant(1, 1));
+    s.floors.read_address.set(s.candidates.index);
+    s.score.floor.set(s.floors.read_data);
+    s.floors.write.set(s.score.floor_write);
+    s.floors.write_address.set(s.score.floor_index);
+    s.floors.write_data.set(s.score.floor_data);
+    s.totals.read.set(k.constant(1, 1));
+    s.totals.read_address.set(s.search_sequencer.comparing.mux(s.search_sequencer.candidate, s.score.read_index));
+    s.score.total.set(s.totals.read_data);
+    s.search_sequencer.total.set(s.totals.read_data);
+    s.totals.write.set(s.score.write);
+    s.totals.write_address.set(s.score.write_index);
+    s.totals.write_data.set(s.score.write_data);
 }
 
 #[cfg(test)]

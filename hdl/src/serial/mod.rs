@@ -10,8 +10,8 @@
 //!                                                                                      '-> along_x, transposed, along_y,
 //!                                                                                          candidates, score
 //! ```
-//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output. [`Serial`]
-//! connects them.
+//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output.
+//! `engine` connects them.
 
 mod banks;
 mod candidates;
@@ -32,7 +32,7 @@ mod unfold;
 pub use banks::Banks;
 pub use candidates::Candidates;
 pub use coefficient_shift::CoefficientShift;
-pub(crate) use engine::Serial;
+pub(crate) use engine::{build, STAGES};
 pub use forces::Forces;
 pub use horner::Horner;
 pub use pass::Pass;

@@ -24,20 +24,17 @@ use crate::primitives::{count_bits, frame_quads, position_bits};
 block! {
     /// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other. The
     /// ports of the frame buffer and of the labels are those of the stage that runs.
-    ///
-    /// Without contacts pulses pass on wires, and what only contacts need is constant 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Contacts {
         quads: usize,
         /// Steps of `relax`.
         steps: usize,
-        /// Largest number of contacts; 0 without contacts.
+        /// Largest number of contacts.
         contacts: usize,
         /// Width of the word of both ln σ.
         score_bits: usize,
         /// A contact needs codes of both signs for a μ.
         both_signs: bool,
-        cases: usize,
         /// Quads of a frame, over all subarrays, and steps in which they are sent.
         frame_quads: usize,
         frame_steps: usize,
@@ -47,12 +44,8 @@ block! {
         reset;
         /// A subarray starts.
         in start;
-        /// Index of the case; constant while a frame is computed.
-        in which: count_bits(*cases);
         /// The products of v_00 may begin.
         in readable;
-        /// `fold` has read the frame.
-        in folded;
         /// `unfold` gives a quad of taxels.
         in taxels_valid;
         /// The contacts are known; high for one cycle.
@@ -61,8 +54,6 @@ block! {
         in count: label_bits(*contacts);
         /// The μ of the contact is known; high for one cycle.
         in known;
-        /// The subarray meets the scene's condition.
-        in condition;
         /// A code of the contact is above the noise floor; valid with `known`.
         in positive;
         /// A code of the contact is below minus the noise floor; valid with `known`.
@@ -75,8 +66,6 @@ block! {
         in ln_sigma: score_bits;
         /// The values of a subarray begin; high for one cycle.
         in values_begin;
-        /// The search of a subarray has ended; high for one cycle.
-        in searched;
         /// Address of the quad that `fold` reads from the frame buffer; in every cycle but those of a window.
         in fold_address: count_bits(*frame_quads);
         /// Address of the quad that `window` reads there, and of its labels; from `window_start` to `known`.
@@ -89,8 +78,8 @@ block! {
         in sent_address: count_bits(*quads);
         /// `label_beats` reads labels.
         in sends_labels;
-        /// Section of the passes: of contacts 0 for v_00, 1 for the layers, 2 for a step; else the case.
-        out section: section_bits(*contacts, *cases);
+        /// Section of the passes: 0 for v_00, 1 for the layers, 2 for a step.
+        out section: SECTION_BITS;
         /// The section begins.
         out pass_start;
         /// The frame buffer may be overwritten.
@@ -104,7 +93,7 @@ block! {
         /// v_00 is filled in: find the contacts.
         out segment_start;
         /// Index of the contact; from the cycle after `segmented`, or after `known` of the contact before.
-        out contact: count_bits(*contacts.max(&1));
+        out contact: count_bits(*contacts);
         /// Label of its taxels, one more; as `contact`.
         out label: label_bits(*contacts);
         /// Read the window around it; its layers begin.
@@ -116,9 +105,9 @@ block! {
         /// Make the operands of a step.
         out shear_start;
         /// Position of μ1 of each contact in mu_max/384, signed, that of label 1 in the low bits; from `known` of the contact on.
-        out positions_x: contacts.max(&1) * position_bits();
+        out positions_x: contacts * position_bits();
         /// The same of μ2; as `positions_x`.
-        out positions_y: contacts.max(&1) * position_bits();
+        out positions_y: contacts * position_bits();
         /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
         out told;
         /// The label; valid with `told`.
@@ -131,7 +120,7 @@ block! {
         out told_ln_sigma: score_bits;
         /// Whether it meets the condition; valid with `told`.
         out told_condition;
-        /// Beats of a subarray may be requested; of contacts once the last status has been told; high for one cycle.
+        /// Beats may be requested: the last status has been told; high for one cycle.
         out begins;
         /// The subarray is out of the passes and the search; high for one cycle.
         out ended;
@@ -154,48 +143,19 @@ enum State {
 }
 
 impl Contacts {
-    /// For the contacts of `model`.
-    pub fn new(model: &Model) -> Self {
+    /// For the contacts of `model`, if it has any.
+    pub fn of_model(model: &Model) -> Option<Self> {
         let formats = model.formats();
         let frame_quads = frame_quads(model.cases());
-        Contacts {
+        model.by_contact.as_ref().map(|_| Contacts {
             quads: formats.quads,
             steps: formats.degree,
             contacts: model.contacts(),
             score_bits: formats.score_bits as usize,
             both_signs: model.scene.partition.condition == Condition::BothSigns,
-            cases: model.cases().len(),
             frame_quads,
             frame_steps: formats.sweep_steps(frame_quads),
-        }
-    }
-
-    /// Without contacts.
-    fn nothing<'k>(k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
-        k.comment("There are no contacts.");
-        io.section.set(io.which);
-        io.pass_start.set(io.readable);
-        io.free.set(io.folded);
-        io.quad_address.set(io.fold_address);
-        io.estimate_start.set(io.start);
-        io.enabled.set(io.condition);
-        io.begins.set(io.values_begin);
-        io.ended.set(io.searched);
-        let words = [
-            io.label_address,
-            io.contact,
-            io.label,
-            io.positions_x,
-            io.positions_y,
-            io.told_label,
-            io.told_x,
-            io.told_y,
-            io.told_ln_sigma,
-        ];
-        let bits = [io.fills, io.segment_start, io.window_start, io.shear_start, io.told, io.told_condition];
-        for output in words.into_iter().chain(bits) {
-            output.set(k.constant(output.bits(), 0));
-        }
+        })
     }
 
     /// What `of` gives for the contact of a label, 0 for label 0.
@@ -210,20 +170,8 @@ fn label_bits(contacts: usize) -> usize {
     count_bits(contacts + 1)
 }
 
-/// Width of the section.
-fn section_bits(contacts: usize, cases: usize) -> usize {
-    if contacts > 0 {
-        SECTION_BITS
-    } else {
-        count_bits(cases)
-    }
-}
-
 impl Block for Contacts {
     fn build<'k>(&self, k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
-        if self.contacts == 0 {
-            return Contacts::nothing(k, io);
-        }
         let (rst, label_bits, bit) = (io.rst, label_bits(self.contacts), Type::unsigned(1));
         let state = k.state("state", Type::unsigned(3), rst, State::Idle as u64);
         let is = |wanted: State| state.is(wanted as u64);
@@ -341,16 +289,8 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Contacts = Contacts {
-        quads: 5,
-        steps: 3,
-        contacts: 6,
-        score_bits: 32,
-        both_signs: true,
-        cases: 1,
-        frame_quads: 5,
-        frame_steps: 5,
-    };
+    const SHAPE: Contacts =
+        Contacts { quads: 5, steps: 3, contacts: 6, score_bits: 32, both_signs: true, frame_quads: 5, frame_steps: 5 };
 
     /// What is waited for.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -369,10 +309,10 @@ mod tests {
     }
 
     /// Place of each input that is more than a pulse.
-    const COUNT: usize = 7;
-    const SIGNS: [usize; 2] = [10, 11];
-    const MU: usize = 12;
-    const FOLD: usize = 17;
+    const COUNT: usize = 5;
+    const SIGNS: [usize; 2] = [7, 8];
+    const MU: usize = 9;
+    const FOLD: usize = 13;
 
     /// What is told of a contact: whether it has a μ, the position of μ, ln σ.
     type Told = (bool, [Word; 2], Word);
@@ -438,12 +378,12 @@ mod tests {
                 bit(ended),
                 bit(ended),
                 bit(free),
-                bit(high(5) && self.waits == Some(Waits::First)),
+                bit(high(3) && self.waits == Some(Waits::First)),
                 bit(window),
                 Some((positive && negative).into()),
                 known.then_some(if reads { at_window } else { fold }),
                 known.then_some(labels),
-                bit(window || shear || high(3)),
+                bit(window || shear || high(2)),
                 self.positions(0),
                 self.positions(1),
                 bit(self.told.is_some()),
@@ -457,8 +397,8 @@ mod tests {
 
         fn clock(&mut self, inputs: &[Word]) {
             let high = |input: usize| inputs[input].number() == 1;
-            let (rst, start, taxels, segmented) = (high(0), high(1), high(5), high(6));
-            let (known, begins) = (high(8), high(15));
+            let (rst, start, taxels, segmented) = (high(0), high(1), high(3), high(4));
+            let (known, begins) = (high(6), high(12));
             self.pulses = [false; 5];
             self.told = match self.waits {
                 Some(Waits::Telling(label)) => {
@@ -527,21 +467,17 @@ mod tests {
                 let mut inputs = vec![
                     rst.into(),
                     start.into(),
-                    Word::default(),
                     answer(waits == Some(Waits::First)),
-                    random.bool().into(),
                     answer(matches!(waits, Some(Waits::First | Waits::Step(_)))),
                     answer(waits == Some(Waits::Segments)),
                     Word::from(count as u64),
                     answer(matches!(waits, Some(Waits::Mu(_)))),
                     random.bool().into(),
                     random.bool().into(),
-                    random.bool().into(),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     random_word(random, SHAPE.score_bits),
                     answer(waits == Some(Waits::Tell)),
-                    random.bool().into(),
                 ];
                 inputs.extend((0..5).map(|_| Word::from(random.u64(..SHAPE.quads as u64))));
                 inputs.push(random.bool().into());

@@ -20,15 +20,12 @@ use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, 
 block! {
     /// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
     /// layer. One more quad, of both positions and two zeros, says that μ is known; no product reads it.
-    ///
-    /// Without a network all outputs are constant 0.
     pub struct Estimate {
         lane_bits: usize,
         data_bits: usize,
         /// Width of the word of both ln σ, which stands in the place of the score.
         score_bits: usize,
-        /// The network; none in a scene with a search.
-        network: Option<Layers>,
+        network: Layers,
     }
     ports EstimatePorts {
         clock;
@@ -71,17 +68,15 @@ struct Layers {
 }
 
 impl Estimate {
-    /// For the network of `model`.
-    pub fn new(model: &Model) -> Self {
-        let formats = model.formats();
-        let network = model.quantised().network.as_ref();
-        Estimate {
+    /// For the network of `model`, if it has one.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let (network, formats) = (model.quantised().network.as_ref()?, model.formats());
+        Some(Estimate {
             lane_bits: formats.lane_bits as usize,
             data_bits: formats.data_bits as usize,
             score_bits: formats.score_bits as usize,
-            network: network
-                .map(|network| Layers { hidden: formats.hidden_rows().sum(), shift: network.shift as usize }),
-        }
+            network: Layers { hidden: formats.hidden_rows().sum(), shift: network.shift as usize },
+        })
     }
 }
 
@@ -95,18 +90,7 @@ fn clamped<'k>(k: &'k Builder, value: Expr<'k>, [least, most]: [i64; 2]) -> Expr
 impl Block for Estimate {
     fn build<'k>(&self, k: &'k Builder, io: EstimatePorts<Inside<'k>>) {
         let EstimatePorts { rst, start, clear, enabled, quad, valid, .. } = io;
-        let Some(Layers { hidden, shift }) = self.network else {
-            k.comment("There is no network.");
-            io.operands.set(k.constant(4 * self.data_bits, 0));
-            io.operands_valid.set(k.constant(1, 0));
-            for position in [io.position_x, io.position_y] {
-                position.set(k.constant(position_bits(), 0));
-            }
-            io.ln_sigma.set(k.constant(self.score_bits, 0));
-            io.known.set(k.constant(1, 0));
-            io.saturations.set(k.constant(SATURATION_BITS, 0));
-            return;
-        };
+        let Layers { hidden, shift } = self.network;
         let bit = Type::unsigned(1);
         let later = |name: &str, value: Expr| {
             let state = k.state(name, bit, rst, 0);
@@ -345,7 +329,7 @@ mod tests {
                 put(true, false, None);
             }
         }
-        let block = Estimate::new(&model);
+        let block = Estimate::of_model(&model).unwrap();
         check(&kernel_of(&block), &stimulus, &mut Rows::new(&model, hidden));
     }
 }

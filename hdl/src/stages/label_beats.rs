@@ -10,27 +10,25 @@ use dermis_golden::spec::quads::Quads;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, lane_of, quad_address_of, TaxelPlace};
+use crate::streams::BEAT_BITS;
 
 block! {
     /// ```text
     /// s_axis --------------------> m_axis
     /// labels --> lane --> beat -----^
     /// ```
-    /// Without contacts, and where a record of each takes the place of the forces, the stream passes on wires.
     pub struct LabelBeats {
         layout: Quads,
-        /// Width of a beat.
-        bits: usize,
-        /// Largest number of contacts; 0 without contacts.
+        /// Largest number of contacts.
         contacts: usize,
-        /// Beats of labels in a frame; 0 where the output has none.
+        /// Beats of labels in a frame.
         beats: usize,
     }
     ports LabelBeatsPorts {
         clock;
         reset;
         /// A beat, 96 bits; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits;
+        in s_axis_tdata: BEAT_BITS;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -38,7 +36,7 @@ block! {
         /// The beat is the last of its frame; valid with `s_axis_tvalid`.
         in s_axis_tlast;
         /// The beat, or one of labels; valid with `m_axis_tvalid`.
-        out m_axis_tdata: bits;
+        out m_axis_tdata: BEAT_BITS;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -49,7 +47,7 @@ block! {
         out reads;
         /// Address of the quad whose labels are needed; with `reads`.
         out label_address: count_bits(layout.len());
-        /// LabelBeats of the four taxels of the quad; two cycles after `label_address`. One bit each without contacts.
+        /// LabelBeats of the four taxels of the quad; two cycles after `label_address`.
         in labels: Quads::LANES * label_bits(*contacts);
     }
 }
@@ -58,10 +56,10 @@ block! {
 const READ: usize = 5;
 
 impl LabelBeats {
-    /// For beats of `bits` bits of `model`.
-    pub fn new(model: &Model, bits: usize) -> Self {
+    /// For the contacts of `model`, if there are any and not a record of each takes the place of the labels.
+    pub fn of_model(model: &Model) -> Option<Self> {
         let (contacts, beats) = (model.contacts(), model.label_beats());
-        LabelBeats { layout: model.layout(), bits, contacts, beats }
+        (beats > 0).then(|| LabelBeats { layout: model.layout(), contacts, beats })
     }
 }
 
@@ -74,16 +72,6 @@ impl Block for LabelBeats {
     fn build<'k>(&self, k: &'k Builder, io: LabelBeatsPorts<Inside<'k>>) {
         let LabelBeatsPorts { rst, s_axis_tdata: data, s_axis_tvalid: given, s_axis_tlast: last, labels, .. } = io;
         let taken = io.m_axis_tready;
-        if self.beats == 0 {
-            k.comment("There are no contacts, or a record of each in place of the labels.");
-            io.m_axis_tdata.set(data);
-            io.m_axis_tvalid.set(given);
-            io.m_axis_tlast.set(last);
-            io.s_axis_tready.set(taken);
-            io.reads.set(k.constant(1, 0));
-            io.label_address.set(k.constant(count_bits(self.layout.len()), 0));
-            return;
-        }
         let (taxels, beats) = (self.layout.rows * self.layout.cols, self.beats);
         let counter = |name: &str, count: usize| k.state(name, Type::unsigned(count_bits(count)), rst, 0);
         let reads = io.reads.state(rst, 0);
@@ -113,8 +101,8 @@ impl Block for LabelBeats {
         let (arrives, empty) = (later(k, rst, "arrives", scans), later(k, rst, "empty", *beyond));
         let label = lane_of(labels, Quads::LANES, from) & (!empty).repeat(label_bits(self.contacts));
         let label = label.extend(LABEL_BITS as usize);
-        let word = k.register("word", Type::unsigned(self.bits));
-        k.when(arrives, || word.set(label.concat(word.slice(LABEL_BITS as usize, self.bits - LABEL_BITS as usize))));
+        let word = k.register("word", Type::unsigned(BEAT_BITS));
+        k.when(arrives, || word.set(label.concat(word.slice(LABEL_BITS as usize, BEAT_BITS - LABEL_BITS as usize))));
         let arrived = counter("arrived", LABELS_PER_BEAT + 1);
         k.when(arrives, || arrived.set(arrived.plus(1)));
         let full = k.wire("full", arrived.is(LABELS_PER_BEAT as u64));
@@ -165,7 +153,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: LabelBeats = LabelBeats { layout: Quads { rows: 5, cols: 7 }, bits: 96, contacts: 8, beats: 2 };
+    const SHAPE: LabelBeats = LabelBeats { layout: Quads { rows: 5, cols: 7 }, contacts: 8, beats: 2 };
     const BITS: usize = 4;
     /// Cycles from the beat before to one of labels, at full speed.
     const CYCLES: usize = LABELS_PER_BEAT + READ - 1;
@@ -272,7 +260,7 @@ mod tests {
             }
             let inputs: Vec<Word> = vec![
                 rst.into(),
-                random_word(&mut random, SHAPE.bits),
+                random_word(&mut random, BEAT_BITS),
                 valid.into(),
                 (last && valid).into(),
                 (random.u8(..5) > 0).into(),

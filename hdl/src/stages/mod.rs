@@ -4,8 +4,9 @@
 //! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` are made of instances of
 //! [primitives](crate::primitives), with single-bit control between them; the others have the logic in their own kernel.
 //!
-//! `banks`, with `choose`, is `receive` where the case is chosen per frame; `unsearched` is `search` in a scene without one. `estimate` and `relax` work where a network gives μ, `segment`,
-//! `contacts`, `window`, `shear` and `label_beats` where it gives one for each contact; in other scenes they are wires.
+//! `banks`, with `choose`, is `receive` where the case is chosen per frame. `search` is made where μ is searched, `estimate` and
+//! `relax` where a network gives it, `segment`, `contacts`, `window`, `shear` and `label_beats` where it gives one for each
+//! contact, `resultants` where sums of forces are sent.
 
 mod banks;
 mod choose;
@@ -26,7 +27,6 @@ mod segment;
 mod send;
 mod shear;
 mod unfold;
-mod unsearched;
 mod window;
 
 pub use choose::Choose;

@@ -12,7 +12,7 @@ use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
     count_bits, longest, position_bits, programs, BitDelay, Counter, Delay, Dff, Lanes, OperandScale, OperandSelect,
-    OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
+    OperandWriter, PassProgram, Ram, FACTOR_BITS, SCALE_LATENCY, SOURCE_BITS,
 };
 
 block! {
@@ -31,7 +31,8 @@ block! {
         vectors: Ram,
         operand_writer: OperandWriter,
         select: OperandSelect,
-        scale: OperandScale,
+        /// Operands of the steps of `relax` are multiplied by μ.
+        scales: bool,
         /// The MAC lanes.
         lanes: Lanes,
     }
@@ -86,7 +87,6 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let quads = formats.quads;
-        let scales = formats.scales_operands();
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
@@ -101,7 +101,7 @@ impl Pass {
             vectors: vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
             operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
             select: OperandSelect::new(formats),
-            scale: OperandScale::new(scales),
+            scales: formats.scales_operands(),
             lanes: Lanes::new(model),
         }
     }
@@ -111,21 +111,15 @@ impl Block for Pass {
     fn build<'k>(&self, k: &'k Builder, io: PassPorts<Inside<'k>>) {
         let column = k.instance("column", Counter::new(self.columns));
         let running = k.instance("running", Dff {});
+        let scaling = if self.scales { SCALE_LATENCY } else { 0 };
         let pass_program = k.instance("pass_program", &self.pass_program);
         let vectors = k.instance("vectors", &self.vectors);
         let operand_writer = k.instance("operand_writer", &self.operand_writer);
-        let scaling = self.scale.latency();
         let source = k.instance("source", Delay::new(SOURCE_BITS, 2));
-        let factor = k.instance("factor", Delay::new(FACTOR_BITS, 3));
         let control = k.instance("control", Delay::new(pass_program.control.bits(), 3 + scaling));
         let valid = k.instance("valid", BitDelay::new(3 + scaling + self.pass_program.latency()));
         let select = k.instance("select", &self.select);
-        let scale = k.instance("scale", &self.scale);
         let lanes = k.instance("lanes", &self.lanes);
-        let low_address =
-            k.instance("low_address", Slice::new(pass_program.operand_address.bits(), count_bits(self.quads)));
-        let coefficient_address =
-            k.instance("coefficient_address", Delay::new(pass_program.coefficient_address.bits(), scaling));
 
         pass_program.which.set(io.which);
         operand_writer.which.set(io.which);
@@ -140,8 +134,7 @@ impl Block for Pass {
         pass_program.column.set(column.value);
         pass_program.finished.set(operand_writer.finished);
 
-        low_address.word.set(pass_program.operand_address);
-        io.input_address.set(low_address.low);
+        io.input_address.set(pass_program.operand_address.low(io.input_address.bits()));
         vectors.read.set(k.constant(1, 1));
         vectors.read_address.set(pass_program.operand_address);
         operand_writer.clear.set(io.start);
@@ -157,19 +150,26 @@ impl Block for Pass {
         control.d.set(pass_program.control);
         valid.d.set(issue);
 
-        factor.d.set(pass_program.factor);
-        scale.factor.set(factor.q);
-        scale.operands.set(select.operands);
-        scale.position_x.set(io.position_x);
-        scale.position_y.set(io.position_y);
-
-        coefficient_address.d.set(pass_program.coefficient_address);
+        let mut coefficient_address = pass_program.coefficient_address;
+        let mut operands = select.operands;
+        if self.scales {
+            let factor = k.instance("factor", Delay::new(FACTOR_BITS, 3));
+            let later = k.instance("coefficient_address", Delay::new(coefficient_address.bits(), scaling));
+            let scale = k.instance("scale", OperandScale {});
+            factor.d.set(pass_program.factor);
+            scale.factor.set(factor.q);
+            scale.operands.set(operands);
+            scale.position_x.set(io.position_x);
+            scale.position_y.set(io.position_y);
+            later.d.set(coefficient_address);
+            (coefficient_address, operands) = (later.q, scale.scaled);
+        }
         lanes.coefficient_write.set(io.coefficient_write);
         lanes.coefficient_word.set(io.coefficient_word);
         lanes.coefficient_pair.set(io.coefficient_pair);
         lanes.coefficient_data.set(io.coefficient_data);
-        lanes.address.set(coefficient_address.q);
-        lanes.operands.set(scale.scaled);
+        lanes.address.set(coefficient_address);
+        lanes.operands.set(operands);
         lanes.valid.set(valid.q);
         lanes.control.set(control.q);
         io.quad.set(lanes.quad);
@@ -179,7 +179,7 @@ impl Block for Pass {
         io.damaged.set(lanes.damaged);
         io.issued.set(issue);
         io.step.set(pass_program.step);
-        k.unused([column.last]);
+        k.unused([column.last, pass_program.factor]);
     }
 }
 
@@ -392,7 +392,7 @@ mod tests {
                 if column.last {
                     let last = if column.layer { usize::MAX } else { own.quads };
                     let count = own.lanes_per_parity.min(last - first);
-                    let leave = self.cycle + self.latency() + 7 + OperandScale::new(own.scales_operands()).latency();
+                    let leave = self.cycle + self.latency() + 7 + if own.scales_operands() { SCALE_LATENCY } else { 0 };
                     let rows = (0..count).map(|row| (leave + row, (column.accumulation, first + row)));
                     self.rows.iter_mut().for_each(|all| all.extend(rows.clone()));
                 }

@@ -1,22 +1,30 @@
-//! Stage `prepare`: images of tables, calibration and averaging before `receive`; what the scene does not use is wires.
+//! Stage `prepare`: images of tables, calibration and averaging before `receive`, as far as the scene has them.
 //!
 //! Where zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
 use dermis_golden::fixed::Model;
 
 use crate::block;
-use crate::language::{Block, Builder, Inside};
-use crate::primitives::{Average, Calibrate, FrameMarks, Load, THRESHOLD_BITS, VERSION_WORD_BITS};
+use crate::language::{Block, Builder, Inside, Outside};
+use crate::primitives::{
+    Average, Calibrate, CalibratePorts, CoefficientPlaces, FrameMarks, Load, LoadPorts, PAIR_BITS, THRESHOLD_BITS,
+    VERSION_WORD_BITS,
+};
+use crate::streams::{leave_by, through, Beats};
 
 block! {
     /// Codes in, words of the frame buffer out.
     pub struct Prepare {
+        stream_bits: usize,
         input_bits: usize,
         floor_bits: usize,
-        load: Load,
+        marks: FrameMarks,
+        coefficients: CoefficientPlaces,
+        /// Tables are written.
+        load: Option<Load>,
         /// Zero and gain of each taxel.
-        calibrate: Calibrate,
-        average: Average,
+        calibrate: Option<Calibrate>,
+        average: Option<Average>,
     }
     ports PreparePorts {
         clock;
@@ -24,7 +32,7 @@ block! {
         /// No frame is in the engine behind this stage.
         in idle;
         /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
-        in s_axis_tdata: load.widths().s_axis_tdata;
+        in s_axis_tdata: stream_bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -40,17 +48,17 @@ block! {
         /// The word is the last of its frame; valid with `m_axis_tvalid`.
         out m_axis_tlast;
         /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
-        out frames: average.widths().frames;
+        out frames: marks.bits();
         /// Reset of the engine: `rst`, or tables are written.
         out restart;
         /// Writes `coefficient_data` to lanes `coefficient_pair` of word `coefficient_word` of the coefficient memory; only with `restart`.
         out coefficient_write;
         /// Word of the memory; valid with `coefficient_write`.
-        out coefficient_word: load.widths().coefficient_word;
+        out coefficient_word: coefficients.word_bits();
         /// Pair of lanes; valid with `coefficient_write`.
-        out coefficient_pair: load.widths().coefficient_pair;
+        out coefficient_pair: coefficients.pair_bits();
         /// The coefficients of two lanes; valid with `coefficient_write`.
-        out coefficient_data: load.widths().coefficient_data;
+        out coefficient_data: PAIR_BITS;
         /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
         out noise_floor: floor_bits;
         /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
@@ -63,69 +71,97 @@ block! {
 }
 
 impl Prepare {
-    /// With the input options of `model`.
-    pub fn new(model: &Model) -> Self {
+    /// With the input options of `model`; `None` where codes are the words of the frame buffer.
+    pub fn of_model(model: &Model) -> Option<Self> {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
         let (power, mean) = (model.prepare.average, model.prepare.mean);
-        Prepare {
+        let marks = FrameMarks::new(model);
+        let load = Load::of_plan(model);
+        let calibrate = Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables());
+        let average = Average::new(taxels, bits, power, mean, marks);
+        let prepares = load.is_some() || calibrate.is_some() || average.is_some();
+        prepares.then(|| Prepare {
+            stream_bits: model.stream_bits() as usize,
             input_bits: formats.input_bits as usize,
             floor_bits: model.floor_bits() as usize,
-            load: Load::new(model),
-            calibrate: Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables()),
-            average: Average::new(taxels, bits, power, mean, FrameMarks::new(model)),
-        }
+            marks,
+            coefficients: CoefficientPlaces::new(model),
+            load,
+            calibrate,
+            average,
+        })
     }
 }
 
 impl Block for Prepare {
     fn build<'k>(&self, k: &'k Builder, io: PreparePorts<Inside<'k>>) {
-        let load = k.instance("load", &self.load);
-        let calibrate = k.instance("calibrate", &self.calibrate);
-        let average = k.instance("average", &self.average);
+        let load = k.instance("load", self.load.as_ref());
+        let calibrate = k.instance("calibrate", self.calibrate.as_ref());
+        let average = k.instance("average", self.average.as_ref());
+        match &load {
+            None => without_tables(k, &io, calibrate.as_ref()),
+            Some(load) => tables(k, &io, load, calibrate.as_ref()),
+        }
+        let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
+        let codes = through!(Beats { data, valid, last, ready: io.s_axis_tready.net() }, load);
+        let words = through!(codes, calibrate);
+        io.frames.set(match &average {
+            Some(average) => average.frames,
+            None if self.marks.limited => words.data.top(),
+            None => k.constant(1, 0),
+        });
+        let words = through!(words, average);
+        leave_by!(Beats { data: words.data.low(self.input_bits), ..words }, io);
+    }
+}
 
-        load.idle.set(io.idle);
-        io.restart.set(load.restart);
-        io.coefficient_write.set(load.coefficient_write);
-        io.coefficient_word.set(load.coefficient_word);
-        io.coefficient_pair.set(load.coefficient_pair);
-        io.coefficient_data.set(load.coefficient_data);
-        io.noise_floor.set(load.noise_floor);
-        io.threshold.set(load.threshold);
-        io.version.set(load.version);
-        io.incomplete.set(load.incomplete);
-        load.s_axis_tdata.set(io.s_axis_tdata);
-        load.s_axis_tvalid.set(io.s_axis_tvalid);
-        load.s_axis_tlast.set(io.s_axis_tlast);
-        io.s_axis_tready.set(load.s_axis_tready);
-        calibrate.rst.set(load.restart);
+/// What [`Load`] writes goes to calibration and out; while it writes, the rest is reset.
+fn tables<'k>(
+    k: &'k Builder,
+    io: &PreparePorts<Inside<'k>>,
+    load: &LoadPorts<Outside<'k>>,
+    calibrate: Option<&CalibratePorts<Outside<'k>>>,
+) {
+    load.rst.set(io.rst);
+    load.idle.set(io.idle);
+    k.reset_instances(load.restart);
+    io.restart.set(load.restart);
+    io.coefficient_write.set(load.coefficient_write);
+    io.coefficient_word.set(load.coefficient_word);
+    io.coefficient_pair.set(load.coefficient_pair);
+    io.coefficient_data.set(load.coefficient_data);
+    io.noise_floor.set(load.noise_floor);
+    io.threshold.set(load.threshold);
+    io.version.set(load.version);
+    io.incomplete.set(load.incomplete);
+    k.unused([load.write, load.taxel, load.entry]);
+    if let Some(calibrate) = calibrate {
         calibrate.write.set(load.write);
         calibrate.write_taxel.set(load.taxel);
         calibrate.write_entry.set(load.entry);
         calibrate.incomplete.set(load.incomplete);
-        average.rst.set(load.restart);
-        calibrate.s_axis_tdata.set(load.m_axis_tdata);
-        calibrate.s_axis_tvalid.set(load.m_axis_tvalid);
-        calibrate.s_axis_tlast.set(load.m_axis_tlast);
-        load.m_axis_tready.set(calibrate.s_axis_tready);
-        average.s_axis_tdata.set(calibrate.m_axis_tdata);
-        average.s_axis_tvalid.set(calibrate.m_axis_tvalid);
-        average.s_axis_tlast.set(calibrate.m_axis_tlast);
-        calibrate.m_axis_tready.set(average.s_axis_tready);
-        io.m_axis_tdata.set(average.m_axis_tdata);
-        io.m_axis_tvalid.set(average.m_axis_tvalid);
-        io.m_axis_tlast.set(average.m_axis_tlast);
-        average.m_axis_tready.set(io.m_axis_tready);
-        io.frames.set(average.frames);
+    }
+}
+
+/// Nothing is written.
+fn without_tables<'k>(k: &'k Builder, io: &PreparePorts<Inside<'k>>, calibrate: Option<&CalibratePorts<Outside<'k>>>) {
+    io.restart.set(io.rst);
+    let coefficients = [io.coefficient_write, io.coefficient_word, io.coefficient_pair, io.coefficient_data];
+    for output in coefficients.into_iter().chain([io.noise_floor, io.threshold, io.version, io.incomplete]) {
+        output.set(k.constant(output.bits(), 0));
+    }
+    if let Some(calibrate) = calibrate {
+        for input in [calibrate.write, calibrate.write_taxel, calibrate.write_entry, calibrate.incomplete] {
+            input.set(k.constant(input.bits(), 0));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{
-        check, check_with_defects, random_word, random_words, subject_of, Pipeline, Reference, Subject,
-    };
+    use crate::language::testbench::{check_with_defects, random_word, subject_of, Reference, Subject};
     use crate::language::Change;
     use crate::primitives::{Sums, Table};
     use crate::scenes::model;
@@ -173,7 +209,7 @@ mod tests {
 
     fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
         subject_of!(
-            Prepare::new(model),
+            Prepare::of_model(model).unwrap(),
             changes,
             inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready, idle],
             outputs [
@@ -216,17 +252,5 @@ mod tests {
             Change::value("", "calibrate__m_axis_tready", |k| k.named("m_axis_tready")),
         ];
         check_with_defects(|changes| subject(&model, changes), &stimulus, || Prepared::new(&model), &defects);
-    }
-
-    #[test]
-    fn without_options_the_stream_passes() {
-        let model = model(2, 3, "");
-        let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1, 1]);
-        let of = |inputs: &[Word]| {
-            let stream = [4, 2, 1, 3].map(|input| Some(inputs[input]));
-            let zero = Some(Word::default());
-            stream.into_iter().chain([zero, Some(inputs[0])]).chain([zero; 8]).collect()
-        };
-        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 14, of));
     }
 }

@@ -11,9 +11,7 @@ use dermis_golden::spec::quads::Quads;
 use super::Choose;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
-use crate::primitives::{
-    count_bits, frame_quads, BitDelay, Delay, Dff, FrameStats, InputMask, LaneBroadcast, Ram, Scan,
-};
+use crate::primitives::{count_bits, frame_quads, BitDelay, Delay, Dff, FrameStats, InputMask, Ram, Scan};
 
 block! {
     /// ```text
@@ -91,7 +89,7 @@ enum Buffers {
 /// The parts of a frame buffer.
 struct Buffer {
     scan: Scan,
-    input_mask: InputMask,
+    input_mask: Option<InputMask>,
     frame: Ram,
     stats: FrameStats,
 }
@@ -144,8 +142,7 @@ impl Block for Receive {
 impl Receive {
     fn build_buffer<'k>(&'k self, k: &'k Builder, io: ReceivePorts<Inside<'k>>, buffer: &'k Buffer) {
         let scan = k.instance("scan", &buffer.scan);
-        let input_mask = k.instance("input_mask", &buffer.input_mask);
-        let broadcast = k.instance("broadcast", LaneBroadcast::new(self.bits));
+        let input_mask = k.instance("input_mask", buffer.input_mask.as_ref());
         let frame = k.instance("frame", &buffer.frame);
         let stats = k.instance("stats", &buffer.stats);
         let stats_enable = k.instance("stats_enable", BitDelay::new(1));
@@ -169,19 +166,19 @@ impl Receive {
         scan.which.set(k.constant(1, 0));
         scan.enable.set(taken);
         scan.clear.set(io.rst | early);
-        input_mask.enable.set(taken);
-        input_mask.clear.set(io.rst | early);
-        input_mask.word.set(io.s_axis_tdata);
-        io.taken_word.set(input_mask.kept);
-        stats_code.d.set(input_mask.kept);
+        let word = input_mask.map_or(io.s_axis_tdata, |mask| {
+            mask.enable.set(taken);
+            mask.clear.set(io.rst | early);
+            mask.word.set(io.s_axis_tdata);
+            mask.kept
+        });
+        io.taken_word.set(word);
+        stats_code.d.set(word);
         stats_mask.d.set(scan.mask);
         stats_address.d.set(scan.address);
-        broadcast.word.set(stats_code.q);
-        broadcast.mask.set(stats_mask.q);
-        broadcast.enable.set(stats_enable.q);
         frame.write_address.set(stats_address.q);
-        frame.write_data.set(broadcast.quad);
-        frame.write.set(broadcast.write);
+        frame.write_data.set(stats_code.q.repeat(Quads::LANES));
+        frame.write.set(stats_mask.q & stats_enable.q.repeat(Quads::LANES));
         frame.read.set(k.constant(1, 1));
         frame.read_address.set(io.quad_address);
         io.quad.set(frame.read_data);

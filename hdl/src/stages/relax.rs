@@ -1,9 +1,7 @@
 //! Stage `relax`: with a network, adds v_00 to the products of each step; its sums are p, and the operands of the next step.
-//!
-//! With a search words and operands pass on wires: v_ij are summed by the search.
 
 use dermis_golden::fixed::plan::resources::Holds;
-use dermis_golden::fixed::words::formats::Formats;
+use dermis_golden::fixed::Model;
 
 use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
@@ -15,7 +13,6 @@ block! {
         word: usize,
         data: usize,
         quads: usize,
-        network: bool,
         /// Each contact has a μ of its own.
         contacts: bool,
     }
@@ -28,17 +25,13 @@ block! {
         in words: 4 * word;
         /// `words` holds a quad.
         in words_valid;
-        /// The same, `data_bits` each, which passes on without a network; valid with `short_valid`.
-        in short: 4 * data;
-        /// `short` holds a quad.
-        in short_valid;
         /// Saturations of `rescale` in this subarray; taken in every cycle.
         in rescaled: SATURATION_BITS;
         /// Saturations of `estimate` in this subarray; taken in every cycle.
         in estimated: SATURATION_BITS;
         /// Saturations of `shear` in this subarray; taken in every cycle.
         in sheared: SATURATION_BITS;
-        /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
+        /// Four parities of p, `vector_bits` each, signed; valid with `sums_valid`.
         out sums: 4 * word;
         /// `sums` holds a quad.
         out sums_valid;
@@ -52,30 +45,21 @@ block! {
 }
 
 impl Relax {
-    /// With the widths of `formats`.
-    pub fn new(formats: &Formats) -> Self {
-        Relax {
+    /// For the network of `model`, if it has one. With a search v_ij are summed by the search.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let formats = model.formats();
+        model.has_network().then(|| Relax {
             word: formats.vector_bits as usize,
             data: formats.data_bits as usize,
             quads: formats.quads,
-            network: formats.has_network(),
             contacts: formats.by_contact(),
-        }
+        })
     }
 }
 
 impl Block for Relax {
     fn build<'k>(&self, k: &'k Builder, io: RelaxPorts<Inside<'k>>) {
         let RelaxPorts { rst, start, words, words_valid: valid, rescaled, estimated, sheared, .. } = io;
-        if !self.network {
-            k.comment("Without a network all passes on.");
-            io.sums.set(words);
-            io.sums_valid.set(valid);
-            io.operands.set(io.short);
-            io.operands_valid.set(io.short_valid);
-            io.saturations.set(rescaled);
-            return;
-        }
         let bit = Type::unsigned(1);
         let quad = k.state("quad", Type::unsigned(count_bits(self.quads)), rst | start, 0);
         let adds = k.state("adds", bit, rst | start, 0);
@@ -133,7 +117,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Relax = Relax { word: 22, data: 18, quads: 5, network: true, contacts: true };
+    const SHAPE: Relax = Relax { word: 22, data: 18, quads: 5, contacts: true };
 
     /// A sum, and how many of its words were saturated.
     type Sum = ([i64; 4], u32);
@@ -161,7 +145,7 @@ mod tests {
             let before = |cycles: usize| Some(self.sums.as_ref()?.get(cycles - 1).copied().flatten());
             let (sum, own) = (before(3), before(4));
             let operands = own.flatten().map(|(sum, _)| Word::of_fields(&sum.map(short), SHAPE.data));
-            let others = [6, 7, 8].map(|input| inputs[input].number()).iter().sum();
+            let others = [4, 5, 6].map(|input| inputs[input].number()).iter().sum();
             self.quiet = if others == self.others { self.quiet } else { 0 };
             self.others = others;
             let total = u64::from(self.total) + others;
@@ -220,18 +204,7 @@ mod tests {
                 [(); 3].map(|()| Word::from(if frame % 9 == 8 { random.u64(..0xffff) } else { random.u64(..9) }));
             let mut put = |random: &mut fastrand::Rng, rst: bool, start: bool, valid: bool| {
                 let word = random_word(random, 4 * SHAPE.word);
-                let short = random_word(random, 4 * SHAPE.data);
-                stimulus.push(vec![
-                    rst.into(),
-                    start.into(),
-                    word,
-                    valid.into(),
-                    short,
-                    false.into(),
-                    counts[0],
-                    counts[1],
-                    counts[2],
-                ]);
+                stimulus.push(vec![rst.into(), start.into(), word, valid.into(), counts[0], counts[1], counts[2]]);
             };
             put(&mut random, frame % 4 == 0, false, false);
             put(&mut random, false, true, false);
@@ -247,22 +220,5 @@ mod tests {
     #[test]
     fn the_products_of_each_step_are_added_to_v_00() {
         check(&kernel_of(&SHAPE), &stimulus(), &mut Sums::default());
-    }
-
-    /// Words, their operands and their count, on wires.
-    struct Wires;
-
-    impl Reference for Wires {
-        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            [2, 3, 4, 5, 6].map(|input| Some(inputs[input])).into()
-        }
-
-        fn clock(&mut self, _: &[Word]) {}
-    }
-
-    #[test]
-    fn without_a_network_all_passes_on() {
-        let block = Relax { network: false, ..SHAPE };
-        check(&kernel_of(&block), &stimulus(), &mut Wires);
     }
 }

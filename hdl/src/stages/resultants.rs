@@ -15,11 +15,11 @@ block! {
     /// s_axis (forces, row-major; status) --> moments --> sums of each subarray or label --> m_axis (sums; status)
     /// ```
     /// One force is accepted per cycle. The sums start to leave four cycles after the last force, then the status beats
-    /// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
+    /// pass through.
     ///
     /// Where each contact has a μ of its own, a force comes with the label of its taxel, and the taxels of a label are counted.
     pub struct Resultants {
-        parts: Option<Parts>,
+        parts: Parts,
         sensor: Sensor,
     }
     ports ResultantsPorts {
@@ -27,7 +27,7 @@ block! {
         reset;
         /// `{fz, fy, fx}` of a taxel, 32 bits signed each, with contacts above them its label, or a status beat; valid with
         /// `s_axis_tvalid`.
-        in s_axis_tdata: parts.map_or(3 * WORD, Parts::force_bits);
+        in s_axis_tdata: parts.force_bits();
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -95,28 +95,19 @@ impl Parts {
 }
 
 impl Resultants {
-    /// The records of `model`; of a scene that asks for a force per taxel, the stream passes through.
-    pub fn new(model: &Model) -> Self {
-        let parts = model.summed().map(|summed| match summed {
+    /// The records of `model`; none of a scene that asks for a force per taxel.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let parts = match model.summed()? {
             Summed::Subarray => Parts::Subarrays(model.grid()),
             Summed::Label => Parts::Labels(model.records()),
-        });
-        Resultants { parts, sensor: model.scene.sensor.clone() }
+        };
+        Some(Resultants { parts, sensor: model.scene.sensor.clone() })
     }
 }
 
 impl Block for Resultants {
     fn build<'k>(&self, k: &'k Builder, io: ResultantsPorts<Inside<'k>>) {
-        match self.parts {
-            Some(parts) => sums(k, io, &self.sensor, parts),
-            None => {
-                k.comment("A force per taxel: the stream passes through.");
-                io.s_axis_tready.set(io.m_axis_tready);
-                io.m_axis_tdata.set(io.s_axis_tdata);
-                io.m_axis_tvalid.set(io.s_axis_tvalid);
-                io.m_axis_tlast.set(io.s_axis_tlast);
-            }
-        }
+        sums(k, io, &self.sensor, self.parts);
     }
 }
 
@@ -380,7 +371,7 @@ mod tests {
             "name = \"sums\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"
         );
         let sensor = Scene::parse(&text, "sums.toml").unwrap().sensor;
-        let block = Resultants { parts: Some(parts), sensor: sensor.clone() };
+        let block = Resultants { parts, sensor: sensor.clone() };
         let mut random = fastrand::Rng::with_seed(12);
         let inputs = |cycle: usize| {
             let mut fields = [(); 3].map(|()| random.i64(..) >> random.u8(32..64)).to_vec();

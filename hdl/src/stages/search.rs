@@ -14,8 +14,8 @@ use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
     count_bits, largest, position_bits, store_latency, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff,
-    LaneMask, PolynomialWord, Score, ScoreBias, SearchSequencer, Slice, Store, Sum, Taylor, BUFFER_BITS,
-    CANDIDATES_LATENCY, SCORE_LATENCY, TAYLOR_LATENCY,
+    LaneMask, PolynomialWord, Score, ScoreBias, SearchSequencer, Store, Sum, Taylor, BUFFER_BITS, CANDIDATES_LATENCY,
+    SCORE_LATENCY, TAYLOR_LATENCY,
 };
 
 block! {
@@ -32,8 +32,7 @@ block! {
         /// Values that are output in a cycle.
         width: usize,
         score_bits: usize,
-        /// What finds μ*; without a search μ* is 0, or that of a network.
-        search: Option<Box<Sweeps>>,
+        sweeps: Box<Sweeps>,
     }
     ports SearchPorts {
         clock;
@@ -98,7 +97,6 @@ struct Sweeps {
     sum_taylor: Taylor,
     sum_candidates: Candidates,
     fill_mask: LaneMask,
-    constants: Slice,
     quads: CaseCounter,
     period: CaseCounter,
     began: BitDelay,
@@ -117,29 +115,25 @@ struct Sweeps {
 }
 
 impl Search {
-    /// With the widths of `model`.
-    pub fn new(model: &Model) -> Self {
+    /// With the widths of `model`, if it searches. Otherwise μ is 0 or that of a network, and the values are p.
+    pub fn of_model(model: &Model) -> Option<Self> {
         let formats = model.formats();
-        let searches = model.searches();
-        Search {
+        model.searches().then(|| Search {
             cases: model.cases().len(),
             quads: formats.quads,
             vectors: formats.vectors(),
             fill_bits: formats.vector_bits as usize + 2,
             value_bits: formats.search_bits[0] as usize,
-            width: if searches { formats.search_width } else { Quads::LANES },
+            width: formats.search_width,
             score_bits: formats.score_bits as usize,
-            search: searches.then(|| Box::new(Sweeps::new(model))),
-        }
+            sweeps: Box::new(Sweeps::new(model)),
+        })
     }
 }
 
 impl Block for Search {
     fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
-        match &self.search {
-            Some(search) => search.build(k, io),
-            None => io.unsearched(k, self.vectors),
-        }
+        self.sweeps.build(k, io);
     }
 }
 
@@ -159,7 +153,6 @@ impl Sweeps {
         let fill_bits = formats.vector_bits as usize + 2;
         let taxels = PolynomialWord::new(width, &formats.search_bits);
         let sums = PolynomialWord::new(1, &formats.sum_bits);
-        let value = width * formats.search_bits[0] as usize;
         // Cycles from the address of a step to its shifted polynomials.
         let moved = store_latency(formats) + TAYLOR_LATENCY;
         Sweeps {
@@ -175,7 +168,6 @@ impl Sweeps {
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
             fill_mask: LaneMask::new(&layouts, Quads::LANES),
-            constants: Slice::new(taxels.bits(), value),
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             // The result of a comparison and the move computed from it are registered before a sweep is set up.
@@ -206,12 +198,9 @@ impl Sweeps {
         let taylor = k.instance("taylor", &self.taylor);
         let candidates = k.instance("candidates", &self.candidates);
         let scores = k.instance("scores", &self.scores);
-        let lane_mask = k.instance("lane_mask", &self.lane_mask);
         let sum = k.instance("sum", &self.sum);
         let sum_taylor = k.instance("sum_taylor", &self.sum_taylor);
         let sum_candidates = k.instance("sum_candidates", &self.sum_candidates);
-        let fill_mask = k.instance("fill_mask", &self.fill_mask);
-        let constants = k.instance("constants", &self.constants);
         let quads = k.instance("quads", &self.quads);
         let period = k.instance("period", &self.period);
         let counting = k.instance("counting", Dff {});
@@ -231,13 +220,10 @@ impl Sweeps {
         let step = k.instance("step", &self.step);
         let target = k.instance("target", &self.target);
         let moved_address = k.instance("moved_address", &self.moved_address);
-        let scored_address = k.instance("scored_address", &self.scored_address);
         let set_up = k.instance("set_up", Dff {});
         let stalled_before = k.instance("stalled_before", Dff {});
 
         bias.which.set(io.which);
-        lane_mask.which.set(io.which);
-        fill_mask.which.set(io.fill_which);
         quads.which.set(io.which);
         period.which.set(io.which);
 
@@ -246,11 +232,10 @@ impl Sweeps {
         store.fill_index.set(io.fill_index);
         store.fill_address.set(io.fill_address);
         store.fill_quad.set(io.fill_quad);
-        fill_mask.address.set(io.fill_address);
         sum.fill.set(io.fill);
         sum.fill_index.set(io.fill_index);
         sum.fill_address.set(io.fill_address);
-        sum.fill_mask.set(fill_mask.mask);
+        sum.fill_mask.set(self.fill_mask.of(k, "fill_mask", io.fill_which, || io.fill_address));
         sum.fill_quad.set(io.fill_quad);
 
         k.comment("A sweep is set up and starts one cycle later");
@@ -313,12 +298,15 @@ impl Sweeps {
 
         k.comment("Scores and their comparison");
         scored.d.set(trial.q);
-        scored_address.d.set(moved_address.q);
-        lane_mask.address.set(scored_address.q);
         first.d.set(go.q);
         scores.first.set(first.q);
         scores.valid.set(scored.q);
-        scores.mask.set(lane_mask.mask);
+        let address = || {
+            let scored_address = k.instance("scored_address", &self.scored_address);
+            scored_address.d.set(moved_address.q);
+            scored_address.q
+        };
+        scores.mask.set(self.lane_mask.of(k, "lane_mask", io.which, address));
         scores.values.set(candidates.values);
         scores.sums.set(sum_candidates.values);
         totals.d.set(quad_end & !sequencer.last);
@@ -334,8 +322,7 @@ impl Sweeps {
         best.sweep.set(bias.weighted_sweep);
 
         k.comment("The constant terms of the last sweep are the values");
-        constants.word.set(taylor.moved);
-        io.values.set(constants.low);
+        io.values.set(taylor.moved.low(io.values.bits()));
         io.values_valid.set(outcome.q);
         io.settled.set(go.q & sequencer.last);
         io.values_begin.set(sum_outcome.q);

@@ -52,8 +52,7 @@ block! {
         contact_bits: usize,
         /// Width of a label.
         label_bits: usize,
-        /// The circuit; none without contacts.
-        shape: Option<Shape>,
+        shape: Shape,
     }
     ports SegmentPorts {
         clock;
@@ -91,35 +90,24 @@ block! {
 }
 
 impl Segment {
-    /// For the contacts of `model`; without contacts all outputs are constant 0.
-    pub fn of_model(model: &Model) -> Self {
-        let formats = model.formats();
+    /// For the contacts of `model`, if it has any.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let (contacts, formats) = (model.by_contact.as_ref()?, model.formats());
         let lane = formats.vector_bits as usize + 2;
-        match &model.by_contact {
-            Some(contacts) => Segment::new(&contacts.segmentation(&model.scene), lane, word_shift(formats) as usize),
-            None => Segment { layout: model.layout(), lane, contact_bits: 1, label_bits: 1, shape: None },
-        }
+        Some(Segment::new(&contacts.segmentation(&model.scene), lane, word_shift(formats) as usize))
     }
 
     /// For a segmentation of quads with lanes of `lane` bits, of which the word is that from bit `low` on.
     pub fn new(segmentation: &Segmentation, lane: usize, low: usize) -> Self {
         let shape = Shape::new(segmentation, lane, low);
         let (contact_bits, label_bits) = (count_bits(shape.most), shape.label());
-        Segment { layout: segmentation.quads(), lane, contact_bits, label_bits, shape: Some(shape) }
+        Segment { layout: segmentation.quads(), lane, contact_bits, label_bits, shape }
     }
 }
 
 impl Block for Segment {
     fn build<'k>(&'k self, k: &'k Builder, io: SegmentPorts<Inside<'k>>) {
-        let Some(shape) = &self.shape else {
-            k.comment("There are no contacts.");
-            let words = [io.count, io.labelled_quad, io.labels, io.middle_row, io.middle_col];
-            for output in [io.done, io.overflow, io.labelled].into_iter().chain(words) {
-                output.set(k.constant(output.bits(), 0));
-            }
-            return;
-        };
-        io.circuit(k, shape);
+        io.circuit(k, &self.shape);
     }
 }
 

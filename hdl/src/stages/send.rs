@@ -74,10 +74,14 @@ impl Block for Send {
 
         scan.which.set(io.which);
         parts.which.set(io.which);
-        released.begins.set(io.begins);
-        released.first.set(io.start);
-        released.part.set(scan.part);
-        let step = k.wire("step", sending.q & io.room & (status.q | released.open));
+        let open = released.map(|released| {
+            released.begins.set(io.begins);
+            released.first.set(io.start);
+            released.part.set(scan.part);
+            status.q | released.open
+        });
+        let offers = sending.q & io.room;
+        let step = k.wire("step", open.map_or(offers, |open| offers & open));
         let at_end = k.wire("at_end", step & !status.q & scan.last);
         let finish = k.wire("finish", step & status.q & words.last & parts.last);
         io.offer.set(step);

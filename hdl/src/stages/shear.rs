@@ -17,11 +17,11 @@ use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, 
 
 block! {
     /// Operands of p in, in the order of the quads; after `start`, operands of the products with Ax, then with Ay, the first
-    /// [`LATENCY`] cycles later. Without contacts all outputs are constant 0.
+    /// [`LATENCY`] cycles later.
     pub struct Shear {
         data: usize,
         quads: usize,
-        /// Largest number of contacts; 0 without contacts.
+        /// Largest number of contacts.
         contacts: usize,
     }
     ports ShearPorts {
@@ -40,9 +40,9 @@ block! {
         /// Contact of each lane of that quad, 0 for none, else 1 …; two cycles after `label_address`.
         in labels: 4 * label_bits(*contacts);
         /// Position of μ1 of each contact in mu_max/384, signed, contact 1 in the low bits; constant while operands leave.
-        in positions_x: positions_bits(*contacts);
+        in positions_x: contacts * position_bits();
         /// The same of μ2; as `positions_x`.
-        in positions_y: positions_bits(*contacts);
+        in positions_y: contacts * position_bits();
         /// Four parities, `data_bits` each, signed; valid with `sheared_valid`.
         out sheared: 4 * data;
         /// `sheared` holds a quad.
@@ -53,10 +53,10 @@ block! {
 }
 
 impl Shear {
-    /// For the contacts of `model`.
-    pub fn new(model: &Model) -> Self {
-        let formats = model.formats();
-        Shear { data: formats.data_bits as usize, quads: formats.quads, contacts: model.contacts() }
+    /// For the contacts of `model`, if it has any.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let (formats, contacts) = (model.formats(), model.contacts());
+        (contacts > 0).then(|| Shear { data: formats.data_bits as usize, quads: formats.quads, contacts })
     }
 
     /// The address of the next quad.
@@ -74,11 +74,6 @@ impl Shear {
     }
 }
 
-/// Width of the positions of so many contacts.
-fn positions_bits(contacts: usize) -> usize {
-    contacts.max(1) * position_bits()
-}
-
 /// Width of the number of one of so many contacts.
 fn label_bits(contacts: usize) -> usize {
     count_bits(contacts + 1)
@@ -88,14 +83,6 @@ impl Block for Shear {
     fn build<'k>(&self, k: &'k Builder, io: ShearPorts<Inside<'k>>) {
         let ShearPorts { rst, clear, operands, operands_valid: valid, start, labels, .. } = io;
         let positions = [io.positions_x, io.positions_y];
-        if self.contacts == 0 {
-            k.comment("There are no contacts.");
-            io.label_address.set(k.constant(count_bits(self.quads), 0));
-            io.sheared.set(k.constant(4 * self.data, 0));
-            io.sheared_valid.set(k.constant(1, 0));
-            io.saturations.set(k.constant(SATURATION_BITS, 0));
-            return;
-        }
         let (bit, count) = (Type::unsigned(1), Type::unsigned(count_bits(self.quads)));
         let place = k.state("place", count, rst | clear, 0);
         k.when(valid, || place.set(self.after(k, *place)));

@@ -17,7 +17,7 @@ block! {
         /// Width of a word.
         bits: usize,
         unfolder: Unfolder,
-        transposed: TransposedPlace,
+        transposed: Option<TransposedPlace>,
     }
     ports UnfoldPorts {
         clock;
@@ -69,7 +69,7 @@ impl Block for Unfold {
         let quads = k.instance("quads", CaseCounter::new(&self.quads));
         let vectors = k.instance("vectors", Counter::new(self.vectors));
         let unfolder = k.instance("unfolder", &self.unfolder);
-        let transposed = k.instance("transposed", &self.transposed);
+        let transposed = k.instance("transposed", self.transposed.as_ref());
         let index_first = k.instance("index_first", Delay::new(io.index.bits(), 2));
         let index_later = k.instance("index_later", Delay::new(io.index.bits(), 1));
         let address_later = k.instance("address_later", Delay::new(io.address.bits(), 3));
@@ -89,13 +89,19 @@ impl Block for Unfold {
         address_later.d.set(quads.value);
         valid_later.d.set(io.words_valid);
 
-        transposed.index.set(index_later.q);
-        transposed.address.set(address_later.q);
-        transposed.quad.set(unfolder.taxels);
-        io.taxels.set(transposed.taxels);
+        let (address, taxels) = match transposed {
+            None => (address_later.q, unfolder.taxels),
+            Some(transposed) => {
+                transposed.index.set(index_later.q);
+                transposed.address.set(address_later.q);
+                transposed.quad.set(unfolder.taxels);
+                (transposed.placed, transposed.taxels)
+            }
+        };
+        io.taxels.set(taxels);
         io.taxels_valid.set(valid_later.q);
         io.index.set(index_later.q);
-        io.address.set(transposed.placed);
+        io.address.set(address);
         finish.d.set(quad_end & vectors.last);
         io.done.set(finish.q);
     }

@@ -26,8 +26,6 @@ block! {
     /// Reads the window around a contact, shifts its codes until the largest fills the word, folds them and gives their high
     /// limbs, quad after quad, with the folded mask. Taxels beyond the array and dead ones are 0 and masked. The array is one
     /// subarray.
-    ///
-    /// Without contacts all outputs are constant 0.
     pub struct Window {
         layout: Quads,
         /// Width of a code.
@@ -41,8 +39,7 @@ block! {
         floor_bits: usize,
         /// Dead taxels, in ascending order.
         dead: Vec<usize>,
-        /// The window; none without contacts.
-        window: Option<window::Window>,
+        window: window::Window,
     }
     ports WindowPorts {
         clock;
@@ -84,10 +81,10 @@ const CODE: usize = 7;
 const SUM: usize = 9;
 
 impl Window {
-    /// For the windows of `model`.
-    pub fn new(model: &Model) -> Self {
-        let formats = model.formats();
-        Window {
+    /// For the windows around the contacts of `model`, if it has any.
+    pub fn of_model(model: &Model) -> Option<Self> {
+        let (contacts, formats) = (model.by_contact.as_ref()?, model.formats());
+        Some(Window {
             layout: model.layout(),
             bits: formats.input_bits as usize,
             low_bits: formats.input_low_bits as usize,
@@ -96,23 +93,14 @@ impl Window {
             floor: model.built_in_floor(),
             floor_bits: model.floor_bits() as usize,
             dead: model.dead.clone(),
-            window: model.by_contact.as_ref().map(|contacts| contacts.window),
-        }
+            window: contacts.window,
+        })
     }
 }
 
 impl Block for Window {
     fn build<'k>(&self, k: &'k Builder, io: WindowPorts<Inside<'k>>) {
-        match &self.window {
-            Some(window) => Circuit { k, io, block: self }.window(window),
-            None => {
-                k.comment("There are no contacts.");
-                let words = [io.quad_address, io.write_quad, io.mask_quad];
-                for output in words.into_iter().chain([io.write, io.positive, io.negative]) {
-                    output.set(k.constant(output.bits(), 0));
-                }
-            }
-        }
+        Circuit { k, io, block: self }.window(&self.window);
     }
 }
 

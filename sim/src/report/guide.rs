@@ -7,6 +7,7 @@
 //! | `timing-STAGE.svg` | the ports of a stage during a frame, kernel simulation | always the same |
 //! | `time-sensor-1-shear.svg` | shear error against the time of a frame | measured anew |
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::{anyhow, Result};
@@ -26,11 +27,8 @@ use crate::cosim::block_timing::{timing, traces, SCENE};
 use crate::jobs::Interrupt;
 use crate::progress::Progress;
 
-/// Scenes whose hardware has stages that [`SCENE`] has not, and these stages.
-const OTHERS: [(&str, &[&str]); 2] = [
-    ("sensor-1-noisy", &["estimate", "relax"]),
-    ("eight-by-eight-contacts", &["segment", "contacts", "window", "shear", "label_beats"]),
-];
+/// A scene with the stages for options of input and output.
+const SUMS: &str = include_str!("../../../golden/data/scenes/sensor-1-sums.toml");
 /// The frame with two feet, and the scene of its sensor.
 const FEET: (&str, &str) = ("s4-plantar-two-feet", "sensor-4");
 
@@ -55,23 +53,27 @@ impl PictureFile {
 /// A picture that cannot be written.
 pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
-    let scene = Scene::builtin(SCENE)?;
-    let stages = traces(&scene, build)?;
-    let own = |trace: &&Trace| OTHERS.iter().all(|(_, stages)| !stages.contains(&trace.block.name));
-    for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)).filter(own) {
-        files.push(timing_picture(&scene.name, stage)?);
-    }
-    for (other, stages) in OTHERS {
-        for stage in traces(&Scene::builtin(other)?, build)?.iter().filter(|trace| stages.contains(&trace.block.name)) {
-            files.push(timing_picture(other, stage)?);
+    let mut drawn = BTreeSet::new();
+    for scene in scenes()? {
+        for trace in traces(&scene, build)? {
+            let block = &trace.block;
+            let is_drawn = !block.instance.contains(SEPARATOR) || block.name == "choose";
+            if is_drawn && drawn.insert(block.name) {
+                files.push(timing_picture(&scene.name, &trace)?);
+            }
         }
     }
-    let mut choosing = scene;
-    choosing.partition.case = Case::Adaptive;
-    for stage in traces(&choosing, build)?.iter().filter(|trace| trace.block.name == "choose") {
-        files.push(timing_picture(&choosing.name, stage)?);
-    }
     Ok(files)
+}
+
+/// Scenes whose hardware has all stages between them; a stage is drawn for the first that has it.
+fn scenes() -> Result<Vec<Scene>> {
+    let base = Scene::builtin(SCENE)?;
+    let mut choosing = base.clone();
+    choosing.partition.case = Case::Adaptive;
+    let others = [Scene::builtin("sensor-1-noisy")?, Scene::builtin("eight-by-eight-contacts")?];
+    let sums = Scene::parse(SUMS, "sensor-1-sums.toml")?;
+    Ok([base].into_iter().chain(others).chain([choosing, sums]).collect())
 }
 
 /// The picture of a block's ports during a frame.

@@ -19,11 +19,12 @@ pub fn ports(block: &BlockText) -> String {
     aligned(4, &["port", "direction", "meaning", "valid", "bits"], block.ports.iter().map(row).collect())
 }
 
-/// The blocks of an engine.
+/// The described blocks, with the number of ports of those that the scene's engine has.
 pub fn blocks(all: &[BlockText]) -> String {
     let row = |block: &BlockText| {
         let (name, path) = (format!("`{}`", block.name), format!("`{}`", block.instance));
-        vec![name, path, block.purpose.clone(), block.ports.len().to_string()]
+        let ports = block.ports.len();
+        vec![name, path, block.purpose.clone(), if ports > 0 { ports.to_string() } else { "–".to_owned() }]
     };
     aligned(3, &["block", "instance", "does", "ports"], all.iter().map(row).collect())
 }

@@ -3,7 +3,7 @@
 use dermis_golden::spec::quads::Quads;
 
 use crate::block;
-use crate::language::{Block, Builder, Inside};
+use crate::language::{Block, Builder, Expr, Inside, Interface};
 use crate::primitives::address::counter::count_bits;
 
 block! {
@@ -30,6 +30,20 @@ impl LaneMask {
     /// `layouts[case]` is the quad layout of the subarrays of each case; a step has `lanes` lanes.
     pub fn new(layouts: &[Quads], lanes: usize) -> Self {
         LaneMask { layouts: layouts.to_vec(), lanes }
+    }
+
+    /// The mask of the step `address` of case `which`, by instance `name`; without instance and address where each lane always
+    /// counts.
+    pub fn of<'k>(&self, k: &'k Builder, name: &str, which: Expr<'k>, address: impl FnOnce() -> Expr<'k>) -> Expr<'k> {
+        let all = (1 << self.lanes) - 1;
+        let steps = 0..1 << self.widths().address;
+        if self.layouts.iter().all(|layout| steps.clone().all(|step| mask(Some(layout), self.lanes, step) == all)) {
+            return k.constant(self.lanes, all);
+        }
+        let instance = k.instance(name, self);
+        instance.which.set(which);
+        instance.address.set(address());
+        instance.mask
     }
 }
 

@@ -8,11 +8,9 @@ use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
 
 block! {
-    /// Where frames begin whole, all outputs follow from `full` and `begins`, and there is no register.
-    pub struct Arrival {
-        /// A frame may begin with its first row of subarrays.
-        early: bool,
-    }
+    /// Where a frame may begin with its first row of subarrays.
+    #[derive(Default)]
+    pub struct Arrival {}
     ports ArrivalPorts {
         clock;
         reset;
@@ -28,7 +26,7 @@ block! {
         in begins;
         /// The passes of a subarray are complete, until it is handed over.
         in complete;
-        /// What has arrived is enough to begin the passes; where a row of subarrays is, from two cycles after its last taxel.
+        /// A row of subarrays has arrived, enough to begin the passes; from two cycles after its last taxel.
         out ready;
         /// The frame in the passes is not complete: its first subarray must not be handed over.
         out waits;
@@ -39,23 +37,8 @@ block! {
     }
 }
 
-impl Arrival {
-    /// `early`: a frame may begin with its first row of subarrays.
-    pub fn new(early: bool) -> Self {
-        Arrival { early }
-    }
-}
-
 impl Block for Arrival {
     fn build<'k>(&self, k: &'k Builder, io: ArrivalPorts<Inside<'k>>) {
-        if !self.early {
-            let none = k.constant(1, 0);
-            io.ready.set(io.full);
-            io.waits.set(none);
-            io.arrives.set(io.begins);
-            io.discards.set(none);
-            return;
-        }
         let state = |name: &str| k.state(name, Type::unsigned(1), io.rst, 0);
         k.comment("The last codes of the row are in the buffer one cycle after they are accepted.");
         let (row, ready) = (state("row"), io.ready.state(io.rst, 0));
@@ -76,7 +59,7 @@ impl Block for Arrival {
 mod tests {
     use super::*;
     use crate::language::kernel_of;
-    use crate::language::testbench::{check, random_words, Pipeline, Reference};
+    use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
     /// The frame that is received and the one in the passes, as a sequence of events; undefined before the first reset.
@@ -128,10 +111,6 @@ mod tests {
             inputs.map(Word::from).to_vec()
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
-        check(&kernel_of(&Arrival::new(true)), &stimulus, &mut Frames::default());
-        // Whole frames: no state.
-        let whole = |inputs: &[Word]| vec![Some(inputs[4]), Some(0.into()), Some(inputs[5]), Some(0.into())];
-        let stimulus = random_words(200, &[1; 7]);
-        check(&kernel_of(&Arrival::new(false)), &stimulus, &mut Pipeline::new(0, 4, whole));
+        check(&kernel_of(&Arrival {}), &stimulus, &mut Frames::default());
     }
 }

@@ -8,7 +8,6 @@ use super::sliding_mean::{frames_bits, SlidingMean};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::stream::pass_through::pass_through;
 
 block! {
     /// ```text
@@ -16,8 +15,8 @@ block! {
     /// ```
     /// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
     /// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
-    /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
-    /// k = 0 the stream passes through. Module `sliding_mean` has the kernel of a sliding mean.
+    /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. Module
+    /// `sliding_mean` has the kernel of a sliding mean.
     ///
     /// Where zeros run, the bit above a word says whether one is at its limit; it goes on with the number of frames.
     ///
@@ -82,9 +81,10 @@ impl FrameMarks {
 
 impl Average {
     /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean; with
-    /// the `marks` of a frame.
-    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind, marks: FrameMarks) -> Self {
-        Average { taxels, bits, power: power as usize, mean, marks }
+    /// the `marks` of a frame. `None` where each frame is its own sum.
+    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind, marks: FrameMarks) -> Option<Self> {
+        let averages = power > 0 || mean == MeanKind::Sliding;
+        averages.then_some(Average { taxels, bits, power: power as usize, mean, marks })
     }
 
     fn sums<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
@@ -150,15 +150,9 @@ impl Block for Average {
         let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
         let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
         let Average { taxels, bits, power, mean, marks: FrameMarks { limited, .. } } = *self;
-        match power {
-            _ if mean == MeanKind::Sliding => {
-                SlidingMean { taxels, bits, power, limited }.build(k, io.rst, from, to, io.frames);
-            }
-            0 => {
-                pass_through(k, "No averaging: the stream passes through.", from, to);
-                io.frames.set(if limited { io.s_axis_tdata.top() } else { k.constant(1, 0) });
-            }
-            _ => self.sums(k, io),
+        match mean {
+            MeanKind::Sliding => SlidingMean { taxels, bits, power, limited }.build(k, io.rst, from, to, io.frames),
+            MeanKind::Block => self.sums(k, io),
         }
     }
 }

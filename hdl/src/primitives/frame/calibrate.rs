@@ -8,15 +8,13 @@ use super::running_zero::{follow, Beat, Followed, RECOVERY};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, MemoryPort, Net, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::stream::pass_through::pass_through;
 
 block! {
     /// ```text
     /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
     /// ```
-    /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
-    /// table, where the stream passes through. A running zero takes its drift off the difference, which takes 2 cycles more. The
-    /// taxel count restarts at `tlast`, as in `receive`.
+    /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone. A
+    /// running zero takes its drift off the difference, which takes 2 cycles more. The taxel count restarts at `tlast`, as in `receive`.
     pub struct Calibrate {
         /// Zero of each taxel.
         zero: Option<Vec<i32>>,
@@ -64,10 +62,12 @@ block! {
 const CALIBRATION_FILE: &str = "calibration.hex";
 
 impl Calibrate {
-    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not.
-    pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Self {
+    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not; `None`
+    /// where they have no zero.
+    pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Option<Self> {
         let Prepare { zero, gain, running, .. } = prepare.clone();
-        Calibrate { zero, gain, running, taxels, bits, written }
+        let calibrates = zero.is_some() || running.is_some();
+        calibrates.then_some(Calibrate { zero, gain, running, taxels, bits, written })
     }
 
     /// Width of a gain in the table.
@@ -179,12 +179,7 @@ impl Calibrate {
 
 impl Block for Calibrate {
     fn build<'k>(&self, k: &'k Builder, io: CalibratePorts<Inside<'k>>) {
-        if self.zero.is_some() || self.running.is_some() {
-            return self.calibrated(k, io);
-        }
-        let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
-        let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
-        pass_through(k, "No zero and no gain: the stream passes through.", from, to);
+        self.calibrated(k, io);
     }
 }
 

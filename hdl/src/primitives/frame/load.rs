@@ -12,7 +12,6 @@ use dermis_golden::wire::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::stream::pass_through::pass_through;
 
 block! {
     /// ```text
@@ -20,8 +19,6 @@ block! {
     ///               '----> byte --> word of 6 bytes --> zero and gain of a taxel, two coefficients, threshold, noise floor, version
     ///                        '----> CRC-32 ----------> whole
     /// ```
-    /// Without writable tables the stream passes through, and all but `restart`, which is `rst`, is constant 0.
-    ///
     /// The first byte waits until `idle` has been high, and no code has passed, for [`REST`] cycles. A byte is taken in one cycle
     /// and used in the next, but for a reset.
     /// From the first written word to the last byte `restart` is high. What is in the tables, whether they are whole and their
@@ -33,8 +30,8 @@ block! {
         coefficients: CoefficientPlaces,
         /// Number of the layout of an image.
         layout: u32,
-        /// The tables of the bitstream, where they are writable.
-        tables: Option<Tables>,
+        /// The tables of the bitstream.
+        tables: Tables,
     }
     ports LoadPorts {
         clock;
@@ -42,7 +39,7 @@ block! {
         /// No frame is in the engine.
         in idle;
         /// A code, sign-extended, or a byte of an image, `stream_bits` wide; valid with `s_axis_tvalid`.
-        in s_axis_tdata: code_bits + usize::from(tables.is_some());
+        in s_axis_tdata: code_bits + 1;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -74,8 +71,8 @@ block! {
         out coefficient_pair: coefficients.pair_bits();
         /// The coefficients of two lanes, the lower first, 18 bits each; valid with `coefficient_write`.
         out coefficient_data: PAIR_BITS;
-        /// Noise floor in codes, `input_bits` wide, ≥ 0, one bit where it is not written; valid unless `restart`.
-        out noise_floor: tables.as_ref().map_or(1, |_| *input_bits);
+        /// Noise floor in codes, `input_bits` wide, ≥ 0; valid unless `restart`.
+        out noise_floor: input_bits;
         /// Threshold in force LSBs, 32 bits; valid unless `restart`.
         out threshold: THRESHOLD_BITS;
         /// Version of the tables, 15 bits, and above it whether the last image was refused; valid unless `restart`.
@@ -99,17 +96,17 @@ pub(crate) fn table_beat<'k>(k: &'k Builder, octet: Expr<'k>, code_bits: usize) 
 }
 
 impl Load {
-    /// For the tables of `plan`.
-    pub fn new(plan: &Plan) -> Self {
-        let formats = plan.formats();
-        Load {
+    /// For the tables of `plan`, if they are writable.
+    pub fn of_plan(plan: &Plan) -> Option<Self> {
+        let (tables, formats) = (plan.tables()?, plan.formats());
+        Some(Load {
             code_bits: formats.code_bits as usize,
             input_bits: formats.input_bits as usize,
             taxels: plan.scene.sensor.taxels(),
             coefficients: CoefficientPlaces::new(plan),
             layout: plan.table_layout(),
-            tables: plan.tables(),
-        }
+            tables,
+        })
     }
 }
 
@@ -159,17 +156,7 @@ fn crc_after<'k>(k: &'k Builder, crc: Expr<'k>, byte: Expr<'k>) -> Expr<'k> {
 
 impl Block for Load {
     fn build<'k>(&self, k: &'k Builder, io: LoadPorts<Inside<'k>>) {
-        if let Some(tables) = &self.tables {
-            return self.take_tables(k, io, tables);
-        }
-        let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
-        let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
-        pass_through(k, "The tables are in the bitstream: the stream passes through.", from, to);
-        io.restart.set(io.rst);
-        Load::no_coefficients(k, &io);
-        for output in [io.write, io.taxel, io.entry, io.noise_floor, io.threshold, io.version, io.incomplete] {
-            output.set(k.constant(output.bits(), 0));
-        }
+        self.take_tables(k, io, &self.tables);
     }
 }
 

@@ -5,7 +5,7 @@ use crate::language::{Block, Builder, Inside, Type};
 use crate::primitives::address::counter::count_bits;
 
 block! {
-    /// A word delayed by `depth` cycles, with 0 on wires. Data, therefore without reset.
+    /// A word delayed by `depth` ≥ 1 cycles. Data, therefore without reset.
     pub struct Delay {
         bits: usize,
         depth: usize,
@@ -28,10 +28,6 @@ impl Delay {
 
 impl Block for Delay {
     fn build<'k>(&self, k: &'k Builder, io: DelayPorts<Inside<'k>>) {
-        if self.depth == 0 {
-            io.q.set(io.d);
-            return;
-        }
         io.q.delay((1..self.depth).fold(io.d, |value, number| k.delay(&format!("pipe{number}"), value)));
     }
 }

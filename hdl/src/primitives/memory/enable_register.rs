@@ -7,7 +7,6 @@ block! {
     /// `kept` is the value of `word` at the last clock edge at which `keep` was high.
     pub struct EnableRegister {
         bits: usize,
-        constant: bool,
     }
     ports EnableRegisterPorts {
         clock;
@@ -23,23 +22,14 @@ block! {
 impl EnableRegister {
     /// A register of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        EnableRegister { bits, constant: false }
-    }
-
-    /// With `constant`, wires in place of the register, for a word that never changes.
-    pub fn constant(self, constant: bool) -> Self {
-        EnableRegister { constant, ..self }
+        EnableRegister { bits }
     }
 }
 
 impl Block for EnableRegister {
     fn build<'k>(&self, k: &'k Builder, io: EnableRegisterPorts<Inside<'k>>) {
-        if self.constant {
-            io.kept.set(io.word);
-        } else {
-            let kept = io.kept.register();
-            k.when(io.keep, || kept.set(io.word));
-        }
+        let kept = io.kept.register();
+        k.when(io.keep, || kept.set(io.word));
     }
 }
 

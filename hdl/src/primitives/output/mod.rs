@@ -5,4 +5,3 @@ pub(crate) mod frame_cycles;
 pub(crate) mod parts_begun;
 pub(crate) mod status_bits;
 pub(crate) mod status_code;
-pub(crate) mod status_source;

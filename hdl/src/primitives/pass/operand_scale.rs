@@ -10,12 +10,9 @@ use crate::primitives::search::sweep::position_bits;
 
 block! {
     /// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
-    /// [`latency`](OperandScale::latency) cycles later. Unless a network gives one μ there is no factor, and the
-    /// operands pass on wires.
-    pub struct OperandScale {
-        /// A network gives one μ.
-        wanted: bool,
-    }
+    /// [`SCALE_LATENCY`] cycles later. For a network that gives one μ.
+    #[derive(Default)]
+    pub struct OperandScale {}
     ports OperandScalePorts {
         clock;
         /// Operand of each lane group, four times 18 bits, signed; taken in every cycle.
@@ -32,32 +29,11 @@ block! {
 }
 
 const M: usize = MULTIPLIER_BITS as usize;
-/// Cycles from `operands` to `scaled` where there is a network.
-const LATENCY: usize = 3;
-
-impl OperandScale {
-    /// `wanted`: a network gives one μ.
-    pub fn new(wanted: bool) -> Self {
-        OperandScale { wanted }
-    }
-
-    /// Cycles from `operands` to `scaled`.
-    pub fn latency(&self) -> usize {
-        if self.wanted {
-            LATENCY
-        } else {
-            0
-        }
-    }
-}
+/// Cycles from `operands` to `scaled`.
+pub const SCALE_LATENCY: usize = 3;
 
 impl Block for OperandScale {
     fn build<'k>(&self, k: &'k Builder, io: OperandScalePorts<Inside<'k>>) {
-        if !self.wanted {
-            k.comment("Nothing is multiplied by μ.");
-            io.scaled.set(io.operands);
-            return;
-        }
         k.comment("Operands and μ are registered in front of the multipliers: both come from far away.");
         let taken = k.delay("taken", io.operands);
         let position = k.delay("position", io.factor.at(1).mux(io.position_y.signed(), io.position_x.signed()));
@@ -84,27 +60,23 @@ mod tests {
 
     #[test]
     fn operands_are_multiplied_by_the_position_of_their_axis() {
-        for wanted in [true, false] {
-            let mut random = fastrand::Rng::with_seed(21);
-            let mut inputs = |_| {
-                let operands = [(); 4].map(|()| random.i64(-(1 << (M - 1))..1 << (M - 1)));
-                let [x, y] = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
-                let factor = if wanted { random.u64(..3) } else { 0 };
-                vec![Word::of_fields(&operands, M), Word::from(factor), x, y]
+        let mut random = fastrand::Rng::with_seed(21);
+        let mut inputs = |_| {
+            let operands = [(); 4].map(|()| random.i64(-(1 << (M - 1))..1 << (M - 1)));
+            let [x, y] = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
+            vec![Word::of_fields(&operands, M), random.u64(..3).into(), x, y]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
+        let of = |inputs: &[Word]| {
+            let operands = [0, 1, 2, 3].map(|parity| inputs[0].signed(parity, M));
+            let position = |input: usize| inputs[input].signed(0, position_bits());
+            let all = match inputs[1].number() {
+                0 => operands,
+                1 => scaled(operands, position(2)),
+                _ => scaled(operands, position(3)),
             };
-            let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
-            let of = |inputs: &[Word]| {
-                let operands = [0, 1, 2, 3].map(|parity| inputs[0].signed(parity, M));
-                let position = |input: usize| inputs[input].signed(0, position_bits());
-                let all = match inputs[1].number() {
-                    0 => operands,
-                    1 => scaled(operands, position(2)),
-                    _ => scaled(operands, position(3)),
-                };
-                vec![Some(Word::of_fields(&all, M))]
-            };
-            let block = OperandScale::new(wanted);
-            check(&kernel_of(&block), &stimulus, &mut Pipeline::new(block.latency(), 1, of));
-        }
+            vec![Some(Word::of_fields(&all, M))]
+        };
+        check(&kernel_of(&OperandScale {}), &stimulus, &mut Pipeline::new(SCALE_LATENCY, 1, of));
     }
 }

@@ -10,11 +10,11 @@ use crate::primitives::address::counter::count_bits;
 block! {
     /// One stage at a time gives quads, which pass on in the same cycle.
     ///
-    /// | scene | operands |
+    /// | operands | of |
     /// |---|---|
-    /// | with a search | `own`: v_ij |
-    /// | one μ by a network | `own`: v_00 and p; `images`: of the layers, and when μ is known |
-    /// | a μ for each contact | `window_quad`, then as many quads of its mask; `images`; `sheared` |
+    /// | `window_quad`, then as many quads of its mask | the first layer |
+    /// | `images` | the other layers, and when μ is known |
+    /// | `sheared` | a step |
     ///
     /// The mask of a window is kept until its last quad has been given, then it follows in consecutive cycles.
     #[derive(Clone, Copy)]
@@ -24,17 +24,12 @@ block! {
         operand: usize,
         /// Width of a word of the window.
         limb: usize,
-        network: bool,
-        /// Quads of a window, where each contact has a μ of its own.
-        window: Option<usize>,
+        /// Quads of a window.
+        window: usize,
     }
     ports OperandSourcePorts {
         clock;
         reset;
-        /// Operands of `relax`, `data_bits` each, signed; valid with `own_valid`.
-        in own: 4 * data;
-        /// `own` holds a quad; with a μ for each contact it goes to `shear` instead.
-        in own_valid;
         /// Operands of `estimate`, `data_bits` each, signed; valid with `images_valid`.
         in images: 4 * data;
         /// `images` holds a quad.
@@ -62,16 +57,15 @@ block! {
 pub const MASK_BITS: usize = 4;
 
 impl OperandSource {
-    /// For the operands of `model`.
-    pub fn new(model: &Model) -> Self {
+    /// For the operands of `model`, if each contact has a μ of its own.
+    pub fn of_model(model: &Model) -> Option<Self> {
         let formats = model.formats();
-        OperandSource {
+        formats.window_quads.map(|window| OperandSource {
             data: formats.data_bits as usize,
             operand: formats.operand_bits() as usize,
             limb: (formats.fold_bits - formats.input_low_bits) as usize,
-            network: formats.has_network(),
-            window: formats.window_quads,
-        }
+            window,
+        })
     }
 
     /// Four signed fields of `bits` bits as operands, times 2^`shift`.
@@ -84,17 +78,7 @@ impl OperandSource {
 
 impl Block for OperandSource {
     fn build<'k>(&self, k: &'k Builder, io: OperandSourcePorts<Inside<'k>>) {
-        let (images_valid, window_valid) = (io.images_valid, io.window_valid);
-        let Some(quads) = self.window else {
-            let (quad, valid) = match self.network {
-                true => (images_valid.mux(io.images, io.own), images_valid | io.own_valid),
-                false => (io.own, io.own_valid),
-            };
-            io.quad.set(quad);
-            io.valid.set(valid);
-            io.of_window.set(k.constant(1, 0));
-            return;
-        };
+        let (quads, images_valid, window_valid) = (self.window, io.images_valid, io.window_valid);
         let place = k.state("place", Type::unsigned(count_bits(quads)), io.rst, 0);
         let masks = k.state("masks", Type::unsigned(1), io.rst, 0);
         let last = k.wire("last", place.is(quads as u64 - 1));
@@ -120,7 +104,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: OperandSource = OperandSource { data: 14, operand: 18, limb: 17, network: true, window: Some(5) };
+    const SHAPE: OperandSource = OperandSource { data: 14, operand: 18, limb: 17, window: 5 };
 
     /// Inputs in the order of the block.
     struct Sources {
@@ -133,19 +117,15 @@ mod tests {
 
     impl Reference for Sources {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let [own, images, window, sheared] = [2, 4, 7, 9].map(|input| inputs[input].number() == 1);
-            let OperandSource { data, operand, limb, network, window: quads } = self.shape;
-            if quads.is_none() {
-                let quad = if images && network { Some(inputs[3]) } else { own.then_some(inputs[1]) };
-                return vec![quad, Some((own || images && network).into()), Some(Word::default())];
-            }
+            let [images, window, sheared] = [2, 5, 7].map(|input| inputs[input].number() == 1);
+            let OperandSource { data, operand, limb, .. } = self.shape;
             let mask = self.masks.as_ref().zip(self.next).map(|(masks, next)| {
                 Word::of_fields(&[0, 1, 2, 3].map(|lane| masks[next].signed(lane, MASK_BITS) * MASKED), operand)
             });
             let wide =
                 |quad: Word, bits: usize| Word::of_fields(&[0, 1, 2, 3].map(|lane| quad.signed(lane, bits)), operand);
-            let read = wide(inputs[5], limb);
-            let [image, step] = [3, 8].map(|input: usize| wide(inputs[input], data));
+            let read = wide(inputs[3], limb);
+            let [image, step] = [1, 6].map(|input: usize| wide(inputs[input], data));
             let made = [(window, read), (images, image), (sheared, step)];
             let made = made.into_iter().find_map(|(given, quad)| given.then_some(quad));
             let bit = |value: bool| self.masks.as_ref().map(|_| value.into());
@@ -153,9 +133,9 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let Some(quads) = self.shape.window else { return };
-            if let (true, Some(masks)) = (inputs[7].number() == 1, &mut self.masks) {
-                masks.push(inputs[6]);
+            let quads = self.shape.window;
+            if let (true, Some(masks)) = (inputs[5].number() == 1, &mut self.masks) {
+                masks.push(inputs[4]);
                 self.next = (masks.len() == quads).then_some(0);
             } else if let (Some(next), Some(masks)) = (self.next, &mut self.masks) {
                 self.next = (next + 1 < quads).then_some(next + 1);
@@ -180,8 +160,6 @@ mod tests {
             all.push(vec![
                 rst.into(),
                 quad(random),
-                given(0),
-                quad(random),
                 given(1),
                 random_word(random, 4 * shape.limb),
                 mask,
@@ -192,14 +170,14 @@ mod tests {
         };
         for round in 0..80 {
             put(&mut random, round % 9 == 0, None);
-            let quads = shape.window.unwrap_or(0);
+            let quads = shape.window;
             for _ in 0..if round % 9 == 8 { random.usize(..=quads) } else { quads } {
                 put(&mut random, false, Some(2));
                 (0..random.usize(..4)).for_each(|_| put(&mut random, false, None));
             }
             (0..if round % 9 == 8 { 0 } else { quads }).for_each(|_| put(&mut random, false, None));
             for _ in 0..12 {
-                let one = [None, Some(1), if shape.window.is_some() { Some(3) } else { Some(0) }][random.usize(..3)];
+                let one = [None, Some(1), Some(3)][random.usize(..3)];
                 put(&mut random, false, one.filter(|_| round % 9 < 8));
             }
         }
@@ -208,13 +186,7 @@ mod tests {
 
     #[test]
     fn quads_of_one_stage_at_a_time_pass_on() {
-        for shape in [
-            SHAPE,
-            OperandSource { window: None, operand: SHAPE.data, ..SHAPE },
-            OperandSource { window: None, operand: SHAPE.data, network: false, ..SHAPE },
-        ] {
-            let mut sources = Sources { shape, masks: None, next: None };
-            check(&kernel_of(&shape), &stimulus(shape), &mut sources);
-        }
+        let mut sources = Sources { shape: SHAPE, masks: None, next: None };
+        check(&kernel_of(&SHAPE), &stimulus(SHAPE), &mut sources);
     }
 }

@@ -2,18 +2,16 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside};
-use crate::primitives::stream::pass_through::pass_through;
 
 block! {
     /// ```text
     /// s_axis --> register --> m_axis
     /// ```
     /// Data and handshake pass through registers in both directions, which lets sender and receiver be placed far apart, at
-    /// the cost of one beat every two cycles. If not wanted, the stream passes through on wires.
+    /// the cost of one beat every two cycles.
     pub struct RegisterSlice {
         /// Width of a beat in bits.
         bits: usize,
-        wanted: bool,
     }
     ports RegisterSlicePorts {
         clock;
@@ -38,19 +36,14 @@ block! {
 }
 
 impl RegisterSlice {
-    /// For beats of `bits` bits; a register if `wanted`, otherwise wires.
-    pub fn new(bits: usize, wanted: bool) -> Self {
-        RegisterSlice { bits, wanted }
+    /// For beats of `bits` bits.
+    pub fn new(bits: usize) -> Self {
+        RegisterSlice { bits }
     }
 }
 
 impl Block for RegisterSlice {
     fn build<'k>(&self, k: &'k Builder, io: RegisterSlicePorts<Inside<'k>>) {
-        if !self.wanted {
-            let why = "No register slice: sender and receiver are placed close together.";
-            let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
-            return pass_through(k, why, from, [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready]);
-        }
         let tdata = io.m_axis_tdata.register();
         let valid = io.m_axis_tvalid.state(io.rst, 0);
         let tlast = io.m_axis_tlast.register();
@@ -95,6 +88,6 @@ mod tests {
     fn beats_pass_one_at_a_time() {
         let mut stimulus = random_words(4000, &[1, 33, 1, 1, 1]);
         stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 101 == 0).into());
-        check(&kernel_of(&RegisterSlice::new(33, true)), &stimulus, &mut Slice(None));
+        check(&kernel_of(&RegisterSlice::new(33)), &stimulus, &mut Slice(None));
     }
 }

@@ -208,7 +208,7 @@ fn sweeps_and_values_are_those_of_the_model() {
     for model in [several, narrow] {
         let subject = |changes: &[Change]| {
             subject_of!(
-                Search::new(&model),
+                Search::of_model(&model).unwrap(),
                 changes,
                 inputs [rst, which, fill_which, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
                 outputs [

@@ -9,10 +9,8 @@ use dermis_golden::fixed::Plan;
 use dermis_golden::spec::window::Place;
 
 use super::*;
-use crate::language::testbench::{
-    check, check_with_defects, random_word, random_words, subject_of, Pipeline, Reference, Subject,
-};
-use crate::language::{kernel_of, Change};
+use crate::language::testbench::{check, check_with_defects, random_word, subject_of, Reference, Subject};
+use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
 
@@ -194,7 +192,7 @@ impl Reference for Windows<'_> {
 
 fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
     subject_of!(
-        Window::new(model),
+        Window::of_model(model).unwrap(),
         changes,
         inputs [rst, start, middle_row, middle_col, label, quad, labels, floor],
         outputs [quad_address, write, write_quad, mask_quad, positive, negative],
@@ -233,13 +231,4 @@ fn a_window_that_differs_is_found() {
         Change::value("", "ends_quad_0", |k| k.named("quad_ends")),
     ];
     check_with_defects(|changes| subject(&model, changes), &inputs, || reference(&model, &contacts), &defects);
-}
-
-/// In a scene without contacts there is nothing to read.
-#[test]
-fn without_contacts_there_is_no_window() {
-    let block = Window::new(&model(4, 5, ""));
-    let widths = [1, 1, 2, 3, 4, 80, 16, 1];
-    let outputs = |_: &[Word]| vec![Some(Word::default()); 6];
-    check(&kernel_of(&block), &random_words(100, &widths), &mut Pipeline::new(0, 6, outputs));
 }

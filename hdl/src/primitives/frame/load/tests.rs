@@ -4,8 +4,7 @@ use dermis_golden::fixed::stages::load::{beats, Outcome};
 use dermis_golden::fixed::{Intake, Model};
 
 use super::*;
-use crate::language::kernel_of;
-use crate::language::testbench::{check, check_with_defects, random_words, subject_of, Pipeline, Reference};
+use crate::language::testbench::{check_with_defects, subject_of, Reference};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
@@ -278,7 +277,7 @@ fn is_taken(model: &Model) {
     assert_eq!(ends_with_pair, writes_coefficients, "a short image ends with two coefficients");
     let subject = |changes: &[Change]| {
         subject_of!(
-            Load::new(model),
+            Load::of_plan(model).unwrap(),
             changes,
             inputs [rst, idle, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
             outputs [
@@ -307,15 +306,4 @@ fn is_taken(model: &Model) {
         ];
         check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
     }
-}
-
-#[test]
-fn without_writable_tables_the_stream_passes() {
-    let model = model(2, 3, "");
-    let stimulus = random_words(500, &[1, 1, model.formats().code_bits as usize, 1, 1, 1]);
-    let of = |inputs: &[Word]| {
-        let stream = [2, 3, 4, 5, 0].map(|input| Some(inputs[input]));
-        stream.into_iter().chain([Some(Word::default()); 11]).collect()
-    };
-    check(&kernel_of(&Load::new(&model)), &stimulus, &mut Pipeline::new(0, 16, of));
 }
