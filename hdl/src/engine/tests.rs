@@ -8,6 +8,7 @@ use super::Engine;
 use crate::language::testbench::{check_with_defects, random_word, variants, Reference};
 use crate::language::Change;
 use crate::scenes::{learned, model};
+use crate::simulate::design;
 use crate::wire::Word;
 
 /// Width of a component of a force, in bits.
@@ -161,5 +162,26 @@ fn contacts_leave_in_the_cycles_of_the_model() {
             Change::value("", "operand_source__mask", |k| k.constant(1, 0)),
         ];
         check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
+    }
+}
+
+/// Scenes with and without each stage, of both engines; a case chosen per frame, sums, tables, several subarrays.
+#[test]
+fn no_block_of_any_scene_is_of_wires_alone() {
+    let contacts = "mu_max = 0.3\n[partition]\ncase = \"contacts\"\nmax_contacts = 3\n";
+    let plain = [
+        "",
+        "[search]\nmu_max = 0.0\n",
+        "[input]\naverage = 1\n[output]\nforces = \"resultants\"\n",
+        "[partition]\nrows = 2\ncols = 2\n",
+        "[input]\nfull_scale_MPa = 1.0\ndead = [[1, 2]]\n[hardware]\ntables = \"writable\"\n",
+        "[hardware]\nboard = \"icebreaker\"\n",
+    ];
+    let models = plain.map(|more| model(4, 4, more));
+    let learned = [learned(4, 5, &[7], "mu_max = 0.3\n"), learned(4, 5, &[7], contacts)];
+    for model in models.iter().chain(&learned) {
+        for (path, kernel) in design(model).unwrap().kernels() {
+            assert!(!kernel.is_wires(), "{path}");
+        }
     }
 }

@@ -429,6 +429,15 @@ impl Kernel {
         clock.chain(self.ports.iter().map(|port| (port.name.as_str(), port.output, port.bits, port.doc.as_str())))
     }
 
+    /// Whether its outputs are inputs, parts of them and constants alone: no register, memory, instance or operator.
+    #[cfg(test)]
+    pub(crate) fn is_wires(&self) -> bool {
+        let is_logic = |node: &Node| matches!(node, Node::Unary(..) | Node::Binary(..) | Node::Mux(..));
+        let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
+        let logic = self.within(&values).any(|node| is_logic(&self.nodes[node].0));
+        !logic && self.registers().next().is_none() && self.memories.is_empty() && self.instances.is_empty()
+    }
+
     /// Width in bits of the signal of this name.
     pub(crate) fn width_of(&self, name: &str) -> Option<usize> {
         self.signal_of(name).map(|id| self.signals[id].ty.bits)

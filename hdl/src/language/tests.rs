@@ -434,3 +434,61 @@ fn a_changed_kernel_differs_under_verilator() {
     assert_eq!(verilated(&Subject::from(&adder(3)), &stimulus), expected);
     assert_ne!(verilated(&Subject::from(&adder(2)), &stimulus), expected);
 }
+
+crate::block! {
+    /// A bit one cycle later, 0 after a reset.
+    struct Later {}
+    ports LaterPorts {
+        clock;
+        reset;
+        /// The bit.
+        in d;
+        /// The bit of the cycle before.
+        out q;
+    }
+}
+
+impl Block for Later {
+    fn build<'k>(&self, _: &'k Builder, io: LaterPorts<Inside<'k>>) {
+        io.q.state(io.rst, 0).set(io.d);
+    }
+}
+
+crate::block! {
+    /// `d` on `q`, later where that is `wanted`; reset by `clear`.
+    struct Around {
+        wanted: bool,
+    }
+    ports AroundPorts {
+        clock;
+        reset;
+        /// Resets what is inside.
+        in clear;
+        /// The bit.
+        in d;
+        /// The bit, or that of the cycle before.
+        out q;
+    }
+}
+
+impl Block for Around {
+    fn build<'k>(&self, k: &'k Builder, io: AroundPorts<Inside<'k>>) {
+        let later = k.instance("later", self.wanted.then_some(Later {}));
+        k.reset_instances(io.clear);
+        io.q.set(later.map_or(io.d, |later| {
+            later.d.set(io.d);
+            later.q
+        }));
+    }
+}
+
+#[test]
+fn an_instance_that_is_not_wanted_is_left_out() {
+    let with = kernel_of(&Around { wanted: true });
+    let text = with.verilog();
+    assert!(text.contains("assign later__rst = clear;") && text.contains("assign q = later__q;"), "{text}");
+    assert!(with.instances.len() == 1 && !with.is_wires());
+    let without = kernel_of(&Around { wanted: false });
+    assert_eq!(without.verilog().lines().next_back(), Some("assign q = d;"));
+    assert!(without.instances.is_empty() && without.is_wires() && without.errors().is_empty());
+}
