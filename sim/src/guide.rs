@@ -42,6 +42,7 @@ pages! {
     "boards.md" boards,
     "your-board.md" your_board,
     "in-your-soc.md" in_your_soc,
+    "microcontroller.md" microcontroller,
     "method.md" method,
     "formats.md" formats,
     "architecture.md" architecture,
