@@ -256,8 +256,8 @@ struct Stream<'a> {
 impl Stream<'_> {
     /// Says between which estimators is chosen.
     fn choice(&self, output: &mut Output) -> std::io::Result<()> {
-        let text = |all| format!("{}, or what of {all} keeps up", self.estimators.name());
-        self.estimators.choice().map_or(Ok(()), |all| output(&Outcome::Note(&text(all))))
+        let Some(all) = self.estimators.choice() else { return Ok(()) };
+        output(&Outcome::Note(&format!("the best estimator that keeps up, of {all}")))
     }
 
     /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
@@ -548,7 +548,7 @@ mod tests {
             assert_eq!(line["estimator"], if number < 25 { "evidence" } else { "search" });
             assert_eq!(line["estimator_change"].as_str(), (number == 25).then_some(why));
         }
-        assert_eq!(notes, ["evidence, or what of evidence, search keeps up", why]);
+        assert_eq!(notes, ["the best estimator that keeps up, of evidence, search", why]);
         assert!(counts.to_string().ends_with("; 25 by evidence, 35 by search"), "{counts}");
         // Fast enough, and one that cannot be built.
         let (counts, ..) = slow_stream(60, Some(50.0), false);
