@@ -2,6 +2,7 @@
 
 use criterion::{criterion_group, criterion_main, Criterion};
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::partition::Case;
@@ -39,7 +40,8 @@ fn beyond(criterion: &mut Criterion) {
         let golden = Golden::new(&scene).expect("the scene has matrices");
         for shapes in [Shapes::Elliptic, Shapes::Other] {
             let count = if case == Case::Contacts { 3 } else { 1 };
-            let contacts = random_contacts(&scene.sensor, Draw { count, shapes, touching: false, seed: 1 });
+            let contacts =
+                random_contacts(&scene.sensor, Draw { count, shapes, slip: Slip::Full, touching: false, seed: 1 });
             let frame = generate("drawn", &scene.sensor, scene.medium, &contacts).expect("drawn contacts are sound");
             let id = format!("golden frame {name}, case {case}, {}, {shapes:?}", objective.name());
             criterion.bench_function(&id, |bencher| bencher.iter(|| golden.run(black_box(&frame))));

@@ -2,6 +2,7 @@
 //! several subarrays, and the difference between fixed and floating point.
 
 use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
@@ -19,7 +20,7 @@ fn scene() -> Scene {
 }
 
 fn drawn(scene: &Scene, seed: u64) -> Frame {
-    let draw = Draw { count: 1, shapes: Shapes::Elliptic, touching: false, seed };
+    let draw = Draw { count: 1, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed };
     generate("drawn", &scene.sensor, scene.medium, &random_contacts(&scene.sensor, draw)).unwrap()
 }
 
@@ -103,7 +104,7 @@ proptest! {
         scene.search.mu_max = 0.0;
         let golden = Golden::reference(&scene).unwrap();
         let (cols, pitch) = (scene.sensor.cols, scene.sensor.pitch_x_mm);
-        let draw = Draw { count: 1, shapes: Shapes::Elliptic, touching: false, seed };
+        let draw = Draw { count: 1, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed };
         let mut contacts = random_contacts(&scene.sensor, draw);
         contacts[0].centre_mm = Some([0.3 * pitch, 0.1 * pitch]);
         let frame = |contacts: &[_]| generate("aside", &scene.sensor, scene.medium, contacts).unwrap();

@@ -2,6 +2,7 @@
 
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::DrawOptions;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind};
 use dermis_golden::study::noise::{shape_study, study, Candidate, ShapeStudy, Study};
 use dermis_sim::commands::noise::{by_name, shapes_named, AVERAGED};
@@ -22,6 +23,7 @@ fn named<T: Copy>(field: &str, wanted: Option<Vec<String>>, names: &[(&str, T)])
 struct OverShapes {
     estimators: Option<Vec<String>>,
     contacts: Option<i64>,
+    slip: Option<String>,
     gain_spread: Option<f64>,
     drift: Option<f64>,
     tare_frames: Option<i64>,
@@ -36,6 +38,7 @@ impl OverShapes {
         let all = [
             ("estimators", self.estimators.is_some()),
             ("contacts", self.contacts.is_some()),
+            ("slip", self.slip.is_some()),
             ("gain_spread", self.gain_spread.is_some()),
             ("drift", self.drift.is_some()),
             ("tare_frames", self.tare_frames.is_some()),
@@ -59,6 +62,10 @@ impl OverShapes {
         let options = DrawOptions {
             shapes: shapes_named(shapes).map_err(|error| input(format!("shapes = {error}")))?,
             contacts: count("contacts", self.contacts.unwrap_or(1))?,
+            slip: self
+                .slip
+                .map_or(Ok(Slip::Full), |name| name.parse())
+                .map_err(|error| input(format!("slip = {error}")))?,
             seed: basic.seed,
             converter,
             ..DrawOptions::default()
@@ -100,6 +107,8 @@ impl Scene {
     ///     Estimators; default: what the scene names.
     /// contacts : int, default 1
     ///     Contacts of a frame.
+    /// slip : str, default "full"
+    ///     How the shear is spread over the contacts: "full", "even", "mixed", or its share of the friction limit, such as "0.4".
     /// gain_spread : float, default 0
     ///     Standard deviation of the taxels' gains, a fraction.
     /// drift : float, default 0
@@ -123,8 +132,8 @@ impl Scene {
     /// InputError
     ///     A parameter out of range, a scene that the model refuses.
     #[pyo3(signature = (*, levels = None, draws = 200, seed = 1, objectives = None, frames = None, shapes = None,
-        estimators = None, contacts = None, gain_spread = None, drift = None, tare_frames = None, unipolar = None,
-        stated = None, hardware = None))]
+        estimators = None, contacts = None, slip = None, gain_spread = None, drift = None, tare_frames = None,
+        unipolar = None, stated = None, hardware = None))]
     // One argument per option of the command.
     #[allow(clippy::too_many_arguments)]
     fn noise<'py>(
@@ -138,6 +147,7 @@ impl Scene {
         shapes: Option<&str>,
         estimators: Option<Vec<String>>,
         contacts: Option<i64>,
+        slip: Option<String>,
         gain_spread: Option<f64>,
         drift: Option<f64>,
         tare_frames: Option<i64>,
@@ -154,7 +164,8 @@ impl Scene {
         };
         basic.levels = levels.unwrap_or(basic.levels);
         let objectives = named("objectives", objectives, &ObjectiveKind::NAMES)?;
-        let own = OverShapes { estimators, contacts, gain_spread, drift, tare_frames, unipolar, stated, hardware };
+        let own =
+            OverShapes { estimators, contacts, slip, gain_spread, drift, tare_frames, unipolar, stated, hardware };
         if let Some(shapes) = shapes {
             let wanted = own.study(self, shapes, Study { objectives, ..basic }, frames.unwrap_or(1))?;
             let rows = py.detach(|| shape_study(self.spec(), &wanted, &|_, _| ())).map_err(input)?;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dermis_golden::data::frame::{Frame as Stress, FrameError};
 use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::spec::scene::Scene as Spec;
@@ -327,6 +328,8 @@ impl Scene {
     ///     Number of random contacts, beside those described; at most 1000.
     /// shapes : "elliptic" or "other", default "elliptic"
     ///     Shapes of the random contacts.
+    /// slip : str, default "full"
+    ///     How the shear is spread over the random contacts: "full", "even", "mixed", or its share of the friction limit, such as "0.4".
     /// touching : bool, default False
     ///     Place random contacts so that they touch each other.
     /// seed : int, default 1
@@ -356,8 +359,8 @@ impl Scene {
     /// InputError
     ///     No contact, a contact that is inconsistent or beside the array, an option out of range.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (contacts = None, *, random = 0, shapes = "elliptic", touching = false, seed = 1, noise = 0.0,
-        gain_spread = 0.0, drift = 0.0, tare_frames = 0, frames = 1, unipolar = false, bits = None,
+    #[pyo3(signature = (contacts = None, *, random = 0, shapes = "elliptic", slip = "full", touching = false, seed = 1,
+        noise = 0.0, gain_spread = 0.0, drift = 0.0, tare_frames = 0, frames = 1, unipolar = false, bits = None,
         full_scale_MPa = None, dead = Vec::new(), stuck = Vec::new(), id = "generated"))]
     fn generate(
         &self,
@@ -365,6 +368,7 @@ impl Scene {
         contacts: Option<&Bound<'_, PyAny>>,
         random: i64,
         shapes: &str,
+        slip: &str,
         touching: bool,
         seed: i64,
         noise: f64,
@@ -381,7 +385,8 @@ impl Scene {
     ) -> PyResult<Frame> {
         let mut all = contacts.map_or(Ok(Vec::new()), self::contacts)?;
         let seed = count("seed", seed)?;
-        let draw = Draw { count: count("random", random)?, shapes: shapes_named(shapes)?, touching, seed };
+        let slip: Slip = slip.parse().map_err(|error| input(format!("slip = {error}")))?;
+        let draw = Draw { count: count("random", random)?, shapes: shapes_named(shapes)?, slip, touching, seed };
         draw.check().map_err(input)?;
         let converter = Converter {
             noise,

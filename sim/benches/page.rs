@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use anyhow::{ensure, Context};
 use browser::Browser;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
@@ -52,7 +53,10 @@ const DRAW: &str = "(async () => {
 fn main() -> anyhow::Result<()> {
     let sensor = Sensor { rows: 20, cols: 20, pitch_x_mm: 3.0, pitch_y_mm: 3.0, thickness_mm: 2.5 };
     let scene = Scene::of_sensor(&sensor, "20x20");
-    let contacts = random_contacts(&sensor, Draw { count: 3, shapes: Shapes::Elliptic, touching: false, seed: 1 });
+    let contacts = random_contacts(
+        &sensor,
+        Draw { count: 3, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed: 1 },
+    );
     let frame = &generate("three contacts", &sensor, scene.medium, &contacts)?;
     let result = &Golden::reference(&scene)?.run(frame)?;
     let newest = Arc::new(Newest::default());

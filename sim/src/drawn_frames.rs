@@ -6,6 +6,7 @@
 use anyhow::Result;
 use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{self, generate, random_contacts, Draw};
 use dermis_golden::spec::scene::Scene;
 
@@ -59,7 +60,7 @@ impl DrawnFrames {
             let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (index as u64) << 32;
             let contacts = random_contacts(
                 &scene.sensor,
-                Draw { count, shapes: self.shapes.into(), touching: self.touching, seed },
+                Draw { count, shapes: self.shapes.into(), slip: Slip::Full, touching: self.touching, seed },
             );
             Ok(generate(&format!("fresh-{}-{index}", self.seed), &scene.sensor, scene.medium, &contacts)?)
         };

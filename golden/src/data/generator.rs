@@ -25,7 +25,8 @@
 //! |---|---|
 //! | `none` | none; the tangential load must be zero |
 //! | `full-sliding` (default), `proportional` | \|T\|/N times the pressure |
-//! | `partial-slip` | Cattaneo–Mindlin, Hertz shapes: friction (p over a − c/a p over c), c/a = (1 − \|T\|/friction N)^⅓ |
+//! | `partial-slip` | Cattaneo–Mindlin, not for feet: friction (p over a − c/a p over c), c/a = (1 − \|T\|/friction N)^⅓; for a ring, whose width counts, its root |
+//! | `even-shear` | \|T\| over the contact's area, not for feet |
 
 mod cells;
 pub mod converter;
@@ -34,6 +35,7 @@ mod error;
 mod plantar;
 pub mod presses;
 mod random;
+pub mod slip;
 mod stress;
 pub(crate) mod support;
 #[cfg(test)]

@@ -23,6 +23,7 @@
 //! | 8 × 8, 0.91 (`sensor-4`) | 0.018 | 1 | 87 % each: contacts within a cell show next to no shear | 1 |
 
 use crate::data::frame::{Contact, Frame};
+use crate::data::generator::slip::Slip;
 use crate::data::generator::{generate, random_contacts, Draw, Shapes};
 use crate::estimate::float::objective::{Objective, Sparse};
 use crate::estimate::float::pass::Polynomial;
@@ -171,14 +172,15 @@ fn drawn(sensor: &Sensor, medium: Medium, mu_max: f64) -> Vec<Frame> {
     let draws =
         [Shapes::Elliptic, Shapes::Other].into_iter().flat_map(|shapes| (0..DRAWS).map(move |seed| (shapes, seed)));
     let frame = |(shapes, seed)| {
-        let contacts: Vec<Contact> = random_contacts(sensor, Draw { count: 1, shapes, touching: false, seed })
-            .into_iter()
-            .map(|contact| Contact {
-                tangential_N: contact.tangential_N.map(|shear| shear.map(|t| t * mu_max / DRAWN_FOR)),
-                friction: contact.friction.map(|friction| friction * mu_max / DRAWN_FOR),
-                ..contact
-            })
-            .collect();
+        let contacts: Vec<Contact> =
+            random_contacts(sensor, Draw { count: 1, shapes, slip: Slip::Full, touching: false, seed })
+                .into_iter()
+                .map(|contact| Contact {
+                    tangential_N: contact.tangential_N.map(|shear| shear.map(|t| t * mu_max / DRAWN_FOR)),
+                    friction: contact.friction.map(|friction| friction * mu_max / DRAWN_FOR),
+                    ..contact
+                })
+                .collect();
         generate("degree", sensor, medium, &contacts).ok()
     };
     draws.filter_map(frame).collect()

@@ -24,6 +24,7 @@
 //! | `contact` | force and standard deviation |
 //! | `residual` | whether what is left can be white noise |
 //! | `follow` | a frame of a stream, from the fit of the frame before |
+//! | `slip` | how far the shear is spread beyond the pressure |
 //! | `screen`, `suspect` | taxels that read what no force explains; they are taken as missing |
 //! | `failed` | Σ b·area where no fit explains the stress |
 //!
@@ -56,6 +57,7 @@ mod prior;
 mod regions;
 mod residual;
 mod screen;
+mod slip;
 mod suspect;
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@
 //!
 //! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
 //! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
-//! [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
+//! [`slip_study`] measures the bias of the shear in partial slip. [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
 //! [`measure_deviations`] the standard deviations of a search.
 //!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
@@ -27,6 +27,7 @@ pub mod matching;
 pub mod outcome;
 mod sensitivity;
 mod shapes;
+mod slip;
 pub mod statistic;
 mod study;
 pub mod support_bound;
@@ -37,5 +38,6 @@ mod unlike;
 pub use deviations::{deviations_coverage, measure_deviations};
 pub use sensitivity::{other_medium, sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
+pub use slip::{slip_study, SlipRow};
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};
 pub use unlike::{misfit_limit, unlike_study, UnlikeRow};

@@ -12,6 +12,7 @@ use anyhow::{anyhow, bail, Result};
 use clap::Args;
 use dermis_golden::data::frame::{Contact, Frame};
 use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw};
 use dermis_golden::spec::scene::Scene;
 
@@ -25,7 +26,7 @@ pub struct Arguments {
     /// Built-in name or path of the scene that defines sensor and medium.
     scene: String,
     /// Contact, repeatable: shape:key=value:… with at=X,Y (mm), size=… (mm, degrees), normal=N, shear=X,Y (N),
-    /// slip=none|full-sliding|partial-slip, friction=F.
+    /// slip=none|full-sliding|partial-slip|even-shear, friction=F.
     #[arg(long = "contact", value_name = "TEXT")]
     contacts: Vec<String>,
     /// Use the contacts described in a frame file.
@@ -37,6 +38,9 @@ pub struct Arguments {
     /// Shapes of the random contacts.
     #[arg(long, value_enum, default_value = "elliptic")]
     shapes: Shapes,
+    /// How the shear is spread over the random contacts: full (slip), even, mixed, or its share of the friction limit.
+    #[arg(long, value_name = "SLIP", default_value_t = Slip::Full)]
+    slip: Slip,
     /// Place random contacts so that they touch each other.
     #[arg(long)]
     touching: bool,
@@ -89,7 +93,7 @@ const EXAMPLES: &str = "Examples:
   dermis generate sensor-1 --contact tilted:size=4,5,30,0.5,-0.3:normal=5:shear=1,1 --noise 0.01 --gain-spread 0.01 \
                            --drift 0.002 --frames 64 --tare-frames 256
   dermis generate sensor-4 --contact plantar-left:at=-70,0:normal=350:shear=10,50
-  dermis generate sensor-3 --random 4 --seed 12 --dead 3,4 --stuck 0,7=0.2
+  dermis generate sensor-3 --random 4 --slip mixed --seed 12 --dead 3,4 --stuck 0,7=0.2
 Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; tilted a,b,angle,u,v; lobed a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
   rectangle width,height,angle; plantar-left, plantar-right none or width,length,angle.";
 
@@ -103,8 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if let Some(path) = &arguments.like {
         contacts.extend(Frame::load(path, Some(&scene))?.contacts);
     }
-    let Arguments { random: count, shapes, touching, seed, .. } = *arguments;
-    let draw = Draw { count, shapes: shapes.into(), touching, seed };
+    let Arguments { random: count, shapes, slip, touching, seed, .. } = *arguments;
+    let draw = Draw { count, shapes: shapes.into(), slip, touching, seed };
     draw.check()?;
     contacts.extend(random_contacts(&scene.sensor, draw));
     if contacts.is_empty() {

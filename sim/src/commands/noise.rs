@@ -4,6 +4,7 @@
 //! |---|---|
 //! | none | objectives on elliptic Hertz contacts, beside the bounds with 6 and 9 unknowns |
 //! | `--shapes` | estimators on drawn contacts of any shape, beside two baselines and the bound of a known support |
+//! | `--shapes --slips` | errors and bias of the shear in full slip, at shares of the friction limit, and spread evenly |
 //! | `--shapes --sensitivity` | errors if the scene states something wrongly, or the gains differ |
 //! | `--unlike` | how many frames like and unlike a network's training are flagged |
 
@@ -11,8 +12,10 @@ use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
-use dermis_golden::study::noise::{sensitivities, shape_study, study, unlike_study, Candidate, ShapeStudy, Study};
+use dermis_golden::study::noise::{sensitivities, shape_study, slip_study, study, unlike_study};
+use dermis_golden::study::noise::{Candidate, ShapeStudy, Study};
 
 use crate::progress::Progress;
 use crate::report::{self, Format};
@@ -32,6 +35,8 @@ const SENSITIVITY_LEVEL: f64 = 1e-3;
   dermis noise sensor-1 --shapes tilted,ring --unipolar --unstated --objective sparse --draws 20 --json
   dermis noise sensor-1 --shapes table --level 0.01 --gain-spread 0.01 --frames 64 --coverage
   dermis noise sensor-3 --shapes table --contacts 3 --level 0.0005
+  dermis noise sensor-1 --shapes table --slip mixed --level 0.002
+  dermis noise sensor-1 --shapes table --slips --estimator evidence --level 0.0005
   dermis noise sensor-1 --shapes table --sensitivity
   dermis noise sensor-1-noisy --unlike --estimator network --hardware --draws 10")]
 pub struct Arguments {
@@ -82,6 +87,12 @@ struct ShapeArguments {
     /// Also the scene's hardware, by its bit-true model.
     #[arg(long, requires = "drawn", conflicts_with = "sensitivity")]
     hardware: bool,
+    /// How the shear is spread over the contacts: full (slip), even, mixed, or its share of the friction limit.
+    #[arg(long, value_name = "SLIP", default_value_t = Slip::Full, requires = "shapes")]
+    slip: Slip,
+    /// Print errors and bias of the shear in full slip, in partial slip, and spread evenly.
+    #[arg(long, requires = "shapes", conflicts_with_all = ["slip", "sensitivity", "coverage", "medians"])]
+    slips: bool,
     /// Number of contacts of a frame.
     #[arg(long, value_name = "N", default_value_t = 1, requires = "shapes")]
     contacts: usize,
@@ -176,6 +187,7 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
     let options = DrawOptions {
         shapes: shapes.to_vec(),
         contacts: own.contacts,
+        slip: own.slip,
         seed: arguments.seed,
         converter,
         ..Default::default()
@@ -192,6 +204,9 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
         let level = arguments.levels.first().copied().unwrap_or(SENSITIVITY_LEVEL);
         let wanted = ShapeStudy { levels: vec![level], ..wanted };
         return report::sensitivity(&sensitivities(scene, &wanted, &progress)?, level, format);
+    }
+    if own.slips {
+        return report::slips(&slip_study(scene, &wanted, &progress)?, format);
     }
     let rows = shape_study(scene, &wanted, &progress)?;
     match (arguments.medians, own.coverage, format) {

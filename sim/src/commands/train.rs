@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{bail, Result};
 use clap::Args;
+use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::estimate::learned::{Learned, Stage, Training};
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::study::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
@@ -52,6 +53,10 @@ pub struct Arguments {
     /// Largest rate of a step.
     #[arg(long, default_value_t = Training::default().rate)]
     rate: f64,
+    /// How the shear is spread over the contacts: full (slip), mixed, even, or its share of the friction limit. The shipped
+    /// networks are of full slip.
+    #[arg(long, default_value_t = Training::default().slip)]
+    slip: Slip,
     /// Seed of weights and frames; equal seeds give equal files on one machine.
     #[arg(long, default_value_t = Training::default().seed)]
     seed: u64,
@@ -83,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         contacts: arguments.contacts,
         hidden: arguments.hidden.clone(),
         rate: arguments.rate,
+        slip: arguments.slip,
         seed: arguments.seed,
     };
     let frames = training.contacts.min(MOST_MEASURED);
@@ -109,13 +115,14 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     write(&out, &trained.bytes)?;
     let limit = measured(&mut scene, &out, frames, training.seed)?;
     let mut text = format!(
-        "{}: {} weights, {} bytes\ntraining        {} steps of {} frames, {} contacts drawn, seed {}\n",
+        "{}: {} weights, {} bytes\ntraining        {} steps of {} frames, {} contacts drawn, slip {}, seed {}\n",
         out.display(),
         trained.learned.weights(),
         trained.bytes.len(),
         training.steps,
         training.batch,
         training.contacts,
+        training.slip,
         training.seed
     );
     text.push_str(&format!("trained for     {}\n{limit}", describe(&trained.learned)));

@@ -67,7 +67,7 @@ pub use load::{load, LoadReport};
 pub use measure::{trace, ComparedWords};
 pub use microcontroller::{microcontroller_needs, microcontrollers};
 pub use noise::{noise, noise_medians};
-pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes, unlike};
+pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes, slips, unlike};
 pub use ports::{blocks, ports};
 pub use power::power;
 pub use registers::registers;

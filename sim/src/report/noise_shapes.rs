@@ -4,7 +4,7 @@ use anyhow::Result;
 use dermis_golden::study::noise::coverage::Coverage;
 use dermis_golden::study::noise::outcome::Summary;
 use dermis_golden::study::noise::statistic::{ErrorSpread, Interval};
-use dermis_golden::study::noise::{SensitivityRow, ShapeRow, UnlikeRow};
+use dermis_golden::study::noise::{SensitivityRow, ShapeRow, SlipRow, UnlikeRow};
 
 use super::table::{aligned, percent};
 use super::Format;
@@ -185,6 +185,49 @@ pub fn sensitivity(rows: &[SensitivityRow], level: f64, format: Format) -> Resul
             let mut text = aligned(4, &head, rows.iter().map(line).collect());
             let draws = rows.first().map_or(0, |row| row.summary.draws);
             text.push_str(&format!("\n{draws} frames, noise {} of max |b|; (…): 95 % interval\n", of(level)));
+            text
+        }
+    })
+}
+
+/// The table over the kinds of slip: a line per level, estimator and figure, a column per kind.
+///
+/// # Errors
+/// JSON that cannot be written.
+pub fn slips(rows: &[SlipRow], format: Format) -> Result<String> {
+    Ok(match format {
+        Format::Json => serde_json::to_string(rows)? + "\n",
+        Format::Csv => {
+            let mut text = "noise,estimator,slip,draws,bias,et_median,et_90,within_1\n".to_owned();
+            for row in rows {
+                let SlipRow { noise, estimator, slip, draws, bias, tangential: [median, ninety], within_1 } = row;
+                let within_1 = within_1.map_or(String::new(), |share| share.to_string());
+                text.push_str(&format!("{noise},{estimator},{slip},{draws},{bias},{median},{ninety},{within_1}\n"));
+            }
+            text
+        }
+        Format::Markdown => {
+            let groups: Vec<&[SlipRow]> =
+                rows.chunk_by(|a, b| (a.noise, &a.estimator) == (b.noise, &b.estimator)).collect();
+            let kinds = groups.first().into_iter().flat_map(|group| group.iter()).map(|row| row.slip.as_str());
+            let head: Vec<&str> = ["noise", "estimator", "figure"].into_iter().chain(kinds).collect();
+            let figures: [(&str, fn(&SlipRow) -> String); 3] = [
+                ("bias", |row| format!("{:+.1} %", 100.0 * row.bias)),
+                ("e_t", |row| row.tangential.map(|share| format!("{:.1}", 100.0 * share)).join(" / ") + " %"),
+                ("1 σ", |row| row.within_1.map_or("-".into(), |share| format!("{:.0} %", 100.0 * share))),
+            ];
+            let line = |group: &[SlipRow], (name, figure): (&str, fn(&SlipRow) -> String)| {
+                let named = [of(group[0].noise), group[0].estimator.clone(), name.to_owned()];
+                named.into_iter().chain(group.iter().map(figure)).collect()
+            };
+            let lines = groups.iter().flat_map(|group| figures.map(|figure| line(group, figure))).collect();
+            let mut text = aligned(3, &head, lines);
+            let draws = rows.first().map_or(0, |row| row.draws);
+            text.push_str(&format!(
+                "\n{draws} frames, the same contacts in every column. full: full slip; numbers: shear over the friction limit; even: \
+                 the same shear everywhere.\nbias: median error along the true shear; e_t: median / nine of ten; 1 σ: share of the \
+                 tangential components within one standard deviation\n"
+            ));
             text
         }
     })

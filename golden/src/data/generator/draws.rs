@@ -9,6 +9,9 @@
 //! | tilt | 0.3 … 0.8, any direction |
 //! | normal load | `normal_N`, 1 … 12 N |
 //! | shear over load | `ratio`, 0.15 … 0.5, any direction |
+//! | spread of the shear | `slip`, full |
+//!
+//! Frames that differ in `slip` alone have the same contacts and forces.
 //!
 //! The stress is the generator's quadrature of the continuous traction, on the scene's medium. `converter` makes the
 //! readings: noise as a share of max |b|, gains, drift, averaging, clipping, codes.
@@ -21,6 +24,7 @@
 
 use super::converter::Converter;
 use super::random::placed;
+use super::slip::Slip;
 use super::traction::{centre_of_pressure_mm, pieces, total_N};
 use super::{generate, GeneratorError};
 use crate::data::frame::{Contact, Frame};
@@ -104,6 +108,8 @@ pub struct DrawOptions {
     pub normal_N: [f64; 2],
     /// Smallest and largest ratio of shear to normal load.
     pub ratio: [f64; 2],
+    /// How the shear is spread over a contact.
+    pub slip: Slip,
     /// max |b| of the exact stress in MPa, to which all loads of a frame are scaled; `None`: not scaled.
     pub peak_MPa: Option<f64>,
     /// The sensor; its seed is added to that of each frame.
@@ -119,6 +125,7 @@ impl Default for DrawOptions {
             contacts: 1,
             normal_N: [1.0, 12.0],
             ratio: [0.15, 0.5],
+            slip: Slip::Full,
             peak_MPa: None,
             converter: Converter::default(),
             seed: 1,
@@ -221,8 +228,9 @@ impl Draws {
     /// # Errors
     /// [`GeneratorError::Option`] if so many contacts have no room on the array.
     pub fn contacts(&self, number: u64) -> Result<Vec<Contact>, GeneratorError> {
-        let DrawOptions { contacts: count, normal_N, ratio, seed, .. } = self.options;
-        let mut random = Random::new(seed.wrapping_mul(SPREAD) ^ number << 32);
+        let DrawOptions { contacts: count, normal_N, ratio, slip, seed, .. } = self.options;
+        let seed = seed.wrapping_mul(SPREAD) ^ number << 32;
+        let (mut random, mut of_slip) = (Random::new(seed), Random::new(!seed));
         let shaped = |random: &mut Random, index: usize, axes: [f64; 2]| {
             let (shape, size_mm) = self.shape(number, index).describe(random, axes);
             let normal = random.between(normal_N[0], normal_N[1]);
@@ -240,7 +248,7 @@ impl Draws {
         let size_mm = if pitch_mm > COARSE * thickness_mm { pitch_mm } else { thickness_mm };
         for _ in 0..TRIES {
             if let (contacts, true) = placed(&self.sensor, size_mm, &mut random, count, false, shaped) {
-                return Ok(contacts);
+                return Ok(contacts.into_iter().map(|contact| slip.of(contact, &mut of_slip)).collect());
             }
         }
         let allowed = "so few that they fit on the array without overlap";

@@ -9,10 +9,13 @@
 //! | shear over load | 0.1 … 0.45, any direction |
 //! | position | the rim at least h/2 inside the array, if possible, and 2 h from other contacts |
 //!
+//! | spread of the shear | `slip`; `other` shapes in full slip: Hertz circles at 0.5 … 0.91 of the friction limit |
+//!
 //! Contacts that touch: their circumscribed circles touch.
 //!
 //! Sizes, loads and shear ratios have the distribution of the shipped frames `S?-hs-random-*` and `S3-hs-multi-*`.
 
+use super::slip::Slip;
 use super::GeneratorError;
 use crate::data::frame::Contact;
 use crate::random::Random;
@@ -45,6 +48,8 @@ pub struct Draw {
     pub count: usize,
     /// The shapes of the contacts.
     pub shapes: Shapes,
+    /// How the shear is spread over a contact.
+    pub slip: Slip,
     /// Whether every contact but the first touches another one.
     pub touching: bool,
     /// Seed of the random numbers.
@@ -72,7 +77,9 @@ impl Draw {
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
     let shaped = |random: &mut Random, _: usize, axes| shaped(random, draw.shapes, axes);
-    placed(sensor, sensor.thickness_mm, &mut random, draw.count, draw.touching, shaped).0
+    let (contacts, _) = placed(sensor, sensor.thickness_mm, &mut random, draw.count, draw.touching, shaped);
+    let mut of_slip = Random::new(!draw.seed);
+    contacts.into_iter().map(|contact| draw.slip.of(contact, &mut of_slip)).collect()
 }
 
 /// Draws size and place of `count` contacts, the first half-axis from `size_mm` to twice that; `shaped` makes contact k of

@@ -5,8 +5,8 @@
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: contact in full sliding | – | mm, N |
-//! | out: place and share of the load of each node | m | mm, – |
+//! | in: contact | – | mm, N |
+//! | out: place, share of the load and of the shear of each node | m | mm, – |
 //! | out: stress per unit force at a place | taxels | MPa/N |
 
 use super::stress::Body;
@@ -29,6 +29,8 @@ pub(crate) struct Support {
     pub at_mm: Vec<[f64; 2]>,
     /// Share of the load on each node; their sum is 1.
     pub share: Vec<f64>,
+    /// Share of the shear on each node; their sum is 1.
+    pub shear_share: Vec<f64>,
     /// Force of the contact in N, [x, y, normal].
     pub force_N: [f64; 3],
 }
@@ -41,14 +43,22 @@ impl Support {
     pub fn new(contact: &Contact) -> Result<Support, GeneratorError> {
         let pieces = pieces(0, contact)?;
         let force_N = total_N(&pieces);
-        let (mut at_mm, mut share) = (Vec::new(), Vec::new());
+        let [tx, ty, normal] = force_N;
+        let square = tx * tx + ty * ty;
+        let (mut at_mm, mut share, mut shear_share) = (Vec::new(), Vec::new(), Vec::new());
         for piece in &pieces {
+            let [x, y, z] = piece.force_N;
+            let of_load = z / normal;
+            // The shear of all pieces has one direction. In full slip the shares are equal to the bit.
+            let uneven = matches!(contact.kind_of_slip.as_deref(), Some("partial-slip" | "even-shear")) && square > 0.0;
+            let of_shear = if uneven { (x * tx + y * ty) / square } else { of_load };
             for (place, weight) in nodes(piece) {
                 at_mm.push(place);
-                share.push(weight * piece.force_N[2] / force_N[2]);
+                share.push(weight * of_load);
+                shear_share.push(weight * of_shear);
             }
         }
-        Ok(Support { at_mm, share, force_N })
+        Ok(Support { at_mm, share, shear_share, force_N })
     }
 }
 
@@ -100,24 +110,29 @@ impl Kernels {
 mod tests {
     use super::*;
     use crate::data::generator::draws::{DrawOptions, Draws, Shape};
+    use crate::data::generator::slip::Slip;
     use crate::spec::scene::Scene;
 
     #[test]
     fn nodes_carry_the_load_and_cause_the_stress() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
-        let draws = Draws::new(&scene, DrawOptions { shapes, ..Default::default() }).unwrap();
         let kernels = Kernels::new(&scene.sensor, scene.medium);
-        for number in 0..6 {
-            let drawn = draws.frame(number).unwrap();
-            let support = Support::new(&drawn.frame.contacts[0]).unwrap();
-            assert!((support.share.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            let nodes = || support.at_mm.iter().zip(&support.share);
-            for (taxel, wanted) in drawn.exact_MPa.iter().enumerate() {
-                let stress = |(at, share): (&[f64; 2], &f64)| share * kernels.stress_MPa(taxel, *at, support.force_N);
-                let sum: f64 = nodes().map(stress).sum();
-                // A bound to a few percent needs no more than a thousandth.
-                assert!((sum - wanted).abs() < 1e-3 * drawn.peak_MPa(), "{number} {taxel}: {sum} {wanted}");
+        for slip in [Slip::Full, Slip::Partial(0.4), Slip::Even] {
+            let draws = Draws::new(&scene, DrawOptions { shapes: shapes.clone(), slip, ..Default::default() }).unwrap();
+            for number in 0..6 {
+                let drawn = draws.frame(number).unwrap();
+                let support = Support::new(&drawn.frame.contacts[0]).unwrap();
+                let Support { at_mm, share, shear_share, force_N: [tx, ty, normal] } = support;
+                assert!([&share, &shear_share].iter().all(|all| (all.iter().sum::<f64>() - 1.0).abs() < 1e-12));
+                // An even shear is that of full slip where the pressure is even.
+                assert!(slip == Slip::Even || (share == shear_share) == (slip == Slip::Full), "{number} {slip}");
+                for (taxel, wanted) in drawn.exact_MPa.iter().enumerate() {
+                    let force = |k: usize| [shear_share[k] * tx, shear_share[k] * ty, share[k] * normal];
+                    let sum: f64 = (0..share.len()).map(|k| kernels.stress_MPa(taxel, at_mm[k], force(k))).sum();
+                    // A bound to a few percent needs no more than a thousandth.
+                    assert!((sum - wanted).abs() < 1e-3 * drawn.peak_MPa(), "{number} {slip} {taxel}: {sum} {wanted}");
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The generator against the shipped frames, which come from other programs, and its errors.
 
 use super::*;
+use crate::data::generator::slip::Slip;
 use crate::spec::scene::Scene;
 
 /// The frames have 9 digits, and their own quadrature is accurate to 8e-9 of the peak.
@@ -102,11 +103,58 @@ fn partial_slip_holds_its_load() {
     assert!(off(&limit.stress_MPa, &sliding.stress_MPa) < 1e-9);
 }
 
+/// In partial slip and with an even shear, every shape has the pressure of full slip, its whole shear, and none against it or
+/// beside the contact.
+#[test]
+fn the_spread_of_the_shear_keeps_forces() {
+    let sensor = Sensor { rows: 80, cols: 80, pitch_x_mm: 0.2, pitch_y_mm: 0.2, thickness_mm: 3.0 };
+    let shapes = [
+        ("hertz-ellipse", vec![3.0, 5.0, 30.0]),
+        ("tilted", vec![4.0, 5.0, 20.0, 0.5, -0.4]),
+        ("lobed", vec![4.0, 5.0, 20.0]),
+        ("flat-punch", vec![4.0, 3.0, 50.0]),
+        ("ring", vec![5.0, 2.0]),
+        ("rectangle", vec![5.0, 7.0, 30.0]),
+    ];
+    for (shape, size_mm) in shapes {
+        let forces = |kind: &str, friction: Option<f64>| {
+            let contact = Contact {
+                shape: Some(shape.to_string()),
+                size_mm: size_mm.clone(),
+                normal_N: Some(10.0),
+                tangential_N: Some([1.5, -2.0]),
+                kind_of_slip: Some(kind.to_string()),
+                friction,
+                ..Default::default()
+            };
+            cells::forces(&sensor, &traction::pieces(0, &contact).unwrap())
+        };
+        let full = forces("full-sliding", None);
+        for (kind, friction) in [("partial-slip", Some(0.6)), ("partial-slip", Some(0.26)), ("even-shear", None)] {
+            let own = forces(kind, friction);
+            let sum = own.resultant();
+            assert!((0..3).all(|k| (sum[k] - [1.5, -2.0, 10.0][k]).abs() < 1e-9), "{shape} {kind}: {sum:?}");
+            for (cell, force) in own.fx.iter().enumerate() {
+                assert!((own.fz[cell] - full.fz[cell]).abs() < 1e-9, "{shape} {kind} {cell}");
+                assert!(*force > -1e-9 && (full.fz[cell].abs() > 1e-9 || force.abs() < 1e-4), "{shape} {kind} {cell}");
+            }
+            // Nearer to sliding, nearer to the pressure.
+            let away = own.fx.iter().zip(&full.fx).map(|(a, b)| (a - b).abs()).sum::<f64>() / 1.5;
+            let uniform = matches!(shape, "flat-punch" | "ring" | "rectangle");
+            match (kind, friction) {
+                ("even-shear", _) => assert!(if uniform { away < 1e-9 } else { away > 0.1 }, "{shape}: {away}"),
+                (_, Some(0.6)) => assert!(away > 0.3, "{shape}: {away}"),
+                _ => assert!(away < 0.2, "{shape}: {away}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn drawn_contacts_lie_inside_and_repeat() {
     let sensor = Scene::builtin("sensor-3").unwrap().sensor;
     for (seed, shapes) in (0..20).map(|seed| (seed, if seed < 10 { Shapes::Elliptic } else { Shapes::Other })) {
-        let draw = Draw { count: 3, shapes, touching: false, seed };
+        let draw = Draw { count: 3, shapes, slip: Slip::Full, touching: false, seed };
         let contacts = random_contacts(&sensor, draw);
         assert_eq!(contacts, random_contacts(&sensor, draw));
         generate("drawn", &sensor, Medium::HalfSpace, &contacts).unwrap();
@@ -122,7 +170,7 @@ fn drawn_contacts_touch_where_they_are_to() {
     let sensor = Scene::builtin("sensor-3").unwrap().sensor;
     for seed in 0..10 {
         let gap = |touching: bool| {
-            let draw = Draw { count: 2, shapes: Shapes::Elliptic, touching, seed };
+            let draw = Draw { count: 2, shapes: Shapes::Elliptic, slip: Slip::Full, touching, seed };
             let [a, b] = random_contacts(&sensor, draw).try_into().unwrap();
             let reach = |contact: &Contact| contact.size_mm[0].max(contact.size_mm[1]);
             let ([x, y], [u, v]) = (a.centre_mm.unwrap(), b.centre_mm.unwrap());
@@ -156,8 +204,14 @@ fn refusals_name_contact_field_and_value() {
         ),
         (Contact { kind_of_slip: text("partial-slip"), ..good.clone() }, "friction = none is"),
         (
-            Contact { shape: text("flat-punch"), kind_of_slip: text("partial-slip"), ..good.clone() },
-            "full-sliding but for Hertz",
+            Contact {
+                shape: text("plantar-left"),
+                size_mm: vec![],
+                friction: Some(1.0),
+                kind_of_slip: text("partial-slip"),
+                ..good.clone()
+            },
+            "none or full-sliding for feet",
         ),
     ];
     let sensor = Scene::builtin("sensor-1").unwrap().sensor;
@@ -173,7 +227,7 @@ fn refusals_name_contact_field_and_value() {
 #[test]
 fn written_frames_come_back() {
     let sensor = Scene::builtin("sensor-1").unwrap().sensor;
-    let draw = Draw { count: 1, shapes: Shapes::Elliptic, touching: false, seed: 7 };
+    let draw = Draw { count: 1, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed: 7 };
     let frame = generate("mine", &sensor, Medium::HalfSpace, &random_contacts(&sensor, draw)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.json");

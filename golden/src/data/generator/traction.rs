@@ -1,14 +1,13 @@
 //! Traction: decomposition of a described contact into simple pieces.
 //!
 //! A piece is a region with a pressure distribution and a force of fixed direction. A contact is a sum of pieces: a
-//! ring is a disc minus a disc, partial slip is two Hertz pressures of different radii, a lobed contact is two Hertz
+//! ring is a disc minus a disc, partial slip is the pressure and a smaller one with shear alone, a lobed contact is two Hertz
 //! pressures of which the smaller one touches the rim of the other, a foot is one square per pixel.
 
 use super::plantar::{self, Foot};
 use super::GeneratorError;
 use crate::data::frame::Contact;
 use crate::spec::sensor::Sensor;
-use std::f64::consts::PI;
 
 /// Share of the load and of the half-axes of the smaller pressure of a lobed contact.
 const LOBE: [f64; 2] = [0.35, 0.5];
@@ -134,16 +133,15 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
         return fail("size_mm", format!("{sizes:?}"), allowed);
     }
     let angle = contact.rotation_rad.unwrap_or_else(|| sizes.get(2).map_or(0.0, |degrees| degrees.to_radians()));
-    let turn = [angle.cos(), angle.sin()];
-    let piece = |form, half_mm, force_N| Piece { form, centre_mm, half_mm, turn, tilt: [0.0; 2], force_N };
+    let outline = Outline { shape, sizes, centre_mm, turn: [angle.cos(), angle.sin()] };
     let force = [shear[0], shear[1], normal];
-    let both = |sizes: &[f64]| [sizes[0], *sizes.get(1).unwrap_or(&sizes[0])];
-    let slip = contact.kind_of_slip.as_deref().unwrap_or("full-sliding");
-    match slip {
-        "none" if shear == [0.0; 2] => {}
-        "none" => return fail("tangential_N", format!("{shear:?}"), "[0, 0] without slip"),
-        "full-sliding" | "proportional" => {}
-        "partial-slip" if shape.starts_with("hertz") => {
+    match contact.kind_of_slip.as_deref().unwrap_or("full-sliding") {
+        "none" if shear != [0.0; 2] => fail("tangential_N", format!("{shear:?}"), "[0, 0] without slip"),
+        "none" | "full-sliding" | "proportional" => Ok(outline.full_slip(force)),
+        slip @ ("partial-slip" | "even-shear") if Foot::named(shape).is_some() => {
+            fail("kind_of_slip", format!("{slip:?}"), "none or full-sliding for feet")
+        }
+        "partial-slip" => {
             let ratio = shear[0].hypot(shear[1]) / normal;
             let friction = contact.friction.unwrap_or(f64::NAN);
             // A NaN fails the comparison.
@@ -151,61 +149,110 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
                 let value = stated(contact.friction);
                 return fail("friction", value, "given and above the ratio of tangential to normal load");
             }
-            return Ok(partial_slip(piece, both(sizes), force, friction));
+            Ok(outline.partial_slip(force, friction))
         }
-        "partial-slip" => return fail("kind_of_slip", format!("{slip:?}"), "full-sliding but for Hertz shapes"),
-        _ => return fail("kind_of_slip", format!("{slip:?}"), "none, full-sliding or partial-slip"),
+        "even-shear" => Ok(outline.even_shear(force)),
+        slip => fail("kind_of_slip", format!("{slip:?}"), "none, full-sliding, partial-slip or even-shear"),
     }
-    let times = |factor: f64| force.map(|f| f * factor);
-    Ok(match shape {
-        "hertz-circle" | "hertz-ellipse" => vec![piece(PressureShape::Hertz, both(sizes), force)],
-        "tilted" => vec![Piece { tilt: [sizes[3], sizes[4]], ..piece(PressureShape::Hertz, both(sizes), force) }],
-        "lobed" => {
-            let [share, size] = LOBE;
-            let off = (1.0 - size) * sizes[0];
-            let centre = [centre_mm[0] + off * turn[0], centre_mm[1] + off * turn[1]];
-            let lobe = piece(PressureShape::Hertz, both(sizes).map(|a| size * a), times(share));
-            vec![piece(PressureShape::Hertz, both(sizes), times(1.0 - share)), Piece { centre_mm: centre, ..lobe }]
-        }
-        "flat-punch" => vec![piece(PressureShape::Disc, both(sizes), force)],
-        "rectangle" => vec![piece(PressureShape::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
-        "ring" => {
-            let [outer, inner] = [sizes[0], sizes[1]].map(|r| PI * r * r);
-            let disc = |radius, share| piece(PressureShape::Disc, [radius; 2], times(share));
-            vec![disc(sizes[0], outer / (outer - inner)), disc(sizes[1], -inner / (outer - inner))]
-        }
-        _ => plantar::pixels(shape, sizes)
-            .into_iter()
-            .map(|pixel| {
-                let [x, y] = pixel.centre_mm;
-                let centre = [x * turn[0] - y * turn[1] + centre_mm[0], x * turn[1] + y * turn[0] + centre_mm[1]];
-                Piece { centre_mm: centre, ..piece(PressureShape::Square, pixel.half_mm, times(pixel.share)) }
-            })
-            .collect(),
-    })
 }
 
-/// The pressure with shear at the friction limit, minus the excess shear of the stick area: a Hertz pressure of c/a
-/// times the p0 on half-axes c/a times as long, which carries (c/a)³ of the load.
-fn partial_slip(
-    piece: impl Fn(PressureShape, [f64; 2], [f64; 3]) -> Piece,
-    half_mm: [f64; 2],
-    force: [f64; 3],
-    friction: f64,
-) -> Vec<Piece> {
-    let [tx, ty, normal] = force;
-    let shear = tx.hypot(ty);
-    if shear == 0.0 {
-        return vec![piece(PressureShape::Hertz, half_mm, force)];
+/// Half-axes of a contact that may be round.
+fn both(sizes: &[f64]) -> [f64; 2] {
+    [sizes[0], *sizes.get(1).unwrap_or(&sizes[0])]
+}
+
+/// Where a contact is, its sizes checked.
+struct Outline<'a> {
+    shape: &'a str,
+    sizes: &'a [f64],
+    centre_mm: [f64; 2],
+    turn: [f64; 2],
+}
+
+impl Outline<'_> {
+    fn piece(&self, form: PressureShape, half_mm: [f64; 2], force_N: [f64; 3]) -> Piece {
+        Piece { form, centre_mm: self.centre_mm, half_mm, turn: self.turn, tilt: [0.0; 2], force_N }
     }
-    let limit = friction * normal / shear;
-    let stick = (1.0 - 1.0 / limit).cbrt();
-    // −limit (c/a)³ of the load, (c/a)³ = 1 − 1/limit.
-    let stick_share = 1.0 - limit;
-    vec![
-        piece(PressureShape::Hertz, half_mm, [tx * limit, ty * limit, normal]),
-        piece(PressureShape::Hertz, half_mm.map(|a| a * stick), [tx * stick_share, ty * stick_share, 0.0]),
-    ]
+
+    /// A force that is spread as the pressure.
+    fn full_slip(&self, force: [f64; 3]) -> Vec<Piece> {
+        let Outline { shape, sizes, centre_mm, turn } = *self;
+        let times = |factor: f64| force.map(|f| f * factor);
+        match shape {
+            "hertz-circle" | "hertz-ellipse" => vec![self.piece(PressureShape::Hertz, both(sizes), force)],
+            "tilted" => {
+                vec![Piece { tilt: [sizes[3], sizes[4]], ..self.piece(PressureShape::Hertz, both(sizes), force) }]
+            }
+            "lobed" => {
+                let [share, size] = LOBE;
+                let off = (1.0 - size) * sizes[0];
+                let centre = [centre_mm[0] + off * turn[0], centre_mm[1] + off * turn[1]];
+                let lobe = self.piece(PressureShape::Hertz, both(sizes).map(|a| size * a), times(share));
+                let rest = self.piece(PressureShape::Hertz, both(sizes), times(1.0 - share));
+                vec![rest, Piece { centre_mm: centre, ..lobe }]
+            }
+            "flat-punch" => vec![self.piece(PressureShape::Disc, both(sizes), force)],
+            "rectangle" => vec![self.piece(PressureShape::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
+            "ring" => self.ring([sizes[0], sizes[1]], force),
+            _ => plantar::pixels(shape, sizes)
+                .into_iter()
+                .map(|pixel| {
+                    let [x, y] = pixel.centre_mm;
+                    let centre = [x * turn[0] - y * turn[1] + centre_mm[0], x * turn[1] + y * turn[0] + centre_mm[1]];
+                    Piece { centre_mm: centre, ..self.piece(PressureShape::Square, pixel.half_mm, times(pixel.share)) }
+                })
+                .collect(),
+        }
+    }
+
+    /// A force that is spread evenly between two circles.
+    fn ring(&self, [outer, inner]: [f64; 2], force: [f64; 3]) -> Vec<Piece> {
+        let area = outer * outer - inner * inner;
+        let disc = |radius: f64, sign: f64| {
+            self.piece(PressureShape::Disc, [radius; 2], force.map(|f| f * sign * radius * radius / area))
+        };
+        vec![disc(outer, 1.0), disc(inner, -1.0)]
+    }
+
+    /// The pressure with shear at the friction limit, minus the excess shear of the area that sticks: the pressure that a smaller
+    /// load would cause (Jäger 1998), of c times the size on a core c times as wide.
+    fn partial_slip(&self, force: [f64; 3], friction: f64) -> Vec<Piece> {
+        let [tx, ty, normal] = force;
+        let shear = tx.hypot(ty);
+        if shear == 0.0 {
+            return self.full_slip(force);
+        }
+        let limit = friction * normal / shear;
+        // The load that sticks, as a share of all; limit times this of the shear.
+        let stick = 1.0 - 1.0 / limit;
+        let excess = [tx * (1.0 - limit), ty * (1.0 - limit), 0.0];
+        let core = match self.shape {
+            // Narrower, and not smaller.
+            "ring" => {
+                let [middle, half] = [0.5 * (self.sizes[0] + self.sizes[1]), 0.5 * (self.sizes[0] - self.sizes[1])];
+                let width = stick.sqrt() * half;
+                self.ring([middle + width, middle - width], excess)
+            }
+            _ => {
+                let smaller = |piece: Piece| Piece { half_mm: piece.half_mm.map(|half| stick.cbrt() * half), ..piece };
+                self.full_slip(excess).into_iter().map(smaller).collect()
+            }
+        };
+        let mut pieces = self.full_slip([tx * limit, ty * limit, normal]);
+        pieces.extend(core);
+        pieces
+    }
+
+    /// The pressure with a shear that is the same everywhere.
+    fn even_shear(&self, force: [f64; 3]) -> Vec<Piece> {
+        let [tx, ty, normal] = force;
+        if matches!(self.shape, "flat-punch" | "rectangle" | "ring") {
+            return self.full_slip(force);
+        }
+        let mut pieces = self.full_slip([0.0, 0.0, normal]);
+        pieces.push(self.piece(PressureShape::Disc, both(self.sizes), [tx, ty, 0.0]));
+        pieces
+    }
 }
 
 /// A number for a message.

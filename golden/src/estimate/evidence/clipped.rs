@@ -70,6 +70,7 @@ mod tests {
                 s: Mat::from_fn(6, 1, |row, _| if row < 2 { 1.0 } else { 0.0 }),
                 contact: vec![0],
                 baseline: 0,
+                spread: Mat::zeros(4, 1),
             };
             let mut readings = Readings { y: vec![shift, 0.0], precision: vec![2.0, 0.0] };
             let mu = [[0.0; 2]];

@@ -5,6 +5,7 @@ use super::cells::Cells;
 use super::envelope::Envelopes;
 use super::prior::Shape;
 use super::screen::Screen;
+use super::slip::SpreadPrior;
 use crate::estimate::learned::Learned;
 use crate::estimate::segment::{Segmenter, WIDTH};
 use crate::spec::scene::Scene;
@@ -25,6 +26,7 @@ pub struct Evidence {
     pub(super) shape: Shape,
     pub(super) segmenter: Segmenter,
     pub(super) prior: Prior,
+    pub(super) spreads: SpreadPrior,
     /// Taxels that are not dead.
     pub(super) alive: Vec<bool>,
     pub(super) unipolar: bool,
@@ -59,6 +61,7 @@ impl Evidence {
             segmenter: Segmenter::new(&cells.grid, WIDTH),
             cells,
             prior: Prior { mu_max: scene.search.mu_max },
+            spreads: SpreadPrior::ANY,
             screen: Screen::new(sensor, scene.medium, &alive),
             alive,
             unipolar: scene.input.unipolar,

@@ -18,6 +18,7 @@ use super::estimate::Estimate;
 use super::estimator::Evidence;
 use super::model::{Design, Readings};
 use super::regions::Regions;
+use super::slip::Quadratic;
 use super::{clipped, noise};
 use crate::estimate::segment::neighbours;
 use faer::{Mat, Scale};
@@ -61,6 +62,8 @@ pub(super) struct Progress {
     pub labels: Vec<usize>,
     /// μ of each contact.
     pub mu: Vec<[f64; 2]>,
+    /// Spread of each contact, see `slip`.
+    pub spread: Vec<f64>,
     /// Sizes of the baseline.
     pub sizes: Sizes,
     /// Standard deviation of the noise.
@@ -129,7 +132,7 @@ impl<'a> Fit<'a> {
         let sigma = stated.unwrap_or_else(|| noise::first(readings).min(UNKNOWN)).max(FLOOR);
         let p = scene.envelopes.first_pressure(sensor, &without, used, sigma);
         let (labels, mu, sizes) = (vec![0; p.len()], vec![[0.0; 2]], Sizes::of_plane(first));
-        Fit::from(scene, b, used, stated, Progress { p, labels, mu, sizes, sigma })
+        Fit::from(scene, b, used, stated, Progress { p, labels, mu, spread: vec![scene.spreads.mean()], sizes, sigma })
     }
 
     /// The same that goes on from what the rounds of another frame found.
@@ -172,6 +175,7 @@ impl<'a> Fit<'a> {
             let mut regions = self.regions(if before.len() > 1 { 0.0 } else { COARSE });
             let top = self.ascend(&mut regions.design, 1)?;
             let top = self.with_rest(&mut regions.design, top, 1, 0)?;
+            self.find_spread(&mut regions.design, &top);
             self.take(&regions, &top);
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
             let most = before.iter().zip(&top.mu).map(moved).fold(0.0, f64::max);
@@ -210,7 +214,7 @@ impl<'a> Fit<'a> {
         let covariance = match searched {
             // What was cut would have left the shear open.
             true if regions.wide => self.scene.prior.unresolved(unknowns),
-            true => self.scene.prior.covariance(&top.slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR),
+            true => self.covariance(&regions.design, &top)?,
             false => Mat::zeros(unknowns, unknowns),
         };
         let mut found = Found { regions, top, covariance };
@@ -241,8 +245,10 @@ impl<'a> Fit<'a> {
         }
         // Regions without a loaded cell are no contacts.
         let kept: Vec<usize> = (0..segments.count).filter(|&label| strongest[label].is_some()).collect();
-        let mu_of = |&label: &usize| strongest[label].map_or([0.0; 2], |cell| self.now.mu[self.now.labels[cell]]);
-        self.now.mu = kept.iter().map(mu_of).collect();
+        let before = |&label: &usize| strongest[label].map(|cell| self.now.labels[cell]);
+        let mu_of = |label| before(label).map_or([0.0; 2], |own| self.now.mu[own]);
+        let spread_of = |label| before(label).map_or(self.scene.spreads.mean(), |own| self.now.spread[own]);
+        (self.now.mu, self.now.spread) = kept.iter().map(|label| (mu_of(label), spread_of(label))).unzip();
         let number = |label: &Option<usize>| kept.iter().position(|kept| Some(*kept) == *label).unwrap_or(0);
         self.now.labels = segments.labels.iter().map(number).collect();
     }
@@ -279,6 +285,7 @@ impl<'a> Fit<'a> {
             *label = if *label == b { a } else { *label - usize::from(*label > b) };
         }
         self.now.mu.remove(b);
+        self.now.spread.remove(b);
     }
 
     /// Standard deviation of a taxel.
@@ -313,6 +320,7 @@ impl<'a> Fit<'a> {
             if pass >= least && !self.now.sizes.matter() && self.clipped.is_empty() {
                 break;
             }
+            self.find_spread(design, &top);
             self.now.mu = top.mu;
             top = self.ascend(design, steps)?;
         }
@@ -333,6 +341,43 @@ impl<'a> Fit<'a> {
             let noise = self.noise(self.taxels[k]);
             clipped::update(&mut self.readings, k, stress[k], noise);
         }
+    }
+
+    /// For each contact: the posterior of its spread, mean and variance, and the derivative of all μ in it; `None` if it is not
+    /// representable.
+    fn of_spreads(&self, design: &Design, top: &Top) -> Option<Vec<([f64; 2], Vec<f64>)>> {
+        let (prior, unknowns) = (self.scene.prior, 2 * top.mu.len());
+        let covariance = prior.covariance(&top.slope)?;
+        let of = |k: usize| {
+            let own = design.of_spread(&self.readings, &top.posterior, &top.mu, k);
+            let moved = |u: usize| -(0..unknowns).map(|v| covariance[(u, v)] * own.with_mu[v]).sum::<f64>();
+            let moved: Vec<f64> = (0..unknowns).map(moved).collect();
+            let uphill = |u: usize| top.slope.gradient[u] - prior.precision() * top.mu[u / 2][u % 2];
+            let gradient = own.gradient + (0..unknowns).map(|u| moved[u] * uphill(u)).sum::<f64>();
+            let information = own.information + (0..unknowns).map(|u| moved[u] * own.with_mu[u]).sum::<f64>();
+            let stress = Quadratic { at: self.now.spread[k], gradient, information: information.max(0.0) };
+            (self.scene.spreads.moments(stress), moved)
+        };
+        Some((0..top.mu.len()).map(of).collect())
+    }
+
+    /// Finds the spreads that go with a posterior.
+    fn find_spread(&mut self, design: &mut Design, top: &Top) {
+        for (k, ([mean, _], _)) in self.of_spreads(design, top).into_iter().flatten().enumerate() {
+            design.add_spread(k, mean - self.now.spread[k]);
+            self.now.spread[k] = mean;
+        }
+    }
+
+    /// The covariance of all μ with what the envelope and the spreads add.
+    fn covariance(&self, design: &Design, top: &Top) -> Option<Mat<f64>> {
+        let mut covariance = self.scene.prior.covariance(&top.slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
+        for (k, ([mean, variance], moved)) in self.of_spreads(design, top)?.into_iter().enumerate() {
+            let square = variance + (mean - self.now.spread[k]).powi(2);
+            (0..moved.len())
+                .for_each(|u| (0..moved.len()).for_each(|v| covariance[(u, v)] += square * moved[u] * moved[v]));
+        }
+        Some(covariance)
     }
 
     /// Takes over pressure and μ of a round.

@@ -41,6 +41,8 @@ pub(super) struct Design {
     pub contact: Vec<usize>,
     /// Number of coefficients of the baseline.
     pub baseline: usize,
+    /// Gx D F and Gy D F below each other, 2 readings × r, MPa: what a spread of 1 adds to S.
+    pub spread: Mat<f64>,
 }
 
 /// The readings as the model takes them: what each says, and how surely.
@@ -75,6 +77,16 @@ pub(super) struct Slope {
     pub gradient: Vec<f64>,
     /// Fisher information of μ with w marginalised, 2 contacts × 2 contacts.
     pub information: Mat<f64>,
+}
+
+/// Log evidence about the spread θ of one contact, the others' given.
+pub(super) struct OfSpread {
+    /// Slope in θ.
+    pub gradient: f64,
+    /// Fisher information of θ.
+    pub information: f64,
+    /// That of θ with μ1 and μ2 of each contact.
+    pub with_mu: Vec<f64>,
 }
 
 /// Σ a b.
@@ -234,6 +246,42 @@ impl Design {
         });
         Slope { gradient, information }
     }
+
+    /// Adds `change` to the spread of contact `k`.
+    pub fn add_spread(&mut self, k: usize, change: f64) {
+        let n = self.s.nrows() / 3;
+        for i in (0..self.rank()).filter(|i| self.contact[*i] == k) {
+            add(&mut self.s.col_as_slice_mut(i)[n..], change, self.spread.col_as_slice(i));
+        }
+    }
+
+    /// Slope and information in the spread of contact `k`, at the μ of `posterior`.
+    pub fn of_spread(&self, readings: &Readings, posterior: &Posterior, mu: &[[f64; 2]], k: usize) -> OfSpread {
+        let n = self.s.nrows() / 3;
+        let [covariance, stress] = posterior.spread();
+        let (mut added, mut trace) = (vec![0.0; n], 0.0);
+        for i in (0..self.rank()).filter(|i| self.contact[*i] == k) {
+            let (x, y) = self.spread.col_as_slice(i).split_at(n);
+            let mut column = vec![0.0; n];
+            [x, y].into_iter().zip(mu[k]).for_each(|(along, mu)| add(&mut column, mu, along));
+            trace += dot(&times(&readings.precision, stress.col_as_slice(i)), &column);
+            add(&mut added, posterior.w[i], &column);
+        }
+        let of_mu = self.derivatives(readings, posterior);
+        let own = [[times(&readings.precision, &added), added]];
+        let (cross, cross_mu) = (self.cross(posterior, &own), self.cross(posterior, &of_mu));
+        let mut known = Mat::zeros(self.rank(), 1);
+        matmul(&mut known, Accum::Replace, covariance, &cross, 1.0, Par::Seq);
+        let [[weighted, added]] = &own;
+        let known = known.col_as_slice(0);
+        OfSpread {
+            gradient: dot(weighted, &posterior.left) - trace,
+            information: dot(weighted, added) - dot(cross.col_as_slice(0), known),
+            with_mu: (0..of_mu.len())
+                .map(|u| dot(weighted, &of_mu[u][1]) - dot(cross_mu.col_as_slice(u), known))
+                .collect(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -244,9 +292,10 @@ mod tests {
     fn setting() -> (Design, Readings) {
         // Row t of block a, column i.
         let s = Mat::from_fn(18, 4, |row, i| ((3 * (row % 6) + 5 * (4 * (row / 6) + i)) as f64).sin());
+        let spread = Mat::from_fn(12, 4, |row, i| 0.3 * ((5 * row + 3 * i) as f64).cos());
         let y = (0..6).map(|t| (t as f64).cos()).collect();
         (
-            Design { s, contact: vec![0, 0, 1, 1], baseline: 0 },
+            Design { s, contact: vec![0, 0, 1, 1], baseline: 0, spread },
             Readings { y, precision: vec![4.0, 3.0, 0.0, 2.0, 9.0, 1.0] },
         )
     }
@@ -280,6 +329,17 @@ mod tests {
             let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             assert!((slope.gradient[unknown] - difference).abs() < 1e-8, "{unknown}");
             assert!(slope.information[(unknown, unknown)] > 0.0);
+        }
+        for k in [0, 1] {
+            let of_spread = design.of_spread(&readings, &posterior, &mu, k);
+            let value = |by: f64| {
+                let mut moved = setting().0;
+                moved.add_spread(k, by);
+                moved.posterior(&readings, &mu).unwrap().value
+            };
+            let difference = (value(1e-5) - value(-1e-5)) / 2e-5;
+            assert!((of_spread.gradient - difference).abs() < 1e-8 && of_spread.information > 0.0, "{k}");
+            assert_eq!(of_spread.with_mu.len(), 4);
         }
     }
 }

@@ -66,7 +66,7 @@ mod tests {
         let count = 400;
         let of = |t: usize, i: usize| if t < count { ((t + 1) as f64 * (i + 1) as f64).sin() } else { 0.0 };
         let s = Mat::from_fn(3 * count, 2, of);
-        let design = Design { s, contact: vec![0, 0], baseline: 0 };
+        let design = Design { s, contact: vec![0, 0], baseline: 0, spread: Mat::zeros(2 * count, 2) };
         let clipped: Vec<usize> = (0..count).step_by(4).collect();
         let mut random = Random::new(5);
         let sigma = 0.03;

@@ -4,6 +4,7 @@
 use super::*;
 use crate::data::generator::converter::Converter;
 use crate::data::generator::draws::{DrawOptions, DrawnFrame, Draws};
+use crate::data::generator::slip::Slip;
 use crate::estimate::float::Golden;
 use crate::result::checks::NOT_RESOLVED;
 use crate::result::flags::Flag;
@@ -106,6 +107,47 @@ fn each_contact_has_its_own_shear() {
     }
 }
 
+/// Frames of one contact with a kind of slip, read with noise that is stated: error along the true shear over it, and whether each
+/// component of the shear is within its standard deviation.
+fn along_the_shear(evidence: &Evidence, scene: &Scene, slip: Slip, frames: u64, noise: f64) -> Vec<(f64, [bool; 2])> {
+    let draws = Draws::new(scene, DrawOptions { slip, seed: 21, ..Default::default() }).unwrap();
+    let one = |number| {
+        let drawn = draws.frame(number).unwrap();
+        let frame = drawn.read(&Converter { noise, seed: number, ..Default::default() }).unwrap();
+        let estimate = evidence.solve(&frame.stress_MPa, Some(noise * drawn.peak_MPa()));
+        let ([x, y, _], [tx, ty, _]) = (estimate.forces_N.resultant(), drawn.total_N);
+        let [sx, sy, _] = estimate.contacts[0].sigma_N;
+        ((x * tx + y * ty) / (tx * tx + ty * ty) - 1.0, [(x - tx).abs() < sx, (y - ty).abs() < sy])
+    };
+    (0..frames).map(one).collect()
+}
+
+fn median_bias(all: &[(f64, [bool; 2])]) -> f64 {
+    let mut sorted: Vec<f64> = all.iter().map(|(bias, _)| *bias).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// A contact that sticks in part is not read with too much shear where the noise lets see it, and its standard deviation says how
+/// far the rest may be off. Taken for one in full slip, it is read with up to a tenth too much.
+#[test]
+fn partial_slip_has_no_bias() {
+    let scene = scene("sensor-1");
+    let evidence = Evidence::new(&scene);
+    for (slip, noise, most) in
+        [(0.8, 0.0, 0.03), (0.6, 0.0, 0.03), (0.4, 0.0, 0.03), (0.6, 5e-4, 0.05), (0.4, 5e-4, 0.05)]
+    {
+        let bias = median_bias(&along_the_shear(&evidence, &scene, Slip::Partial(slip), 15, noise));
+        assert!(bias.abs() < most, "{slip} {noise}: {bias}");
+    }
+    let mixed = along_the_shear(&evidence, &scene, Slip::Mixed, 40, 2e-3);
+    let within = mixed.iter().flat_map(|(_, within)| within).filter(|within| **within).count() as f64 / 80.0;
+    // 68 %, and three standard deviations of 80 components.
+    assert!((0.52..0.84).contains(&within), "{within}");
+    let full = Evidence { spreads: slip::SpreadPrior::FULL_SLIP, ..evidence };
+    assert!(median_bias(&along_the_shear(&full, &scene, Slip::Partial(0.4), 15, 0.0)) > 0.06);
+}
+
 /// A frame of another scale has the forces of that scale, and noise that is not stated is found.
 #[test]
 fn scale_and_unknown_noise() {
@@ -191,15 +233,20 @@ fn coupled_lines_do_not_fit() {
     let scene = scene("sensor-1");
     let golden = Golden::new(&scene).unwrap();
     let draws = Draws::new(&scene, DrawOptions { seed: 14, ..Default::default() }).unwrap();
-    for number in 0..4 {
+    let mut misfits = 0;
+    for number in 0..8 {
         let mut frame = draws.frame(number).unwrap().frame;
         let b = frame.stress_MPa.clone();
         let mean = |of: &dyn Fn(usize) -> usize| (0..10).map(|k| b[of(k)]).sum::<f64>().max(0.0) / 10.0;
         let coupled = |k: usize| b[k] + 0.1 * (mean(&|col| k / 10 * 10 + col) + mean(&|row| 10 * row + k % 10));
         frame.stress_MPa = (0..100).map(coupled).collect();
         let result = golden.run(&frame).unwrap();
-        assert!(result.flags.contains(&Flag::Misfit), "{number} {:?}", result.checks);
+        misfits += usize::from(result.flags.contains(&Flag::Misfit));
+        // Or the taxel is left out that shows it most.
+        let told = [Flag::Misfit, Flag::TaxelSuspect];
+        assert!(result.flags.iter().any(|flag| told.contains(flag)), "{number} {:?}", result.checks);
     }
+    assert!(misfits >= 7, "{misfits} of 8");
 }
 
 /// A taxel that is stuck is named and does not bend the rest.

@@ -5,6 +5,7 @@
 //!
 //! | drawn | range |
 //! |---|---|
+//! | spread of the shear | the training's [`Slip`] |
 //! | contacts | [`Draws`], all shapes in turn; one, or in windows around contacts one to four, as many as fit |
 //! | μ | 0 … 0.85 mu_max, any direction |
 //! | load | times 1 … 2, its logarithm evenly |
@@ -21,6 +22,7 @@
 
 use super::features::Readings;
 use crate::data::generator::draws::{DrawOptions, Draws, Shape};
+use crate::data::generator::slip::Slip;
 use crate::data::generator::support::Support;
 use crate::data::generator::GeneratorError;
 use crate::estimate::float::objective::taxels::Taxels;
@@ -70,6 +72,7 @@ impl Frames {
     pub fn new(
         scene: &Scene,
         window: Window,
+        slip: Slip,
         count: usize,
         seed: u64,
         progress: &(dyn Fn() + Sync),
@@ -82,7 +85,8 @@ impl Frames {
         let draws = (1..=most)
             .map(|contacts| {
                 let ratio = [0.0, RATIO * scene.search.mu_max];
-                Draws::new(scene, DrawOptions { shapes: shapes.clone(), contacts, ratio, seed, ..Default::default() })
+                let shapes = shapes.clone();
+                Draws::new(scene, DrawOptions { shapes, contacts, ratio, slip, seed, ..Default::default() })
             })
             .collect::<Result<Vec<_>, _>>()?;
         let array = Taxels::new(&window.sensor(&scene.sensor), scene.medium);
@@ -166,9 +170,15 @@ fn item(scene: &Scene, window: Window, array: &Taxels, supports: &[Support], own
     // Per N along x, y and z.
     let stress = |support: &Support| {
         let mut axes = [(); 3].map(|()| vec![0.0; masked.len()]);
-        for ([x, y], share) in support.at_mm.iter().zip(&support.share) {
-            array.add_unit_forces([x - middle[0], y - middle[1]], *share, &mut axes);
+        let mut of_load = [(); 3].map(|()| vec![0.0; masked.len()]);
+        for (([x, y], share), of_shear) in support.at_mm.iter().zip(&support.share).zip(&support.shear_share) {
+            let at = [x - middle[0], y - middle[1]];
+            array.add_unit_forces(at, *of_shear, &mut axes);
+            if share != of_shear {
+                array.add_unit_forces(at, share - of_shear, &mut of_load);
+            }
         }
+        axes[2].iter_mut().zip(&of_load[2]).for_each(|(sum, rest)| *sum += rest);
         axes
     };
     let read = |t: usize, b: f64| if masked[t] { 0.0 } else { b as f32 };

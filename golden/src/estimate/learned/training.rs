@@ -19,6 +19,7 @@ use super::error::LearnedError;
 use super::features::Features;
 use super::frames::Frames;
 use super::network::{exchanged, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, PLACES};
+use crate::data::generator::slip::Slip;
 use crate::physics::symmetry::folded::EVEN;
 use crate::random::Random;
 use crate::spec::scene::Scene;
@@ -53,13 +54,16 @@ pub struct Training {
     pub hidden: Vec<usize>,
     /// Largest rate of a step.
     pub rate: f64,
+    /// How the shear is spread over the contacts.
+    pub slip: Slip,
     /// Seed of weights and frames.
     pub seed: u64,
 }
 
 impl Default for Training {
     fn default() -> Self {
-        Training { steps: 60_000, batch: 384, contacts: 60_000, hidden: vec![150, 75, 25], rate: 2e-3, seed: 1 }
+        let (hidden, slip) = (vec![150, 75, 25], Slip::Mixed);
+        Training { steps: 60_000, batch: 384, contacts: 60_000, hidden, rate: 2e-3, slip, seed: 1 }
     }
 }
 
@@ -100,7 +104,7 @@ pub(super) fn train(
         let count = drawn.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
         progress(Stage::Contacts(count));
     };
-    let frames = Frames::new(scene, window, training.contacts, training.seed, &one)?;
+    let frames = Frames::new(scene, window, training.slip, training.contacts, training.seed, &one)?;
     let features = Features::new(&window, &scene.sensor, scene.medium)?;
     let mut random = Random::new(training.seed);
     let widths: Vec<usize> = std::iter::once(Features::channels(&window))

@@ -18,6 +18,8 @@ pub struct Outcome {
     pub tangential: Option<f64>,
     /// e_n of the resultant.
     pub normal: Option<f64>,
+    /// Error of the resultant's shear along the true one, as a fraction of it: above 0 where too much is read.
+    pub bias: Option<f64>,
     /// Tangential error of the resultant over the sum of all contacts' tangential forces; the sum of shears that cancel is
     /// no measure.
     pub over_all: Option<f64>,
@@ -56,6 +58,7 @@ impl Outcome {
             shape: drawn.truth[0].shape,
             tangential: errors.tangential,
             normal: errors.normal,
+            bias: bias(drawn, result.resultant_N),
             over_all: over_all(drawn, result.resultant_N),
             contact_tangential: Vec::new(),
             flagged: !result.flags.is_empty(),
@@ -85,12 +88,20 @@ impl Outcome {
             shape: drawn.truth[0].shape,
             tangential: errors.tangential,
             normal: errors.normal,
+            bias: bias(drawn, [0.0; 3]),
             over_all: over_all(drawn, [0.0; 3]),
             contact_tangential: drawn.truth.iter().filter_map(alone).collect(),
             flagged: false,
             deviations: Vec::new(),
         }
     }
+}
+
+/// Error of a resultant's shear along the true one over that; `None` without shear.
+fn bias(drawn: &DrawnFrame, [x, y, _]: [f64; 3]) -> Option<f64> {
+    let [true_x, true_y, _] = drawn.total_N;
+    let square = true_x * true_x + true_y * true_y;
+    (square > 0.0).then(|| (x * true_x + y * true_y) / square - 1.0)
 }
 
 /// Tangential error of a resultant over the sum of all contacts' tangential forces; `None` if there are none.

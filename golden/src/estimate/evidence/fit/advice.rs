@@ -60,8 +60,12 @@ impl Fit<'_> {
     fn by_baseline(&self, found: &Found) -> Option<Vec<f64>> {
         let Found { regions, top, covariance } = found;
         let (design, kept) = (&regions.design, regions.design.of_baseline().start);
-        let without =
-            Design { s: design.s.subcols(0, kept).to_owned(), contact: design.contact[..kept].to_vec(), baseline: 0 };
+        let without = Design {
+            s: design.s.subcols(0, kept).to_owned(),
+            contact: design.contact[..kept].to_vec(),
+            baseline: 0,
+            spread: design.spread.subcols(0, kept).to_owned(),
+        };
         let mut readings = self.readings.clone();
         let stress = top.posterior.stress_of(|i| i >= kept);
         readings.y.iter_mut().zip(stress).for_each(|(y, stress)| *y -= stress);

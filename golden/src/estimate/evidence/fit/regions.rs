@@ -10,6 +10,7 @@ use crate::estimate::evidence::baseline::{terms, TERMS};
 use crate::estimate::evidence::model::Design;
 use crate::estimate::evidence::prior::remainder;
 use crate::estimate::evidence::regions::Regions;
+use crate::estimate::evidence::slip::spread;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
@@ -49,7 +50,7 @@ impl Fit<'_> {
     fn design(&self, cells: &[Vec<usize>], factors: &[Mat<f64>]) -> Design {
         let n = self.taxels.len();
         let rank = TERMS + factors.iter().map(Mat::ncols).sum::<usize>();
-        let mut s = Mat::zeros(3 * n, rank);
+        let (mut s, mut of_spread) = (Mat::zeros(3 * n, rank), Mat::zeros(2 * n, rank));
         let mut contact = Vec::with_capacity(rank);
         for (k, (own, factor)) in cells.iter().zip(factors).enumerate() {
             let mut influence = Mat::zeros(3 * n, own.len());
@@ -58,11 +59,15 @@ impl Fit<'_> {
             }
             let columns = s.subcols_mut(contact.len(), factor.ncols());
             matmul(columns, Accum::Replace, &influence, factor, 1.0, Par::Seq);
+            let uneven = spread(&self.scene.cells, own, self.centre_mm(own), factor);
+            let columns = of_spread.subcols_mut(contact.len(), factor.ncols());
+            matmul(columns, Accum::Replace, influence.subrows(n, 2 * n), &uneven, 1.0, Par::Seq);
             contact.extend(vec![k; factor.ncols()]);
         }
         contact.extend([0; TERMS]);
-        let mut design = Design { s, contact, baseline: TERMS };
+        let mut design = Design { s, contact, baseline: TERMS, spread: of_spread };
         self.baseline(&mut design);
+        self.now.spread.iter().enumerate().for_each(|(k, spread)| design.add_spread(k, *spread));
         design
     }
 

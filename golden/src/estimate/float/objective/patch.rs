@@ -109,6 +109,7 @@ impl Objective for Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::generator::slip::Slip;
     use crate::data::generator::{generate, random_contacts, Draw, Shapes};
     use crate::estimate::float::pass::Polynomial;
     use crate::physics::matrices::Matrices;
@@ -119,7 +120,7 @@ mod tests {
     fn several_ellipses_add_up_on_any_body() {
         let mut scene = Scene::builtin("sensor-3").unwrap();
         let sensor = scene.sensor.clone();
-        let draw = Draw { count: 2, shapes: Shapes::Elliptic, touching: false, seed: 3 };
+        let draw = Draw { count: 2, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed: 3 };
         let contacts = random_contacts(&sensor, draw);
         for medium in [Medium::HalfSpace, Medium::BondedLayer { poisson: 0.48 }] {
             let frame = generate("two", &sensor, medium, &contacts).unwrap();

@@ -1,0 +1,122 @@
+//! Slip: how the shear of a drawn contact is spread over it.
+//!
+//! A contact slides as a whole only when its shear reaches the friction limit. Below it, as in every object that is held, the
+//! middle sticks and the shear there is less than its share of the pressure.
+//!
+//! | name | shear traction |
+//! |---|---|
+//! | `full` | proportional to the pressure |
+//! | a number above 0 and below 1 | partial slip, the shear over the friction limit being that number |
+//! | `even` | the same everywhere on the contact |
+//! | `mixed` | of four contacts one `full`, two in partial slip with a number from 0.1 to 1, one `even` |
+//!
+//! The traction is that of [`crate::data::generator`].
+
+use crate::data::frame::Contact;
+use crate::random::Random;
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+
+/// Range of shear over the friction limit in [`Slip::Mixed`].
+const MIXED: [f64; 2] = [0.1, 1.0];
+/// Shares of [`Slip::Mixed`]: full slip, partial slip; the rest is even.
+const SHARES: [f64; 2] = [0.25, 0.5];
+
+/// How the shear of a contact is spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Slip {
+    /// Full slip: proportional to the pressure.
+    #[default]
+    Full,
+    /// Partial slip at this share of the friction limit, above 0 and below 1.
+    Partial(f64),
+    /// The same everywhere.
+    Even,
+    /// Full, partial and even, drawn for each contact.
+    Mixed,
+}
+
+impl Slip {
+    /// The columns of tables over the kinds of slip.
+    pub const TABLE: [Slip; 6] =
+        [Slip::Full, Slip::Partial(0.8), Slip::Partial(0.6), Slip::Partial(0.4), Slip::Partial(0.2), Slip::Even];
+
+    /// One kind of slip: what `Mixed` draws, else itself.
+    fn drawn(self, random: &mut Random) -> Slip {
+        if self != Slip::Mixed {
+            return self;
+        }
+        let (kind, limit) = (random.between(0.0, 1.0), random.between(MIXED[0], MIXED[1]));
+        match kind {
+            kind if kind < SHARES[0] => Slip::Full,
+            kind if kind < SHARES[0] + SHARES[1] => Slip::Partial(limit),
+            _ => Slip::Even,
+        }
+    }
+
+    /// The contact, its forces stated, with its shear spread like this.
+    pub(super) fn of(self, contact: Contact, random: &mut Random) -> Contact {
+        let [x, y] = contact.tangential_N.unwrap_or_default();
+        let ratio = x.hypot(y) / contact.normal_N.unwrap_or_default();
+        let of = |kind: &str, friction| Contact { kind_of_slip: Some(kind.to_string()), friction, ..contact.clone() };
+        match self.drawn(random) {
+            Slip::Partial(share) if ratio > 0.0 => of("partial-slip", Some(ratio / share)),
+            Slip::Even => of("even-shear", None),
+            Slip::Full | Slip::Partial(_) | Slip::Mixed => contact,
+        }
+    }
+}
+
+impl FromStr for Slip {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Slip, String> {
+        match name {
+            "full" => Ok(Slip::Full),
+            "even" => Ok(Slip::Even),
+            "mixed" => Ok(Slip::Mixed),
+            number => match number.parse() {
+                Ok(share) if share > 0.0 && share < 1.0 => Ok(Slip::Partial(share)),
+                _ => Err(format!("{number:?}: allowed are full, even, mixed, or a number above 0 and below 1")),
+            },
+        }
+    }
+}
+
+impl Display for Slip {
+    fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
+        match self {
+            Slip::Full => f.write_str("full"),
+            Slip::Partial(share) => share.fmt(f),
+            Slip::Even => f.write_str("even"),
+            Slip::Mixed => f.write_str("mixed"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_and_refused() {
+        for slip in Slip::TABLE.into_iter().chain([Slip::Mixed]) {
+            assert_eq!(slip.to_string().parse(), Ok(slip));
+        }
+        for name in ["", "none", "0", "1", "1.5", "-0.2", "NaN"] {
+            assert!(name.parse::<Slip>().unwrap_err().contains("above 0 and below 1"), "{name}");
+        }
+    }
+
+    /// The shares of the mixture, within four standard deviations of 4000 draws.
+    #[test]
+    fn the_mixture_has_its_shares() {
+        let mut random = Random::new(3);
+        let drawn: Vec<Slip> = (0..4000).map(|_| Slip::Mixed.drawn(&mut random)).collect();
+        let count = |of: fn(&Slip) -> bool| drawn.iter().filter(|slip| of(slip)).count() as f64 / 4000.0;
+        assert!((count(|slip| *slip == Slip::Full) - 0.25).abs() < 0.03);
+        assert!((count(|slip| *slip == Slip::Even) - 0.25).abs() < 0.03);
+        assert!(count(|slip| matches!(slip, Slip::Partial(share) if *share < 0.55)) > 0.2);
+        assert!(drawn.iter().all(|slip| !matches!(slip, Slip::Partial(share) if !(0.1..1.0).contains(share))));
+    }
+}
