@@ -51,12 +51,12 @@ impl Hierarchy {
     /// The net of the signal `name` in the block at `path`: a port of a block inside belongs to that block.
     pub(super) fn net(&self, path: &str, name: &str) -> Net {
         let instances = self.blocks.get(path).into_iter().flat_map(|kernel| &kernel.instances);
-        let inner = instances.filter_map(|instance| {
+        let mut inner = instances.filter_map(|instance| {
             let port = name.strip_prefix(&instance.name)?.strip_prefix(SEPARATOR)?;
             let is_port = instance.kernel.port_list().any(|(own, ..)| own == port);
             is_port.then(|| (called(path, &instance.name), port.to_owned()))
         });
-        inner.last().unwrap_or_else(|| (path.to_owned(), name.to_owned()))
+        inner.next_back().unwrap_or_else(|| (path.to_owned(), name.to_owned()))
     }
 
     /// The kernel of every block by its path.

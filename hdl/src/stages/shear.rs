@@ -56,7 +56,7 @@ impl Shear {
     /// For the contacts of `model`, if it has any.
     pub fn of_model(model: &Model) -> Option<Self> {
         let (formats, contacts) = (model.formats(), model.contacts());
-        (contacts > 0).then(|| Shear { data: formats.data_bits as usize, quads: formats.quads, contacts })
+        (contacts > 0).then_some(Shear { data: formats.data_bits as usize, quads: formats.quads, contacts })
     }
 
     /// The address of the next quad.

@@ -190,6 +190,9 @@ pub fn sensitivity(rows: &[SensitivityRow], level: f64, format: Format) -> Resul
     })
 }
 
+/// Name and text of one figure of [`SlipRow`].
+type SlipFigure = (&'static str, fn(&SlipRow) -> String);
+
 /// The table over the kinds of slip: a line per level, estimator and figure, a column per kind.
 ///
 /// # Errors
@@ -211,12 +214,12 @@ pub fn slips(rows: &[SlipRow], format: Format) -> Result<String> {
                 rows.chunk_by(|a, b| (a.noise, &a.estimator) == (b.noise, &b.estimator)).collect();
             let kinds = groups.first().into_iter().flat_map(|group| group.iter()).map(|row| row.slip.as_str());
             let head: Vec<&str> = ["noise", "estimator", "figure"].into_iter().chain(kinds).collect();
-            let figures: [(&str, fn(&SlipRow) -> String); 3] = [
+            let figures: [SlipFigure; 3] = [
                 ("bias", |row| format!("{:+.1} %", 100.0 * row.bias)),
                 ("e_t", |row| row.tangential.map(|share| format!("{:.1}", 100.0 * share)).join(" / ") + " %"),
                 ("1 σ", |row| row.within_1.map_or("-".into(), |share| format!("{:.0} %", 100.0 * share))),
             ];
-            let line = |group: &[SlipRow], (name, figure): (&str, fn(&SlipRow) -> String)| {
+            let line = |group: &[SlipRow], (name, figure): SlipFigure| {
                 let named = [of(group[0].noise), group[0].estimator.clone(), name.to_owned()];
                 named.into_iter().chain(group.iter().map(figure)).collect()
             };

@@ -36,7 +36,7 @@ impl TransposedPlace {
     /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed`
     /// arrive with rows and columns exchanged; `None` if there is none.
     pub fn new(layout: Quads, bits: usize, vectors: usize, transposed: Vec<usize>) -> Option<Self> {
-        (!transposed.is_empty()).then(|| TransposedPlace { layout, bits, vectors, transposed })
+        (!transposed.is_empty()).then_some(TransposedPlace { layout, bits, vectors, transposed })
     }
 }
 
