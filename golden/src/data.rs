@@ -14,3 +14,4 @@ pub mod import;
 pub mod input;
 pub mod quantise;
 pub mod reception;
+pub mod text;

@@ -1,0 +1,178 @@
+//! Cells of a line, and the number in a cell.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use csv::ReaderBuilder;
+
+use super::shown;
+
+/// What stands between two cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Separator {
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
+    /// `,`
+    Comma,
+    /// One or more blanks or tabs.
+    Blank,
+}
+
+impl Separator {
+    /// Every separator, in the order in which they are tried: a comma can be a decimal mark, a blank stand beside any other.
+    pub const ALL: [Separator; 4] = [Separator::Semicolon, Separator::Tab, Separator::Comma, Separator::Blank];
+
+    /// The cells of a line, without blanks around them and without quotes.
+    pub(super) fn cells(self, line: &str) -> Vec<Cow<'_, str>> {
+        let byte = match self {
+            Separator::Semicolon => b';',
+            Separator::Tab => b'\t',
+            Separator::Comma => b',',
+            Separator::Blank => return line.split_whitespace().map(Cow::Borrowed).collect(),
+        };
+        if line.contains('"') {
+            let mut reader = ReaderBuilder::new().delimiter(byte).has_headers(false).from_reader(line.as_bytes());
+            if let Some(Ok(record)) = reader.records().next() {
+                return record.iter().map(|cell| Cow::Owned(cell.trim().to_owned())).collect();
+            }
+        }
+        line.split(char::from(byte)).map(|cell| Cow::Borrowed(cell.trim())).collect()
+    }
+}
+
+impl fmt::Display for Separator {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Separator::Semicolon => "semicolons",
+            Separator::Tab => "tabs",
+            Separator::Comma => "commas",
+            Separator::Blank => "blanks",
+        })
+    }
+}
+
+/// The reading in a cell: NaN where it is missing, `None` for anything else than a finite number or a missing reading.
+///
+/// ```
+/// use dermis_golden::data::text::reading;
+///
+/// assert_eq!(reading(" -3e-1"), Some(-0.3));
+/// assert!([" ", "nan", "NaN", "null", "B"].iter().all(|cell| reading(cell).is_some_and(f64::is_nan)));
+/// assert!(["inf", "1e400", "x", "-"].iter().all(|cell| reading(cell).is_none()));
+/// ```
+pub fn reading(cell: &str) -> Option<f64> {
+    match cell.trim() {
+        // `B` is Tekscan's mark of a sensel that does not exist.
+        "" | "null" | "B" => Some(f64::NAN),
+        cell => cell.parse().ok().filter(|value: &f64| !value.is_infinite()),
+    }
+}
+
+/// How the numbers of a text are written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Digits {
+    /// The decimal mark, where the numbers have one; a point where some have a comma.
+    pub mark: Option<char>,
+    /// Number of decimals, where it is fixed: nearly all have as many, two or more, and some end with a zero, which the shortest form
+    /// of a number has not.
+    decimals: Option<usize>,
+    /// Digits of an exponent, where nearly all numbers have one of as many digits, two or more.
+    exponent: Option<usize>,
+    /// A zero may stand without decimals.
+    bare_zero: bool,
+    /// Numbers are filled with zeros in front.
+    padded: bool,
+}
+
+/// Share of the numbers from which on all are taken to be written alike.
+const LIKE: f64 = 0.9;
+
+/// The parts of a number.
+struct Number<'t> {
+    whole: &'t str,
+    decimals: &'t str,
+    exponent: &'t str,
+}
+
+impl<'t> Number<'t> {
+    /// The parts of a text that is a number with decimal point.
+    fn of(text: &'t str) -> Number<'t> {
+        let text = text.trim_start_matches(['-', '+']);
+        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, ""));
+        let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+        Number { whole, decimals, exponent: exponent.trim_start_matches(['-', '+']) }
+    }
+
+    fn is_bare_zero(&self) -> bool {
+        self.whole == "0" && self.decimals.is_empty() && self.exponent.is_empty()
+    }
+
+    fn is_padded(&self) -> bool {
+        self.whole.len() > 1 && self.whole.starts_with('0')
+    }
+}
+
+impl Digits {
+    /// What the cells of some lines show.
+    pub(super) fn of_cells<'t>(cells: impl Iterator<Item = &'t str> + Clone) -> Digits {
+        let mark = ['.', ','].into_iter().find(|mark| cells.clone().any(|cell| cell.contains(*mark)));
+        let texts = cells.map(point);
+        let numbers: Vec<Cow<str>> = texts.filter(|cell| reading(cell).is_some_and(f64::is_finite)).collect();
+        let numbers: Vec<Number> = numbers.iter().map(|text| Number::of(text)).collect();
+        let share = |is: &dyn Fn(&Number) -> bool| {
+            numbers.iter().filter(|number| is(number)).count() as f64 / numbers.len() as f64
+        };
+        // That of most numbers, so that one that is cut changes nothing.
+        let fixed = |length: fn(&Number) -> usize| {
+            let mut lengths: Vec<usize> = numbers.iter().map(length).collect();
+            lengths.sort_unstable();
+            let middle = lengths.get(lengths.len() / 2).copied().filter(|middle| *middle >= 2)?;
+            (share(&|number| length(number) == middle) >= LIKE).then_some(middle)
+        };
+        let zero_at_end = numbers.iter().any(|number| number.decimals.ends_with('0'));
+        Digits {
+            mark,
+            decimals: fixed(|number| number.decimals.len()).filter(|_| zero_at_end),
+            exponent: fixed(|number| number.exponent.len()),
+            bare_zero: numbers.iter().filter(|number| number.is_bare_zero()).count() > 1,
+            padded: share(&|number| number.is_padded()) > 1.0 - LIKE,
+        }
+    }
+
+    /// The reading in a cell: NaN where it is missing.
+    ///
+    /// # Errors
+    /// A cell that is no number, or not one as the others are written, in words.
+    pub(super) fn reading(&self, cell: &str) -> Result<f64, String> {
+        if cell.contains(',') && self.mark == Some('.') {
+            return Err(format!("{} has a comma, where others have a decimal point", shown(cell)));
+        }
+        let text = point(cell);
+        let value = reading(&text).ok_or_else(|| format!("{} is not a finite number", shown(cell)))?;
+        let number = Number::of(&text);
+        let differs = |own: usize, wanted: Option<usize>| wanted.is_some_and(|wanted| own != wanted);
+        match value.is_finite() && !(self.bare_zero && number.is_bare_zero()) {
+            true if differs(number.decimals.len(), self.decimals) => Err(format!(
+                "{} has {} decimals, the others {}",
+                shown(cell),
+                number.decimals.len(),
+                self.decimals.unwrap_or(0)
+            )),
+            true if differs(number.exponent.len(), self.exponent) => {
+                Err(format!("{} has an exponent that is cut", shown(cell)))
+            }
+            true if number.is_padded() && !self.padded => Err(format!("{} begins with a zero", shown(cell))),
+            _ => Ok(value),
+        }
+    }
+}
+
+/// A cell with a decimal point.
+pub(super) fn point(cell: &str) -> Cow<'_, str> {
+    match cell.contains(',') && !cell.contains('.') {
+        true => Cow::Owned(cell.trim().replacen(',', ".", 1)),
+        false => Cow::Borrowed(cell.trim()),
+    }
+}

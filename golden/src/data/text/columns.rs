@@ -1,0 +1,242 @@
+//! Which columns of a text hold the readings, and which the time.
+
+use super::cells::point;
+use super::time::TimeUnit;
+
+/// Columns that a header may name beside the readings; units and numbers in names are left out before they are compared.
+const BESIDE: [&str; 26] = [
+    "average pressure",
+    "average",
+    "count",
+    "date",
+    "datetime",
+    "estimated force",
+    "force",
+    "frame",
+    "id",
+    "index",
+    "label",
+    "load",
+    "max",
+    "mean",
+    "name",
+    "no",
+    "nr",
+    "number",
+    "sample",
+    "seq",
+    "sequence",
+    "sum",
+    "temperature",
+    "total",
+    "unnamed",
+    "user",
+];
+/// Those of them that are times.
+const TIMES: [&str; 13] = [
+    "t",
+    "time",
+    "timestamp",
+    "datetime",
+    "date",
+    "seconds",
+    "sec",
+    "millis",
+    "micros",
+    "elapsed",
+    "stamp",
+    "clock",
+    "ms",
+];
+/// Most columns beside the readings whose header does not name them.
+const MOST_BESIDE: usize = 3;
+
+/// The columns of a text, each a list of cells from some of its lines, without those of its header.
+pub(super) struct Columns<'t> {
+    /// Cells of each column.
+    pub cells: Vec<Vec<&'t str>>,
+    /// Names of the columns, if there is a header with as many cells.
+    pub names: Option<Vec<&'t str>>,
+}
+
+/// What the columns hold, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Found {
+    /// First column of the readings.
+    pub first: usize,
+    /// Column of the time and its unit.
+    pub time: Option<(usize, TimeUnit)>,
+}
+
+/// What one column beside the readings holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Beside {
+    Time(TimeUnit),
+    Index,
+    Text,
+}
+
+impl<'t> Columns<'t> {
+    /// The columns of `readings` readings; `time` is the stated column of the time, from 0.
+    ///
+    /// # Errors
+    /// Columns of which more than one reading is possible, or none, in words.
+    pub(super) fn find(&self, readings: usize, time: Option<usize>) -> Result<Found, String> {
+        let beside = self.cells.len() - readings;
+        if beside == 0 {
+            return Ok(Found { first: 0, time: None });
+        }
+        if let Some(first) = self.named(readings) {
+            return self.with_time(first, readings, time);
+        }
+        if beside > MOST_BESIDE {
+            return Err(format!(
+                "{} columns, {readings} of which are readings; --columns A..B says which",
+                self.cells.len()
+            ));
+        }
+        if time.is_none() && beside == 1 {
+            let ends = [0, readings].map(|column| self.beside(column));
+            match ends {
+                [None, Some(Beside::Time(_))] if self.rises(readings) => return self.with_time(0, readings, None),
+                [Some(Beside::Time(_)), Some(Beside::Time(_))]
+                    if self.rises(0) && self.rises(readings) && !self.rises(readings / 2) =>
+                {
+                    let last = readings + 1;
+                    return Err(format!(
+                        "column 1 and column {last} both rise as a time does; --time-column 1 or --time-column {last} says which it is"
+                    ));
+                }
+                _ => (),
+            }
+        }
+        let first = if time.is_some_and(|time| time >= readings) { 0 } else { beside };
+        self.with_time(first, readings, time)
+    }
+
+    /// First column of the readings by the names of the header: those that [`BESIDE`] and [`TIMES`] do not have, without a gap.
+    fn named(&self, readings: usize) -> Option<usize> {
+        let names = self.names.as_ref()?;
+        let is_beside = |name: &str| {
+            let plain = plain(name);
+            plain.is_empty() && name.trim().parse::<f64>().is_err()
+                || BESIDE.contains(&plain.as_str())
+                || TIMES.contains(&plain.split(' ').next().unwrap_or(""))
+        };
+        let own: Vec<usize> = (0..names.len()).filter(|&column| !is_beside(names[column])).collect();
+        let first = *own.first()?;
+        (own.len() == readings && own[readings - 1] + 1 - first == readings).then_some(first)
+    }
+
+    /// The readings from column `first` on and the time in one of the others.
+    fn with_time(&self, first: usize, readings: usize, stated: Option<usize>) -> Result<Found, String> {
+        let others = (0..self.cells.len()).filter(|column| !(first..first + readings).contains(column));
+        if let Some(column) = stated {
+            return self.at(first, readings, column);
+        }
+        let mut times = Vec::new();
+        for column in others {
+            match self.beside(column) {
+                // A sum can rise as a time does.
+                _ if self.name(column).is_some_and(|name| !is_time(name) && BESIDE.contains(&plain(name).as_str())) => (),
+                Some(Beside::Time(unit)) => times.push((column, unit)),
+                Some(_) => (),
+                None => {
+                    return Err(format!(
+                        "column {} is neither a time nor an index, and {} columns are one too many; --columns A..B says which are readings",
+                        column + 1,
+                        self.cells.len()
+                    ))
+                }
+            }
+        }
+        let named = times.iter().copied().find(|(column, _)| self.name(*column).is_some_and(is_time));
+        match times[..] {
+            [] => Ok(Found { first, time: None }),
+            [only] => Ok(Found { first, time: Some(only) }),
+            [a, b, ..] if named.is_none() => {
+                let [a, b] = [a.0 + 1, b.0 + 1];
+                Err(format!("columns {a} and {b} both rise as a time does; --time-column says which it is"))
+            }
+            _ => Ok(Found { first, time: named }),
+        }
+    }
+
+    /// The stated readings from column `first` on, with the stated time, or that of the first other column that is named one or
+    /// stands first; whatever else there is.
+    pub(super) fn stated(&self, first: usize, readings: usize, time: Option<usize>) -> Result<Found, String> {
+        if let Some(column) = time {
+            return self.at(first, readings, column);
+        }
+        let mut others = (0..self.cells.len()).filter(|column| !(first..first + readings).contains(column));
+        let is_clock = |column: &usize| match (self.name(*column), self.beside(*column)) {
+            (name, Some(Beside::Time(unit))) if *column == 0 || name.is_some_and(is_time) => Some((*column, unit)),
+            _ => None,
+        };
+        Ok(Found { first, time: others.find_map(|column| is_clock(&column)) })
+    }
+
+    /// The readings from column `first` on and the time in `column`.
+    fn at(&self, first: usize, readings: usize, column: usize) -> Result<Found, String> {
+        if (first..first + readings).contains(&column) {
+            return Err(format!("--time-column {} is one of the readings", column + 1));
+        }
+        let unit = self.cells.get(column).and_then(|cells| TimeUnit::of_column(cells, self.name(column)));
+        let unit = unit.ok_or_else(|| format!("--time-column {} holds no times that rise", column + 1))?;
+        Ok(Found { first, time: Some((column, unit)) })
+    }
+
+    /// Leaves out the last column.
+    pub(super) fn drop_last(&mut self) {
+        self.cells.pop();
+        self.names.iter_mut().for_each(|names| {
+            names.pop();
+        });
+    }
+
+    /// What a column beside the readings holds; `None` if it looks like a reading.
+    fn beside(&self, column: usize) -> Option<Beside> {
+        let (cells, name) = (&self.cells[column], self.name(column));
+        if cells.iter().all(|cell| super::reading(&point(cell)).is_none()) && TimeUnit::of_column(cells, name).is_none()
+        {
+            return Some(Beside::Text);
+        }
+        let whole: Option<Vec<i64>> = cells.iter().map(|cell| cell.parse().ok()).collect();
+        let counts = whole.is_some_and(|whole| {
+            whole.windows(2).all(|pair| pair[1] == pair[0] + 1) && whole.len() > 1 && whole[0] < 1 << 24
+        });
+        match name.is_some_and(is_time) || !counts {
+            true => TimeUnit::of_column(cells, name).map(Beside::Time),
+            false => Some(Beside::Index),
+        }
+    }
+
+    /// Whether a column rises from line to line, through three lines or more.
+    fn rises(&self, column: usize) -> bool {
+        let numbers: Vec<f64> = self.cells[column].iter().filter_map(|cell| point(cell).parse().ok()).collect();
+        numbers.len() > 2
+            && numbers.len() == self.cells[column].len()
+            && numbers.windows(2).all(|pair| pair[0] < pair[1])
+    }
+
+    fn name(&self, column: usize) -> Option<&'t str> {
+        self.names.as_ref()?.get(column).copied()
+    }
+
+    /// Whether the first column rises as a time does, and hardly another one.
+    pub(super) fn begins_with_time(&self) -> bool {
+        let others = 1..self.cells.len();
+        self.rises(0) && others.clone().filter(|&column| self.rises(column)).count() * 2 < others.len()
+    }
+}
+
+/// A name in small letters, with blanks for all that is no letter, without what is in brackets.
+fn plain(name: &str) -> String {
+    let name = name.split(['(', '[']).next().unwrap_or("").to_lowercase();
+    let words: String = name.chars().map(|c| if c.is_alphabetic() { c } else { ' ' }).collect();
+    words.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn is_time(name: &str) -> bool {
+    TIMES.contains(&plain(name).split(' ').next().unwrap_or(""))
+}

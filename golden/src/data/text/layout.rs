@@ -1,0 +1,304 @@
+//! The layout of a text, found from its lines.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use super::cells::{point, Digits, Separator};
+use super::columns::{Columns, Found};
+use super::time::TimeUnit;
+use super::{reading, Line, NoReadings};
+
+/// Lines from which a layout is found.
+const LOOKED_AT: usize = 256;
+
+/// How frames stand in a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A line is a frame, in the order of the rows.
+    Line,
+    /// A line is a row; a frame follows the one before, with or without a blank line or a heading between them.
+    Grid,
+}
+
+/// What is stated of a layout; what is `None` is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stated {
+    /// First and last column of the readings, from 1.
+    pub columns: Option<[usize; 2]>,
+    /// Column of the time, from 1.
+    pub time_column: Option<usize>,
+    /// Lines at the begin that hold no readings.
+    pub skip_rows: usize,
+    /// Frame per line, or grid.
+    pub form: Option<Form>,
+}
+
+/// The layout of a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// What stands between two cells.
+    pub separator: Separator,
+    pub(super) digits: Digits,
+    /// Cells of a line, with the empty one behind a separator at its end.
+    pub(super) cells: usize,
+    /// The last cell is the empty one behind a separator at the end, which a line may lack.
+    trailing: bool,
+    /// First column of the readings, from 0.
+    pub(super) first: usize,
+    /// Readings of a line.
+    pub(super) readings: usize,
+    /// Column of the time, from 0, and its unit.
+    pub time: Option<(usize, TimeUnit)>,
+    /// Frame per line, or grid.
+    pub form: Form,
+    /// Lines of a frame.
+    pub(super) lines: usize,
+    /// A blank line ends a frame of a grid.
+    pub(super) blocks: bool,
+    /// Number of the first line with readings; those before are the header.
+    pub first_line: usize,
+}
+
+/// Lines split at one separator.
+struct Table<'s> {
+    separator: Separator,
+    rows: Vec<(Line<'s>, Vec<Cow<'s, str>>)>,
+    /// Cells of most lines that have numbers.
+    cells: usize,
+    /// The last cell of these is always empty.
+    trailing: bool,
+}
+
+impl Layout {
+    /// The layout of `lines` of an array of `[rows, cols]`.
+    ///
+    /// # Errors
+    /// No layout that fits, or more than one.
+    pub fn of_lines(lines: &[Line], shape: [usize; 2], stated: &Stated) -> Result<Layout, NoReadings> {
+        if lines.is_empty() {
+            return Err(NoReadings::of_text("no line with readings"));
+        }
+        let all = Separator::ALL.into_iter().filter_map(|separator| Table::of(separator, lines));
+        let mut closest: Option<NoReadings> = None;
+        for table in all {
+            match table.layout(shape, stated) {
+                Ok(layout) => return Ok(layout),
+                Err(error) => {
+                    closest.get_or_insert(error);
+                }
+            }
+        }
+        let [rows, cols] = shape;
+        Err(closest.unwrap_or_else(|| {
+            NoReadings::of_line(&lines[0], format!("no numbers, wanted {} of {rows}x{cols} taxels", rows * cols))
+        }))
+    }
+
+    /// The cells of a line.
+    pub(super) fn split<'t>(&self, text: &'t str) -> Vec<Cow<'t, str>> {
+        self.separator.cells(text)
+    }
+
+    /// Readings of a line, NaN where one is missing.
+    pub(super) fn readings_of(&self, line: &Line, cells: &[Cow<str>]) -> Result<Vec<f64>, NoReadings> {
+        let ends_without =
+            self.trailing && cells.len() + 1 == self.cells && cells.last().is_some_and(|cell| !cell.is_empty());
+        if cells.len() != self.cells && !ends_without {
+            let empty = usize::from(self.trailing);
+            let got = cells.len() - empty.min(usize::from(cells.last().is_some_and(|cell| cell.is_empty())));
+            return Err(NoReadings::of_line(line, format!("{got} values, wanted {}", self.cells - empty)));
+        }
+        let own = (self.first..self.first + self.readings).map(|column| {
+            self.digits.reading(&cells[column]).map_err(|reason| NoReadings::of_cell(line, column + 1, reason))
+        });
+        own.collect()
+    }
+
+    /// Whether the other layout reads lines alike: all but the number of the first line.
+    pub(super) fn is_like(&self, other: &Layout) -> bool {
+        (self.separator, self.cells, self.first) == (other.separator, other.cells, other.first)
+    }
+
+    /// Whether the readings of a line are the numbers of their columns, 0, 1, 2 …, as pandas writes them in a header.
+    pub(super) fn has_numbers_of_columns(&self, line: &Line) -> bool {
+        let readings = self.readings_of(line, &self.split(line.text)).unwrap_or_default();
+        readings.len() > 2 && readings.iter().enumerate().all(|(column, reading)| *reading == column as f64)
+    }
+}
+
+impl<'s> Table<'s> {
+    /// The lines split at a separator; `None` if no line has numbers.
+    fn of(separator: Separator, lines: &[Line<'s>]) -> Option<Table<'s>> {
+        let rows: Vec<_> = lines.iter().take(LOOKED_AT).map(|line| (*line, separator.cells(line.text))).collect();
+        let mut counts: Vec<usize> =
+            rows.iter().filter(|(_, cells)| has_numbers(cells)).map(|(_, cells)| cells.len()).collect();
+        counts.sort_unstable();
+        let cells = counts.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len())?[0];
+        let mut table = Table { separator, cells, trailing: false, rows };
+        table.trailing = cells > 1 && table.body(0).all(|cells| cells[cells.len() - 1].is_empty());
+        Some(table)
+    }
+
+    /// Cells of the lines from `first` on that are like most.
+    fn body(&self, first: usize) -> impl Iterator<Item = &Vec<Cow<'s, str>>> + Clone {
+        self.rows[first..]
+            .iter()
+            .map(|(_, cells)| cells)
+            .filter(|cells| cells.len() == self.cells && has_numbers(cells))
+    }
+
+    /// The layout with this separator.
+    fn layout(&self, [rows, cols]: [usize; 2], stated: &Stated) -> Result<Layout, NoReadings> {
+        // A table has a line with numbers.
+        let mut first =
+            self.rows.iter().position(|(_, cells)| cells.len() == self.cells && has_numbers(cells)).unwrap_or(0);
+        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].0, reason);
+        let (form, readings) = self.form([rows, cols], stated).map_err(at_first)?;
+        let lines = if form == Form::Line { 1 } else { rows };
+        let before = first.checked_sub(1).map(|before| &self.rows[before].1);
+        let mut names = before.filter(|names| names.len() == self.cells);
+        let data = self.body(first).count();
+        if self.is_numbered(first, readings) && data > lines && (data - 1).is_multiple_of(lines) {
+            names = Some(&self.rows[first].1);
+            first += 1;
+        }
+        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].0, reason);
+        let found = self.columns(first, names, readings, stated).map_err(at_first)?;
+        let of_readings: Vec<&str> = self
+            .body(first)
+            .flat_map(|cells| cells[found.first..found.first + readings].iter().map(Cow::as_ref))
+            .collect();
+        let layout = Layout {
+            separator: self.separator,
+            digits: Digits::of_cells(of_readings.iter().copied()),
+            cells: self.cells,
+            trailing: self.trailing && found.first + readings < self.cells,
+            first: found.first,
+            readings,
+            time: found.time,
+            form,
+            lines,
+            blocks: form == Form::Grid && self.has_blocks(first, lines),
+            first_line: self.rows[first].0.number,
+        };
+        self.check(first, &layout)?;
+        Ok(layout)
+    }
+
+    /// Frame per line or grid, and the readings of a line.
+    fn form(&self, [rows, cols]: [usize; 2], stated: &Stated) -> Result<(Form, usize), String> {
+        let (taxels, got) = (rows * cols, self.cells);
+        let of = |form: Form| (form, if form == Form::Line { taxels } else { cols });
+        if let Some([a, b]) = stated.columns {
+            let forms =
+                [Form::Line, Form::Grid].into_iter().filter(|form| stated.form.is_none_or(|wanted| wanted == *form));
+            let fits = forms.map(of).find(|(_, readings)| a >= 1 && b + 1 == a + readings && b <= got);
+            return fits.ok_or_else(|| {
+                format!("--columns {a}..{b} of {got}, wanted {taxels} columns of a frame or {cols} of a row")
+            });
+        }
+        let whole = self
+            .body(0)
+            .flatten()
+            .all(|cell| cell.trim_start_matches(['-', '+']).bytes().all(|byte| byte.is_ascii_digit()));
+        if self.separator == Separator::Comma && whole && [2 * taxels, 2 * cols].contains(&got) && got != taxels {
+            let wanted = if got == 2 * cols { cols } else { taxels };
+            return Err(format!(
+                "{got} values, wanted {wanted}; a decimal mark is a point where commas separate values"
+            ));
+        }
+        let own = got - usize::from(self.trailing);
+        match stated.form {
+            Some(form) if own >= of(form).1 || got == of(form).1 => Ok(of(form)),
+            None if got == taxels || own >= taxels => Ok(of(Form::Line)),
+            None if got == cols || own == cols => Ok(of(Form::Grid)),
+            _ => Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row")),
+        }
+    }
+
+    /// The columns of the readings and of the time in the lines from `first` on.
+    fn columns(
+        &self,
+        first: usize,
+        names: Option<&Vec<Cow<str>>>,
+        readings: usize,
+        stated: &Stated,
+    ) -> Result<Found, String> {
+        let column = |column: usize| self.body(first).map(|cells| cells[column].as_ref()).collect::<Vec<&str>>();
+        let cells: Vec<Vec<&str>> = (0..self.cells).map(column).collect();
+        let mut columns = Columns { cells, names: names.map(|names| names.iter().map(Cow::as_ref).collect()) };
+        let time = stated.time_column.map(|column| column.saturating_sub(1));
+        if let Some([a, _]) = stated.columns {
+            return columns.stated(a - 1, readings, time);
+        }
+        // A last column that is always empty is none, unless it makes up the number of readings.
+        if self.trailing && self.cells > readings && !(time.is_some() && self.cells == readings + 1) {
+            columns.drop_last();
+            if self.cells == readings + 1 && columns.begins_with_time() {
+                return Err(format!(
+                    "the last column is empty: a separator behind each line (--columns 1..{readings}), or a time in front and a \
+                     reading that is always missing (--time-column 1)"
+                ));
+            }
+        }
+        columns.find(readings, time)
+    }
+
+    /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … beside names or of nine and more.
+    fn is_numbered(&self, first: usize, readings: usize) -> bool {
+        let cells = &self.rows[first].1;
+        let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
+        let others = cells.iter().filter(|cell| cell.parse::<usize>().is_err());
+        let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none();
+        let names = others.clone().filter(|cell| is_name(cell)).count();
+        let counts = |from: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + from);
+        others.clone().all(|cell| cell.is_empty() || is_name(cell))
+            && numbers.len() > 1
+            && (names > 0 || numbers.len() == readings)
+            && (counts(0) || (names > 0 || readings >= 9) && counts(1))
+    }
+
+    /// Whether frames of `lines` lines stand apart, by blank lines or headings.
+    fn has_blocks(&self, first: usize, lines: usize) -> bool {
+        let rows = self.rows[first..].iter().filter(|(_, cells)| cells.len() == self.cells && has_numbers(cells));
+        let numbers: Vec<usize> = rows.map(|(line, _)| line.number).collect();
+        let runs: Vec<usize> = numbers.chunk_by(|a, b| a + 1 == *b).map(<[usize]>::len).collect();
+        runs.len() > 1 && 2 * runs.iter().filter(|run| **run == lines).count() >= runs.len()
+    }
+
+    /// Checks that at least half of the lines with numbers have readings.
+    fn check(&self, first: usize, layout: &Layout) -> Result<(), NoReadings> {
+        let rows = self.rows[first..].iter().filter(|(_, cells)| has_numbers(cells));
+        let unfit: Vec<Option<NoReadings>> = rows.map(|(line, cells)| layout.readings_of(line, cells).err()).collect();
+        match unfit.iter().flatten().count() * 2 > unfit.len() {
+            true => unfit.into_iter().flatten().next().map_or(Ok(()), Err),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Whether at least half of a line's cells that are not empty are numbers.
+pub(super) fn has_numbers(cells: &[Cow<str>]) -> bool {
+    let filled = cells.iter().filter(|cell| !cell.is_empty());
+    let is_number = |cell: &Cow<str>| reading(&point(cell)).is_some();
+    let (numbers, others): (Vec<_>, Vec<_>) = filled.partition(|cell| is_number(cell));
+    numbers.iter().any(|cell| reading(&point(cell)).is_some_and(f64::is_finite)) && numbers.len() >= others.len()
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mark = if self.digits.mark == Some(',') { ", decimal commas" } else { "" };
+        let header = match self.first_line {
+            1 => String::new(),
+            line => format!(", header above line {line}"),
+        };
+        let time =
+            self.time.map_or(String::new(), |(column, unit)| format!(", time in column {} ({unit})", column + 1));
+        let (a, b) = (self.first + 1, self.first + self.readings);
+        let form = match self.form {
+            Form::Line => "a frame per line".to_owned(),
+            Form::Grid => format!("a grid of {} lines per frame", self.lines),
+        };
+        write!(f, "{form}, separated by {}{mark}{header}{time}, readings in columns {a} to {b}", self.separator)
+    }
+}

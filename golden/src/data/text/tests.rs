@@ -1,0 +1,213 @@
+//! Texts as other programs write them; what is cut, changed in the middle, or can be read in two ways.
+
+use super::*;
+
+fn read(text: &str, shape: [usize; 2]) -> TextFrames {
+    frames(text, shape, &Stated::default()).unwrap_or_else(|error| panic!("{text:?}: {error}"))
+}
+
+fn refused(text: &str, shape: [usize; 2], stated: &Stated) -> String {
+    frames(text, shape, stated).map(|read| panic!("{text:?}: {read:?}")).unwrap_or_else(|error| error.to_string())
+}
+
+/// Readings of each frame; missing ones are −1.
+fn readings(read: &TextFrames) -> Vec<Vec<f64>> {
+    let known = |value: &f64| if value.is_nan() { -1.0 } else { *value };
+    read.frames.iter().map(|frame| frame.readings.iter().map(known).collect()).collect()
+}
+
+/// Two frames of 2×2 in many layouts.
+#[test]
+fn the_same_frames_in_every_layout() {
+    let texts = [
+        "1.5,2,3,4\n2,3,4,5\n",
+        "1.5,2,3,4,\n2,3,4,5,\n",
+        "1.5;2;3;4;\n2;3;4;5\n",
+        "1,5;2;3;4\n2;3;4;5\n",
+        "1.5\t2\t3\t4\t\n2\t3\t4\t5\t\n",
+        "\u{feff}  1.5   2 3 4\r\n2 3 4 5\r\n",
+        "# made up\na,b,c,d\n1.5,2,3,4\n\n2,3,4,5\n",
+        "0,1,2,3\n1.5,2,3,4\n2,3,4,5\n",
+        ",0,1,2,3\n0,1.5,2,3,4\n1,2,3,4,5\n",
+        "t,0,1,2,3,sum\n0.0,1.5,2,3,4,10.5\n0.1,2,3,4,5,14\n",
+        "sum;frame;s1;s2;s3;s4\n10,5;1;1,5;2;3;4\n14;2;2;3;4;5\n",
+        "\"1,5\",\"2\",\"3\",\"4\"\n\"2\",\"3\",\"4\",\"5\"\n",
+        "Device: made up\nUnits: kPa\n\n1.5,2,3,4\n2,3,4,5\n",
+        "2026-01-02T10:00:00,1.5,2,3,4\n2026-01-02T10:00:01,2,3,4,5\n",
+        "left,1.5,2,3,4\nleft,2,3,4,5\n",
+        "1.5,2\n3,4\n2,3\n4,5\n",
+        "1.5,2\n3,4\n\n2,3\n4,5\n",
+        "Frame 1\n1.5 2\n3 4\nFrame 2\n2 3\n4 5\n",
+        "{\"stress_MPa\": [1.5, 2, 3, 4]}\n{\"id\": \"b\", \"timestamp\": 12.5, \"stress_MPa\": [2, 3, 4, 5]}\n",
+    ];
+    for text in texts {
+        assert_eq!(readings(&read(text, [2, 2])), [[1.5, 2.0, 3.0, 4.0], [2.0, 3.0, 4.0, 5.0]], "{text:?}");
+        assert!(read(text, [2, 2]).left_out.is_empty(), "{text:?}");
+    }
+}
+
+#[test]
+fn times_are_found_and_taken_from_the_first_frame() {
+    let apart = |text: &str| {
+        let read = read(text, [2, 2]);
+        let times: Vec<Option<i64>> = read.frames.iter().map(|frame| frame.time_ns).collect();
+        times.last().copied().flatten().zip(times[0]).map(|(last, first)| last - first)
+    };
+    let cases = [
+        ("timestamp,p0,p1,p2,p3\n1732770000.00,1,2,3,4\n1732770000.01,2,3,4,5\n", Some(10_000_000)),
+        ("timestamp,p0,p1,p2,p3\n1732770000000,1,2,3,4\n1732770000010,2,3,4,5\n", Some(10_000_000)),
+        ("2026-01-02T10:00:00.000,1,2,3,4\n2026-01-02T10:00:00.010,2,3,4,5\n", Some(10_000_000)),
+        ("100 1 2 3 4\n110 2 3 4 5\n", Some(10_000_000)),
+        ("0;0,5;1;2;3;4\n1;0,51;2;3;4;5\n", Some(10_000_000)),
+        ("1,2,3,4,0.5\n2,1,4,5,0.51\n0,9,3,2,0.52\n", Some(20_000_000)),
+        ("0,1,2,3,4\n1,2,3,4,5\n2,2,3,4,5\n", None),
+        ("1,2,3,4\n2,3,4,5\n", None),
+    ];
+    for (text, wanted) in cases {
+        assert_eq!(apart(text), wanted, "{text:?}");
+    }
+}
+
+#[test]
+fn missing_readings_are_not_a_number() {
+    for cell in ["", " ", "nan", "NaN", "null", "B", "-nan"] {
+        let text = format!("1,2,3,4\n1,{cell},3,4\n");
+        assert_eq!(readings(&read(&text, [2, 2])), [[1.0, 2.0, 3.0, 4.0], [1.0, -1.0, 3.0, 4.0]], "{cell:?}");
+    }
+    let json = "{\"stress_MPa\": [1, null, NaN, 4], \"id\": \"NaN, \\\"NaN\"}";
+    let read = read(json, [2, 2]);
+    assert_eq!(readings(&read), [[1.0, -1.0, -1.0, 4.0]]);
+    assert_eq!(read.frames[0].id, "NaN, \"NaN");
+}
+
+#[test]
+fn what_does_not_fit_is_left_out_and_named() {
+    let cases = [
+        ("1,2,3,4\n1,2,3\n2,3,4,5\n", "line 2: 3 values, wanted 4"),
+        ("1,2,3,4\n1,2,x,4\n2,3,4,5\n", "line 2, value 3: \"x\" is not a finite number"),
+        ("1,2,3,4\n1,inf,3,4\n2,3,4,5\n", "line 2, value 2: \"inf\" is not a finite number"),
+        (
+            "0.10,2.00,3.00,4.00\n1.00,2.00,3.00,4.0\n2.00,3.00,4.00,5.00\n",
+            "line 2, value 4: \"4.0\" has 1 decimals, the others 2",
+        ),
+        ("1.5,2,3,4\n1,015,3,4\n2,3,4,5\n", "line 2, value 2: \"015\" begins with a zero"),
+        (
+            "1.0e-01,2.0e-01,0.0e+00,4.0e-01\n1.0e-01,2.0e-01,0.0e+00,4.0e-0\n1.0e-01,2.0e-01,0.0e+00,4.0e-01\n",
+            "line 2, value 4: \"4.0e-0\" has an exponent that is cut",
+        ),
+        ("1,2\n3,4\n5,x\n7,8\n9,10\n11,12\n", "line 3, value 2: \"x\" is not a finite number"),
+        ("1,2\n3,4\n\n5,6\n\n7,8\n9,10\n", "line 5: the frame before has 1 rows, wanted 2"),
+        ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress_MPa\":[1,2,3]}\n", "line 2: stress_MPa has 3 values, wanted 4"),
+        ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress\":[1,2,3,4]}\n", "line 2: column 9: unknown field `stress`"),
+    ];
+    for (text, wanted) in cases {
+        let read = read(text, [2, 2]);
+        assert_eq!(read.left_out.len(), 1, "{text:?}: {read:?}");
+        assert!(!read.frames.is_empty(), "{text:?}");
+        let reason = read.left_out[0].reason.to_string();
+        assert!(reason.starts_with(wanted), "{text:?}: {reason}");
+    }
+}
+
+#[test]
+fn what_can_be_read_in_two_ways_is_refused_until_it_is_stated() {
+    let none = Stated::default();
+    let columns = |a: usize, b: usize| Stated { columns: Some([a, b]), ..none };
+    let time = |column: usize| Stated { time_column: Some(column), ..none };
+    // A time and a last taxel that is dead, or a separator behind each line.
+    let dead = "0.1,5,2,4,\n0.2,4,3,4,\n0.3,6,2,1,\n";
+    let refusal = refused(dead, [2, 2], &none);
+    assert!(refusal.contains("--columns 1..4") && refusal.contains("--time-column 1"), "{refusal}");
+    assert_eq!(readings(&frames(dead, [2, 2], &columns(1, 4)).unwrap())[0], [0.1, 5.0, 2.0, 4.0]);
+    let timed = frames(dead, [2, 2], &time(1)).unwrap();
+    assert_eq!((readings(&timed)[0].clone(), timed.frames[0].time_ns), (vec![5.0, 2.0, 4.0, -1.0], Some(100_000_000)));
+    // Columns in front and behind that both rise.
+    let both = "0.1,5,2,4,1\n0.2,4,3,4,2\n0.3,6,2,1,4\n";
+    assert!(refused(both, [2, 2], &none).contains("--time-column 1 or --time-column 5"));
+    assert_eq!(readings(&frames(both, [2, 2], &time(5)).unwrap())[0], [0.1, 5.0, 2.0, 4.0]);
+    // A column that is nothing known, and more than three.
+    assert!(
+        refused("5,1,2,3,4\n3,1,2,3,4\n4,1,2,3,4\n", [2, 2], &none).contains("--columns A..B says which are readings")
+    );
+    assert!(refused("9,9,9,9,9,1,2,3,4\n9,9,9,9,9,1,2,3,4\n", [2, 2], &none).contains("--columns A..B"));
+    assert_eq!(readings(&frames("5,1,2,3,4\n", [2, 2], &columns(2, 5)).unwrap()), [[1.0, 2.0, 3.0, 4.0]]);
+    // Commas as decimal marks and separators.
+    assert!(refused("0,1,0,2,0,3,0,4\n", [2, 2], &none).contains("8 values, wanted 4; a decimal mark is a point"));
+    // A mark of thousands among decimal points.
+    assert!(refused("1,234;0.5;1;2\n1,234;0.5;1;2\n", [2, 2], &none).contains("has a comma"));
+    // Statements that do not fit.
+    for (stated, wanted) in [
+        (columns(1, 3), "--columns 1..3 of 4, wanted 4 columns of a frame or 2 of a row"),
+        (columns(3, 6), "--columns 3..6 of 4"),
+        (time(2), "--time-column 2 is one of the readings"),
+        (Stated { form: Some(Form::Line), ..none }, "line 1: 2 values, wanted 4"),
+    ] {
+        let text = if stated.form.is_some() { "1,2\n3,4\n" } else { "1,2,3,4\n" };
+        let refusal = refused(text, [2, 2], &stated);
+        assert!(refusal.contains(wanted), "{refusal}");
+    }
+    assert_eq!(refused("", [2, 2], &none), "no line with readings");
+    assert_eq!(refused("a,b,c,d\n", [2, 2], &none), "line 1: no numbers, wanted 4 of 2x2 taxels");
+    // More lines that do not fit than fit are of another array.
+    assert_eq!(
+        refused("1,2,3\n1,2,3\n1,2,3,4\n", [2, 2], &none),
+        "line 1: 3 values, wanted 4 of a frame or 2 of a row"
+    );
+    // What is skipped is not looked at.
+    assert_eq!(readings(&frames("5,6,7,8\n1,2,3,4\n", [2, 2], &Stated { skip_rows: 1, ..none }).unwrap()).len(), 1);
+}
+
+/// The lines of a stream, whose layout is that of its first line.
+#[test]
+fn a_stream_takes_the_layout_of_its_first_line_until_three_have_another() {
+    let mut reader = Reader::new([2, 3], Stated::default());
+    let lines = [
+        "a,b,c,d,e,f",
+        "0.1 0.2 0.3 0.1 0.2 0.3",
+        "0.1,0.2,0.3,0.1,0.2,0.3,",
+        "0.1 0.2 0.3 0.1 0.2 0.3",
+        "12.5,0.1,0.2,0.3,0.1,0.2,0.3",
+        "12.6,0.1,0.2,0.3,0.1,0.2,0.3",
+        "12.7,0.1,0.2,0.3,0.1,0.2,0.3",
+    ];
+    let read: Vec<Read> =
+        lines.iter().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+    let is_frame = |read: &Read| matches!(read, Read::Frame(_));
+    assert_eq!(read[0], Read::Header);
+    assert_eq!(read.iter().map(is_frame).collect::<Vec<_>>(), [false, true, false, true, false, false, true]);
+    let Read::LeftOut(left_out) = &read[2] else { panic!("{:?}", read[2]) };
+    let reason = left_out.reason.to_string();
+    assert_eq!(reason, "line 3: 1 values, wanted 6; this line is separated by commas, those before by blanks");
+    let Read::Frame(frame) = &read[6] else { panic!("{:?}", read[6]) };
+    assert_eq!((frame.line, frame.time_ns), (7, Some(12_700_000_000)));
+    // A grid, with a blank line between frames and a row that is lost.
+    let mut reader = Reader::new([2, 3], Stated::default());
+    let rows = ["1,2,3", "4,5,6", "", "1,2,3", "", "7,8,9", "4,5,6"];
+    let read: Vec<Read> =
+        rows.iter().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+    assert_eq!(read.iter().map(is_frame).collect::<Vec<_>>(), [true, false, true], "{read:?}");
+    assert!(reader.finish().is_empty());
+}
+
+/// One byte of a line is lost, at every place of 40 lines: a line that is still read has the readings that were written, but for
+/// a digit of a whole number or a sign, which nothing shows.
+#[test]
+fn a_lost_byte_makes_no_other_number() {
+    let line = |k: usize| {
+        (0..9).map(|taxel| format!("{:.4}", 0.0123 * ((k * taxel) % 37) as f64)).collect::<Vec<_>>().join(",")
+    };
+    let lines: Vec<String> = (0..40).map(line).collect();
+    let whole = read(&(lines.join("\n") + "\n"), [3, 3]);
+    let mut wrong = 0;
+    for (number, text) in lines.iter().enumerate() {
+        for byte in 0..text.len() {
+            let mut cut = lines.clone();
+            cut[number].remove(byte);
+            let read = read(&(cut.join("\n") + "\n"), [3, 3]);
+            assert_eq!(read.frames.len() + read.left_out.len(), 40);
+            let own = read.frames.iter().find(|frame| frame.line == number + 1);
+            wrong += usize::from(own.is_some_and(|own| own.readings != whole.frames[number].readings));
+        }
+    }
+    assert_eq!(wrong, 0);
+}
