@@ -84,7 +84,7 @@ impl<'t> Columns<'t> {
     pub(super) fn find(&self, readings: usize, time: Option<usize>) -> Result<Found, String> {
         let beside = self.cells.len() - readings;
         if beside == 0 {
-            return Ok(Found { first: 0, time: None });
+            return time.map_or(Ok(Found { first: 0, time: None }), |column| self.at(0, readings, column));
         }
         if let Some(first) = self.named(readings) {
             return self.with_time(first, readings, time);

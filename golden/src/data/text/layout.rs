@@ -57,6 +57,8 @@ pub struct Layout {
     pub(super) blocks: bool,
     /// Number of the first line with readings; those before are the header.
     pub first_line: usize,
+    /// Number of the line with the names or numbers of the columns, if there is one.
+    names_line: Option<usize>,
 }
 
 /// Lines split at one separator.
@@ -79,17 +81,19 @@ impl Layout {
             return Err(NoReadings::of_text("no line with readings"));
         }
         let all = Separator::ALL.into_iter().filter_map(|separator| Table::of(separator, lines));
-        let mut closest: Option<NoReadings> = None;
+        // The reason of the separator that finds most cells.
+        let mut closest: Option<(usize, NoReadings)> = None;
         for table in all {
             match table.layout(shape, stated) {
                 Ok(layout) => return Ok(layout),
-                Err(error) => {
-                    closest.get_or_insert(error);
+                Err(error) if closest.as_ref().is_none_or(|(cells, _)| table.cells > *cells) => {
+                    closest = Some((table.cells, error));
                 }
+                Err(_) => (),
             }
         }
         let [rows, cols] = shape;
-        Err(closest.unwrap_or_else(|| {
+        Err(closest.map(|(_, error)| error).unwrap_or_else(|| {
             NoReadings::of_line(&lines[0], format!("no numbers, wanted {} of {rows}x{cols} taxels", rows * cols))
         }))
     }
@@ -117,6 +121,19 @@ impl Layout {
     /// Whether the other layout reads lines alike: all but the number of the first line.
     pub(super) fn is_like(&self, other: &Layout) -> bool {
         (self.separator, self.cells, self.first) == (other.separator, other.cells, other.first)
+    }
+
+    /// Whether the cells of a line between the rows of a grid are a heading: words, or some of another number.
+    pub(super) fn is_heading(&self, cells: &[Cow<str>]) -> bool {
+        let numbers = cells.iter().filter(|cell| reading(&point(cell)).is_some_and(f64::is_finite)).count();
+        numbers == 0 || (cells.len() != self.cells && 2 * numbers <= cells.len())
+    }
+
+    /// Whether a line before the first readings is a part of the header: its names, or fewer numbers than half of a line's readings.
+    pub(super) fn is_header(&self, line: &Line) -> bool {
+        let cells = self.split(line.text);
+        let numbers = cells.iter().filter(|cell| reading(&point(cell)).is_some_and(f64::is_finite)).count();
+        Some(line.number) == self.names_line || 2 * numbers < self.readings
     }
 
     /// Whether the readings of a line are the numbers of their columns, 0, 1, 2 …, as pandas writes them in a header.
@@ -180,6 +197,7 @@ impl<'s> Table<'s> {
             lines,
             blocks: form == Form::Grid && self.has_blocks(first, lines),
             first_line: self.rows[first].0.number,
+            names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].0.number),
         };
         self.check(first, &layout)?;
         Ok(layout)
@@ -244,18 +262,18 @@ impl<'s> Table<'s> {
         columns.find(readings, time)
     }
 
-    /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … beside names or of nine and more.
+    /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … of nine and more.
     fn is_numbered(&self, first: usize, readings: usize) -> bool {
         let cells = &self.rows[first].1;
         let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
         let others = cells.iter().filter(|cell| cell.parse::<usize>().is_err());
-        let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none();
+        let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
         let names = others.clone().filter(|cell| is_name(cell)).count();
         let counts = |from: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + from);
         others.clone().all(|cell| cell.is_empty() || is_name(cell))
             && numbers.len() > 1
             && (names > 0 || numbers.len() == readings)
-            && (counts(0) || (names > 0 || readings >= 9) && counts(1))
+            && (counts(0) || readings >= 9 && counts(1))
     }
 
     /// Whether frames of `lines` lines stand apart, by blank lines or headings.

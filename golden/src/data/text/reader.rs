@@ -118,8 +118,12 @@ pub fn frames(text: &str, shape: [usize; 2], stated: &Stated) -> Result<TextFram
     let first_line = layout.as_ref().map_or(1, |layout| layout.first_line);
     reader.layout.clone_from(&layout);
     let mut read = TextFrames { layout, frames: Vec::new(), left_out: Vec::new() };
-    let ends = lines.into_iter().filter(|line| line.number >= first_line || is_json(line));
-    for line in ends {
+    // Before the first readings stands a header; a line of numbers there is one that does not fit.
+    let is_header = |line: &Line| {
+        line.number < first_line && !is_json(line) && read.layout.as_ref().is_none_or(|layout| layout.is_header(line))
+    };
+    let own: Vec<Line> = lines.into_iter().filter(|line| !is_header(line)).collect();
+    for line in own {
         read.add(reader.push(line));
     }
     read.add(reader.finish());
@@ -168,7 +172,7 @@ impl Reader {
             return Vec::new();
         }
         let is_apart = self.last > 0 && line.number > self.last + 1;
-        self.last = line.number;
+        let before = std::mem::replace(&mut self.last, line.number);
         if line.text.trim_start().starts_with('{') {
             return vec![json_frame(&line, self.shape[0] * self.shape[1])];
         }
@@ -184,14 +188,14 @@ impl Reader {
         let Some(layout) = self.layout.clone() else { return Vec::new() };
         match layout.form {
             Form::Line => vec![self.line(&layout, &line)],
-            Form::Grid => self.row(&layout, &line, is_apart),
+            Form::Grid => self.row(&layout, &line, before, is_apart),
         }
     }
 
     /// The end of the text: what is left of a frame that is not complete.
     pub fn finish(&mut self) -> Vec<Read> {
         let wanted = self.layout.as_ref().map_or(0, |layout| layout.lines);
-        self.cut(wanted)
+        self.cut(wanted, self.last)
     }
 
     /// A line that is a frame.
@@ -220,24 +224,24 @@ impl Reader {
             self.layout = Some(own.clone());
             return self.line(&own, line);
         }
-        let is = |layout: &Layout| match own.separator == layout.separator {
-            true => format!("{} values", layout.cells),
-            false => format!("separated by {}", layout.separator),
+        let [now, before] = match own.separator == layout.separator {
+            true => [&own, layout].map(|layout| format!("of {} values", layout.cells)),
+            false => [&own, layout].map(|layout| format!("separated by {}", layout.separator)),
         };
-        reason.reason += &format!("; this line is {}, those before {}", is(&own), is(layout));
+        reason.reason += &format!("; this line is {now}, those before are {before}");
         self.other = Some((own, count));
         Read::LeftOut(LeftOut { id: Value::Null, reason })
     }
 
-    /// A row of a grid.
-    fn row(&mut self, layout: &Layout, line: &Line, is_apart: bool) -> Vec<Read> {
+    /// A row of a grid; `before` is the number of the line before, and `is_apart` whether a blank line is between.
+    fn row(&mut self, layout: &Layout, line: &Line, before: usize, is_apart: bool) -> Vec<Read> {
         let cells = layout.split(line.text);
-        let is_heading = !has_numbers(&cells);
+        let is_heading = layout.is_heading(&cells);
         if is_apart && self.blocks.is_none() {
             self.blocks = Some(self.rows.is_empty());
         }
         let mut read = match is_heading || (is_apart && self.blocks == Some(true)) {
-            true => self.cut(layout.lines),
+            true => self.cut(layout.lines, before),
             false => Vec::new(),
         };
         if is_heading {
@@ -262,17 +266,17 @@ impl Reader {
         read
     }
 
-    /// Ends a frame of a grid that is not complete.
-    fn cut(&mut self, wanted: usize) -> Vec<Read> {
+    /// Ends a frame of a grid that is not complete, after the line `before`.
+    fn cut(&mut self, wanted: usize, before: usize) -> Vec<Read> {
         let rows = std::mem::take(&mut self.rows);
         if rows.is_empty() {
             return Vec::new();
         }
         let got = rows.len();
         let short = NoReadings {
-            line: Some(self.last),
+            line: Some(before),
             cell: None,
-            reason: format!("the frame before has {got} rows, wanted {wanted}"),
+            reason: format!("the frame ends after {got} of {wanted} rows"),
         };
         vec![Read::LeftOut(LeftOut {
             id: Value::Null,

@@ -37,7 +37,7 @@ fn the_same_frames_in_every_layout() {
         "left,1.5,2,3,4\nleft,2,3,4,5\n",
         "1.5,2\n3,4\n2,3\n4,5\n",
         "1.5,2\n3,4\n\n2,3\n4,5\n",
-        "Frame 1\n1.5 2\n3 4\nFrame 2\n2 3\n4 5\n",
+        "Frame 1 of 2\n1.5 2\n3 4\nFrame 2 of 2\n2 3\n4 5\n",
         "{\"stress_MPa\": [1.5, 2, 3, 4]}\n{\"id\": \"b\", \"timestamp\": 12.5, \"stress_MPa\": [2, 3, 4, 5]}\n",
     ];
     for text in texts {
@@ -96,7 +96,7 @@ fn what_does_not_fit_is_left_out_and_named() {
             "line 2, value 4: \"4.0e-0\" has an exponent that is cut",
         ),
         ("1,2\n3,4\n5,x\n7,8\n9,10\n11,12\n", "line 3, value 2: \"x\" is not a finite number"),
-        ("1,2\n3,4\n\n5,6\n\n7,8\n9,10\n", "line 5: the frame before has 1 rows, wanted 2"),
+        ("1,2\n3,4\n\n5,6\n\n7,8\n9,10\n", "line 4: the frame ends after 1 of 2 rows"),
         ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress_MPa\":[1,2,3]}\n", "line 2: stress_MPa has 3 values, wanted 4"),
         ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress\":[1,2,3,4]}\n", "line 2: column 9: unknown field `stress`"),
     ];
@@ -177,7 +177,10 @@ fn a_stream_takes_the_layout_of_its_first_line_until_three_have_another() {
     assert_eq!(read.iter().map(is_frame).collect::<Vec<_>>(), [false, true, false, true, false, false, true]);
     let Read::LeftOut(left_out) = &read[2] else { panic!("{:?}", read[2]) };
     let reason = left_out.reason.to_string();
-    assert_eq!(reason, "line 3: 1 values, wanted 6; this line is separated by commas, those before by blanks");
+    assert_eq!(
+        reason,
+        "line 3: 1 values, wanted 6; this line is separated by commas, those before are separated by blanks"
+    );
     let Read::Frame(frame) = &read[6] else { panic!("{:?}", read[6]) };
     assert_eq!((frame.line, frame.time_ns), (7, Some(12_700_000_000)));
     // A grid, with a blank line between frames and a row that is lost.
