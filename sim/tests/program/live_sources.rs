@@ -165,4 +165,9 @@ fn what_a_board_does_not_take_is_refused() {
     assert!(finger.contains("--board absent: the board applies input.calibration of scene pad"), "{finger}");
     let port = run(&["pad.toml", "--stream"]);
     assert!(port.ends_with("error: port absent: No such file or directory\n"), "{port}");
+    let rate = run(&["pad.toml", "--stream", "--rate", "100"]);
+    assert!(
+        rate.ends_with("--rate = 100 is not allowed: the board at absent computes every frame that arrives\n"),
+        "{rate}"
+    );
 }
