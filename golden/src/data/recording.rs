@@ -12,16 +12,18 @@ pub mod file;
 pub mod message;
 pub mod read;
 
-pub use file::{Kind, RecordingFile, Stamp};
+pub use file::{frame_messages, Kind, RecordingFile, Stamp};
 pub use read::{End, FrameOptions, Frames, Messages, Recorded, RecordedFrame};
 
-use message::{Header, Image, Message};
 use thiserror::Error;
 
 /// Channel of the frames for viewers, which take pixels of 32 bits.
 pub const STRESS: &str = "/dermis/stress";
 /// Channel of the frames with every bit of their values.
 pub const EXACT: &str = "/dermis/stress_exact";
+
+/// What begins the library's name in the header of a file that Dermis writes.
+const LIBRARY: &str = "dermis ";
 
 /// What is wrong with a recording, in words without the file's name.
 #[derive(Debug, Error)]
@@ -48,24 +50,4 @@ impl From<mcap::McapError> for RecordingError {
             other => RecordingError(other.to_string()),
         }
     }
-}
-
-/// The messages of a frame of `rows` × `cols` readings in MPa, NaN where one is missing: channel and bytes of each.
-///
-/// # Errors
-/// A header that CDR cannot represent.
-pub fn frame_messages(
-    [rows, cols]: [usize; 2],
-    header: &Header,
-    readings_MPa: &[f64],
-) -> Result<[(&'static str, Vec<u8>); 2], RecordingError> {
-    let exact: Vec<u8> = readings_MPa.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let rounded: Vec<u8> = readings_MPa.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
-    let image = |encoding: &str, data: &[u8]| {
-        let (height, width, step) = (rows as u32, cols as u32, (data.len() / rows.max(1)) as u32);
-        let image =
-            Image { header: header.clone(), height, width, encoding: encoding.into(), is_bigendian: 0, step, data };
-        image.to_cdr().map_err(RecordingError)
-    };
-    Ok([(EXACT, image(read::DOUBLE, &exact)?), (STRESS, image(read::SINGLE, &rounded)?)])
 }

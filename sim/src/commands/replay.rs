@@ -95,7 +95,7 @@ fn write_results(mut messages: Messages, output: &mut dyn Write) -> Result<End> 
             output.write_all(b"\n")?;
         }
     }
-    match found {
+    match found || messages.end() == End::Cut {
         true => Ok(messages.end()),
         false => bail!(messages.without(RESULT)),
     }

@@ -44,6 +44,8 @@ pub struct Recorder {
 
 /// The messages of one outcome.
 struct Entry {
+    /// When it was made.
+    made: Instant,
     stamp: Stamp,
     /// Channel, type and bytes of each.
     messages: Vec<(String, Kind, Vec<u8>)>,
@@ -93,7 +95,12 @@ impl Recorder {
             Outcome::Refusal(_) => (self.results, seconds(SystemTime::now())),
         };
         let stamp = Stamp { sequence, logged: nanoseconds(logged_s) };
-        let mut entry = Entry { stamp, messages: Vec::new(), is_result: matches!(outcome, Outcome::Answer(_)) };
+        let mut entry = Entry {
+            made: Instant::now(),
+            stamp,
+            messages: Vec::new(),
+            is_result: matches!(outcome, Outcome::Answer(_)),
+        };
         if let Outcome::Answer(answer) = outcome {
             self.answer(answer, &mut entry).map_err(|error| anyhow!("{}: {error}", self.path.display()))?;
             self.results += 1;
@@ -165,12 +172,12 @@ fn write_until_failure(
     loop {
         let wait = since.map_or(CHUNK, |since| CHUNK.saturating_sub(since.elapsed()));
         match entries.recv_timeout(wait) {
-            Ok(Entry { stamp, messages, is_result }) => {
+            Ok(Entry { made, stamp, messages, is_result }) => {
                 for (topic, kind, bytes) in messages {
                     file.message(&topic, kind, stamp, &bytes)?;
                 }
                 waiting += u64::from(is_result);
-                since.get_or_insert_with(Instant::now);
+                since.get_or_insert(made);
             }
             Err(RecvTimeoutError::Timeout) => (),
             Err(RecvTimeoutError::Disconnected) => {

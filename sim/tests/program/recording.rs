@@ -249,7 +249,7 @@ fn a_full_disk_is_said_at_once_and_the_answers_go_on() {
     let work = searching();
     // A file of more than this size cannot be written, as on a full disk; dash counts blocks of 512 bytes.
     let mut shell = Command::new("sh");
-    shell.args(["-c", "trap '' XFSZ; ulimit -f 128; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_dermis")]).args(RECORD);
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 2048; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_dermis")]).args(RECORD);
     let mut recording = Recording::begin(&mut shell, work.path());
     let mut words = BufReader::new(recording.child.stderr.take().unwrap()).lines().map_while(Result::ok);
     let said = words.find(|line| line.starts_with("killed.mcap")).unwrap();

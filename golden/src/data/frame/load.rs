@@ -123,7 +123,7 @@ fn without_mark(text: &str) -> &str {
 }
 
 /// The file's name without its ending.
-pub(super) fn stem(path: &Path) -> String {
+fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 

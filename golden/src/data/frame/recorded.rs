@@ -36,13 +36,14 @@ impl Recording {
         let shape = [scene.sensor.rows, scene.sensor.cols];
         let options = FrameOptions { shape: Some(shape), ..FrameOptions::default() };
         let mut frames = Frames::open(path, options).map_err(wrong)?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let (mut found, mut count) = (Vec::new(), 0);
         while let Some(recorded) = frames.next_frame().map_err(wrong)? {
             count += 1;
             if number.is_some_and(|number| number != count) {
                 continue;
             }
-            let id = frame_name(&super::load::stem(path), count);
+            let id = frame_name(&stem, count);
             let frame = Frame::from_stress(&id, &scene.sensor, recorded.stress_MPa)?;
             frame.check_missing(&format!("{file}:{count}"), Some(scene))?;
             found.push(frame);
@@ -109,7 +110,7 @@ mod tests {
         assert_eq!(Frame::load_recorded(&path, Some(&scene)).unwrap(), frames);
         for (k, frame) in frames.iter().enumerate() {
             assert_eq!(Frame::load(numbered(k + 1), Some(&scene)).unwrap(), *frame);
-            assert_eq!(Frame::load_all(numbered(k + 1), Some(&scene)).unwrap(), [frame.clone()]);
+            assert_eq!(Frame::load_all(numbered(k + 1), Some(&scene)).unwrap(), std::slice::from_ref(frame));
         }
         let error = |path: &str, scene: Option<&Scene>| Frame::load(path, scene).unwrap_err().to_string();
         let named = path.display().to_string();

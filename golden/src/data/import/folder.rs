@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 const SUMMARY: &str = "recording.json";
 /// Largest summary in bytes; a frame takes some 150.
 const LARGEST_SUMMARY: u64 = 64 << 20;
-/// Frames that are written to the disk at a time.
+/// Frames that are written at a time.
 const FRAMES_AT_A_TIME: u64 = 8192;
 
 impl Summary {

@@ -7,7 +7,7 @@
 //!
 //! Whatever stops the program between two writes leaves a valid file without an index. A write that fails, as on a full disk, is
 //! taken back: the end takes the place of what was begun, in blocks that the file already has. Only what is stopped within a
-//! write, by a signal or a loss of power, leaves part of a chunk at the end.
+//! write, by a signal, leaves part of a chunk at the end. What a loss of power leaves is up to the operating system.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,8 +19,9 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Compression, WriteOptions, Writer};
 
-use super::message::{Image, Message};
-use super::{RecordingError, EXACT, STRESS};
+use super::message::{Header, Image, Message};
+use super::read::{DOUBLE, SINGLE};
+use super::{RecordingError, EXACT, LIBRARY, STRESS};
 
 /// What the records of a file that is not completed end with: DataEnd without check sum, Footer without index, the magic.
 const END: &[u8] = &[
@@ -46,8 +47,6 @@ const OFFERED_QOS: &str = "\
     nsec: 854775807
   avoid_ros_namespace_conventions: false
 ";
-/// What begins the library's name in a header that this module writes.
-pub(super) const LIBRARY: &str = "dermis ";
 
 /// A type of messages.
 #[derive(Clone, Copy, Debug)]
@@ -141,7 +140,7 @@ impl RecordingFile {
         Ok(channel)
     }
 
-    /// Ends the chunk and writes it to the disk; after an error the file is as it was before, and takes no more.
+    /// Ends the chunk and writes it to the file; after an error the file is as it was before, and takes no more.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -157,6 +156,26 @@ impl RecordingFile {
         self.writer.finish()?;
         Ok(self.writer.into_inner().into_inner().completed()?)
     }
+}
+
+/// The messages of a frame of `rows` × `cols` readings in MPa, NaN where one is missing: channel and bytes of each.
+///
+/// # Errors
+/// A header that CDR cannot represent.
+pub fn frame_messages(
+    [rows, cols]: [usize; 2],
+    header: &Header,
+    readings_MPa: &[f64],
+) -> Result<[(&'static str, Vec<u8>); 2], RecordingError> {
+    let exact: Vec<u8> = readings_MPa.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let rounded: Vec<u8> = readings_MPa.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
+    let image = |encoding: &str, data: &[u8]| {
+        let (height, width, step) = (rows as u32, cols as u32, (data.len() / rows.max(1)) as u32);
+        let image =
+            Image { header: header.clone(), height, width, encoding: encoding.into(), is_bigendian: 0, step, data };
+        image.to_cdr().map_err(RecordingError::new)
+    };
+    Ok([(EXACT, image(DOUBLE, &exact)?), (STRESS, image(SINGLE, &rounded)?)])
 }
 
 /// A file of whole records with an end behind them.
@@ -176,15 +195,10 @@ impl Whole {
         self.file.sync_data()
     }
 
-    fn append(&mut self) -> std::io::Result<()> {
-        self.file.write_all_at(&self.pending, self.length)?;
-        self.file.sync_data()
-    }
-
     /// Whether a write failed; the library would complete the file without what that one had.
     fn usable(&self) -> std::io::Result<()> {
         if self.failed {
-            return Err(Error::new(ErrorKind::Other, "a write failed before"));
+            return Err(Error::other("a write failed before"));
         }
         Ok(())
     }
@@ -201,7 +215,8 @@ impl Write for Whole {
         self.usable()?;
         let bytes = self.pending.len() as u64;
         self.pending.extend_from_slice(END);
-        let appended = self.append();
+        // Not synchronised: a disk that takes a second for that would hold up what comes next.
+        let appended = self.file.write_all_at(&self.pending, self.length);
         self.pending.clear();
         match appended {
             Ok(()) => self.length += bytes,
