@@ -137,9 +137,9 @@ pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<
         frames.truncate(1);
     } else if !scene.input.has_memory() && frames.len() != wanted {
         let (origin, got) = (named.unwrap_or(&scene.name), frames.len());
+        let hint = if got > files.len() { "; FILE.mcap:N is frame N of a recording" } else { "" };
         bail!(
-            "{origin}: input.average = {average}: the number of frames must be 2^{average} = {wanted}, got {got}; \
-               FILE.mcap:N is frame N of a recording"
+            "{origin}: input.average = {average}: the number of frames must be 2^{average} = {wanted}, got {got}{hint}"
         );
     }
     Ok((scene, frames))
