@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
@@ -91,7 +92,8 @@ impl Arguments {
             (Some(source), _) => open(source, scene, self.baud).map(Some),
             (None, Some(path)) => {
                 let (name, shape) = (path.display().to_string(), Some([scene.sensor.rows, scene.sensor.cols]));
-                let lines = Lines::open(path.clone(), shape, Pace::Recorded, self.repeat);
+                let options = FrameOptions { shape, ..FrameOptions::default() };
+                let lines = Lines::open(path.clone(), options, Pace::Recorded, [self.repeat, false]);
                 let lines = lines.map_err(|error| anyhow!("--recording {name}: {error}"))?;
                 Ok(Some((Box::new(lines), name)))
             }
