@@ -247,6 +247,16 @@ pub fn largest_code(bits: u32) -> i32 {
     ((1i64 << (bits - 1)) - 1) as i32
 }
 
+/// Whether the hardware checks the codes of its frames, see [`Scene::checks_codes`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CodeCheck {
+    /// Where it can.
+    #[default]
+    On,
+    /// It does not.
+    Off,
+}
+
 /// Whether the hardware checks its coefficient memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CoefficientCheck {
@@ -307,6 +317,11 @@ table! {
             choice(&[("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)])
                 .or(CoefficientCheck::None)
                 .page("robustness");
+        /// Whether the hardware itself finds clipped codes, and rows and columns that repeat the one before.
+        code_check: CodeCheck = choice(&[("on", CodeCheck::On), ("off", CodeCheck::Off)])
+            .or(CodeCheck::On)
+            .hardware("parallel engine, from 4 × 4 taxels on, no writable tables")
+            .page("architecture/prepare");
         /// Estimator of the hardware and its bit-true model; left out, [`Scene::choose_for_hardware`] takes one. A network takes up to
         /// 144 taxels in one subarray, or `"contacts"`.
         estimator: Option<EstimatorKind> = choice(&EstimatorKind::HARDWARE_NAMES)
@@ -548,7 +563,17 @@ impl ObjectiveKind {
     }
 }
 
+/// Fewest rows and columns of which the hardware checks codes: with fewer no line has others on both sides.
+const LEAST_LINES: usize = 4;
+
 impl Scene {
+    /// Whether the hardware checks the codes of its frames for plateaus and repeated lines: not with the serial engine, whose plan
+    /// says so in `hardware.code_check`, nor where tables are written, as signs of gains and dead taxels are not known before.
+    pub fn checks_codes(&self) -> bool {
+        let large = self.sensor.rows >= LEAST_LINES && self.sensor.cols >= LEAST_LINES;
+        self.hardware.code_check == CodeCheck::On && large && !self.hardware.has_writable_tables()
+    }
+
     /// The cases in which the scene can be compared: `all`, or with a network the scene's own, for which it was trained.
     pub fn cases_of(&self, all: &[Case]) -> Vec<Case> {
         match self.hardware_estimator() {
