@@ -210,7 +210,10 @@ fn a_recording_that_is_killed_at_any_moment_has_every_frame_older_than_a_second(
     let kill = |seed: u64| {
         let mut random = fastrand::Rng::with_seed(seed);
         let work = searching();
-        let recording = Recording::begin(Command::new(env!("CARGO_BIN_EXE_dermis")).args(RECORD), work.path());
+        // Under nohup SIGHUP would be ignored.
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_dermis")]).args(RECORD);
+        let recording = Recording::begin(&mut command, work.path());
         std::thread::sleep(Duration::from_secs_f64(1.2 + 1.5 * random.f64()));
         let signal = if random.bool() { Signal::KILL } else { Signal::HUP };
         let killed = Instant::now();
