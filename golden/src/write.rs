@@ -12,7 +12,7 @@
 //! A path that is no regular file, such as a pipe or `/dev/stdout`, is written to directly: it has no old content to
 //! keep.
 
-use std::fs::{self, Permissions};
+use std::fs::{self, File, Permissions};
 use std::io::{Error, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -44,14 +44,22 @@ impl FileError {
 /// # Errors
 /// [`FileError`] if the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    replace(path, bytes).map_err(FileError::at(path))
+    replace(path, |file| file.write_all(bytes))
 }
 
-fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+/// Replaces the file at `path` by what `fill` writes into an empty one, atomically.
+///
+/// # Errors
+/// [`FileError`] if the file cannot be written, or with the error of `fill`.
+pub fn replace(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), Error>) -> Result<(), FileError> {
+    replace_file(path, fill).map_err(FileError::at(path))
+}
+
+fn replace_file(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), Error>) -> Result<(), Error> {
     // A symbolic link is kept and its target replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if fs::metadata(&target).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return fs::write(&target, bytes);
+        return fill(&mut File::options().write(true).open(&target)?);
     }
     let folder = match target.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -64,7 +72,7 @@ fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         .prefix(".dermis-")
         .permissions(Permissions::from_mode(NEW_FILE))
         .tempfile_in(folder)?;
-    part.write_all(bytes)?;
+    fill(part.as_file_mut())?;
     if let Ok(found) = fs::metadata(&target) {
         part.as_file().set_permissions(found.permissions())?;
     }

@@ -364,6 +364,8 @@ mod tests {
                 // Most of the scenes search the whole array.
                 let has = match bit.feature {
                     Feature::WholeSearch => !matches!(feature, Feature::Adaptive | Feature::Contacts),
+                    // All have four rows and columns and the parallel engine.
+                    Feature::CodeCheck => *feature != Feature::WritableTables,
                     other => with.contains(&other),
                 };
                 let wanted = has.then_some(bit.mask());

@@ -167,7 +167,7 @@ impl Scene {
         Stress::shipped(&self.spec).into_iter().map(Frame::from).collect()
     }
 
-    /// Read all frames of a .csv or .json file, or of a folder of them.
+    /// Read all frames of a .csv, .json or .mcap file, or of a folder of them; `name.mcap:N` is frame N of a recording, from 1.
     ///
     /// Raises
     /// ------

@@ -235,7 +235,7 @@ def test_a_batch_reads_the_array_where_it_stands() -> None:
 def test_a_tracker_has_the_history_of_a_stream() -> None:
     scene = dermis.Scene.from_toml(SMALL)
     stress = growing(12)
-    stress[:, 3, 3] = stress[0].max()
+    stress[:, 4, 4] = stress[0].max()
     wanted = scene.reconstruct(stress)
     with scene.tracker() as tracker:
         results = [tracker.push(frame) for frame in stress]

@@ -269,6 +269,40 @@ typedef struct {
   bool has_centre_mm;
 } dermis_contact;
 
+/**
+ * Where the results of dermis_reconstruct_many are written, one after the other. An array that is NULL is left out.
+ */
+typedef struct {
+  /**
+   * Number of results, for which the arrays have room.
+   */
+  size_t results;
+  /**
+   * Sum of the forces in N, x, y and normal: 3 values for each result.
+   */
+  double *resultant_N;
+  /**
+   * Standard deviation of that in N: 3 values for each result, NaN where the estimator gives none.
+   */
+  double *sigma_N;
+  /**
+   * Limitations of the result, a sum of dermis_flag: 1 value for each result.
+   */
+  uint32_t *flags;
+  /**
+   * Force along x on each taxel in N: rows * cols values for each result.
+   */
+  double *fx_N;
+  /**
+   * Force along y on each taxel in N: rows * cols values for each result.
+   */
+  double *fy_N;
+  /**
+   * Normal force on each taxel in N: rows * cols values for each result.
+   */
+  double *fz_N;
+} dermis_batch;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -379,6 +413,23 @@ dermis_status dermis_result_flags(const dermis_result *result, uint32_t *flags);
  * error.
  */
 const char *dermis_result_json(const dermis_result *result);
+
+/**
+ * Reconstruct frames that do not depend on each other, on all cores, into arrays of the caller.
+ *
+ * engine, stress_MPa and cross_check are as for dermis_reconstruct: count values, frame after frame of rows * cols; the stress is
+ * read where it stands. batch->results is the number of results, count / (rows * cols) / dermis_scene_frames_per_result.
+ * Results are those of dermis_reconstruct of each frame alone, in the order of the frames; the frames of a sensor in the order of
+ * time show more, and take less time with evidence: dermis_stream. DERMIS_STATUS_INPUT for a sliding mean and a running zero, whose
+ * results depend on the frames before; DERMIS_STATUS_ABSENT for forces of taxels of output.forces = "resultants". After an error what
+ * the arrays hold is not defined.
+ */
+dermis_status dermis_reconstruct_many(const dermis_scene *scene,
+                                      const char *engine,
+                                      const double *stress_MPa,
+                                      size_t count,
+                                      bool cross_check,
+                                      const dermis_batch *batch);
 
 /**
  * Begin a stream of frames of a scene. It belongs to the caller: dermis_stream_free; the scene may be freed before it. After

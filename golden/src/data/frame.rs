@@ -1,6 +1,6 @@
 //! Frame: the stress on every taxel at one moment, with what is known about the contacts.
 //!
-//! Frames come from JSON files with known forces, CSV files of rows × cols stresses, the generator and the paper's Eq.
+//! Frames come from JSON files with known forces, CSV files of rows × cols stresses, recordings, the generator and the paper's Eq.
 //! 2.
 //!
 //! | field | shape | unit | range |
@@ -21,12 +21,14 @@ mod csv;
 mod error;
 mod json;
 mod load;
+mod recorded;
 mod shipped;
 #[cfg(test)]
 mod tests;
 
 pub use csv::{csv_hint, reading};
 pub use error::FrameError;
+pub(in crate::data) use recorded::frame_name;
 
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;

@@ -31,7 +31,7 @@ impl<E: Engine + ?Sized> CheckedEngine<E> {
     /// use dermis_golden::{fixed::Model, estimate::float::Golden, data::frame::Frame, spec::scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
-    /// let frames = &Frame::shipped(&scene)[..1];
+    /// let frames = &Frame::shipped(&scene)[2..3];
     /// let engines: [Box<dyn Engine>; 2] = [Box::new(Golden::new(&scene)?), Box::new(Model::new(&scene)?)];
     /// let [golden, fixed] = engines.map(|engine| CheckedEngine::new(engine).result(frames, true));
     /// // The shear of the search differs from that of evidence by less than 10 %.

@@ -99,14 +99,15 @@ impl Model {
                 framing: false,
                 case: number,
                 frames,
-                raised: FlagSet::raised([
-                    (Flag::NoContact, !contact),
-                    (Flag::TooManyContacts, told.more_contacts),
-                    (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
-                    (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
-                    (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
-                    (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),
-                ]),
+                raised: prepared.raised
+                    | FlagSet::raised([
+                        (Flag::NoContact, !contact),
+                        (Flag::TooManyContacts, told.more_contacts),
+                        (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
+                        (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
+                        (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
+                        (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),
+                    ]),
                 score: told.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,

@@ -229,18 +229,20 @@ flags! {
         bit: WRONG_CHANNEL = StatusField::flag("wrong_channel", 10, Feature::Scan, "a sample named another channel"),
     }
     Clipped = 18 "clipped" {
-        raised_when: "several readings are the largest to the bit, and the others are far below (`plateau` above 7, the logarithm of a probability)",
+        raised_when: "several readings are the largest to the bit, and the others are far below (`plateau` above 7, the logarithm of a probability); hardware by itself: more than four codes, and the next one 8 steps below",
         remedy: "find what clips below full scale: an amplifier, a table, a unit",
         raised_by: "all engines",
         rule: |checks, _| checks.plateau.is_some_and(|plateau| plateau > PLATEAU),
         figure: |checks| checks.plateau.map(|plateau| format!("by chance in e^-{plateau:.0} of the frames")),
+        bit: CLIPPED = StatusField::flag("clipped", 13, Feature::CodeCheck, "more than four codes are the largest, far above the next one"),
     }
     LineFault = 19 "line-fault" {
-        raised_when: "a row or column repeats the next one to the bit, or has one reading beside loaded ones (`line_share` above 0.2 of the frame's range)",
+        raised_when: "a row or column repeats the next one to the bit, or has one reading beside loaded ones (`line_share` above 0.2 of the frame's range); hardware by itself: the former, where the line changes by a quarter of what the frame does",
         remedy: "check the multiplexer, the connector, the transfer of the frame",
         raised_by: "all engines",
         rule: |checks, _| checks.line_share.is_some_and(|share| share > LINE),
         figure: |checks| checks.line_share.map(|share| format!("beside {:.0} % of the range", 1e2 * share)),
+        bit: LINE_FAULT = StatusField::flag("line_fault", 14, Feature::CodeCheck, "a loaded row or column repeats the one before"),
     }
     TaxelConstant = 20 "taxel-constant" {
         raised_when: "in a stream, a taxel has had one reading for 8 frames while all beside it rose or fell by 6 % of the range (`constant_share`)",

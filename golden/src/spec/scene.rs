@@ -7,12 +7,14 @@
 //! the default and the meaning, [`Scene::json_schema`] gives them to editors, and the guide's page "your sensor" has the table.
 
 mod adc_scan;
+mod declared;
 mod error;
 mod estimator;
 mod estimator_choice;
 mod field;
 pub mod inverse;
 mod inversion;
+mod kinds;
 mod load;
 mod parse;
 mod reader;
@@ -20,11 +22,13 @@ mod schema;
 mod supported;
 #[cfg(test)]
 mod tests;
+mod zero;
 
+pub use declared::Declared;
 pub use error::SceneError;
 pub use estimator::EstimatorKind;
-pub use field::Declared;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
+pub use zero::{RunningZero, Zero};
 
 use crate::spec::adc::AdcScan;
 use crate::spec::board::SEARCH_WIDTHS;
@@ -35,11 +39,12 @@ use crate::spec::sliding;
 use adc_scan::ScanFields;
 use estimator::FORMER_NAMES;
 use field::{choice, nested, table, whole, File, Flag, Kind as _, Limits, Listed, Number};
-use parse::{BoardName, DeadTaxels, ZeroFields};
+use kinds::{BoardName, DeadTaxels};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
+use zero::ZeroFields;
 
 /// One scene, all fields checked and defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -242,6 +247,16 @@ pub fn largest_code(bits: u32) -> i32 {
     ((1i64 << (bits - 1)) - 1) as i32
 }
 
+/// Whether the hardware checks the codes of its frames, see [`Scene::checks_codes`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CodeCheck {
+    /// Where it can.
+    #[default]
+    On,
+    /// It does not.
+    Off,
+}
+
 /// Whether the hardware checks its coefficient memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CoefficientCheck {
@@ -302,6 +317,11 @@ table! {
             choice(&[("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)])
                 .or(CoefficientCheck::None)
                 .page("robustness");
+        /// Whether the hardware itself finds clipped codes, and rows and columns that repeat the one before.
+        code_check: CodeCheck = choice(&[("on", CodeCheck::On), ("off", CodeCheck::Off)])
+            .or(CodeCheck::On)
+            .hardware("parallel engine, from 4 × 4 taxels on, no writable tables")
+            .page("architecture/prepare");
         /// Estimator of the hardware and its bit-true model; left out, [`Scene::choose_for_hardware`] takes one. A network takes up to
         /// 144 taxels in one subarray, or `"contacts"`.
         estimator: Option<EstimatorKind> = choice(&EstimatorKind::HARDWARE_NAMES)
@@ -367,35 +387,6 @@ pub enum MeanKind {
     Block,
     /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::spec::sliding`].
     Sliding,
-}
-
-/// What the zero of each taxel is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Zero {
-    /// The stored one: the mean of the tare frames, else the table's offset, else 0.
-    #[default]
-    Fixed,
-    /// It starts as the stored one and follows the readings while nothing presses: [`crate::data::input::running_zero`].
-    Running(RunningZero),
-}
-
-/// How the zero of each taxel follows its readings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunningZero {
-    /// The zero takes 2^−average of what a reading is off; 1 to 16.
-    pub average: u32,
-    /// Largest distance from the stored zero in MPa, and largest stress in MPa that is no touch; above 0, at most the full
-    /// scale.
-    pub limit_MPa: f64,
-}
-
-impl RunningZero {
-    /// Default of `input.zero_average`: a second at 1 kHz.
-    pub const AVERAGE: u32 = 10;
-    /// Default of `input.zero_limit_MPa` over the full scale.
-    pub const LIMIT_SHARE: f64 = 1.0 / 64.0;
-    /// Least limit over the noise of a frame, so that noise on any of 256 × 256 taxels is no touch.
-    pub const LEAST_OVER_NOISE: f64 = 5.0;
 }
 
 table! {
@@ -572,7 +563,17 @@ impl ObjectiveKind {
     }
 }
 
+/// Fewest rows and columns of which the hardware checks codes: with fewer no line has others on both sides.
+const LEAST_LINES: usize = 4;
+
 impl Scene {
+    /// Whether the hardware checks the codes of its frames for plateaus and repeated lines: not with the serial engine, whose plan
+    /// says so in `hardware.code_check`, nor where tables are written, as signs of gains and dead taxels are not known before.
+    pub fn checks_codes(&self) -> bool {
+        let large = self.sensor.rows >= LEAST_LINES && self.sensor.cols >= LEAST_LINES;
+        self.hardware.code_check == CodeCheck::On && large && !self.hardware.has_writable_tables()
+    }
+
     /// The cases in which the scene can be compared: `all`, or with a network the scene's own, for which it was trained.
     pub fn cases_of(&self, all: &[Case]) -> Vec<Case> {
         match self.hardware_estimator() {

@@ -2,7 +2,6 @@
 
 use dermis_golden::spec::scene::Condition;
 
-use super::output::Values;
 use super::Parallel;
 use crate::language::Expr;
 use crate::primitives::{Arrival, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles};
@@ -37,6 +36,22 @@ pub(super) struct Control<'k> {
     pub(super) cycles: Expr<'k>,
     /// A frame is under way behind the frame buffer.
     pub(super) computes: Expr<'k>,
+}
+
+/// p(μ*) of a subarray, and when; in a scene without a search p as it leaves the passes.
+pub(super) struct Values<'k> {
+    /// One step of values.
+    pub(super) step: Expr<'k>,
+    /// `step` holds values.
+    pub(super) valid: Expr<'k>,
+    /// The result is known; high for one cycle.
+    pub(super) settled: Expr<'k>,
+    /// The values can be read from now on; high for one cycle.
+    pub(super) begin: Expr<'k>,
+    /// All values have left; high for one cycle.
+    pub(super) done: Expr<'k>,
+    /// The last sweep of the search waits in this cycle.
+    pub(super) stalled: Expr<'k>,
 }
 
 /// How much of a frame has arrived.

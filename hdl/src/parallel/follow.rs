@@ -2,6 +2,9 @@
 
 use super::control::Control;
 use super::Parallel;
+use crate::language::Expr;
+use crate::primitives::{BitDelay, FrameCheck, CHECK_LATENCY};
+use crate::streams::Beats;
 
 impl<'k> Parallel<'k, '_> {
     /// Case, `tlast` and number of frames follow their frame; shifts and saturations their subarray.
@@ -39,5 +42,27 @@ impl<'k> Parallel<'k, '_> {
         let received = self.held("received_frames", s.receive.accept, frames, remembers);
         let passing = self.held("frame_frames", c.begin_frame, received, remembers);
         s.forces.frames.set(self.held("searched_frames", c.hand_over, passing, remembers));
+    }
+
+    /// The `codes` of a frame are checked as they arrive; their faults follow it as its other bits do, [`CHECK_LATENCY`] cycles
+    /// later.
+    pub(super) fn check(&self, codes: Beats<'k>, c: &Control<'k>) {
+        let (k, s) = (self.k, &self.s);
+        let Some(check) = k.instance("check", FrameCheck::of_model(self.model)) else {
+            s.forces.faults.set(self.zero(s.forces.faults.bits()));
+            return;
+        };
+        k.comment("What the codes show");
+        check.accept.set(codes.valid & *codes.ready);
+        check.code.set(codes.data);
+        check.tlast.set(codes.last);
+        let follow = |state: &str, enters: Expr<'k>, faults: Expr<'k>| {
+            let entered = k.instance(&format!("{state}_checked"), BitDelay::new(CHECK_LATENCY));
+            entered.d.set(enters);
+            self.held(&format!("{state}_faults"), entered.q, faults, true)
+        };
+        let faults = follow("frame", c.arrives, check.faults);
+        let faults = follow("searched", c.hand_over, faults);
+        s.forces.faults.set(follow("sent", c.begin_send, faults));
     }
 }

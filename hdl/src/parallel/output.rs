@@ -1,26 +1,10 @@
 //! The search, forces, statuses, the output.
 
-use super::control::Control;
+use super::control::{Control, Values};
 use super::Parallel;
 use crate::language::{Expr, Inside};
 use crate::primitives::{position_bits, BitDelay};
 use crate::streams::{leave_by, sent_by, through, EnginePorts};
-
-/// p(μ*) of a subarray, and when; in a scene without a search p as it leaves the passes.
-pub(super) struct Values<'k> {
-    /// One step of values.
-    step: Expr<'k>,
-    /// `step` holds values.
-    valid: Expr<'k>,
-    /// The result is known; high for one cycle.
-    pub(super) settled: Expr<'k>,
-    /// The values can be read from now on; high for one cycle.
-    pub(super) begin: Expr<'k>,
-    /// All values have left; high for one cycle.
-    pub(super) done: Expr<'k>,
-    /// The last sweep of the search waits in this cycle.
-    pub(super) stalled: Expr<'k>,
-}
 
 /// What is stored of a subarray or a contact for its status.
 struct Status<'k> {

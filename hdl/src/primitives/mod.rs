@@ -39,6 +39,7 @@ pub use frame::average::{Average, FrameMarks};
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
 pub use frame::calibrate::{Calibrate, CalibratePorts};
+pub use frame::code_check::{FrameCheck, FAULT_BITS, LATENCY as CHECK_LATENCY};
 pub use frame::frame_stats::FrameStats;
 pub(crate) use frame::frame_stats::{beyond, magnitude_of};
 pub use frame::input_mask::InputMask;

@@ -78,7 +78,7 @@ block! {
         in sent_address: count_bits(*quads);
         /// `label_beats` reads labels.
         in sends_labels;
-        /// Section of the passes: 0 for v_00, 1 for the layers, 2 for a step.
+        /// Section of the passes, 0 for v_00, 1 for the layers, 2 for a step; until the next `pass_start`.
         out section: SECTION_BITS;
         /// The section begins.
         out pass_start;

@@ -83,6 +83,8 @@ block! {
         in version: VERSION_WORD_BITS;
         /// The tables are not whole, where they are written.
         in incomplete;
+        /// The frame's codes are clipped, above it whether a line repeats another; valid while the frame is sent.
+        in faults: unit.widths().faults;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -144,6 +146,7 @@ impl Block for Forces {
         unit.condition.set(io.condition);
         unit.found.set(io.found);
         unit.framing.set(io.framing);
+        unit.faults.set(io.faults);
         unit.damaged.set(io.damaged);
         unit.frames.set(io.frames);
         unit.score.set(io.score);
@@ -221,8 +224,8 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [valid, address, ready] = [27, 28, 29].map(|input| inputs[input]);
-            let mut of_unit = inputs[..27].to_vec();
+            let [valid, address, ready] = [28, 29, 30].map(|input| inputs[input]);
+            let mut of_unit = inputs[..28].to_vec();
             of_unit[VALUES] = self.values.shown().unwrap_or_default();
             let [beat, written, last] = [0, 1, 2].map(|output| self.unit.outputs(&of_unit)[output].unwrap_or_default());
             self.leaving.clock(&[inputs[0], inputs[5], written, last, beat, ready]);
@@ -276,6 +279,7 @@ mod tests {
                 random.u64(..1 << 32).into(),
                 Word::default(),
                 random.bool().into(),
+                random.u64(..4).into(),
                 (2..2 + steps).contains(&at).into(),
                 random.u64(..steps as u64).into(),
                 random.bool().into(),
@@ -283,7 +287,7 @@ mod tests {
             forces.clock(&inputs);
             inputs
         };
-        let reset = [vec![Word::from(true)], vec![Word::default(); 29]].concat();
+        let reset = [vec![Word::from(true)], vec![Word::default(); 30]].concat();
         let all = (0..frames).flat_map(|_| 0..offers + 230).map(&mut cycle);
         [reset.clone(), reset].into_iter().chain(all).collect()
     }
@@ -300,7 +304,7 @@ mod tests {
                 inputs [
                     rst, which, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
                     normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, labels,
-                    overflow, threshold, version, incomplete, values_valid, address, m_axis_tready,
+                    overflow, threshold, version, incomplete, faults, values_valid, address, m_axis_tready,
                 ],
                 outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata, label_address],
             )

@@ -25,11 +25,14 @@ block! {
         /// Quads of a subarray.
         quads: usize,
         fold_bits: usize,
+        /// Bits of a quad of operands.
+        operand_bits: usize,
         lane_bits: usize,
         /// Schedule of the products.
         pass_program: PassProgram,
-        vectors: Ram,
-        operand_writer: OperandWriter,
+        /// Operands of later products; of a schedule that has none there is no memory.
+        vectors: Option<Ram>,
+        operand_writer: Option<OperandWriter>,
         select: OperandSelect,
         /// Operands of the steps of `relax` are multiplied by μ.
         scales: bool,
@@ -50,7 +53,7 @@ block! {
         in input_quad: 4 * fold_bits;
         /// Four parities of an operand, of a v_ij, the images of a layer, a window or p, `operand_bits` each, signed, quads in order;
         /// valid with `vector_valid`.
-        in vector_quad: vectors.widths().write_data;
+        in vector_quad: *operand_bits;
         /// `vector_quad` holds a quad.
         in vector_valid;
         /// Position of μ1 in mu_max/384, signed, with a network; valid from the quad of operands that says so.
@@ -89,17 +92,18 @@ impl Pass {
         let quads = formats.quads;
         let lengths: Vec<Vec<usize>> = programs(model).into_iter().map(|(_, section)| section.operands).collect();
         let operands = operand_words(formats);
-        let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
-        let parity_bits = 4 * formats.operand_bits() as usize;
+        let operand_bits = 4 * formats.operand_bits() as usize;
+        let memory = || Ram::new(operands.max(quads), 1, operand_bits).holding([Holds::Operands(0)]).registered();
         Pass {
             columns: longest(model),
             sections: lengths.len(),
             quads,
             fold_bits: formats.fold_bits as usize,
+            operand_bits,
             lane_bits: formats.lane_bits as usize,
             pass_program: PassProgram::new(model),
-            vectors: vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
-            operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
+            vectors: (operands > 0).then(memory),
+            operand_writer: (operands > 0).then(|| OperandWriter::new(&lengths, model.first().storage.streamed)),
             select: OperandSelect::new(formats),
             scales: formats.scales_operands(),
             lanes: Lanes::new(model),
@@ -113,8 +117,8 @@ impl Block for Pass {
         let running = k.instance("running", Dff {});
         let scaling = if self.scales { SCALE_LATENCY } else { 0 };
         let pass_program = k.instance("pass_program", &self.pass_program);
-        let vectors = k.instance("vectors", &self.vectors);
-        let operand_writer = k.instance("operand_writer", &self.operand_writer);
+        let vectors = k.instance("vectors", self.vectors.as_ref());
+        let operand_writer = k.instance("operand_writer", self.operand_writer.as_ref());
         let source = k.instance("source", Delay::new(SOURCE_BITS, 2));
         let control = k.instance("control", Delay::new(pass_program.control.bits(), 3 + scaling));
         let valid = k.instance("valid", BitDelay::new(3 + scaling + self.pass_program.latency()));
@@ -122,7 +126,6 @@ impl Block for Pass {
         let lanes = k.instance("lanes", &self.lanes);
 
         pass_program.which.set(io.which);
-        operand_writer.which.set(io.which);
         lanes.which.set(io.which);
         let issue = k.wire("issue", running.q & pass_program.ready);
         let column_end = k.wire("column_end", issue & pass_program.last);
@@ -132,21 +135,29 @@ impl Block for Pass {
         pass_program.start.set(io.start);
         pass_program.advance.set(column_end);
         pass_program.column.set(column.value);
-        pass_program.finished.set(operand_writer.finished);
-
         io.input_address.set(pass_program.operand_address.low(io.input_address.bits()));
-        vectors.read.set(k.constant(1, 1));
-        vectors.read_address.set(pass_program.operand_address);
-        operand_writer.clear.set(io.start);
-        operand_writer.valid.set(io.vector_valid);
-        vectors.write.set(operand_writer.keep);
-        vectors.write_address.set(operand_writer.address);
-        vectors.write_data.set(io.vector_quad);
+        match vectors.zip(operand_writer) {
+            Some((vectors, operand_writer)) => {
+                operand_writer.which.set(io.which);
+                operand_writer.clear.set(io.start);
+                operand_writer.valid.set(io.vector_valid);
+                pass_program.finished.set(operand_writer.finished);
+                vectors.read.set(k.constant(1, 1));
+                vectors.read_address.set(pass_program.operand_address);
+                vectors.write.set(operand_writer.keep);
+                vectors.write_address.set(operand_writer.address);
+                vectors.write_data.set(io.vector_quad);
+                select.vector_quad.set(vectors.read_data);
+            }
+            None => {
+                pass_program.finished.set(k.constant(pass_program.finished.bits(), 0));
+                select.vector_quad.set(k.constant(select.vector_quad.bits(), 0));
+            }
+        }
 
         source.d.set(pass_program.source);
         select.source.set(source.q);
         select.input_quad.set(io.input_quad);
-        select.vector_quad.set(vectors.read_data);
         control.d.set(pass_program.control);
         valid.d.set(issue);
 

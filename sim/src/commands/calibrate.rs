@@ -19,7 +19,7 @@ use crate::report;
   dermis calibrate my-scene.toml --load 0=zero.csv --load 0.05=half.csv --load 0.1=full.csv --out table.csv
   dermis calibrate my-scene.toml --load 0=zero.csv --load 0.1=full.csv --json
 
-A recording is a CSV file with one frame after the other, a JSON frame, or a folder of such files, in the unit of the
+A recording is a CSV or MCAP file with one frame after the other, a JSON frame, or a folder of such files, in the unit of the
 readings. Each must be taken under the same stress on every taxel, as air pressure on a foil applies it. With three loads
 or more each is left out once, and the table of the others is compared with it. The table is what `input.calibration`
 reads.")]

@@ -130,9 +130,9 @@ enum Command {
     Guide(super::guide_pages::Arguments),
     /// Print the completions of a shell for this command line.
     #[command(after_help = "Examples:
-  dermis completions bash >~/.local/share/bash-completion/completions/dermis
-  dermis completions fish >~/.config/fish/completions/dermis.fish
-  dermis completions zsh >~/.zfunc/_dermis           in a folder of fpath")]
+  dermis completions bash >dermis.bash   sourced by ~/.bashrc, or in ~/.local/share/bash-completion/completions as dermis
+  dermis completions fish >dermis.fish   in ~/.config/fish/completions
+  dermis completions zsh >_dermis        in a folder of fpath")]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,

@@ -1,6 +1,6 @@
 //! `dermis import`: a recording of a real pressure array becomes a scene and frames.
 //!
-//! The folder holds `NAME.toml`, `frames/NAME-0001.json` … and `recording.json`; `dermis reconstruct` takes scene and
+//! The folder holds `NAME.toml`, all frames in `NAME.mcap`, and `recording.json`; `dermis reconstruct` takes scene and
 //! frames, `dermis report --recording` the folder.
 
 use std::fmt::Write as _;
@@ -77,7 +77,9 @@ const EXAMPLES: &str = "Examples:
 Reads the size, pitch and unit that the file states. A sensel without a reading (B, NaN, empty) in any
 frame becomes a dead taxel; one without a reading in some frames is missing in those. An array of
 more than 2304 sensels is cropped around the contact; rows and columns in --crop choose another part.
-Then: dermis reconstruct DIR/NAME.toml --frame DIR/frames/NAME-0001.json, dermis report --recording DIR";
+All frames are in one file, DIR/NAME.mcap, in the form of dermis reconstruct --stream --record. Then:
+dermis reconstruct DIR/NAME.toml --frame DIR/NAME.mcap:1 (the first frame), dermis live DIR/NAME.toml --recording
+DIR/NAME.mcap, dermis replay DIR/NAME.mcap | dermis reconstruct DIR/NAME.toml --stream, dermis report --recording DIR";
 
 /// Imports the recording and writes its folder; returns the summary.
 ///

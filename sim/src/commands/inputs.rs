@@ -2,7 +2,7 @@
 //!
 //! | SCENE | `--frame` | gives |
 //! |---|---|---|
-//! | given | files, `eq2` | the scene, those frames |
+//! | given | files, recordings, `eq2` | the scene, those frames |
 //! | given | none | the scene, its shipped frames |
 //! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
 //!
@@ -97,7 +97,7 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
 /// Unreadable frame, a frame of another sensor, no frames.
 pub(super) fn frames_of(scene: &Scene, files: &[String]) -> Result<Vec<Frame>> {
     if !files.is_empty() {
-        return files.iter().map(|path| load(path, scene)).collect();
+        return files.iter().map(|path| load(path, scene)).collect::<Result<Vec<_>>>().map(|all| all.concat());
     }
     let shipped = Frame::shipped(scene);
     if shipped.is_empty() {
@@ -135,23 +135,24 @@ pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<
     let (average, wanted) = (scene.input.average, scene.input.frames_per_result());
     if files.is_empty() && wanted == 1 {
         frames.truncate(1);
-    } else if !scene.input.has_memory() && files.len() != wanted {
-        let (origin, got) = (named.unwrap_or(&scene.name), files.len());
+    } else if !scene.input.has_memory() && frames.len() != wanted {
+        let (origin, got) = (named.unwrap_or(&scene.name), frames.len());
+        let hint = if got > files.len() { "; FILE.mcap:N is frame N of a recording" } else { "" };
         bail!(
-            "{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, \
-               got {got}"
+            "{origin}: input.average = {average}: the number of frames must be 2^{average} = {wanted}, got {got}{hint}"
         );
     }
     Ok((scene, frames))
 }
 
-fn load(path: &str, scene: &Scene) -> Result<Frame> {
+/// The frame of a file, all of a recording.
+fn load(path: &str, scene: &Scene) -> Result<Vec<Frame>> {
     if path == EQ2 {
-        return Ok(Frame::eq2(&scene.sensor));
+        return Ok(vec![Frame::eq2(&scene.sensor)]);
     }
-    let frame = Frame::load(path, Some(scene))?;
-    frame.check(scene)?;
-    Ok(frame)
+    let frames = Frame::load_recorded(path, Some(scene))?;
+    frames.iter().try_for_each(|frame| frame.check(scene))?;
+    Ok(frames)
 }
 
 /// Names of scenes: `scenes`, or if there is none those of `default`.

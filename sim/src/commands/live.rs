@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
@@ -63,7 +64,7 @@ pub struct Arguments {
     noise: f64,
     /// Frames per second that the estimator has to hold, of the finger 1 to 1000; the best one that does is taken. Default: of a stream as many as
     /// arrive, unless the scene states search.estimator; of the finger at most 60, by the scene's estimator.
-    #[arg(long, value_name = "HZ", value_parser = rate_Hz, conflicts_with = "board")]
+    #[arg(long, value_name = "HZ", value_parser = rate_Hz)]
     rate: Option<f64>,
     /// Address and port of the page; port 0 takes a free one.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8317")]
@@ -91,7 +92,8 @@ impl Arguments {
             (Some(source), _) => open(source, scene, self.baud).map(Some),
             (None, Some(path)) => {
                 let (name, shape) = (path.display().to_string(), Some([scene.sensor.rows, scene.sensor.cols]));
-                let lines = Lines::open(path.clone(), shape, Pace::Recorded, self.repeat);
+                let options = FrameOptions { shape, ..FrameOptions::default() };
+                let lines = Lines::open(path.clone(), options, Pace::Recorded, [self.repeat, false]);
                 let lines = lines.map_err(|error| anyhow!("--recording {name}: {error}"))?;
                 Ok(Some((Box::new(lines), name)))
             }
@@ -129,6 +131,9 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
     }
     if let Some(rate) = rate.filter(|rate| arguments.finger() && !FINGER_HZ.contains(rate)) {
         bail!("--rate = {rate} is not allowed: {} to {}", FINGER_HZ.start(), FINGER_HZ.end());
+    }
+    if let (Some(rate), Some(port)) = (rate.filter(|_| !arguments.finger()), board) {
+        bail!("--rate = {rate} is not allowed: the board at {port} computes every frame that arrives");
     }
     if !(0.0..=1.0).contains(noise) {
         bail!("--noise = {noise} is not allowed: 0 to 1");

@@ -23,7 +23,7 @@ the file of the device family. An estimate: each figure is a range, calibrated a
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
     scene: Option<String>,
-    /// Frame file (.json, .csv) or `eq2`, repeatable; default: all shipped frames of the scene.
+    /// Frame file (.json, .csv; .mcap: all frames, .mcap:N: frame N from 1) or `eq2`, repeatable; default: all shipped frames of the scene.
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,
     /// Print the estimate as JSON and nothing else.

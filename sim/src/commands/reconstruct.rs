@@ -36,7 +36,7 @@ estimator evidence reads the frames of another one too; checks.cross_check_age i
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.
     scene: Option<String>,
-    /// Frame file (.json, .csv) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
+    /// Frame file (.json, .csv; .mcap:N: frame N from 1) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
     /// scene has input.average = k, any number of times with input.mean = "sliding".
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,

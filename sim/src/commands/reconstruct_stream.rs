@@ -59,7 +59,7 @@ pub(super) struct StreamArguments {
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
     /// Write frames and results into a new MCAP file too, with the message types of ROS 2; the first interruption
-    /// completes it.
+    /// completes it. Whatever ends the program, what is older than a second is in the file.
     #[arg(long, value_name = "FILE.mcap", requires = "stream")]
     record: Option<PathBuf>,
 }
@@ -95,7 +95,7 @@ impl StreamArguments {
         let faster = if latest || self.rate.is_some() { faster(scene, name, self.rate) } else { Vec::new() };
         let estimators = Estimators::new(&*engine, faster, pace, self.rate, Clock::default());
         let (input, name) = open(source, scene, self.baud)?;
-        let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, &scene.sensor)).transpose()?;
+        let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, scene)).transpose()?;
         let stop = Stop::default();
         // Without a recording there is nothing to complete.
         let interrupted = match &recorder {
@@ -119,14 +119,15 @@ impl StreamArguments {
         };
         let counts = run_until(&stop, estimators, (input, &name), options, &mut output);
         // Completed whatever ended the stream.
-        if let (Some(recorder), Some(path)) = (recorder, &self.record) {
-            let results = recorder.finish()?;
+        let recorded = recorder.map(Recorder::finish).transpose();
+        if let (Ok(Some(results)), Some(path)) = (&recorded, &self.record) {
             eprintln!("{}: {results} results recorded", path.display());
         }
         let counts = counts?;
         let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
         let (answered, refused) = (counts.answered, counts.refused);
         eprintln!("{}: {answered} results, {rate:.1} per second; {counts}", scene.name);
+        recorded?;
         interrupted.check().map_err(|_| Interrupted("the recording is complete"))?;
         if refused > 0 {
             bail!("{name}: {refused} of {} lines were refused", refused + answered);

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_golden::data::recording::message::Text;
+use dermis_golden::data::recording::{End, FrameOptions, Messages};
 
-use crate::recording::{Lines, Messages, Pace, RESULT};
+use crate::recording::{Lines, Pace, RESULT};
 
 /// Arguments of `dermis replay`.
 #[derive(Args, Debug)]
@@ -15,67 +17,94 @@ use crate::recording::{Lines, Messages, Pace, RESULT};
   dermis replay press.mcap --real-time
   dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream
   dermis replay press.mcap --results
+  dermis replay glove.mcap --topic /tactile/left --mpa-per-count 0.0001
 
-Frames are read from the channel /dermis/stress, a sensor_msgs/msg/Image of 64FC1 or 32FC1, and written as lines
-{\"stress_MPa\": [0.1, ...]}. dermis reconstruct --stream --record makes such a file.")]
+Frames are read from the channel /dermis/stress_exact, else /dermis/stress, and written as lines
+{\"stress_MPa\": [0.1, ...]}, null where a pixel is NaN. dermis reconstruct --stream --record and other recorders of ROS 2
+make such files; compressed by zstd or lz4, or not. Of a file whose recorder was ended every frame is read that it had
+written, a second before its end at the latest; what is missing is said on standard error.")]
 pub struct Arguments {
-    /// MCAP file without compression.
+    /// MCAP file.
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
     /// Write the recorded lines of results instead, as they were written.
-    #[arg(long, conflicts_with_all = ["rate", "real_time"])]
+    #[arg(long, conflicts_with_all = ["rate", "real_time", "topic", "mpa_per_count"])]
     results: bool,
+    /// Read the images of this channel: a sensor_msgs/msg/Image of 64FC1, 32FC1 or integers of 8, 16 or 32 bits.
+    #[arg(long, value_name = "NAME")]
+    topic: Option<String>,
+    /// Stress of one count in MPa, for images of integers; 1 hands on the counts, to a scene with a calibration table.
+    #[arg(long, value_name = "MPA", value_parser = stress_MPa)]
+    mpa_per_count: Option<f64>,
     /// Write so many frames per second; default: as fast as they are read.
     #[arg(long, value_name = "N", conflicts_with = "real_time")]
     rate: Option<f64>,
     /// Write frames as far apart as they were received.
     #[arg(long)]
     real_time: bool,
+    /// Exit with 0 although the file is cut within a record.
+    #[arg(long)]
+    partial: bool,
 }
 
 /// Runs the command; the text is empty.
 ///
 /// # Errors
-/// A file that is no recording or ends early, with its name; what stands before that is written.
+/// A file that is no recording, with its name; one that is cut, unless that is allowed: what stands before is written.
 pub fn run(arguments: &Arguments) -> Result<String> {
-    let Arguments { file, results, rate, real_time } = arguments;
+    let Arguments { file, results, topic, mpa_per_count, rate, real_time, partial } = arguments;
     let pace = match rate {
         Some(rate) if rate.is_finite() && *rate > 0.0 => Pace::Rate(*rate),
         Some(rate) => bail!("--rate = {rate} is not allowed: above 0"),
         None if *real_time => Pace::Recorded,
         None => Pace::Unbounded,
     };
-    let named = |error: anyhow::Error| anyhow!("{}: {error}", file.display());
+    let named = |error: &dyn std::fmt::Display| anyhow!("{}: {error}", file.display());
     let mut output = std::io::stdout().lock();
     let written = match results {
-        true => write_results(Messages::open(file).map_err(named)?, &mut output),
+        true => write_results(Messages::open(file).map_err(|error| named(&error))?, &mut output),
         false => {
-            let mut lines = Lines::open(file.clone(), None, pace, false).map_err(named)?;
-            copy(&mut lines, &mut output).map(drop).map_err(anyhow::Error::from)
+            let options = FrameOptions { shape: None, topic: topic.clone(), MPa_per_count: *mpa_per_count };
+            let mut lines = Lines::open(file.clone(), options, pace, [false, true]).map_err(|error| named(&error))?;
+            copy(&mut lines, &mut output).map(|_| lines.end()).map_err(anyhow::Error::from)
         }
     };
     let closed = |error: &anyhow::Error| {
         error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
     };
-    if let Err(error) = written {
-        if !closed(&error) {
-            return Err(named(error));
-        }
+    let end = match written {
+        Err(error) if !closed(&error) => return Err(named(&error)),
+        Err(_) => End::Complete,
+        Ok(end) => end,
+    };
+    match end.words() {
+        Some(words) if end == End::Cut && !partial => return Err(named(&format!("{words}; --partial allows it"))),
+        Some(words) => eprintln!("{}: {words}", file.display()),
+        None => (),
     }
     Ok(String::new())
 }
 
-fn write_results(mut messages: Messages, output: &mut dyn Write) -> Result<()> {
+fn write_results(mut messages: Messages, output: &mut dyn Write) -> Result<End> {
     let mut found = false;
     while let Some(message) = messages.next_message()? {
         if message.topic == RESULT {
+            let text: Text = message.decoded().map_err(|error| anyhow!("{RESULT}: {error}"))?;
             found = true;
-            output.write_all(&message.data)?;
+            output.write_all(text.data.as_bytes())?;
             output.write_all(b"\n")?;
         }
     }
-    if !found {
-        bail!("has no message of channel {RESULT}; its channels: {}", messages.channels());
+    match found || messages.end() == End::Cut {
+        true => Ok(messages.end()),
+        false => bail!(messages.without(RESULT)),
     }
-    Ok(())
+}
+
+/// Parses the stress of a count.
+fn stress_MPa(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(MPa) if MPa != 0.0 && MPa.is_finite() => Ok(MPa),
+        _ => Err("wanted a finite number of MPa other than 0".into()),
+    }
 }

@@ -4,7 +4,7 @@ use std::fmt::{Display, Write};
 
 use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_SHIFT};
 use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
-use dermis_golden::fixed::stages::prepare::{Prepared, GAIN_FRACTION};
+use dermis_golden::fixed::stages::prepare::{code_check, Prepared, GAIN_FRACTION};
 use dermis_golden::fixed::stages::search::{log_table, COARSE_CENTRES};
 use dermis_golden::fixed::stages::send::{status_fields, CYCLES, LN_SIGMA_BITS, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::{
@@ -98,6 +98,15 @@ fn add_input(all: &mut Definitions, model: &Model, layout: &Layout) {
     all.unsigned("INPUT_LOW", layout.input_low);
     all.unsigned("BIAS", layout.bias);
     all.add("BIAS_WORD", ONE);
+    all.option("HAS_CODE_CHECK", model.prepare.check.is_some());
+    if let Some(check) = &model.prepare.check {
+        all.option("CODES_FALL", check.falls);
+        all.unsigned("CHECK_MIRROR", code_check::MIRROR);
+        all.unsigned("CHECK_PLATEAU_CODES", code_check::PLATEAU_CODES);
+        all.unsigned("CHECK_PLATEAU_GAP", code_check::PLATEAU_GAP);
+        all.unsigned("CHECK_FINE", code_check::FINE);
+        all.unsigned("CHECK_LOADED", code_check::LOADED);
+    }
 }
 
 fn add_passes(all: &mut Definitions, model: &Model) {

@@ -789,6 +789,153 @@ static void send(const struct @NAME@_work *work, struct @NAME@_result *result)
     put(result, STATUS_CYCLES, (work->condition != 0U) ? CYCLES_SEARCHED : CYCLES_NOT_SEARCHED);
 }
 
+#if HAS_CODE_CHECK
+/* Rows, or columns: how many there are, the taxels from one to the next, the taxels of one and from each to the next. */
+struct lines {
+    uint32_t count;
+    uint32_t apart;
+    uint32_t length;
+    uint32_t step;
+};
+
+static const struct lines ROW_LINES = {TAXELS / COLUMNS, COLUMNS, COLUMNS, 1U};
+static const struct lines COLUMN_LINES = {COLUMNS, 1U, TAXELS / COLUMNS, COLUMNS};
+
+/* A reading as a code that rises with the load. */
+static int32_t upward(const int32_t readings[TAXELS], uint32_t taxel)
+{
+    return (CODES_FALL != 0) ? (-1 - readings[taxel]) : readings[taxel];
+}
+
+static uint32_t is_live(uint32_t taxel)
+{
+    uint32_t live = 1U;
+#if DEAD_TAXELS > 0
+    uint32_t k;
+
+    for (k = 0U; k < DEAD_TAXELS; k++) {
+        live &= (DEAD[k] != taxel) ? 1U : 0U;
+    }
+#else
+    (void)taxel;
+#endif
+    return live;
+}
+
+/* The change from a taxel to another, 0 if one is dead. */
+static uint32_t change(const int32_t readings[TAXELS], uint32_t from, uint32_t to)
+{
+    const uint32_t live = is_live(from) & is_live(to);
+
+    return (live != 0U) ? (uint32_t)magnitude_bits(upward(readings, to) - upward(readings, from)) : 0U;
+}
+
+/* The OR of the changes of line k. */
+static uint32_t change_of_line(const int32_t readings[TAXELS], const struct lines *lines, uint32_t k)
+{
+    uint32_t all = 0U;
+    uint32_t place;
+
+    for (place = 1U; place < lines->length; place++) {
+        const uint32_t taxel = (k * lines->apart) + (place * lines->step);
+
+        all |= change(readings, taxel - lines->step, taxel);
+    }
+    return all;
+}
+
+static uint32_t are_equal(const int32_t readings[TAXELS], const struct lines *lines, uint32_t one, uint32_t other)
+{
+    uint32_t equal = 1U;
+    uint32_t place;
+
+    for (place = 0U; place < lines->length; place++) {
+        const uint32_t taxel = place * lines->step;
+
+        equal &= (readings[(one * lines->apart) + taxel] == readings[(other * lines->apart) + taxel]) ? 1U : 0U;
+    }
+    return equal;
+}
+
+/* Adds the changes of all lines, and those of the lines that repeat the one before and are on no axis of a mirror image. */
+static void add_changes(const int32_t readings[TAXELS], const struct lines *lines, uint32_t *all, uint32_t *repeated)
+{
+    uint32_t k;
+
+    for (k = 0U; k < lines->count; k++) {
+        const uint32_t of_line = change_of_line(readings, lines, k);
+        const uint32_t next = k + 1U;
+        uint32_t counts = (k > 0U) ? are_equal(readings, lines, k, k - 1U) : 0U;
+
+        if ((counts != 0U) && (next >= CHECK_MIRROR) && (next < lines->count)) {
+            counts = 1U - are_equal(readings, lines, next, next - CHECK_MIRROR);
+        }
+        *all |= of_line;
+        *repeated |= (counts != 0U) ? of_line : 0U;
+    }
+}
+
+/* The least change above 0 along a row, 0 where there is none. */
+static uint32_t least_change(const int32_t readings[TAXELS])
+{
+    uint32_t least = 0U;
+    uint32_t taxel;
+
+    for (taxel = 1U; taxel < TAXELS; taxel++) {
+        if ((taxel % COLUMNS) != 0U) {
+            const uint32_t size = change(readings, taxel - 1U, taxel);
+
+            least = ((size > 0U) && ((least == 0U) || (size < least))) ? size : least;
+        }
+    }
+    return least;
+}
+
+/* The distance of five largest codes or more from the next one, 0 where fewer are the largest. */
+static uint32_t plateau_gap(const int32_t readings[TAXELS])
+{
+    int32_t largest = INT32_MIN;
+    int32_t next = INT32_MIN;
+    uint32_t count = 0U;
+    uint32_t taxel;
+
+    for (taxel = 0U; taxel < TAXELS; taxel++) {
+        const int32_t code = upward(readings, taxel);
+
+        if (is_live(taxel) != 0U) {
+            if (code > largest) {
+                next = largest;
+                largest = code;
+                count = 1U;
+            } else if (code == largest) {
+                count++;
+            } else {
+                next = (code > next) ? code : next;
+            }
+        }
+    }
+    return ((count >= CHECK_PLATEAU_CODES) && (next > INT32_MIN)) ? (uint32_t)(largest - next) : 0U;
+}
+
+/* Puts into the status whether readings are clipped, and whether a row or column repeats the one before. */
+static void check_codes(const int32_t readings[TAXELS], struct @NAME@_result *result)
+{
+    const uint32_t least = least_change(readings);
+    uint32_t all = 0U;
+    uint32_t repeated = 0U;
+
+    add_changes(readings, &ROW_LINES, &all, &repeated);
+    add_changes(readings, &COLUMN_LINES, &all, &repeated);
+    if (least > 0U) {
+        const uint32_t clipped = ((plateau_gap(readings) >> CHECK_PLATEAU_GAP) >= least) ? 1U : 0U;
+        const uint32_t fine = ((all >> CHECK_FINE) >= least) ? 1U : 0U;
+
+        put(result, STATUS_CLIPPED, clipped);
+        put(result, STATUS_LINE_FAULT, ((repeated << CHECK_LOADED) > all) ? fine : 0U);
+    }
+}
+#endif
+
 int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[TAXELS],
                        struct @NAME@_result *result)
 {
@@ -813,5 +960,8 @@ int @NAME@_reconstruct(struct @NAME@_work *work, const int32_t readings[TAXELS],
     work->saturations = 0U;
     solve(work);
     send(work, result);
+#if HAS_CODE_CHECK
+    check_codes(readings, result);
+#endif
     return ((HAS_FULL_SCALE != 0) && (work->ends > 0U)) ? @MACRO@_SATURATED : 0;
 }

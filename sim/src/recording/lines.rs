@@ -1,12 +1,11 @@
 //! Recorded frames as lines of a stream, at a pace.
 
-use std::io::{Cursor, Error, Read, Result};
+use std::io::{Cursor, Error, Read};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use dermis_golden::data::recording::{End, FrameOptions, Frames, RecordingError};
 use serde_json::json;
-
-use super::read::Frames;
 
 /// When frames are handed out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,10 +21,12 @@ pub enum Pace {
 /// The frames of a file, read as lines that a stream takes; errors have no file's name.
 pub struct Lines {
     path: PathBuf,
-    shape: Option<[usize; 2]>,
+    options: FrameOptions,
     pace: Pace,
     /// Begin again at the end.
     repeat: bool,
+    /// Take a file that is cut like one that ends.
+    partial: bool,
     frames: Frames,
     /// When the first frame is handed out, and when it was received.
     begun: Option<(Instant, u64)>,
@@ -38,21 +39,34 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Opens a file whose frames have `shape`, rows and columns, if that is given; with `repeat` it begins again at its end.
+    /// Opens a file; with `repeat` it begins again at its end. One that is cut ends with an error, unless it may be `partial`.
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn open(path: PathBuf, shape: Option<[usize; 2]>, pace: Pace, repeat: bool) -> anyhow::Result<Lines> {
-        let frames = Frames::open(&path, shape)?;
+    pub fn open(
+        path: PathBuf,
+        options: FrameOptions,
+        pace: Pace,
+        [repeat, partial]: [bool; 2],
+    ) -> Result<Lines, RecordingError> {
+        let frames = Frames::open(&path, options.clone())?;
         let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Cursor::default());
-        Ok(Lines { path, shape, pace, repeat, frames, begun: None, count: 0, due, gap, line })
+        Ok(Lines { path, options, pace, repeat, partial, frames, begun: None, count: 0, due, gap, line })
+    }
+
+    /// How the file ends, once there is no further line.
+    pub fn end(&self) -> End {
+        self.frames.end()
     }
 
     /// Takes the next line, once it is due; returns whether there is one.
-    fn advance(&mut self) -> anyhow::Result<bool> {
+    fn advance(&mut self) -> Result<bool, RecordingError> {
         let mut next = self.frames.next_frame()?;
+        if let (End::Cut, Some(words), false) = (self.end(), self.end().words(), self.partial) {
+            return Err(RecordingError::new(words));
+        }
         if next.is_none() && self.repeat {
-            self.frames = Frames::open(&self.path, self.shape)?;
+            self.frames = Frames::open(&self.path, self.options.clone())?;
             (self.begun, self.count, self.due) = (None, 0, Duration::ZERO);
             next = self.frames.next_frame()?;
         }
@@ -76,7 +90,7 @@ impl Lines {
 }
 
 impl Read for Lines {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         match self.line.read(buffer)? {
             0 if !buffer.is_empty() && self.advance().map_err(|error| Error::other(error.to_string()))? => {
                 self.line.read(buffer)
@@ -102,7 +116,7 @@ mod tests {
         let frames = Frame::shipped(&scene)[..1].to_vec();
         let result = &Golden::reference(&scene).unwrap().run(&frames[0]).unwrap();
         let path = folder.join("press.mcap");
-        let mut recorder = Recorder::create(&path, &scene.sensor).unwrap();
+        let mut recorder = Recorder::create(&path, &scene).unwrap();
         for (sequence, received_s) in (0..).zip(seconds) {
             let (received_s, received, frames) = (*received_s, &[*received_s][..], &frames[..]);
             let answer = Answer {
@@ -128,9 +142,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, frame) = recorded(folder.path(), &[100.0, 100.05, 100.15]);
         let line = json!({"stress_MPa": frame.stress_MPa}).to_string();
+        let options = || FrameOptions { shape: Some([8, 8]), ..FrameOptions::default() };
         let read = |pace, repeat, count: usize| {
             let begun = Instant::now();
-            let lines = BufReader::new(Lines::open(path.clone(), Some([8, 8]), pace, repeat).unwrap()).lines();
+            let lines = BufReader::new(Lines::open(path.clone(), options(), pace, [repeat, false]).unwrap()).lines();
             let lines: Vec<String> = lines.take(count).map(Result::unwrap).collect();
             assert!(lines.iter().all(|own| *own == line));
             (lines.len(), begun.elapsed().as_secs_f64())
@@ -144,11 +159,23 @@ mod tests {
         assert!(count == 4 && took >= 0.25, "{count} in {took} s");
         let (count, took) = read(Pace::Rate(20.0), false, 9);
         assert!(count == 3 && took >= 0.1, "{count} in {took} s");
+        // One that is cut is an error at its end, also where it would begin again.
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
+        for repeat in [false, true] {
+            let lines = Lines::open(path.clone(), options(), Pace::Unbounded, [repeat, false]).unwrap();
+            let lines: Vec<_> = BufReader::new(lines).lines().take(4).collect();
+            assert!(lines.len() == 4 && lines[..3].iter().all(|line| line.is_ok()));
+            assert!(lines[3].as_ref().unwrap_err().to_string().starts_with("ends early"));
+        }
         // A file without frames is no endless loop.
         let empty = folder.path().join("empty.mcap");
-        Recorder::create(&empty, &Scene::builtin("eight-by-eight").unwrap().sensor).unwrap().finish().unwrap();
-        let mut lines = Lines::open(empty, None, Pace::Unbounded, true).unwrap();
+        Recorder::create(&empty, &Scene::builtin("eight-by-eight").unwrap()).unwrap().finish().unwrap();
+        let mut lines = Lines::open(empty, FrameOptions::default(), Pace::Unbounded, [true, false]).unwrap();
         let error = lines.read(&mut [0; 8]).unwrap_err().to_string();
-        assert_eq!(error, "has no message of channel /dermis/stress; its channels: /dermis/stress");
+        assert!(
+            error.starts_with("has no message of channel /dermis/stress; its channels: /dermis/stress_exact ("),
+            "{error}"
+        );
     }
 }

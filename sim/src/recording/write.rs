@@ -1,161 +1,197 @@
 //! Outcomes of a stream into a file.
 
-use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::sync::mpsc::{sync_channel, Receiver, RecvTimeoutError, SyncSender};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{anyhow, Error, Result};
+use anyhow::{anyhow, Result};
 use dermis_golden::data::frame::Forces;
+use dermis_golden::data::recording::message::{
+    Header, Image, Message, PointCloud2, PointField, Text, Time, Wrench, WrenchStamped,
+};
+use dermis_golden::data::recording::{frame_messages, Kind, RecordingError, RecordingFile, Stamp};
 use dermis_golden::result::reconstruct::Reconstruction;
+use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
-use mcap::records::MessageHeader;
-use mcap::{WriteOptions, Writer};
 
+use super::arrows::Arrows;
 use super::contacts::contacts;
-use super::message::{Header, Image, Message, PointCloud2, PointField, Time, Wrench, WrenchStamped};
-use super::read::DOUBLE;
-use super::{contact_channel, FORCES, RESULT, STRESS};
+use super::{contact_channel, ARROWS, FORCES, METRES, RESULT};
 use crate::stream::{seconds, Answer, Outcome};
 
 /// Coordinate system of all messages.
 const FRAME_ID: &str = "dermis";
-/// Metres of a millimetre.
-const METRES: f64 = 1e-3;
-/// Bytes of a pixel and of a point's value, of 64 bits.
-const PIXEL: usize = 8;
+/// Bytes of a point's value, of 64 bits.
+const VALUE: usize = 8;
 /// Bytes of a point's place: three values of 32 bits, and as many as bring the next one to a multiple of its size.
 const PLACE: usize = 16;
+/// After this time what was recorded is in the file: a chunk is at most half a second, the rest is for the disk.
+const CHUNK: Duration = Duration::from_millis(400);
+/// Outcomes that wait for the disk; then the stream waits.
+const WAITING: usize = 256;
 
-/// A recording that is being written.
+/// A recording that is being written, by a thread of its own: a disk that is slow or full does not hold up the answers.
 pub struct Recorder {
-    writer: Writer<BufWriter<File>>,
     path: PathBuf,
     sensor: Sensor,
-    /// Number of each channel so far by its topic.
-    channels: BTreeMap<String, u16>,
+    arrows: Arrows,
+    /// Results so far.
     results: u64,
+    entries: SyncSender<Entry>,
+    thread: JoinHandle<Written>,
 }
 
-/// When and as the how-manieth result messages are recorded.
-#[derive(Clone, Copy)]
-struct Stamp {
-    sequence: u64,
-    /// Nanoseconds since 1970 when the result was ready.
-    logged: u64,
+/// The messages of one outcome.
+struct Entry {
+    /// When it was made.
+    made: Instant,
+    stamp: Stamp,
+    /// Channel, type and bytes of each.
+    messages: Vec<(String, Kind, Vec<u8>)>,
+    is_result: bool,
+}
+
+impl Entry {
+    fn add<M: Message>(&mut self, topic: impl Into<String>, message: &M) -> Result<()> {
+        let topic = topic.into();
+        let bytes = message.to_cdr().map_err(|error| anyhow!("{topic}: {error}"))?;
+        self.messages.push((topic, Kind::of::<M>(), bytes));
+        Ok(())
+    }
+}
+
+/// What the thread has done.
+struct Written {
+    /// Results in the file.
+    results: u64,
+    /// Why the file has no more of them.
+    error: Option<RecordingError>,
 }
 
 impl Recorder {
-    /// Begins the recording of a sensor in a new file.
+    /// Begins the recording of a scene's sensor in a new file.
     ///
     /// # Errors
     /// A file that exists or cannot be made.
-    pub fn create(path: &Path, sensor: &Sensor) -> Result<Recorder> {
-        let file = File::create_new(path).map_err(at(path))?;
-        let library = concat!("dermis ", env!("CARGO_PKG_VERSION"));
-        let options = WriteOptions::new().compression(None).profile("ros2").library(library);
-        let writer = options.create(BufWriter::new(file)).map_err(at(path))?;
-        let (path, sensor, channels) = (path.to_owned(), sensor.clone(), BTreeMap::new());
-        let mut recorder = Recorder { writer, path, sensor, channels, results: 0 };
-        // Present in a recording without a frame too.
-        recorder.channel::<Image>(STRESS)?;
-        Ok(recorder)
+    pub fn create(path: &Path, scene: &Scene) -> Result<Recorder> {
+        let file = RecordingFile::create(path).map_err(|error| anyhow!("{}: {error}", path.display()))?;
+        let (entries, waiting) = sync_channel(WAITING);
+        let (path, sensor, arrows) = (path.to_owned(), scene.sensor.clone(), Arrows::of(scene));
+        let name = path.display().to_string();
+        let thread = std::thread::spawn(move || write_all(file, &waiting, &name));
+        Ok(Recorder { path, sensor, arrows, results: 0, entries, thread })
     }
 
-    /// Records an outcome.
+    /// Records an outcome; one that cannot be written any more is left out, and [`Recorder::finish`] says so.
     ///
     /// # Errors
-    /// A file that cannot be written, with its name.
+    /// A text or list that a message cannot represent, with the file's name.
     pub fn outcome(&mut self, outcome: &Outcome) -> Result<()> {
-        match outcome {
-            Outcome::Answer(answer) => {
-                let stamp = Stamp { sequence: answer.sequence, logged: nanoseconds(answer.answered_s) };
-                self.answer(answer, stamp)?;
-                self.results += 1;
-                self.line(outcome, stamp)
-            }
-            Outcome::Note(_) => Ok(()),
+        let (sequence, logged_s) = match outcome {
+            Outcome::Note(_) => return Ok(()),
+            Outcome::Answer(answer) => (answer.sequence, answer.answered_s),
             // Numbered as the result that follows it.
-            Outcome::Refusal(_) => {
-                let logged = nanoseconds(seconds(SystemTime::now()));
-                self.line(outcome, Stamp { sequence: self.results, logged })
-            }
+            Outcome::Refusal(_) => (self.results, seconds(SystemTime::now())),
+        };
+        let stamp = Stamp { sequence, logged: nanoseconds(logged_s) };
+        let mut entry = Entry {
+            made: Instant::now(),
+            stamp,
+            messages: Vec::new(),
+            is_result: matches!(outcome, Outcome::Answer(_)),
+        };
+        if let Outcome::Answer(answer) = outcome {
+            self.answer(answer, &mut entry).map_err(|error| anyhow!("{}: {error}", self.path.display()))?;
+            self.results += 1;
         }
+        entry.add(RESULT, &Text { data: serde_json::to_string(outcome)? })?;
+        // The thread takes entries as long as there is a sender, unless it has panicked: `finish` says so.
+        let _ = self.entries.send(entry);
+        Ok(())
     }
 
     /// Writes the index and closes the file; returns the number of results.
     ///
     /// # Errors
-    /// A file that cannot be written, with its name.
-    pub fn finish(mut self) -> Result<u64> {
-        self.writer.finish().map_err(at(&self.path))?;
-        self.writer.into_inner().flush().map_err(at(&self.path))?;
-        Ok(self.results)
+    /// A file that cannot be written, with its name and the number of results that it has.
+    pub fn finish(self) -> Result<u64> {
+        let Recorder { path, results, entries, thread, .. } = self;
+        drop(entries);
+        let path = path.display();
+        let written = thread.join().map_err(|_| anyhow!("{path}: the thread that writes it has ended"))?;
+        match written.error {
+            None => Ok(written.results),
+            Some(error) => Err(anyhow!("{path}: {error}; it has {} of {results} results", written.results)),
+        }
     }
 
-    fn answer(&mut self, answer: &Answer, stamp: Stamp) -> Result<()> {
+    fn answer(&self, answer: &Answer, entry: &mut Entry) -> Result<()> {
         for (frame, received_s) in answer.frames.iter().zip(answer.received) {
-            let data = bytes(&frame.readings());
-            self.message(STRESS, stamp, &image(&self.sensor, header(*received_s), &data))?;
+            let shape = [self.sensor.rows, self.sensor.cols];
+            for (topic, cdr) in frame_messages(shape, &header(*received_s), &frame.readings())? {
+                entry.messages.push((topic.to_owned(), Kind::of::<Image>(), cdr));
+            }
         }
         let header = header(answer.received_s);
         if !answer.result.forces_N.fz.is_empty() {
             let points = Points::new(&self.sensor, answer.result);
-            self.message(FORCES, stamp, &points.cloud(&self.sensor, header.clone()))?;
+            entry.add(FORCES, &points.cloud(&self.sensor, header.clone()))?;
         }
-        for (index, contact) in contacts(answer.result).iter().enumerate() {
+        let contacts = contacts(answer.result);
+        for (index, contact) in contacts.iter().enumerate() {
             // Without compressive force there is no place at which the force acts.
             let Some(centre_mm) = contact.centre_mm else { continue };
             let wrench = Wrench { force: contact.force_N, torque: torque(centre_mm, contact.force_N) };
-            self.message(&contact_channel(index + 1), stamp, &WrenchStamped { header: header.clone(), wrench })?;
+            entry.add(contact_channel(index + 1), &WrenchStamped { header: header.clone(), wrench })?;
         }
-        Ok(())
-    }
-
-    fn line(&mut self, outcome: &Outcome, stamp: Stamp) -> Result<()> {
-        let channel = match self.channels.get(RESULT) {
-            Some(channel) => *channel,
-            None => self.add(RESULT, 0, "json")?,
-        };
-        self.write(channel, stamp, &serde_json::to_vec(outcome)?)
-    }
-
-    fn message<M: Message>(&mut self, topic: &str, stamp: Stamp, message: &M) -> Result<()> {
-        let channel = self.channel::<M>(topic)?;
-        let bytes = message.to_cdr().map_err(|error| anyhow!("{}: {topic}: {error}", self.path.display()))?;
-        self.write(channel, stamp, &bytes)
-    }
-
-    /// Number of a channel; a new one is announced with its schema.
-    fn channel<M: Message>(&mut self, topic: &str) -> Result<u16> {
-        if let Some(channel) = self.channels.get(topic) {
-            return Ok(*channel);
-        }
-        let schema = self.writer.add_schema(M::NAME, "ros2msg", M::schema().as_bytes());
-        let schema = schema.map_err(at(&self.path))?;
-        self.add(topic, schema, "cdr")
-    }
-
-    fn add(&mut self, topic: &str, schema: u16, encoding: &str) -> Result<u16> {
-        let channel = self.writer.add_channel(schema, topic, encoding, &BTreeMap::new());
-        let channel = channel.map_err(at(&self.path))?;
-        self.channels.insert(topic.to_owned(), channel);
-        Ok(channel)
-    }
-
-    fn write(&mut self, channel_id: u16, stamp: Stamp, bytes: &[u8]) -> Result<()> {
-        let Stamp { sequence, logged } = stamp;
-        // 32 bits, after which they begin again.
-        let sequence = sequence as u32;
-        let header = MessageHeader { channel_id, sequence, log_time: logged, publish_time: logged };
-        self.writer.write_to_known_channel(&header, bytes).map_err(at(&self.path))
+        entry.add(ARROWS, &self.arrows.markers(&self.sensor, answer.result, &contacts, &header))
     }
 }
 
-/// An error on a file with its name and its cause, for `map_err`.
-fn at<E: Into<Error>>(path: &Path) -> impl FnOnce(E) -> Error + '_ {
-    move |error| anyhow!("{}: {:#}", path.display(), error.into())
+/// Writes all entries; says at once where one cannot be written, and takes the others without writing them.
+fn write_all(file: RecordingFile, entries: &Receiver<Entry>, name: &str) -> Written {
+    let mut results = 0;
+    let error = write_until_failure(file, entries, &mut results).err();
+    if let Some(error) = &error {
+        eprintln!("{name}: {error}; it ends with {results} results, the answers go on");
+        entries.iter().for_each(drop);
+    }
+    Written { results, error }
+}
+
+/// Writes entries until there are no more; `results` are those in the file.
+fn write_until_failure(
+    mut file: RecordingFile,
+    entries: &Receiver<Entry>,
+    results: &mut u64,
+) -> Result<(), RecordingError> {
+    let mut waiting = 0;
+    // Since when something is not in the file.
+    let mut since: Option<Instant> = None;
+    loop {
+        let wait = since.map_or(CHUNK, |since| CHUNK.saturating_sub(since.elapsed()));
+        match entries.recv_timeout(wait) {
+            Ok(Entry { made, stamp, messages, is_result }) => {
+                for (topic, kind, bytes) in messages {
+                    file.message(&topic, kind, stamp, &bytes)?;
+                }
+                waiting += u64::from(is_result);
+                since.get_or_insert(made);
+            }
+            Err(RecvTimeoutError::Timeout) => (),
+            Err(RecvTimeoutError::Disconnected) => {
+                file.finish()?;
+                *results += waiting;
+                return Ok(());
+            }
+        }
+        if since.is_some_and(|since| since.elapsed() >= CHUNK) {
+            file.flush()?;
+            *results += std::mem::take(&mut waiting);
+            since = None;
+        }
+    }
 }
 
 /// Nanoseconds since 1970.
@@ -165,16 +201,6 @@ fn nanoseconds(seconds: f64) -> u64 {
 
 fn header(received_s: f64) -> Header {
     Header { stamp: Time::from(nanoseconds(received_s)), frame_id: FRAME_ID.into() }
-}
-
-fn bytes(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
-}
-
-fn image<'a>(sensor: &Sensor, header: Header, data: &'a [u8]) -> Image<'a> {
-    let [height, width] = [sensor.rows as u32, sensor.cols as u32];
-    let step = width * PIXEL as u32;
-    Image { header, height, width, encoding: DOUBLE.into(), is_bigendian: 0, step, data }
 }
 
 /// Torque in N·m about the array's centre of a force in N that acts on the surface at a place in mm.
@@ -205,9 +231,9 @@ impl Points {
         let mut fields: Vec<PointField> =
             places.map(|(index, name)| field(name, 4 * index, PointField::FLOAT32)).collect();
         for (index, (name, _)) in columns.iter().enumerate() {
-            fields.push(field(name, PLACE + PIXEL * index, PointField::FLOAT64));
+            fields.push(field(name, PLACE + VALUE * index, PointField::FLOAT64));
         }
-        let mut data = Vec::with_capacity(fz.len() * (PLACE + PIXEL * columns.len()));
+        let mut data = Vec::with_capacity(fz.len() * (PLACE + VALUE * columns.len()));
         for taxel in 0..fz.len() {
             let [x, y] = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
             for place in [x, y, 0.0, 0.0] {

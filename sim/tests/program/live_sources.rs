@@ -101,7 +101,10 @@ fn a_recording_of_another_sensor_is_named() {
     let output = command.args(["live", "sensor-1", "--listen", "127.0.0.1:0", "--recording", &path]).output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr.ends_with(&format!("{path}: /dermis/stress, message 0: 8×8 taxels, wanted 10×10\n")), "{stderr}");
+    assert!(
+        stderr.ends_with(&format!("{path}: /dermis/stress_exact, message 0: 8×8 taxels, wanted 10×10\n")),
+        "{stderr}"
+    );
 }
 
 /// The forces of the bit-true model on a picture's stress, and those of the picture.
@@ -165,4 +168,9 @@ fn what_a_board_does_not_take_is_refused() {
     assert!(finger.contains("--board absent: the board applies input.calibration of scene pad"), "{finger}");
     let port = run(&["pad.toml", "--stream"]);
     assert!(port.ends_with("error: port absent: No such file or directory\n"), "{port}");
+    let rate = run(&["pad.toml", "--stream", "--rate", "100"]);
+    assert!(
+        rate.ends_with("--rate = 100 is not allowed: the board at absent computes every frame that arrives\n"),
+        "{rate}"
+    );
 }

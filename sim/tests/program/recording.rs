@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::spec::scene::Scene;
@@ -99,7 +100,7 @@ fn brief_output_leaves_the_recording_whole() {
     // A recording is never written over.
     let again = dermis(work.path(), &args, lines(1).as_bytes());
     assert_eq!(again.status.code(), Some(2));
-    assert_eq!(text(&again.stderr), "error: press.mcap: File exists (os error 17)\n");
+    assert_eq!(text(&again.stderr), "error: press.mcap: exists already, and a recording is never written over\n");
 }
 
 #[test]
@@ -143,4 +144,133 @@ fn a_recording_without_its_end_gives_what_it_has_and_an_error() {
     let (code, frames, error) = replay(&whole[..whole.len() / 3]);
     assert_eq!(code, Some(2));
     assert!(frames < 3 && error.starts_with("error: cut.mcap: ends early"), "{frames}, {error}");
+    let allowed = dermis(work.path(), &["replay", "cut.mcap", "--partial"], b"");
+    assert_eq!((allowed.status.code(), text(&allowed.stdout).lines().count()), (Some(0), frames));
+    assert!(text(&allowed.stderr).starts_with("cut.mcap: ends early"), "{}", text(&allowed.stderr));
+}
+
+/// A stream of a frame every 5 ms into a recording, until it is told to end.
+struct Recording {
+    child: std::process::Child,
+    feeding: std::thread::JoinHandle<()>,
+    /// Each line of its output, and when it came.
+    answers: std::thread::JoinHandle<Vec<(Instant, String)>>,
+}
+
+impl Recording {
+    fn begin(command: &mut Command, folder: &Path) -> Recording {
+        command.current_dir(folder).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let (mut input, output) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        let frames = lines(64);
+        let feeding = std::thread::spawn(move || {
+            // Until the program has ended.
+            for line in frames.lines().cycle() {
+                if writeln!(input, "{line}").is_err() {
+                    return;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        });
+        let read = || BufReader::new(output).lines().map_while(Result::ok).map(|line| (Instant::now(), line)).collect();
+        Recording { child, feeding, answers: std::thread::spawn(read) }
+    }
+
+    /// Waits for the end of a program that was sent a signal: its answers.
+    fn end(mut self) -> Vec<(Instant, String)> {
+        self.child.wait().unwrap();
+        self.feeding.join().unwrap();
+        self.answers.join().unwrap()
+    }
+}
+
+const RECORD: [&str; 5] = ["reconstruct", "searching.toml", "--stream", "--record", "killed.mcap"];
+
+/// A folder with a scene that is answered in well below 5 ms.
+fn searching() -> tempfile::TempDir {
+    let work = tempfile::tempdir().unwrap();
+    let sensor = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    std::fs::write(work.path().join("searching.toml"), format!("{sensor}[search]\nmu_max = 0\n")).unwrap();
+    work
+}
+
+/// What is wrong with the results that are read of a recording whose program was killed at an instant.
+fn lost(answers: &[(Instant, String)], killed: Instant, read: &[&str]) -> Option<String> {
+    let due = answers.iter().filter(|(at, _)| *at + Duration::from_secs(1) < killed).count();
+    if read.len() < due {
+        return Some(format!("{} results, {due} are older than a second", read.len()));
+    }
+    // The last ones may be recorded, but not yet written to standard output.
+    let other = answers.iter().zip(read).position(|((_, answer), read)| answer != read);
+    other.map(|line| format!("result {line} is another one"))
+}
+
+#[test]
+fn a_recording_that_is_killed_at_any_moment_has_every_frame_older_than_a_second() {
+    let kill = |seed: u64| {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let work = searching();
+        // Under nohup SIGHUP would be ignored.
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_dermis")]).args(RECORD);
+        let recording = Recording::begin(&mut command, work.path());
+        std::thread::sleep(Duration::from_secs_f64(1.2 + 1.5 * random.f64()));
+        let signal = if random.bool() { Signal::KILL } else { Signal::HUP };
+        let killed = Instant::now();
+        kill_process(Pid::from_child(&recording.child), signal).unwrap();
+        let answers = recording.end();
+        let replay = |what: &[&str]| {
+            let output = dermis(work.path(), &[&["replay", "killed.mcap"], what].concat(), b"");
+            let words = text(&output.stderr).to_owned();
+            assert!(words.contains("was not completed") || words.contains("ends early"), "{words}");
+            text(&output.stdout).to_owned()
+        };
+        let (frames, results) = (replay(&[]), replay(&["--results"]));
+        let read: Vec<&str> = results.lines().collect();
+        assert_eq!(lost(&answers, killed, &read), None, "seed {seed}");
+        assert!(frames.lines().count() >= read.len(), "seed {seed}");
+        assert!(answers.len() > 20, "seed {seed}: {} answers", answers.len());
+        // Seeded faults: a second that is lost, and another result.
+        let due = answers.iter().filter(|(at, _)| *at + Duration::from_secs(1) < killed).count();
+        assert!(due == 0 || lost(&answers, killed, &read[..due - 1]).is_some());
+        assert!(lost(&answers, killed, &[&["other"], &read[1..]].concat()).is_some());
+    };
+    // Some at a time: a program that waits for the processor would answer late.
+    let count = if is_nightly() { 200 } else { 5 };
+    for seeds in (0..count).collect::<Vec<u64>>().chunks(5) {
+        std::thread::scope(|scope| seeds.iter().for_each(|seed| drop(scope.spawn(|| kill(*seed)))));
+    }
+}
+
+/// Whether `make nightly` runs the test.
+fn is_nightly() -> bool {
+    std::env::var_os("DERMIS_NIGHTLY").is_some()
+}
+
+#[test]
+fn a_full_disk_is_said_at_once_and_the_answers_go_on() {
+    let work = searching();
+    // A file of more than this size cannot be written, as on a full disk; dash counts blocks of 512 bytes.
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 2048; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_dermis")]).args(RECORD);
+    let mut recording = Recording::begin(&mut shell, work.path());
+    let mut words = BufReader::new(recording.child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let said = words.find(|line| line.starts_with("killed.mcap")).unwrap();
+    let (at, end) = (Instant::now(), "the answers go on");
+    assert!(said.contains("File too large") && said.ends_with(end), "{said}");
+    let count: usize = said.split("it ends with ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    kill_process(Pid::from_child(&recording.child), Signal::INT).unwrap();
+    let last = words.last().unwrap();
+    let answers = recording.end();
+    assert!(last.starts_with("error: killed.mcap: File too large"), "{last}");
+    assert!(last.contains(&format!("it has {count} of {} results", answers.len())), "{last}");
+    // The first result that the file lacks is at most a second old.
+    let since = at.saturating_duration_since(answers[count].0);
+    assert!(count > 0 && since < Duration::from_secs(1), "{count} results, said after {since:?}");
+    assert!(answers.last().unwrap().0 > at + Duration::from_millis(300));
+    let replayed = dermis(work.path(), &["replay", "killed.mcap", "--results"], b"");
+    let wanted: Vec<&str> = answers[..count].iter().map(|(_, line)| line.as_str()).collect();
+    assert_eq!((replayed.status.code(), text(&replayed.stdout).lines().collect::<Vec<_>>()), (Some(0), wanted));
+    assert!(text(&replayed.stderr).contains("was not completed"), "{}", text(&replayed.stderr));
 }

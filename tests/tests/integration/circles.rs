@@ -430,7 +430,19 @@ fn the_layers_of_sim_are_in_order() {
     in_order(
         &modules("dermis_sim", "sim"),
         &[],
-        &["flow", "microcontroller", "cosim", "engine", "stream", "recording", "link", "report", "live", "commands"],
+        &[
+            "flow",
+            "microcontroller",
+            "cosim",
+            "engine",
+            "batch",
+            "stream",
+            "recording",
+            "link",
+            "report",
+            "live",
+            "commands",
+        ],
         false,
     );
 }

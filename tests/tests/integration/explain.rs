@@ -49,6 +49,23 @@ fn dead_taxels_cost_what_two_builds_differ_by() {
     assert!(saved("[fixed]\nlanes = 36\n", "dead taxels")[2] > 0);
 }
 
+/// The check of codes states its cost where it is, and what it would cost where it is left out.
+#[test]
+fn the_code_check_costs_what_two_builds_differ_by() {
+    let lanes = "[fixed]\nlanes = 36\n";
+    let (on, off) = (model(lanes), model(&format!("{lanes}[hardware]\ncode_check = \"off\"\n")));
+    let [with, without] = [&on, &off].map(|model| total(&generate(model).unwrap().usage));
+    let of = |model: &Model| explain(model).unwrap().into_iter().find(|e| e.feature == "code check").unwrap();
+    assert!(of(&on).present && !of(&off).present);
+    for costs in [of(&on).costs.unwrap(), of(&off).saved.unwrap()] {
+        assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+        assert_eq!((costs.block_rams, costs.multipliers, costs.cycles), (0, 0, 0));
+        assert!((300..900).contains(&costs.luts) && costs.flip_flops < 600, "{costs:?}");
+    }
+    let has = |model: &Model| verilog_code(&model.scene).contains("check__faults");
+    assert!(has(&on) && !has(&off));
+}
+
 /// The width in use states its cost over the narrowest; a narrower one what the widest would cost.
 #[test]
 fn the_search_width_costs_what_two_builds_differ_by() {
@@ -100,7 +117,7 @@ fn a_running_zero_costs_what_two_builds_differ_by() {
 fn what_the_scene_has_is_not_left_out() {
     let all = explain(&model("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n")).unwrap();
     let present: Vec<&str> = all.iter().filter(|e| e.present).map(|e| e.feature).collect();
-    assert_eq!(present, ["averaging", "search", "polynomial of degree 3", "search width", "threshold"]);
+    assert_eq!(present, ["code check", "averaging", "search", "polynomial of degree 3", "search width", "threshold"]);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn outcomes_add_up_and_a_reset_helps() {
     let coefficients = of(StorageClass::Rom, "pass");
     assert!(4 * coefficients.silent > coefficients.flips && coefficients.detected == 0, "{coefficients:?}");
     // State of the handshake: a flip hangs the design or breaks the length of a frame.
-    let control = ["send", "search", "engine", "receive"].map(|stage| of(StorageClass::Register, stage));
+    let control = ["send", "engine", "receive"].map(|stage| of(StorageClass::Register, stage));
     assert!(control.iter().any(|row| row.hang > 0) && control.iter().any(|row| row.detected > 0), "{control:?}");
     let shares = Shares::of(&rows, StorageClass::Rom).unwrap();
     assert!((shares.harmless + shares.detected + shares.hang + shares.silent - 1.0).abs() < 1e-9, "{shares:?}");

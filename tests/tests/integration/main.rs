@@ -11,6 +11,7 @@ mod artix;
 mod bonded;
 mod choice;
 mod circles;
+mod code_check;
 mod coefficients;
 mod dead;
 mod equality;

@@ -5,7 +5,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use dermis_golden::data::frame::Frame;
+use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::{Model, Plan};
+use dermis_golden::result::flags::{Flag, FlagSet};
 use dermis_golden::spec::scene::{largest_code, Scene};
 use dermis_sim::microcontroller::target::{expected, measure_all, Measured};
 use dermis_sim::microcontroller::{generate, generate_for, needs, CSource};
@@ -82,9 +84,34 @@ fn extreme_readings(model: &Model) -> Vec<Vec<i32>> {
     frames
 }
 
+/// A press; the same clipped, with a row twice, with a column twice, as its own mirror image in both directions; and all of them
+/// as codes that fall with the load.
+fn faulty_readings(model: &Model) -> Vec<Vec<i32>> {
+    let (rows, cols) = (model.scene.sensor.rows, model.scene.sensor.cols);
+    let most = largest_code(model.formats().code_bits);
+    let code = |taxel: usize| {
+        let [down, right] = [(taxel / cols).abs_diff(1), (taxel % cols).abs_diff(2)].map(|off| off as i32);
+        most / 2 - (most / 256 * (7 * down * down + 5 * right * right)).min(most) - (taxel % 3) as i32
+    };
+    let mut press: Vec<i32> = (0..rows * cols).map(code).collect();
+    // The least step.
+    press[1] = press[0] + 1;
+    let mut sorted = press.clone();
+    sorted.sort_unstable();
+    let clipped = press.iter().map(|code| *code.min(&sorted[sorted.len() - 5])).collect();
+    let taken = |of: &dyn Fn(usize, usize) -> usize| (0..rows * cols).map(|k| press[of(k / cols, k % cols)]).collect();
+    let twice = |at: usize| if at == 2 { 1 } else { at };
+    let row_twice = taken(&|row, col| cols * twice(row) + col);
+    let col_twice = taken(&|row, col| cols * row + twice(col));
+    let mirrored = taken(&|row, col| cols * row.min(rows - 1 - row) + col.min(cols - 1 - col));
+    let rising: [Vec<i32>; 5] = [press.clone(), clipped, row_twice, col_twice, mirrored];
+    let falling = rising.clone().map(|frame| frame.into_iter().map(|code| -1 - code).collect());
+    [rising, falling].concat()
+}
+
 /// Asserts that the host's compiler gives every word of the model, for shipped frames and extreme readings.
 fn check(model: &Model, frames: &[Frame], flags: &[&str]) {
-    let mut readings = extreme_readings(model);
+    let mut readings = [extreme_readings(model), faulty_readings(model)].concat();
     readings.extend(frames.iter().map(|frame| model.readings(std::slice::from_ref(frame)).unwrap()));
     let source = generate_for(model, readings).unwrap();
     for (frame, (readings, printed)) in source.readings.iter().zip(run(&source, flags)).enumerate() {
@@ -165,6 +192,29 @@ fn readings_beyond_their_range_are_told() {
     assert_eq!(outcomes("full_scale_MPa = 1.0"), [none, saturated, saturated, none, outside, outside]);
     // Where every frame has a scale of its own its largest reading is the largest code.
     assert_eq!(outcomes(""), [none, none, none, none, outside, outside]);
+}
+
+/// The checks of codes: each kind of faulty frame has its flags, in C as in the model, and none where the scene has no check.
+#[test]
+fn faults_of_codes_are_in_the_status() {
+    let flags_of = |falls: bool, more: &str| {
+        let of_check = |plan: &mut Plan| {
+            plan.prepare.gain = Some(vec![if falls { -65536 } else { 65536 }; 24]);
+            plan.prepare.zero = Some(vec![0; 24]);
+            plan.prepare.check.iter_mut().for_each(|check| check.falls = falls);
+        };
+        let model = Model::new(&parsed(4, 6, [4.0, 4.0], more)).unwrap().with_changed_plan(of_check).unwrap();
+        check(&model, &[], &SANITIZED);
+        let readings = faulty_readings(&model);
+        let raised = |readings: &Vec<i32>| Status::all(&model.run(readings).status).next().unwrap().raised;
+        let both = |raised: FlagSet| [Flag::Clipped, Flag::LineFault].map(|flag| raised.contains(flag));
+        readings.iter().map(|readings| both(raised(readings))).collect::<Vec<_>>()
+    };
+    let (clean, clipped, line) = ([false, false], [true, false], [false, true]);
+    let seen = [clean, clipped, line, line, clean];
+    assert_eq!(flags_of(false, "")[..5], seen);
+    assert_eq!(flags_of(true, "")[5..], seen);
+    assert_eq!(flags_of(false, "[hardware]\ncode_check = \"off\"\n"), [clean; 10]);
 }
 
 /// The source with the first number that is not 0 of a table negated.

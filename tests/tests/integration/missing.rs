@@ -5,6 +5,7 @@ use std::io::{Cursor, Read};
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::import::{import, Settings, Unit};
+use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::engine::{CheckPace, Engine, State};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
@@ -121,13 +122,13 @@ fn every_way_in_names_the_same_taxels_and_gives_the_same_forces() {
             assert_eq!(bare(&of(&frame)), bare(&wanted), "{}: {name}", exact.engine);
         }
         let path = |name: &str| folder.path().join(format!("{}-{name}.mcap", exact.engine));
-        let mut recorder = Recorder::create(&path("press"), &scene.sensor).unwrap();
+        let mut recorder = Recorder::create(&path("press"), &scene).unwrap();
         let input = lines(&stress);
         let results = streamed(&*engine, Box::new(Cursor::new(input.concat().into_bytes())), &mut recorder);
         assert_eq!(results.len(), input.len());
         recorder.finish().unwrap();
-        let again = Lines::open(path("press"), Some([8, 8]), Pace::Unbounded, false).unwrap();
-        let mut other = Recorder::create(&path("replayed"), &scene.sensor).unwrap();
+        let again = Lines::open(path("press"), FrameOptions::default(), Pace::Unbounded, [false, false]).unwrap();
+        let mut other = Recorder::create(&path("replayed"), &scene).unwrap();
         let replayed = streamed(&*engine, Box::new(again), &mut other);
         assert_eq!(replayed.len(), input.len());
         // A frame of a stream goes on from the one before it.

@@ -1,5 +1,6 @@
 //! Errors of frames; each names file, field and value.
 
+use crate::data::recording::RecordingError;
 use crate::spec::sensor::{Sensor, SensorError};
 use thiserror::Error;
 
@@ -23,16 +24,32 @@ pub enum FrameError {
         limit: u64,
     },
     /// A folder has no frame.
-    #[error("{file}: has no frames; their file names end in .json or .csv")]
+    #[error("{file}: has no frames; their file names end in .json, .csv or .mcap")]
     NoFrames {
         /// Path as given.
         file: String,
     },
-    /// The file name ends in neither `.json` nor `.csv`.
-    #[error("{file}: a frame's file name ends in .json or .csv")]
+    /// The file name ends in none of `.json`, `.csv` and `.mcap`.
+    #[error("{file}: a frame's file name ends in .json, .csv or .mcap")]
     UnknownKind {
         /// Path as given.
         file: String,
+    },
+    /// A recording cannot be read, or holds no such frame.
+    #[error("{file}: {source}")]
+    Recording {
+        /// Path as given.
+        file: String,
+        /// What is wrong.
+        source: RecordingError,
+    },
+    /// A recording has several frames where one is wanted.
+    #[error("{file}: has {count} frames, wanted one: {file}:1 is the first")]
+    SeveralFrames {
+        /// Path as given.
+        file: String,
+        /// Number of frames.
+        count: usize,
     },
     /// The text is not valid JSON, is truncated, or a value has the wrong type.
     #[error("{file}, line {line}, column {column}{}: {message}", in_field(field))]

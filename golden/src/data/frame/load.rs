@@ -1,5 +1,6 @@
 //! Reading frames from files, with a limit on their size.
 
+use super::recorded::Recording;
 use super::{csv, json, Frame, FrameError};
 use crate::spec::scene::Scene;
 use std::fs::File;
@@ -10,7 +11,8 @@ use std::path::Path;
 pub const LARGEST_FILE: u64 = 64 << 20;
 
 impl Frame {
-    /// Reads a frame from a `.json` or `.csv` file. A CSV file, or a JSON file without a sensor, takes the scene's;
+    /// Reads a frame from a `.json` or `.csv` file, or frame N from 1 of a recording, `FILE.mcap:N`; N may be left out where
+    /// that has one frame. A recording, a CSV file, or a JSON file without a sensor, takes the scene's;
     /// [`Frame::check`] compares the sensors if both exist.
     ///
     /// # Errors
@@ -18,12 +20,30 @@ impl Frame {
     pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let path = path.as_ref();
         let file = path.display().to_string();
+        if let Some(recording) = Recording::named(path) {
+            let mut frames = recording.load(scene)?;
+            return match (frames.pop(), frames.len()) {
+                (Some(frame), 0) => Ok(frame),
+                (_, others) => Err(FrameError::SeveralFrames { file, count: others + 1 }),
+            };
+        }
         let parser = parser(path)?;
         Frame::parsed(parser, &read(path, &file)?, path, scene)
     }
 
-    /// Reads every frame of a recording: of a folder the `.json` and `.csv` files in the order of their names, of a CSV
-    /// file one frame after the other, of a JSON file its frame.
+    /// As [`Frame::load`], but all frames of a recording whose frame is not named.
+    ///
+    /// # Errors
+    /// As [`Frame::load`].
+    pub fn load_recorded(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+        match Recording::named(path.as_ref()) {
+            Some(recording) => recording.load(scene),
+            None => Frame::load(path, scene).map(|frame| vec![frame]),
+        }
+    }
+
+    /// Reads every frame of a recording: of a folder the `.json`, `.csv` and `.mcap` files in the order of their names, of a CSV
+    /// file or an MCAP file one frame after the other, of a JSON file its frame.
     ///
     /// ```
     /// use dermis_golden::{data::frame::Frame, spec::scene::Scene, spec::sensor::Sensor};
@@ -47,12 +67,15 @@ impl Frame {
             let entries =
                 std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(unreadable)?;
             let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).collect();
-            files.retain(|path| parser(path).is_ok());
+            files.retain(|path| parser(path).is_ok() || Recording::named(path).is_some());
             files.sort();
             let frames: Vec<Vec<Frame>> =
                 files.iter().map(|path| Frame::load_all(path, scene)).collect::<Result<_, _>>()?;
             let frames = frames.concat();
             return if frames.is_empty() { Err(FrameError::NoFrames { file }) } else { Ok(frames) };
+        }
+        if let Some(recording) = Recording::named(path) {
+            return recording.load(scene);
         }
         if is_csv(path) {
             let text = read(path, &file)?;

@@ -12,22 +12,12 @@
 use super::error::{ImportError, Source};
 use super::format::{Format, NPY_MAGIC};
 use super::recording::{is_reading, RawFrame, Recording, LARGEST_SIDE};
-
-/// Kind of a value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Signed,
-    Unsigned,
-    Float,
-}
+use crate::data::number::{NumberFormat, NumberKind as Kind};
 
 /// The fields of a header.
 #[derive(Debug, PartialEq)]
 struct Header {
-    kind: Kind,
-    /// Bytes of a value.
-    width: usize,
-    big_endian: bool,
+    number: NumberFormat,
     fortran: bool,
     shape: Vec<usize>,
 }
@@ -38,12 +28,13 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
     let header = header(&text, source)?;
     let [count, rows, cols] = dimensions(&header.shape, size, source)?;
     let taxels = rows * cols;
-    let wanted = count.checked_mul(taxels).and_then(|values| values.checked_mul(header.width));
+    let wanted = count.checked_mul(taxels).and_then(|values| values.checked_mul(header.number.width));
     if wanted != Some(data.len()) {
         let allowed = format!("the number of bytes of shape {:?}", header.shape);
         return Err(source.field("bytes behind the NumPy header", data.len(), allowed));
     }
-    let value = |index: usize| number(&data[index * header.width..][..header.width], &header);
+    let width = header.number.width;
+    let value = |index: usize| header.number.value(&data[index * width..][..width]);
     let mut frames = Vec::with_capacity(count);
     for frame in 0..count {
         let mut values = Vec::with_capacity(taxels);
@@ -93,7 +84,7 @@ fn field<'a>(text: &'a str, key: &str, source: &Source) -> Result<&'a str, Impor
 fn header(text: &str, source: &Source) -> Result<Header, ImportError> {
     let descr = field(text, "descr", source)?;
     let quoted = descr.strip_prefix(['\'', '"']).and_then(|rest| rest.split(['\'', '"']).next());
-    let (kind, width, big_endian) = quoted.and_then(kind).ok_or_else(|| {
+    let number = quoted.and_then(number).ok_or_else(|| {
         source.field("descr", descr.split(',').next().unwrap_or(""), "an integer, float or boolean type, such as '<f4'")
     })?;
     let order = field(text, "fortran_order", source)?;
@@ -108,12 +99,12 @@ fn header(text: &str, source: &Source) -> Result<Header, ImportError> {
     let numbers = inner.split(',').map(str::trim).filter(|number| !number.is_empty());
     let shape: Vec<usize> =
         numbers.map(|n| n.parse().ok().filter(|n| *n > 0).ok_or_else(wrong)).collect::<Result<_, _>>()?;
-    Ok(Header { kind, width, big_endian, fortran, shape })
+    Ok(Header { number, fortran, shape })
 }
 
-/// Kind, width and byte order of a type such as `<f4`.
-fn kind(descr: &str) -> Option<(Kind, usize, bool)> {
-    let order = descr.chars().next()?;
+/// The numbers of a type such as `<f4`.
+fn number(descr: &str) -> Option<NumberFormat> {
+    let big_endian = descr.starts_with('>');
     let rest = descr.strip_prefix(['<', '>', '|', '='])?;
     let (kind, width) = match rest {
         "b1" | "u1" => (Kind::Unsigned, 1),
@@ -129,7 +120,7 @@ fn kind(descr: &str) -> Option<(Kind, usize, bool)> {
         "f8" => (Kind::Float, 8),
         _ => return None,
     };
-    Some((kind, width, order == '>'))
+    Some(NumberFormat { kind, width, big_endian })
 }
 
 /// Frames, rows and columns of a shape.
@@ -147,41 +138,5 @@ fn dimensions(shape: &[usize], size: Option<[usize; 2]>, source: &Source) -> Res
     match sides[1].max(sides[2]) <= LARGEST_SIDE {
         true => Ok(sides),
         false => Err(wrong(&format!("at most {LARGEST_SIDE} rows and columns"))),
-    }
-}
-
-/// A value; bytes are as many as its width.
-fn number(bytes: &[u8], header: &Header) -> f64 {
-    let mut word = 0u64;
-    for (k, byte) in bytes.iter().enumerate() {
-        let place = if header.big_endian { header.width - 1 - k } else { k };
-        word |= u64::from(*byte) << (8 * place);
-    }
-    match (header.kind, header.width) {
-        (Kind::Unsigned, _) => word as f64,
-        (Kind::Signed, width) => {
-            let unused = 64 - 8 * width as u32;
-            ((word << unused) as i64 >> unused) as f64
-        }
-        // The casts keep the word's width.
-        (Kind::Float, 2) => half(word as u16),
-        (Kind::Float, 4) => f64::from(f32::from_bits(word as u32)),
-        (Kind::Float, _) => f64::from_bits(word),
-    }
-}
-
-/// A float of 16 bits: sign, 5 bits exponent, 10 bits fraction.
-fn half(word: u16) -> f64 {
-    let (exponent, fraction) = (i32::from(word >> 10 & 31), f64::from(word & 1023));
-    let size = match exponent {
-        0 => fraction * 2f64.powi(-24),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
-    };
-    if word >> 15 == 1 {
-        -size
-    } else {
-        size
     }
 }

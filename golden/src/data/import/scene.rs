@@ -10,7 +10,7 @@ use super::error::{ImportError, Source};
 use super::measure::Codes;
 use super::recording::{RawFrame, Recording};
 use super::summary::{FrameRecord, Summary};
-use crate::data::frame::{Frame, FrameError};
+use crate::data::frame::{frame_name, Frame, FrameError};
 use crate::data::input::missing::complete;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
@@ -121,19 +121,15 @@ pub(super) fn frames(
 ) -> Result<(Vec<Frame>, Vec<FrameRecord>), ImportError> {
     let (sensor, name) = (&scene.sensor, &scene.name);
     let area_mm2 = sensor.pitch_x_mm * sensor.pitch_y_mm;
-    let digits = recording.frames.len().to_string().len().max(4);
     let sum = |values: &mut dyn Iterator<Item = f64>| values.filter(|value| !value.is_nan()).sum::<f64>();
     let frame = |(index, raw): (usize, &RawFrame)| {
-        let id = format!("{name}-{:0digits$}", index + 1);
+        let id = frame_name(name, index + 1);
         let stress: Vec<f64> = readings(recording, window, raw).map(|reading| reading / per_MPa).collect();
         let inside_N = area_mm2 * sum(&mut stress.iter().copied());
         let outside_N = area_mm2 / per_MPa * sum(&mut raw.values.iter().copied()) - inside_N;
         let mut frame = Frame::from_stress(&id, sensor, stress)?;
         let normal_N = sensor.sum_of_stress_N(&complete(&scene.input, frame.clone()).stress_MPa);
-        let time = raw.time_s.map_or(String::new(), |seconds| format!(", {seconds:.4} s"));
-        frame.source = Some(format!("recording, frame {}{time}", raw.number));
         let record = FrameRecord {
-            file: format!("frames/{id}.json"),
             number: raw.number,
             time_s: raw.time_s,
             normal_N,
@@ -141,6 +137,7 @@ pub(super) fn frames(
             outside_N: if outside_N.abs() <= 1e-9 * normal_N.abs() { 0.0 } else { outside_N },
             device_N: raw.device.map(|figure| figure.force_N(area_mm2 / per_MPa)),
         };
+        frame.source = Some(record.source());
         Ok((frame, record))
     };
     let all = recording.frames.iter().enumerate().map(frame).collect::<Result<Vec<_>, ImportError>>()?;

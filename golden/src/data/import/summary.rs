@@ -12,8 +12,6 @@ pub const IDLE_SHARE: f64 = 0.05;
 /// One frame of an imported recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
-    /// File of the frame in the recording's folder.
-    pub file: String,
     /// Number as the device counts.
     pub number: usize,
     /// Time from the start in s, if known.
@@ -27,6 +25,12 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
+    /// Origin of the frame, in words.
+    pub(super) fn source(&self) -> String {
+        let time = self.time_s.map_or(String::new(), |seconds| format!(", {seconds:.4} s"));
+        format!("recording, frame {}{time}", self.number)
+    }
+
     /// Σ b·area of the whole array over the device's own figure − 1; none without a figure or for an unloaded frame.
     pub fn closure(&self) -> Option<f64> {
         let device = self.device_N.filter(|force| *force != 0.0)?;

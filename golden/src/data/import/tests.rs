@@ -142,6 +142,16 @@ fn saved_and_opened_again() {
         (&opened.scene, &opened.frames, &opened.summary),
         (&imported.scene, &imported.frames, &imported.summary)
     );
+    // All frames are in one file, which a second import replaces.
+    imported.save(&folder.path().join("a/b")).unwrap();
+    let files = std::fs::read_dir(folder.path().join("a/b")).unwrap();
+    let mut files: Vec<_> = files.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    files.sort();
+    assert_eq!(files, ["finger 1.mcap", "finger 1.toml", "recording.json"]);
+    let fewer = Imported { frames: imported.frames[..1].to_vec(), ..imported.clone() };
+    fewer.save(&folder.path().join("fewer")).unwrap();
+    let error = Imported::open(&folder.path().join("fewer")).unwrap_err().to_string();
+    assert!(error.contains("finger 1.mcap: number of frames = 1"), "{error}");
     let summary = folder.path().join("a/b/recording.json");
     std::fs::write(&summary, "{\"name\": 1}").unwrap();
     let error = Imported::open(&folder.path().join("a/b")).unwrap_err().to_string();

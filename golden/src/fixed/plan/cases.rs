@@ -25,8 +25,8 @@ use crate::spec::adc::timing::Timing;
 use crate::spec::board::{Board, EngineKind};
 use crate::spec::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::spec::quads::Quads;
-use crate::spec::scene::Scene;
 use crate::spec::scene::MAX_DEGREE;
+use crate::spec::scene::{CodeCheck, Scene};
 use crate::spec::sensor::Sensor;
 use crate::spec::window::Window;
 
@@ -139,6 +139,9 @@ fn of_shapes(
     let score_limit = score_limit(&scene)?;
     if let [only] = cases[..] {
         scene.partition.case = only;
+    }
+    if board.engine == EngineKind::Serial {
+        scene.hardware.code_check = CodeCheck::Off;
     }
     if scene.hardware.table_range.has_coefficients() {
         // That of the specimen that needs most; all have it.

@@ -12,8 +12,8 @@ use crate::spec::partition::{subarrays, Case};
 use crate::spec::quads::Quads;
 use crate::spec::scene::MAX_DEGREE;
 use crate::spec::scene::{
-    CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, RunningZero, Scene, SearchSpec, TableRange, TableStorage,
-    Zero,
+    CodeCheck, CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, RunningZero, Scene, SearchSpec, TableRange,
+    TableStorage, Zero,
 };
 use crate::spec::sliding::most_frames;
 
@@ -64,6 +64,10 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     if let Some(scan) = scene.hardware.adc_scan {
         let setting = format!("{} {} on one bus", scan.converters, scan.converter.name);
         add("scan", true, setting, &|| plain(scene));
+    }
+    let checking = with(&|s| s.hardware.code_check = CodeCheck::On);
+    if checking.checks_codes() && plan.board.engine == EngineKind::Parallel {
+        add("code check", scene.checks_codes(), "plateaus, repeated rows and columns".into(), &|| plain(&checking));
     }
     let written = plan.has_writable_tables();
     let table = input.calibration.is_some() || written;
@@ -178,6 +182,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let plan = plain(&with(change)).ok();
         all.iter_mut().filter(|feature| feature.name == name).for_each(|f| f.without_feature = plan.clone());
     };
+    if scene.checks_codes() {
+        without("code check", &|s| s.hardware.code_check = CodeCheck::Off);
+    }
     if running.is_some() {
         without("running zero", &|s| s.input.zero = Zero::Fixed);
     }

@@ -5,7 +5,8 @@
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
 //!                       or sliding mean           b ← b + ⌊(2^k s − b − c) / 2^g + 1/2⌋: likewise
 //! ```
-//! Where the zero runs, its drift is taken off `code − zero` ([`running_zero`]).
+//! Where the zero runs, its drift is taken off `code − zero` ([`running_zero`]). Beside them the codes are checked as they
+//! arrive ([`code_check`]).
 //!
 //! | word | bits | LSB |
 //! |---|---|---|
@@ -20,6 +21,7 @@
 //! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
 //! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
+pub mod code_check;
 pub mod running_zero;
 
 use crate::data::frame::FrameError;
@@ -29,9 +31,11 @@ use crate::data::input::InputError;
 use crate::data::quantise::quantise;
 use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
+use crate::result::flags::FlagSet;
 use crate::spec::scene::largest_code;
 use crate::spec::scene::{MeanKind, Scene};
 use crate::spec::sliding::gain_shift;
+use code_check::CodeCheck;
 use running_zero::{Drift, RunningZero};
 
 /// Fraction bits of a gain word.
@@ -52,6 +56,8 @@ pub struct Prepare {
     pub mean: MeanKind,
     /// How zeros follow the readings, if they do.
     pub running: Option<RunningZero>,
+    /// How codes are checked, if they are.
+    pub check: Option<CodeCheck>,
     /// Reading per MPa at the largest gain, in the readings' unit: 1 / (largest |gain|).
     pub reading_per_MPa: f64,
     code_bits: u32,
@@ -67,6 +73,8 @@ pub struct Prepared {
     pub frames: usize,
     /// How far zeros have moved.
     pub drift: Drift,
+    /// What the codes of a block of frames raise, or with a sliding mean those of the last one.
+    pub raised: FlagSet,
 }
 
 /// Conversion of a scene's readings to MPa, in floating point.
@@ -132,6 +140,7 @@ impl Prepare {
         let running = RunningZero::of_scene(scene);
         Prepare {
             zero: scale.tare.as_deref().or(offset).map(codes),
+            check: CodeCheck::of_scene(scene, gain.as_deref()),
             gain,
             running,
             average: scene.input.average,
@@ -170,7 +179,8 @@ impl Prepare {
 
     /// No frames yet.
     pub fn empty(&self) -> Prepared {
-        Prepared { words: vec![0; self.taxels], frames: 0, drift: Drift::new(self.taxels) }
+        let (words, drift) = (vec![0; self.taxels], Drift::new(self.taxels));
+        Prepared { words, frames: 0, drift, raised: FlagSet::default() }
     }
 
     /// Calibrates frames of codes and adds them to `prepared`, frame after frame, each row-major. A block that is complete
@@ -180,11 +190,13 @@ impl Prepare {
             if self.mean == MeanKind::Block && prepared.frames == 1 << self.average {
                 self.restart_mean(prepared);
             }
+            let raised = self.check.as_ref().map_or(FlagSet::default(), |check| check.flags(frame));
             let samples = self.calibrate(&mut prepared.drift, frame, false);
             let shift = match self.mean {
                 MeanKind::Block => None,
                 MeanKind::Sliding => Some(gain_shift(prepared.frames + 1, self.average)),
             };
+            prepared.raised = if shift.is_some() { raised } else { prepared.raised | raised };
             let half_down = (prepared.frames % 2) as i64;
             for (word, sample) in prepared.words.iter_mut().zip(samples) {
                 let added = match shift {
@@ -207,6 +219,7 @@ impl Prepare {
     fn restart_mean(&self, prepared: &mut Prepared) {
         prepared.words.fill(0);
         prepared.frames = 0;
+        prepared.raised = FlagSet::default();
     }
 
     /// The words after all `codes` since a reset: 2^average frames, with a running zero a multiple of them; or any number with
@@ -252,8 +265,8 @@ mod tests {
             ..Prepare::default()
         };
         // (15 − 10)/2 = 2.5 rounds to 3; 127 + 3 is held to 127.
-        let drift = Drift::new(2);
-        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2, drift });
+        let (drift, raised) = (Drift::new(2), FlagSet::default());
+        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2, drift, raised });
         let sliding = Prepare { zero: None, gain: None, average: 2, mean: MeanKind::Sliding, taxels: 1, ..prepare };
         let mut words = sliding.empty();
         let mut after = |code: i32| {

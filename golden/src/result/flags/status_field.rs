@@ -17,6 +17,8 @@ pub enum Feature {
     WholeSearch,
     /// The coefficient memory is checked.
     CoefficientCheck,
+    /// The codes of a frame are checked.
+    CodeCheck,
     /// Each contact has a μ of its own.
     Contacts,
     /// One of several cases is chosen for each frame.
@@ -40,6 +42,7 @@ impl Feature {
                 let searched = scene.hardware_estimator() == EstimatorKind::Search && scene.search.mu_max > 0.0;
                 searched && scene.partition.case == Case::WHOLE
             }
+            Feature::CodeCheck => scene.checks_codes(),
             Feature::CoefficientCheck => scene.hardware.coefficient_check == CoefficientCheck::Signature,
             Feature::Contacts => scene.partition.case == Case::Contacts,
             Feature::Adaptive => scene.partition.case == Case::Adaptive,
@@ -55,6 +58,7 @@ impl Feature {
         match self {
             Feature::Always => "",
             Feature::WholeSearch => "a search, `partition.case = 0`",
+            Feature::CodeCheck => "`hardware.code_check = \"on\"`",
             Feature::CoefficientCheck => "`hardware.coefficient_check = \"signature\"`",
             Feature::Contacts => "`partition.case = \"contacts\"`",
             Feature::Adaptive => "`partition.case = \"adaptive\"`",

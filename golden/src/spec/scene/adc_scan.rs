@@ -1,6 +1,7 @@
 //! Table `[hardware.adc_scan]`, which `hardware.source = "adc-scan"` needs.
 
-use super::field::{choice, table, whole, Declared, HasDefault, Kind, Member, Number, Power, Table};
+use super::declared::Declared;
+use super::field::{choice, table, whole, HasDefault, Kind, Member, Number, Power, Table};
 use super::reader::Reader;
 use super::SceneError;
 use crate::spec::adc::{AdcScan, Converter, CONVERTERS, MOST_AVERAGE, MOST_CONVERTERS};

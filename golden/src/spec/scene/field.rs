@@ -4,33 +4,14 @@
 //! defaults, the reader with its errors, the known names, and what [`Scene::fields`](super::Scene::fields) tells others: the
 //! guide's table, the JSON schema, the comments of `dermis new`.
 
+use super::declared::Declared;
 use super::reader::Reader;
 use super::SceneError;
 use crate::spec::plain_text::plain_text;
-use serde::Serialize;
 use serde_json::{json, Value as Json};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use toml::Value;
-
-/// A field as it is declared.
-#[derive(Clone, Debug, Serialize)]
-pub struct Declared {
-    /// `table.field`, or `field` at the top level.
-    pub path: String,
-    /// The allowed values, in words.
-    pub allowed: String,
-    /// What a scene has without the field, a value or words; `None` where it must not be missing.
-    pub without: Option<String>,
-    /// Whether the hardware has it: "yes", or which values.
-    pub hardware: &'static str,
-    /// The page of the guide that tells more, a file name without `.md`.
-    pub page: Option<&'static str>,
-    /// What it means, with its unit; plain text.
-    pub meaning: String,
-    /// JSON schema of the value.
-    pub schema: Json,
-}
 
 /// The values that a field may hold.
 pub(super) trait Kind {
@@ -299,7 +280,7 @@ macro_rules! table {
                 Ok($name { $($field: $member.read(reader, concat!($table, ".", stringify!($field)))?,)* })
             }
 
-            fn declare(fields: &mut Vec<$crate::spec::scene::field::Declared>) {
+            fn declare(fields: &mut Vec<$crate::spec::scene::declared::Declared>) {
                 use $crate::spec::scene::field::Member as _;
                 $($member.declare(concat!($table, ".", stringify!($field)), &[$($doc),*], fields);)*
             }

@@ -1,14 +1,12 @@
 //! Parsing of scene text: the tables whose fields do not stand for themselves, and what goes beyond one field.
 
-use super::field::{
-    choice, number_of, table, whole, Declared, Field, HasDefault, Kind, Member, Number, Optional, Table,
-};
+use super::declared::Declared;
+use super::field::{choice, table, whole, Field, Kind, Member, Number, Optional, Table};
 use super::reader::Reader;
 use super::{
     Condition, FixedSpec, HardwareSpec, InputSpec, InverseKind, InverseSpec, MeanKind, Medium, OutputSpec,
-    PartitionSpec, RunningZero, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, Zero, MAX_CONTACTS,
+    PartitionSpec, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, MAX_CONTACTS,
 };
-use crate::spec::board::Board;
 use crate::spec::partition::{subarrays, Case, Grid};
 use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use serde_json::{json, Value as Json};
@@ -300,34 +298,6 @@ impl PartitionFields {
     }
 }
 
-/// A built-in board's name, or the path of a file, which the scene gives relative to its own folder.
-pub(super) struct BoardName;
-
-impl Kind for BoardName {
-    type Value = String;
-
-    fn read(&self, value: &Value, file: &str) -> Option<String> {
-        match value.as_str()? {
-            name if Board::names().contains(&name) => Some(name.to_owned()),
-            path if Board::is_file(path) => Some(Path::new(file).with_file_name(path).display().to_string()),
-            _ => None,
-        }
-    }
-
-    fn allowed(&self) -> String {
-        let names: Vec<_> = Board::names().into_iter().map(|name| format!("{name:?}")).collect();
-        format!("{}, or the path of a board's file, which ends with .toml", names.join(" or "))
-    }
-
-    fn schema(&self) -> Json {
-        json!({ "type": "string", "anyOf": [{ "enum": Board::names() }, { "pattern": "\\.toml$" }] })
-    }
-
-    fn show(&self, value: &String) -> Option<Value> {
-        Some(Value::String(value.clone()))
-    }
-}
-
 fn check_inverse(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
     if scene.inverse.kind == InverseKind::Exact && scene.inverse.level.is_some() {
         return Err(reader.wrong_field("inverse.level", "left out with inverse.kind = \"exact\""));
@@ -359,38 +329,6 @@ fn check_table_range(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Taxels, [row, col] each; sorted, without duplicates.
-pub(super) struct DeadTaxels;
-
-impl Kind for DeadTaxels {
-    type Value = Vec<[usize; 2]>;
-
-    fn read(&self, value: &Value, _: &str) -> Option<Vec<[usize; 2]>> {
-        let index = |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|index| *index < MAX_SIDE);
-        let taxel = |value: &Value| match value.as_array()?.as_slice() {
-            [row, col] => Some([index(row)?, index(col)?]),
-            _ => None,
-        };
-        let mut taxels = value.as_array()?.iter().map(taxel).collect::<Option<Vec<_>>>()?;
-        taxels.sort_unstable();
-        taxels.dedup();
-        Some(taxels)
-    }
-
-    fn allowed(&self) -> String {
-        "a list of [row, col], from 0".to_owned()
-    }
-
-    fn schema(&self) -> Json {
-        let index = json!({ "type": "integer", "minimum": 0, "maximum": MAX_SIDE - 1 });
-        json!({ "type": "array", "items": { "type": "array", "items": index, "minItems": 2, "maxItems": 2 } })
-    }
-
-    fn show(&self, value: &Vec<[usize; 2]>) -> Option<Value> {
-        value.is_empty().then(|| Value::Array(Vec::new()))
-    }
-}
-
 /// Dead taxels are of the array, and fewer than all; a sliding mean of one frame is no mean.
 fn check_input(reader: &Reader, input: &InputSpec, sensor: &Sensor) -> Result<(), SceneError> {
     let (rows, cols) = (sensor.rows, sensor.cols);
@@ -402,61 +340,4 @@ fn check_input(reader: &Reader, input: &InputSpec, sensor: &Sensor) -> Result<()
         return Err(reader.wrong_field("input.mean", "\"block\", or input.average from 1 to 12"));
     }
     Ok(())
-}
-
-table! {
-    struct ZeroTable in "input" {
-        /// The zero of each taxel is that of tare or table, or follows the readings while nothing presses; give all frames since the
-        /// start.
-        zero: bool = choice(&[("fixed", false), ("running", true)])
-            .or(false)
-            .hardware("yes, without a link")
-            .page("architecture/prepare");
-        /// A running zero takes 2^−zero_average of what a reading is off.
-        zero_average: Option<u32> = whole::<u32>(1, 16).optional("10");
-        /// How far in MPa a running zero may go, and what is no touch: more than the zeros drift, less than the lightest press; at
-        /// least 5 times the noise floor, at most the full scale.
-        zero_limit_MPa: Option<f64> = Number::Positive.optional("1/64 of the full scale");
-    }
-}
-
-/// The fields of the zero of each taxel. A fixed one has neither rate nor limit. The limit of a running one is beyond the noise,
-/// so that noise is no touch.
-pub(super) struct ZeroFields;
-
-impl Member for ZeroFields {
-    type Value = Zero;
-
-    fn read(&self, reader: &Reader, _: &str) -> Result<Zero, SceneError> {
-        let ZeroTable { zero: runs, zero_average, zero_limit_MPa } = ZeroTable::read(reader)?;
-        let limit = "input.zero_limit_MPa";
-        if !runs {
-            let stated = [("input.zero_average", zero_average.is_some()), (limit, zero_limit_MPa.is_some())];
-            return match stated.into_iter().find(|(_, stated)| *stated) {
-                Some((field, _)) => Err(reader.wrong_field(field, "left out, or input.zero = \"running\"")),
-                None => Ok(Zero::Fixed),
-            };
-        }
-        let number = |path| reader.value(path).and_then(number_of);
-        let full_scale_MPa = number("input.full_scale_MPa");
-        let least = RunningZero::LEAST_OVER_NOISE * number("search.noise_floor_MPa").unwrap_or(0.0);
-        let in_range = |mpa: &f64| *mpa >= least && full_scale_MPa.is_none_or(|most| *mpa <= most);
-        let allowed = "a number above 0, at least 5 times search.noise_floor_MPa, at most input.full_scale_MPa";
-        if zero_limit_MPa.is_some_and(|mpa| !in_range(&mpa)) {
-            return Err(reader.wrong_field(limit, allowed));
-        }
-        let by_full_scale = full_scale_MPa.map(|most| RunningZero::LIMIT_SHARE * most).filter(in_range);
-        let limit_MPa = zero_limit_MPa.or(by_full_scale).ok_or_else(|| reader.missing(limit, allowed))?;
-        Ok(Zero::Running(RunningZero { average: zero_average.unwrap_or(RunningZero::AVERAGE), limit_MPa }))
-    }
-
-    fn declare(&self, _: &str, _: &[&str], fields: &mut Vec<Declared>) {
-        ZeroTable::declare(fields);
-    }
-}
-
-impl HasDefault for ZeroFields {
-    fn default_value(&self) -> Zero {
-        Zero::Fixed
-    }
 }

@@ -1,6 +1,6 @@
 //! Typed reading of a TOML table, with errors that name file, field, value and what is allowed.
 
-use super::field::Declared;
+use super::declared::Declared;
 use super::SceneError;
 use crate::spec::suggest::{distance, nearest};
 use toml::{Table, Value};

@@ -1,6 +1,6 @@
 //! What a scene may hold, for others than the program's own reader.
 
-use super::field::Declared;
+use super::declared::Declared;
 use super::Scene;
 use serde_json::{json, Value as Json};
 use std::sync::LazyLock;

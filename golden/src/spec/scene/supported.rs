@@ -30,7 +30,8 @@
 //! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
 //! are taken, no average of frames, `input_bits` for a result and a sign.
 //!
-//! `input.zero = "running"`: not the serial engine, which has no stage before `receive`.
+//! `input.zero = "running"`: not the serial engine, which has no stage before `receive`; not behind a link, where a request that is
+//! sent twice would count twice.
 //!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.

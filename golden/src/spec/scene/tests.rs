@@ -57,6 +57,7 @@ fn every_field_is_read() {
         board = "ulx3s-85f"
         link = "spi"
         coefficient_check = "signature"
+        code_check = "off"
         [input]
         full_scale_MPa = 0.25
         average = 6
@@ -77,6 +78,7 @@ fn every_field_is_read() {
     assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
     assert_eq!(scene.partition.condition, Condition::BothSigns);
     assert_eq!(scene.hardware.coefficient_check, CoefficientCheck::Signature);
+    assert_eq!([&scene, &with("").unwrap()].map(|own| own.hardware.code_check), [CodeCheck::Off, CodeCheck::On]);
     assert_eq!(scene.hardware.link.name(), "spi");
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa()), (1.0, 0.001));
@@ -164,6 +166,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
         ("[hardware]\nlink = \"i2c\"", "\"uart\" or \"spi\""),
         ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
+        ("[hardware]\ncode_check = true", "\"on\" or \"off\""),
         ("[hardware]\nsearch_width = 3", "hardware.search_width = 3 is not allowed; it must be 4, 2 or 1"),
         ("[hardware]\nboard = \"ulx4m\"", "\"colorlight-i5\" or \"colorlight-i9\" or \"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),

@@ -107,8 +107,9 @@ pub fn image_bytes(plan: &Plan) -> Option<usize> {
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
-/// whether records take the place of forces, condition, noise floor and threshold in codes, limit of the score, zeros and gains of the taxels, dead taxels, the quantised matrices with
-/// the columns kept, the network, what finds the contacts, and the scan. The names of scene and board and the clock are not included.
+/// whether records take the place of forces, condition, noise floor and threshold in codes, limit of the score, whether codes are
+/// checked, zeros and gains of the taxels, dead taxels, the quantised matrices with the columns kept, the network, what finds the
+/// contacts, and the scan. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
     let (scene, sensor) = (&plan.scene, &plan.scene.sensor);
     let mut text = json!({
@@ -128,6 +129,9 @@ pub fn scene_hash(plan: &Plan) -> u32 {
     });
     if let (Some(scan), Some(timing)) = (scene.hardware.adc_scan, plan.scan_timing()) {
         text["scan"] = json!([scan.converter.name, scan.converters, scan.average, timing.period]);
+    }
+    if plan.prepare.check.is_some() {
+        text["code_check"] = json!(true);
     }
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());

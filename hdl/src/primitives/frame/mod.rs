@@ -3,6 +3,7 @@
 pub(crate) mod arrival;
 pub(crate) mod average;
 pub(crate) mod calibrate;
+pub(crate) mod code_check;
 pub(crate) mod frame_stats;
 pub(crate) mod input_mask;
 pub(crate) mod load;

@@ -21,7 +21,6 @@ block! {
         bits: usize,
         /// There is an output register behind the read register of the memory.
         behind: bool,
-        left_out: bool,
         /// What the memory of each field holds, as far as the plan of the memories says it.
         holds: Vec<Holds>,
     }
@@ -45,18 +44,13 @@ block! {
 impl Ram {
     /// A memory of `depth` words of `fields` fields of `bits` bits.
     pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
-        Ram { depth, fields, bits, behind: false, left_out: false, holds: Vec::new() }
+        Ram { depth, fields, bits, behind: false, holds: Vec::new() }
     }
 
     /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
     /// block RAM leaves no room for logic behind it.
     pub fn registered(self) -> Self {
         Ram { behind: true, ..self }
-    }
-
-    /// Omits the memory, for scenes that do not need it: `read_data` is zero.
-    pub fn left_out(self) -> Self {
-        Ram { left_out: true, ..self }
     }
 
     /// With what the memory of each field holds.
@@ -67,10 +61,6 @@ impl Ram {
 
 impl Block for Ram {
     fn build<'k>(&self, k: &'k Builder, io: RamPorts<Inside<'k>>) {
-        if self.left_out {
-            io.read_data.set(k.constant(io.read_data.bits(), 0));
-            return;
-        }
         // One array per field: every synthesiser maps it to plain memories.
         let field = |number: usize| {
             let memory = k.memory(&format!("field{number}"), self.depth, self.bits, Contents::Undefined).unchecked();
@@ -98,7 +88,7 @@ mod tests {
     use crate::language::testbench::{check, random_words, MemoryReference, Reference, Subject};
     use crate::wire::Word;
 
-    const RAM: Ram = Ram { depth: 11, fields: 3, bits: 30, behind: false, left_out: false, holds: Vec::new() };
+    const RAM: Ram = Ram { depth: 11, fields: 3, bits: 30, behind: false, holds: Vec::new() };
 
     /// Each field is a memory of its own.
     struct Fields([MemoryReference<u64>; 3]);

@@ -5,7 +5,9 @@ use dermis_golden::fixed::stages::resultants::Summed;
 use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING, TABLES_VERSION};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
-use dermis_golden::result::flags::{COEFFICIENTS, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT};
+use dermis_golden::result::flags::{
+    CLIPPED, COEFFICIENTS, LINE_FAULT, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT,
+};
 use dermis_golden::spec::quads::Quads;
 
 use crate::block;
@@ -16,6 +18,7 @@ use crate::primitives::address::quad_address::lane_of;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
 use crate::primitives::frame::average::FrameMarks;
+use crate::primitives::frame::code_check::FAULT_BITS;
 use crate::primitives::frame::load::{THRESHOLD_BITS, VERSION_WORD_BITS};
 use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
 use crate::primitives::output::status_bits::status_bits;
@@ -56,6 +59,8 @@ block! {
         score_limit: Option<i64>,
         /// The scene has the coefficient check.
         checks: bool,
+        /// The codes of a frame are checked.
+        checks_codes: bool,
         /// What goes with a frame.
         marks: FrameMarks,
         /// Subarrays, or labels, of each case.
@@ -126,6 +131,9 @@ block! {
         in version: VERSION_WORD_BITS;
         /// The tables are not whole, where they are written.
         in incomplete;
+        /// The frame's codes are clipped, above it whether a line repeats another; sampled when the beat with the flags
+        /// leaves.
+        in faults: FAULT_BITS;
         /// `beat_data` holds a beat in this cycle.
         out valid;
         /// The beat is the frame's last; valid with `valid`.
@@ -186,6 +194,7 @@ impl ForceUnit {
             threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
             score_limit: model.score_limit.map(i64::from),
             checks: model.has_coefficient_check(),
+            checks_codes: model.prepare.check.is_some(),
             marks: FrameMarks::new(model),
             contacts: f.by_contact(),
             label_bits: if f.by_contact() { count_bits(largest(&counts)) } else { 1 },
@@ -243,36 +252,8 @@ impl ForceUnit {
     /// The word of flags of the beat that leaves.
     fn flags<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, kept: &Kept<'k>, contact: Expr<'k>) -> Expr<'k> {
         let k = kept.k;
-        let case = |below: u32| value_by_case(k, io.which, &self.numbers, (below - CASE.low) as usize);
-        let low = self.score_limit.map(|limit| {
-            let low = io.found & k.signed_constant(self.score_bits, limit).less(io.score.signed());
-            kept.status("scores_low", low)
-        });
-        // Between the number of the case and that of frames.
-        let between = |above: u32| match low {
-            None => case(above),
-            Some(low) => {
-                let more = k.constant((above - SCORE_LOW.low - 1) as usize, 0);
-                more.concat(low).concat(case(SCORE_LOW.low))
-            }
-        };
         let FrameMarks { frames_bits, limited } = self.marks;
-        let case = match self.marks == FrameMarks::default() {
-            true => between(FORCE_BITS),
-            false => {
-                let marks = kept.status("frames_held", io.frames);
-                let low = match limited {
-                    false => between(FRAMES.low),
-                    true => {
-                        let limited = marks.top().shift_left((ZERO_LIMIT.low - CASE.low) as usize);
-                        between(FRAMES.low) | limited.extend((FRAMES.low - CASE.low) as usize)
-                    }
-                };
-                let none = k.constant(WORD - FRAMES.low as usize, 0);
-                let frames = if frames_bits > 0 { marks.low(frames_bits).extend(none.bits()) } else { none };
-                frames.concat(low)
-            }
-        };
+        let marks = (self.marks != FrameMarks::default()).then(|| kept.status("frames_held", io.frames));
         let mut bits = Vec::new();
         bits.extend(self.threshold.is_none().then_some((TABLES, io.incomplete)));
         bits.extend(self.contacts.then_some((MORE_CONTACTS, io.overflow)));
@@ -283,7 +264,26 @@ impl ForceUnit {
             (FOUND, kept.status("founds", io.found)),
             (CONDITION, kept.status("conditions", io.condition)),
         ]);
-        concat(&[vec![case], status_bits(k, &bits, CASE.low)].concat())
+        bits.extend(self.score_limit.map(|limit| {
+            let low = io.found & k.signed_constant(self.score_bits, limit).less(io.score.signed());
+            (SCORE_LOW, kept.status("scores_low", low))
+        }));
+        bits.extend(marks.filter(|_| limited).map(|marks| (ZERO_LIMIT, marks.top())));
+        bits.extend(
+            self.checks_codes
+                .then_some([(CLIPPED, io.faults.low(1)), (LINE_FAULT, io.faults.top())])
+                .into_iter()
+                .flatten(),
+        );
+        // Above the bits, the highest first, stands the number of frames, between them that of the case.
+        let mut all = status_bits(k, &bits, FRAMES.low);
+        let above_case = (FRAMES.low - CASE.low - CASE.bits) as usize;
+        all.splice(
+            above_case..above_case + CASE.bits as usize,
+            [value_by_case(k, io.which, &self.numbers, CASE.bits as usize)],
+        );
+        let frames = marks.filter(|_| frames_bits > 0).map_or(k.constant(1, 0), |marks| marks.low(frames_bits));
+        concat(&[vec![frames.extend(WORD - FRAMES.low as usize)], all].concat())
     }
 
     /// The words of status beat `beat`.

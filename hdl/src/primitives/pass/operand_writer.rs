@@ -53,13 +53,6 @@ impl Block for OperandWriter {
     fn build<'k>(&self, k: &'k Builder, io: OperandWriterPorts<Inside<'k>>) {
         let OperandWriter { lengths, streamed } = self;
         let (vectors, most) = (most_vectors(lengths), words(lengths));
-        if vectors == 0 {
-            k.comment("No v_ij is an operand of a later pass.");
-            for port in [io.address, io.keep, io.finished] {
-                port.set(k.constant(port.bits(), 0));
-            }
-            return;
-        }
         let longest = lengths.iter().flatten().copied().max().unwrap_or(1);
         let quad = k.state("quad", Type::unsigned(count_bits(longest)), io.clear, 0);
         let address = io.address.state(io.clear, 0);

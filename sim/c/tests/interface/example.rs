@@ -192,7 +192,7 @@ fn the_programs_of_the_guide_print_what_stands_there() {
         page.split(&fence).skip(1).map(|after| after.split_once("```").unwrap().0.to_owned()).collect()
     };
     let (programs, texts) = (blocks("c"), blocks("text"));
-    assert_eq!((programs.len(), texts.len()), (2, 2));
+    assert_eq!((programs.len(), texts.len()), (3, 3));
     let own = tempfile::tempdir().unwrap();
     for (number, (program, wanted)) in programs.iter().zip(texts).enumerate() {
         let source = own.path().join(format!("page{number}.c"));

@@ -132,6 +132,8 @@ impl Requests {
                     | flag(part.score_low, SCORE_LOW)
                     | flag(self.model.has_writable_tables() && inputs[26].number() == 1, TABLES)
                     | flag(f.by_contact() && inputs[23].number() == 1, MORE_CONTACTS)
+                    | flag(self.model.prepare.check.is_some() && inputs[27].field(0, 1) == 1, CLIPPED)
+                    | flag(self.model.prepare.check.is_some() && inputs[27].field(1, 1) == 1, LINE_FAULT)
                     | number << CASE.low
                     | self.frames(part.frames);
                 let position = if f.degree > 0 { part.position } else { [0; 2] };
@@ -241,6 +243,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             threshold.into(),
             random_word(&mut random, VERSION_WORD_BITS),
             random.bool().into(),
+            random.u64(..4).into(),
         ]
     };
     (0..cycles).map(inputs).collect()

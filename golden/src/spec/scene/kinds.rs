@@ -1,0 +1,68 @@
+//! Values of fields that stand for themselves: a board's name, dead taxels.
+
+use super::field::Kind;
+use crate::spec::board::Board;
+use crate::spec::sensor::MAX_SIDE;
+use serde_json::{json, Value as Json};
+use std::path::Path;
+use toml::Value;
+
+/// A built-in board's name, or the path of a file, which the scene gives relative to its own folder.
+pub(super) struct BoardName;
+
+impl Kind for BoardName {
+    type Value = String;
+
+    fn read(&self, value: &Value, file: &str) -> Option<String> {
+        match value.as_str()? {
+            name if Board::names().contains(&name) => Some(name.to_owned()),
+            path if Board::is_file(path) => Some(Path::new(file).with_file_name(path).display().to_string()),
+            _ => None,
+        }
+    }
+
+    fn allowed(&self) -> String {
+        let names: Vec<_> = Board::names().into_iter().map(|name| format!("{name:?}")).collect();
+        format!("{}, or the path of a board's file, which ends with .toml", names.join(" or "))
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "type": "string", "anyOf": [{ "enum": Board::names() }, { "pattern": "\\.toml$" }] })
+    }
+
+    fn show(&self, value: &String) -> Option<Value> {
+        Some(Value::String(value.clone()))
+    }
+}
+
+/// Taxels, [row, col] each; sorted, without duplicates.
+pub(super) struct DeadTaxels;
+
+impl Kind for DeadTaxels {
+    type Value = Vec<[usize; 2]>;
+
+    fn read(&self, value: &Value, _: &str) -> Option<Vec<[usize; 2]>> {
+        let index = |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|index| *index < MAX_SIDE);
+        let taxel = |value: &Value| match value.as_array()?.as_slice() {
+            [row, col] => Some([index(row)?, index(col)?]),
+            _ => None,
+        };
+        let mut taxels = value.as_array()?.iter().map(taxel).collect::<Option<Vec<_>>>()?;
+        taxels.sort_unstable();
+        taxels.dedup();
+        Some(taxels)
+    }
+
+    fn allowed(&self) -> String {
+        "a list of [row, col], from 0".to_owned()
+    }
+
+    fn schema(&self) -> Json {
+        let index = json!({ "type": "integer", "minimum": 0, "maximum": MAX_SIDE - 1 });
+        json!({ "type": "array", "items": { "type": "array", "items": index, "minItems": 2, "maxItems": 2 } })
+    }
+
+    fn show(&self, value: &Vec<[usize; 2]>) -> Option<Value> {
+        value.is_empty().then(|| Value::Array(Vec::new()))
+    }
+}
