@@ -8,6 +8,7 @@
 //! | [`input`] | averaging, calibration and dead taxels of a real sensor |
 //! | [`recording`] | frames in MCAP files, with the message types of ROS 2 |
 //! | [`number`] | numbers in the bytes of other programs' files |
+//! | [`text`] | frames in lines of numbers, as other programs write them |
 //! | [`quantise`], [`reception`] | stress as the codes of a converter; the condition for a search, and centroids |
 
 pub mod frame;
@@ -17,5 +18,5 @@ pub mod input;
 pub mod number;
 pub mod quantise;
 pub mod reception;
-pub mod text;
 pub mod recording;
+pub mod text;

@@ -26,7 +26,6 @@ mod shipped;
 #[cfg(test)]
 mod tests;
 
-pub use csv::{csv_hint, reading};
 pub use error::FrameError;
 pub(in crate::data) use recorded::frame_name;
 

@@ -11,7 +11,7 @@
 //! | Tekscan ASF, CSV | `DATA_TYPE`, `ASCII_DATA` | size, pitch, unit, missing sensels (`B`) | full scale for raw counts |
 //! | novel LST | `Pict-No` | size, pitch, force per picture | |
 //! | NumPy `.npy` | first six bytes | size | unit, pitch |
-//! | plain CSV | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch |
+//! | lines of numbers | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch; layout where it can be read in two ways |
 //!
 //! A sensel without a reading in any frame becomes a dead taxel, on which forces continue those around it; where nothing can
 //! press on it, as outside the outline of an insole, it may be stated to read 0 instead. A sensel without a reading in some
@@ -44,6 +44,7 @@ pub use units::Unit;
 
 use crate::data::frame::Frame;
 use crate::data::input::missing::complete;
+use crate::data::text::Stated;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::{Sensor, MAX_LENGTH_MM};
 use error::Source;
@@ -80,6 +81,8 @@ pub struct Settings {
     pub missing_as_zero: bool,
     /// Thickness of an elastic cover over the array in mm.
     pub thickness_mm: Option<f64>,
+    /// Layout of the lines of a plain text.
+    pub layout: Stated,
 }
 
 /// An imported recording.
@@ -175,6 +178,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         missing: dead.iter().filter(|dead| **dead).count(),
         missing_readings: frames.iter().map(|frame| frame.missing.len()).sum(),
         left_out,
+        layout: recording.layout.clone(),
+        lines_left_out: recording.left_out.clone(),
         missing_as_zero: settings.missing_as_zero,
         unit,
         units_per_MPa: per_MPa,
@@ -224,7 +229,7 @@ fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Resu
         Format::Tekscan => tekscan::parse(&decoded(bytes), source),
         Format::Lst => lst::parse(&decoded(bytes), source),
         Format::Npy => npy::parse(bytes, settings.size, source),
-        Format::Csv => csv::parse(&decoded(bytes), settings.size, source),
+        Format::Csv => csv::parse(&decoded(bytes), settings, source),
     }
 }
 

@@ -47,6 +47,7 @@ impl NoiseArguments {
         let (input, name) = open(source, &scene, self.baud)?;
         let bar = Progress::steps(&format!("{}: frames without load", scene.name), u64::from(self.frames));
         let (mut input, mut bytes, mut frames) = (BufReader::new(input), Vec::new(), Vec::new());
+        let mut lines = line::Frames::new(&scene.sensor);
         for number in 1.. {
             if frames.len() == self.frames as usize {
                 break;
@@ -55,7 +56,8 @@ impl NoiseArguments {
             ensure!(read.is_some(), "{name}: ends after {} of {} frames (--frames)", frames.len(), self.frames);
             ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
             if !bytes.iter().all(u8::is_ascii_whitespace) {
-                frames.push(frame(&bytes, number, &scene).map_err(|reason| anyhow!("{name}: {reason}"))?);
+                let frame = frame(&mut lines, &bytes, number);
+                frames.extend(frame.map_err(|reason| anyhow!("{name}: line {number}: {reason}"))?);
                 bar.set(frames.len() as u64);
             }
         }
@@ -74,13 +76,10 @@ impl NoiseArguments {
     }
 }
 
-/// The frame of a line, or why there is none.
-fn frame(bytes: &[u8], number: u64, scene: &Scene) -> Result<Frame, String> {
-    let line = format!("line {number}: ");
-    let text = std::str::from_utf8(bytes).map_err(|error| format!("{line}{error}"))?;
-    // A frame of the wrong length names its line by itself.
-    let named = |reason: String| if reason.starts_with(&line) { reason } else { line.clone() + &reason };
-    line::frame(text, number, &scene.sensor).map(|(_, frame)| frame).map_err(|none| named(none.reason))
+/// The frame of a line, none of a comment and a header, or why there is none.
+fn frame(lines: &mut line::Frames, bytes: &[u8], number: u64) -> Result<Option<Frame>, String> {
+    let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
+    lines.frame(text, number).map(|frame| frame.map(|(_, frame)| frame)).map_err(|none| none.reason)
 }
 
 /// With the digits that are written.

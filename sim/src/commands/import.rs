@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::data::import::{load, Crop, Format, Settings, Summary, Unit};
+use dermis_golden::data::text::Form;
 
+use super::layout::LayoutArguments;
 use crate::report::document::percent_text;
 
 /// Arguments of `dermis import`.
@@ -45,9 +47,12 @@ pub struct Arguments {
     /// Thickness in mm of an elastic cover over the array; without it no shear is searched.
     #[arg(long, value_name = "MM")]
     thickness: Option<f64>,
-    /// Frames to import, the first and the last, counted from 1; default: all.
-    #[arg(long, value_name = "A..B")]
-    frames: Option<String>,
+    /// Frames to import, the first and the last, counted from 1; default: all. Or how they stand in a text, grid: a line per row, or
+    /// line: a line per frame; default: found. May be given twice.
+    #[arg(long, value_name = "A..B|grid|line")]
+    frames: Vec<String>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// auto, contact, or rows and columns counted from 0: A..B,C..D, ends included.
     #[arg(long, value_name = "WINDOW", default_value = "auto")]
     crop: String,
@@ -104,7 +109,14 @@ impl Arguments {
     fn settings(&self) -> Result<Settings> {
         let size = self.size.as_deref().map(|text| pair("--size", text, "ROWSxCOLS", |text| text.split_once('x')));
         let pitch = self.pitch.as_deref().map(|text| pair("--pitch", text, "X,Y", |text| text.split_once(',')));
-        let frames = self.frames.as_deref().map(|text| range("--frames", text, text));
+        let (mut frames, mut layout) = (None, self.layout.stated());
+        for text in &self.frames {
+            match text.as_str() {
+                "grid" => layout.form = Some(Form::Grid),
+                "line" => layout.form = Some(Form::Line),
+                _ => frames = Some(range("--frames", text, text).map_err(|error| anyhow!("{error}, grid or line"))?),
+            }
+        }
         Ok(Settings {
             name: self.name.clone(),
             format: self.format,
@@ -113,10 +125,11 @@ impl Arguments {
             pitch_mm: pitch.transpose()?,
             full_scale_MPa: self.full_scale,
             bits: self.bits,
-            frames: frames.transpose()?,
+            frames,
             crop: crop(&self.crop)?,
             missing_as_zero: self.missing == Missing::Zero,
             thickness_mm: self.thickness,
+            layout,
         })
     }
 }
@@ -141,6 +154,12 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
         window.col0,
         window.col0 + window.cols - 1,
     )?;
+    if let Some(layout) = &summary.layout {
+        writeln!(text, "layout          {layout}")?;
+    }
+    if let Some(first) = summary.lines_left_out.first() {
+        writeln!(text, "left out        {} lines without a frame; {first}", summary.lines_left_out.len())?;
+    }
     if summary.missing > 0 {
         let what = match summary.missing_as_zero {
             true => "they read 0",

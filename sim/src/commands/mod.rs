@@ -17,6 +17,7 @@
 //! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
 //! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
 //! | [`inputs`] | scene and frames from command-line arguments |
+//! | `layout` | options of the layout of lines of numbers |
 //! | [`live`] | `dermis live`: a local page with the newest forces of a stream, of a recording, or of a finger |
 //! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
@@ -53,6 +54,7 @@ pub mod guide_pages;
 pub mod host;
 pub mod import;
 pub mod inputs;
+mod layout;
 pub mod live;
 mod load;
 pub mod new;

@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
-use crate::stream::line::{self, NoFrame};
+use crate::stream::line::{self, Frames, NoFrame};
 use crate::stream::{seconds, LONGEST_LINE};
 
 /// An output line with an answer.
@@ -77,16 +77,18 @@ pub(crate) fn run<P: Read + Write>(
 ) -> Result<FramesSent> {
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     let (mut bytes, mut checks) = (Vec::new(), StreamChecks::new(&session.model, CheckPace::Beside));
+    let mut frames = Frames::new(&session.model.scene.sensor);
     for number in 1.. {
         let text =
             match line::read(input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))? {
                 None => break,
                 Some(false) => Err((Value::Null, anyhow!("over {LONGEST_LINE} bytes"))),
                 Some(true) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
-                Some(true) => answer(session, &mut checks, &bytes, number),
+                Some(true) => answer(session, &mut checks, &mut frames, &bytes, number),
             };
         let text = match text {
-            Ok(reply) => {
+            Ok(None) => continue,
+            Ok(Some(reply)) => {
                 sent.equal &= reply.answer.equal != Some(false);
                 sent.answered += 1;
                 serde_json::to_string(&reply)?
@@ -105,17 +107,18 @@ pub(crate) fn run<P: Read + Write>(
     Ok(sent)
 }
 
-/// The answer to one line, or its id (null if it cannot be parsed) with the error.
+/// The answer to one line, none to a comment and a header, or its id (null if it cannot be parsed) with the error.
 fn answer<P: Read + Write>(
     session: &mut Session<P>,
     checks: &mut StreamChecks,
+    frames: &mut Frames,
     bytes: &[u8],
     number: u64,
-) -> Result<Reply, (Value, anyhow::Error)> {
+) -> Result<Option<Reply>, (Value, anyhow::Error)> {
     let text = std::str::from_utf8(bytes).map_err(|error| (Value::Null, error.into()))?;
-    let (id, frame) = line::frame(text, number, &session.model.scene.sensor)
-        .map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    reply(session, checks, &id, &frame).map_err(|error| (id, error))
+    let frame = frames.frame(text, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
+    let Some((id, frame)) = frame else { return Ok(None) };
+    reply(session, checks, &id, &frame).map(Some).map_err(|error| (id, error))
 }
 
 fn reply<P: Read + Write>(

@@ -195,7 +195,8 @@ pub fn run_until(
     };
     stop.add(&queue);
     let (times, counts) = (Vec::new(), Counts::default());
-    let mut stream = Stream { estimators, change: None, times, counts };
+    let frames = line::Frames::new(&estimators.scene().sensor);
+    let mut stream = Stream { estimators, frames, change: None, times, counts };
     stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
     loop {
         if stop.stopped() {
@@ -246,6 +247,8 @@ fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>)
 /// The state of a stream.
 struct Stream<'a> {
     estimators: Estimators<'a>,
+    /// Frames of the lines.
+    frames: line::Frames,
     /// Why the next result has another estimator than the last one.
     change: Option<String>,
     /// Seconds since 1970 when the line of each frame of a block that is not complete was read.
@@ -263,6 +266,7 @@ impl Stream<'_> {
     /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
     fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
+            let Some(frame) = frame else { return Ok(None) };
             self.times.push(seconds(received.time));
             self.estimators.push(frame).map_err(|error| {
                 self.times.clear();
@@ -301,11 +305,12 @@ impl Stream<'_> {
         Ok(())
     }
 
-    fn frame(&self, received: &Received) -> Result<Frame, String> {
+    /// The frame in a line; `None` for a comment and a header.
+    fn frame(&mut self, received: &Received) -> Result<Option<Frame>, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
         let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-        match line::frame(text, received.number, &self.estimators.scene().sensor) {
-            Ok((_, frame)) => Ok(frame),
+        match self.frames.frame(text, received.number) {
+            Ok(frame) => Ok(frame.map(|(_, frame)| frame)),
             Err(none) => Err(none.reason),
         }
     }

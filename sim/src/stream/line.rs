@@ -1,25 +1,14 @@
 //! Lines of bounded length, and the frame in a line.
 
-use std::io::{self, BufRead, Read};
+use std::io::{self, BufRead, Read as _};
 
-use dermis_golden::data::frame::{csv_hint, reading, Frame};
+use dermis_golden::data::frame::Frame;
+use dermis_golden::data::text::{Form, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
 use dermis_golden::spec::sensor::Sensor;
-use serde::Deserialize;
 use serde_json::Value;
 
 /// Longest input line in bytes; 65536 taxels of 25 characters take 1.6 MB.
 pub const LONGEST_LINE: u64 = 4 << 20;
-/// Characters of a value that are shown in an error.
-const SHOWN: usize = 40;
-
-/// A line of JSON.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Request {
-    #[serde(default)]
-    id: Value,
-    stress_MPa: Vec<Option<f64>>,
-}
 
 /// Why a line holds no frame, with its id if that could be read.
 #[derive(Debug, PartialEq)]
@@ -48,37 +37,41 @@ pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Op
     }
 }
 
-/// The frame in a line, of JSON or of numbers separated by commas, and its id; `number` names a frame without one.
-pub(crate) fn frame(text: &str, number: u64, sensor: &Sensor) -> Result<(Value, Frame), NoFrame> {
-    let json = text.trim_start().starts_with('{');
-    let hint = || if json { "" } else { csv_hint(text, sensor.taxels(), number == 1) };
-    let (id, stress_MPa) = match json {
-        true => {
-            let request: Request =
-                serde_json::from_str(text).map_err(|error| NoFrame { id: Value::Null, reason: error.to_string() })?;
-            (request.id, request.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect())
-        }
-        false => (Value::Null, numbers(text).map_err(|reason| NoFrame { id: Value::Null, reason: reason + hint() })?),
-    };
-    let name = match &id {
-        Value::Null => format!("line {number}"),
-        Value::String(name) => name.clone(),
-        other => other.to_string(),
-    };
-    match Frame::from_stress(&name, sensor, stress_MPa) {
-        Ok(frame) => Ok((id, frame)),
-        Err(error) => Err(NoFrame { id, reason: error.to_string() + hint() }),
-    }
+/// The frames of a stream's lines, of JSON or of numbers: [`dermis_golden::data::text`]. Each line is a frame, and the first one with
+/// numbers decides their layout.
+pub(crate) struct Frames {
+    reader: Reader,
+    sensor: Sensor,
 }
 
-/// The readings of a line, separated by commas; NaN where one is missing.
-fn numbers(text: &str) -> Result<Vec<f64>, String> {
-    let number = |(index, cell): (usize, &str)| {
-        let shown: String = cell.trim().chars().take(SHOWN).collect();
-        let wrong = || format!("value {}: {shown:?} is not a finite number", index + 1);
-        reading(cell).ok_or_else(wrong)
-    };
-    text.split(',').enumerate().map(number).collect()
+impl Frames {
+    pub(crate) fn new(sensor: &Sensor) -> Frames {
+        let stated = Stated { form: Some(Form::Line), ..Stated::default() };
+        Frames { reader: Reader::new([sensor.rows, sensor.cols], stated), sensor: sensor.clone() }
+    }
+
+    /// The frame in a line and its id; `number` names a frame without one. `None` for a comment and a header.
+    pub(crate) fn frame(&mut self, text: &str, number: u64) -> Result<Option<(Value, Frame)>, NoFrame> {
+        // A line of its own: it brings one thing at most.
+        let line = usize::try_from(number).unwrap_or(usize::MAX);
+        match self.reader.push(Line { number: line, text }).pop() {
+            None | Some(Read::Header) => Ok(None),
+            Some(Read::LeftOut(LeftOut { id, reason })) => {
+                Err(NoFrame { id, reason: NoReadings { line: None, ..reason }.to_string() })
+            }
+            Some(Read::Frame(TextFrame { id, readings, .. })) => {
+                let name = match &id {
+                    Value::Null => format!("line {number}"),
+                    Value::String(name) => name.clone(),
+                    other => other.to_string(),
+                };
+                match Frame::from_stress(&name, &self.sensor, readings) {
+                    Ok(frame) => Ok(Some((id, frame))),
+                    Err(error) => Err(NoFrame { id, reason: error.to_string() }),
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -89,20 +82,30 @@ mod tests {
         Sensor { rows: 2, cols: 2, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
     }
 
+    /// The frame of a line that is the only one.
+    fn frame(text: &str, number: u64) -> Result<(Value, Frame), NoFrame> {
+        Frames::new(&small()).frame(text, number).map(Option::unwrap)
+    }
+
     #[test]
     fn json_and_numbers_give_the_same_frame() {
-        let (id, json) = frame("{\"id\": 7, \"stress_MPa\": [0.1, 0, -1e-3, 2]}", 3, &small()).unwrap();
-        let (none, csv) = frame(" 0.1, 0,-1e-3,2\r\n", 3, &small()).unwrap();
+        let (id, json) = frame("{\"id\": 7, \"stress_MPa\": [0.1, 0, -1e-3, 2]}", 3).unwrap();
+        let (none, csv) = frame(" 0.1, 0,-1e-3,2\r\n", 3).unwrap();
         assert_eq!((id, none, csv.id.as_str()), (Value::from(7), Value::Null, "line 3"));
         assert_eq!((json.id.as_str(), json.stress_MPa), ("7", csv.stress_MPa));
     }
 
     #[test]
     fn missing_readings_are_named_by_every_form() {
-        for text in
-            ["{\"stress_MPa\": [0.1, null, 0.3, 2]}", "0.1,,0.3,2", "0.1, nan,0.3,2", "0.1,NaN,0.3,2", "0.1,null,0.3,2"]
-        {
-            let (_, frame) = frame(text, 1, &small()).unwrap();
+        for text in [
+            "{\"stress_MPa\": [0.1, null, 0.3, 2]}",
+            "{\"stress_MPa\": [0.1, NaN, 0.3, 2]}",
+            "0.1,,0.3,2",
+            "0.1, nan,0.3,2",
+            "0.1;NaN;0.3;2",
+            "0.1 null 0.3 2",
+        ] {
+            let (_, frame) = frame(text, 1).unwrap();
             assert_eq!((frame.missing, frame.stress_MPa), (vec![1], vec![0.1, 0.0, 0.3, 2.0]), "{text}");
         }
     }
@@ -110,19 +113,24 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         let cases = [
-            ("1,2,3", "line 1: stress_MPa has 3 values, wanted 4"),
+            ("1,2,3", "3 values, wanted 4"),
             ("1,x,3,4", "value 2: \"x\" is not a finite number"),
-            ("1;2;3;4", "value 1: \"1;2;3;4\" is not a finite number; values are separated by commas"),
-            ("0,1;0,2;0,3;0,4", "values are separated by commas, and a decimal mark is a point"),
-            ("0,1,0,2,0,3,0,4", "stress_MPa has 8 values, wanted 4; a decimal mark is a point, not a comma"),
-            ("a,b,c,d", "value 1: \"a\" is not a finite number; a frame has no header line"),
+            ("0,1,0,2,0,3,0,4", "8 values, wanted 4; a decimal mark is a point where commas separate values"),
             ("1,inf,3,4", "value 2: \"inf\" is not a finite number"),
-            ("{\"stress\": []}", "unknown field `stress`"),
+            ("{\"stress\": []}", "column 9: unknown field `stress`"),
         ];
         for (text, wanted) in cases {
-            let reason = frame(text, 1, &small()).unwrap_err().reason;
-            assert!(reason.contains(wanted), "{text}: {reason}");
+            let reason = frame(text, 1).unwrap_err().reason;
+            assert!(reason.starts_with(wanted), "{text}: {reason}");
         }
+        let mut frames = Frames::new(&small());
+        assert!(frames.frame("a,b,c,d", 1).unwrap().is_none() && frames.frame("# a remark", 2).unwrap().is_none());
+        assert!(frames.frame("1;2;3;4", 3).unwrap().is_some());
+        let other = frames.frame("1,2,3,4", 4).unwrap_err().reason;
+        assert_eq!(
+            other,
+            "1 values, wanted 4; this line is separated by commas, those before are separated by semicolons"
+        );
     }
 
     #[test]

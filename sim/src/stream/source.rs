@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | `-` | standard input | with it | waits |
 //! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never | loses lines |
-//! | a character device | a serial port | with an error, when it is unplugged | loses lines |
+//! | a character device | a serial port, from its first end of a line on | with an error, when it is unplugged | loses lines |
 //! | a regular file | the file from its start, then what is added; from its start again if it becomes shorter | never | waits |
 //! | a pipe | the pipe | with it | waits |
 
@@ -72,7 +72,7 @@ impl Source {
                     let unknown = "a serial port needs --baud, because the scene's board has no uart_baud";
                     let baud = baud.ok_or_else(|| named(path, Error::new(ErrorKind::InvalidInput, unknown)))?;
                     let port = serialport::new(path, baud).timeout(SERIAL_WAIT).open();
-                    Box::new(Serial(port.map_err(|error| named(path, error.into()))?))
+                    Box::new(Serial { port: port.map_err(|error| named(path, error.into()))?, begun: false })
                 } else {
                     let file = File::open(Path::new(path)).map_err(|error| named(path, error))?;
                     match kind.is_file() {
@@ -135,14 +135,25 @@ impl Read for Growing {
     }
 }
 
-/// A serial port, which has no end.
-struct Serial(Box<dyn SerialPort>);
+/// A serial port, which has no end. What comes before its first end of a line is left out.
+struct Serial {
+    port: Box<dyn SerialPort>,
+    /// A line has ended: what came before its end may be the rest of one.
+    begun: bool,
+}
 
 impl Read for Serial {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
         loop {
-            match self.0.read(buffer) {
+            match self.port.read(buffer) {
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => (),
+                Ok(bytes) if !self.begun && bytes > 0 => {
+                    // The end itself stays: the line counts, as a blank one.
+                    let Some(end) = buffer[..bytes].iter().position(|byte| *byte == b'\n') else { continue };
+                    buffer.copy_within(end..bytes, 0);
+                    self.begun = true;
+                    return Ok(bytes - end);
+                }
                 other => return other,
             }
         }

@@ -1,6 +1,7 @@
 //! Errors of frames; each names file, field and value.
 
 use crate::data::recording::RecordingError;
+use crate::data::text::NoReadings;
 use crate::spec::sensor::{Sensor, SensorError};
 use thiserror::Error;
 
@@ -139,33 +140,13 @@ pub enum FrameError {
         /// Its column.
         col: usize,
     },
-    /// A CSV cell is neither a finite number nor a missing reading.
-    #[error("{file}, line {line}, value {column}: {value:?} is not a finite number{hint}")]
-    CsvValue {
+    /// A line of text holds no frame.
+    #[error("{}", reason.in_file(file))]
+    Text {
         /// Path as given.
         file: String,
-        /// Line, from 1.
-        line: usize,
-        /// Position in the line, from 1.
-        column: usize,
-        /// The text found.
-        value: String,
-        /// A likely reason, or empty.
-        hint: &'static str,
-    },
-    /// A CSV line has more or fewer values than the sensor has columns.
-    #[error("{file}, line {line}: {got} values, wanted {wanted}{hint}")]
-    CsvRagged {
-        /// Path as given.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// Number of values found.
-        got: usize,
-        /// Number of columns of the sensor.
-        wanted: usize,
-        /// A likely reason, or empty.
-        hint: &'static str,
+        /// Line, cell and what is wrong.
+        reason: NoReadings,
     },
     /// The frame's sensor is not the scene's.
     #[error(

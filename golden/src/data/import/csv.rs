@@ -1,62 +1,29 @@
-//! Plain CSV: one frame per line, a value per taxel in the order of the rows.
+//! Plain text: lines of numbers, as [`crate::data::text`] reads them.
 //!
-//! Values are separated by commas, semicolons, tabs or spaces, whichever the last line has; with any but commas, a
-//! comma is a decimal point. With one value more than taxels the first is the time in s. Lines that start with
-//! `#` and a first line that begins with a name are skipped. `B`, `NaN`, `null` and empty cells are missing
-//! readings.
+//! Times of a date, and seconds or milliseconds since 1970, are taken from the first frame on.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{reading, sensel, RawFrame, Recording};
-use crate::data::frame;
-use csv::{ReaderBuilder, StringRecord};
+use super::recording::{RawFrame, Recording, LARGEST_READING};
+use super::Settings;
+use crate::data::text::{frames, TimeUnit};
 
-/// Reads a recording of `size` rows and columns.
-pub(super) fn parse(text: &str, size: Option<[usize; 2]>, source: &Source) -> Result<Recording, ImportError> {
-    let [rows, cols] = size.ok_or_else(|| source.missing("the size", "give it with --size ROWSxCOLS"))?;
-    let (taxels, separator) = (rows * cols, separator(text));
-    let mut reader = ReaderBuilder::new()
-        .delimiter(separator)
-        .comment(Some(b'#'))
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(text.as_bytes());
-    let mut frames: Vec<RawFrame> = Vec::new();
-    for (index, record) in reader.records().enumerate() {
-        let record = record.map_err(|error| source.field("CSV", error, "values and separators"))?;
-        let line = record.position().map_or(0, |position| usize::try_from(position.line()).unwrap_or(0));
-        let cells: Vec<String> = cells(&record, separator);
-        if cells.is_empty() || (index == 0 && is_names(&cells)) {
-            continue;
+/// Reads a recording of the stated size.
+pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
+    let shape = settings.size.ok_or_else(|| source.missing("the size", "give it with --size ROWSxCOLS"))?;
+    let read = frames(text, shape, &settings.layout).map_err(|reason| source.text(reason))?;
+    let unit = read.layout.as_ref().and_then(|layout| layout.time).map(|(_, unit)| unit);
+    let is_date = matches!(unit, Some(TimeUnit::Iso | TimeUnit::Number { since_1970: true, .. }));
+    let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|_| is_date).unwrap_or(0);
+    let mut own = Vec::with_capacity(read.frames.len());
+    for (index, frame) in read.frames.into_iter().enumerate() {
+        if let Some(large) = frame.readings.iter().find(|value| value.abs() > LARGEST_READING) {
+            return Err(source.line(frame.line, &large.to_string(), "a number up to 1e9 in magnitude"));
         }
-        let timed = cells.len() == taxels + 1;
-        if cells.len() != taxels && !timed {
-            let got = cells.len();
-            let whole = record.iter().collect::<Vec<_>>().join(",");
-            return Err(source.line(line, &whole, format!("{taxels} values, --size {rows}x{cols}, not {got}")));
-        }
-        let time_s = if timed { Some(reading(source, line, 1, &cells[0])?) } else { None };
-        let sensels = cells.iter().enumerate().skip(usize::from(timed));
-        let values = sensels.map(|(index, cell)| sensel(source, line, index + 1, cell)).collect::<Result<_, _>>()?;
-        frames.push(RawFrame { number: frames.len() + 1, time_s, values, device: None });
+        let time_s = frame.time_ns.map(|ns| (ns - start_ns) as f64 * 1e-9);
+        own.push(RawFrame { number: index + 1, time_s, values: frame.readings, device: None });
     }
-    Ok(Recording::bare(Format::Csv, [rows, cols], frames))
-}
-
-/// The separator of the last line, which has values even where the first has names.
-fn separator(text: &str) -> u8 {
-    let line = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("");
-    [b';', b'\t', b','].into_iter().find(|byte| line.contains(char::from(*byte))).unwrap_or(b' ')
-}
-
-/// The cells of a line with decimal points.
-fn cells(record: &StringRecord, separator: u8) -> Vec<String> {
-    let cells = record.iter().map(str::trim).filter(|cell| separator != b' ' || !cell.is_empty());
-    cells.map(|cell| if separator == b',' { cell.to_string() } else { cell.replace(',', ".") }).collect()
-}
-
-/// Whether a first line has names: its first cell begins with a letter and is not a missing reading.
-fn is_names(cells: &[String]) -> bool {
-    let name = |cell: &str| cell.starts_with(char::is_alphabetic) && cell != "B" && frame::reading(cell).is_none();
-    cells.first().is_some_and(|cell| name(cell))
+    let layout = read.layout.map(|layout| layout.to_string());
+    let left_out = read.left_out.iter().map(|left_out| left_out.reason.to_string()).collect();
+    Ok(Recording { layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
 }

@@ -2,6 +2,7 @@
 
 use super::format::Format;
 use crate::data::frame::FrameError;
+use crate::data::text::NoReadings;
 use crate::spec::scene::SceneError;
 use crate::write::FileError;
 use thiserror::Error;
@@ -30,6 +31,14 @@ pub enum ImportError {
     Unrecognised {
         /// Path as given.
         file: String,
+    },
+    /// A text holds no frames of the array.
+    #[error("{}", reason.in_file(file))]
+    Text {
+        /// Path as given.
+        file: String,
+        /// Line, cell and what is wrong.
+        reason: NoReadings,
     },
     /// A line is wrong as a whole.
     #[error("{file}, line {line}: {value:?} is not allowed; it must be {allowed}")]
@@ -110,6 +119,10 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
+    pub(super) fn text(&self, reason: NoReadings) -> ImportError {
+        ImportError::Text { file: self.file.to_string(), reason }
+    }
+
     pub(super) fn line(&self, line: usize, value: &str, allowed: impl Into<String>) -> ImportError {
         ImportError::Line { file: self.file.to_string(), line, value: shortened(value), allowed: allowed.into() }
     }

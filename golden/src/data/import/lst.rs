@@ -167,6 +167,8 @@ fn assemble(header: Header, pages: Vec<Page>, source: &Source) -> Result<Recordi
         bits: None,
         full_scale: None,
         missing: Vec::new(),
+        layout: None,
+        left_out: Vec::new(),
         frames,
     })
 }

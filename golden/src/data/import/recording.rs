@@ -3,10 +3,10 @@
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::units::Unit;
-use crate::data::frame;
+use crate::data::text;
 
 /// Largest magnitude of a reading, in any unit; beyond it sums would lose their meaning.
-const LARGEST_READING: f64 = 1e9;
+pub(super) const LARGEST_READING: f64 = 1e9;
 /// Largest number of rows or columns of a recording, before it is cropped.
 pub(super) const LARGEST_SIDE: usize = 4096;
 
@@ -50,6 +50,10 @@ pub(super) struct Recording {
     pub full_scale: Option<f64>,
     /// Sensels without a reading in any frame, row-major; empty before the frames are selected.
     pub missing: Vec<bool>,
+    /// Layout of the lines of a plain text.
+    pub layout: Option<String>,
+    /// Lines of a plain text that hold no frame, with the reason.
+    pub left_out: Vec<String>,
     pub frames: Vec<RawFrame>,
 }
 
@@ -66,6 +70,8 @@ impl Recording {
             bits: None,
             full_scale: None,
             missing: Vec::new(),
+            layout: None,
+            left_out: Vec::new(),
             frames,
         }
     }
@@ -77,12 +83,11 @@ pub(super) fn reading(source: &Source, line: usize, column: usize, text: &str) -
     number.ok_or_else(|| source.value(line, column, text, "a number up to 1e9 in magnitude"))
 }
 
-/// The reading of a sensel: NaN where it is missing, `B` as Tekscan writes it, or as [`frame::reading`] has it.
-pub(super) fn sensel(source: &Source, line: usize, column: usize, text: &str) -> Result<f64, ImportError> {
-    match text.trim() {
-        "B" => Ok(f64::NAN),
-        text if frame::reading(text).is_some_and(f64::is_nan) => Ok(f64::NAN),
-        text => reading(source, line, column, text),
+/// The reading of a sensel: NaN where it is missing, as [`text::reading`] has it.
+pub(super) fn sensel(source: &Source, line: usize, column: usize, cell: &str) -> Result<f64, ImportError> {
+    match cell.trim() {
+        cell if text::reading(cell).is_some_and(f64::is_nan) => Ok(f64::NAN),
+        cell => reading(source, line, column, cell),
     }
 }
 

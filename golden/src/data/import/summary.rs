@@ -61,6 +61,12 @@ pub struct Summary {
     /// Numbers of the frames that are left out because they lack too many readings.
     #[serde(default)]
     pub left_out: Vec<usize>,
+    /// Layout of the lines of a plain text, in words.
+    #[serde(default)]
+    pub layout: Option<String>,
+    /// Lines of a plain text that hold no frame, with the reason.
+    #[serde(default)]
+    pub lines_left_out: Vec<String>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
     /// Unit of the readings.

@@ -80,6 +80,8 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         bits: Some(BITS),
         full_scale: header.saturation.and_then(|text| saturation(&text, header.unit)),
         missing: Vec::new(),
+        layout: None,
+        left_out: Vec::new(),
         frames,
     })
 }

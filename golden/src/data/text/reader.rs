@@ -13,7 +13,9 @@ const CHANGES_AFTER: usize = 3;
 /// A frame of a text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextFrame {
-    /// Number of its last line, from 1.
+    /// Number of its first line, from 1.
+    pub first_line: usize,
+    /// Number of its last line.
     pub line: usize,
     /// `id` of a line of JSON.
     pub id: Value,
@@ -82,7 +84,8 @@ pub struct Reader {
     blocks: Option<bool>,
     /// Rows of the frame that is not complete.
     rows: Vec<Result<Vec<f64>, NoReadings>>,
-    /// Time of its first row.
+    /// Line and time of its first row.
+    first_line: usize,
     time_ns: Option<i64>,
     /// Number of the last line that was not blank.
     last: usize,
@@ -157,7 +160,18 @@ impl Reader {
     /// Before the first line; the layout is found from the first line with readings.
     pub fn new(shape: [usize; 2], stated: Stated) -> Reader {
         let (layout, other, blocks, time_ns) = (None, None, None, None);
-        Reader { shape, stated, layout, other, decided: false, blocks, rows: Vec::new(), time_ns, last: 0 }
+        Reader {
+            shape,
+            stated,
+            layout,
+            other,
+            decided: false,
+            blocks,
+            rows: Vec::new(),
+            first_line: 0,
+            time_ns,
+            last: 0,
+        }
     }
 
     /// The layout, once it is found.
@@ -205,7 +219,13 @@ impl Reader {
         match layout.readings_of(line, &cells) {
             Ok(readings) => {
                 self.other = None;
-                Read::Frame(TextFrame { line: line.number, id: Value::Null, time_ns, readings })
+                Read::Frame(TextFrame {
+                    first_line: line.number,
+                    line: line.number,
+                    id: Value::Null,
+                    time_ns,
+                    readings,
+                })
             }
             Err(reason) => self.of_another_layout(layout, line, reason),
         }
@@ -248,6 +268,7 @@ impl Reader {
             return read;
         }
         if self.rows.is_empty() {
+            self.first_line = line.number;
             self.time_ns = layout.time.and_then(|(column, unit)| unit.ns(cells.get(column)?));
         }
         self.rows.push(layout.readings_of(line, &cells));
@@ -255,6 +276,7 @@ impl Reader {
             let rows = std::mem::take(&mut self.rows);
             read.push(match rows.into_iter().collect::<Result<Vec<_>, _>>() {
                 Ok(rows) => Read::Frame(TextFrame {
+                    first_line: self.first_line,
                     line: line.number,
                     id: Value::Null,
                     time_ns: self.time_ns.take(),
@@ -311,7 +333,13 @@ fn json_frame(line: &Line, taxels: usize) -> Read {
     };
     let of_cell = || TimeUnit::of_column(&[&cell], None)?.ns(&cell);
     let readings = request.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect();
-    Read::Frame(TextFrame { line: line.number, id: request.id, time_ns: request.time_ns.or_else(of_cell), readings })
+    Read::Frame(TextFrame {
+        first_line: line.number,
+        line: line.number,
+        id: request.id,
+        time_ns: request.time_ns.or_else(of_cell),
+        readings,
+    })
 }
 
 /// JSON with `null` for `NaN`, which Python writes and JSON does not have; texts in quotes stay.
