@@ -9,7 +9,10 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
     let mut frames = parse_all(text, file, stem, scene)?;
     match (frames.pop(), frames.len()) {
         (Some(frame), 0) => Ok(frame),
-        (_, others) => Err(FrameError::SeveralFrames { file: file.to_string(), count: others + 1 }),
+        (_, others) => {
+            let reason = format!("has {} frames, wanted one", others + 1);
+            Err(FrameError::Text { file: file.to_string(), reason: NoReadings { line: None, cell: None, reason } })
+        }
     }
 }
 

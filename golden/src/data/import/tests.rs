@@ -201,8 +201,10 @@ fn arrays_that_numpy_wrote() {
 fn plain_csv_with_times_names_and_missing_values() {
     let settings = Settings { size: Some([2, 3]), ..stated() };
     let read = |text: &str| import("p.csv", text.as_bytes(), &settings).unwrap();
-    let plain = read("0,1,2,3,4,5\n\n6,7,8,9,10,11\n");
+    let plain = read("0,2,1,3,4,5\n\n6,7,8,9,10,11\n");
     assert_eq!(plain.frames[1].stress_MPa, [6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+    // The numbers of the columns are a header.
+    assert_eq!(read("0,1,2,3,4,5\n6,7,8,9,10,11\n").frames[0].stress_MPa, plain.frames[1].stress_MPa);
     for text in [
         "# a remark\ntime;a;b;c;d;e;f\n0,5;0,25;1;2;3;;5\n",
         "0.5\t0.25\t1\t2\t3\tNaN\t5\n",
@@ -301,7 +303,7 @@ fn what_is_missing_or_wrong_is_named() {
         (message("a.csv", b"1,2,3,4", &Settings { size: Some([2, 2]), ..none.clone() }), "a.csv: the unit is missing"),
         (
             message("a.csv", b"1,2,3", &Settings { size: Some([2, 2]), ..stated() }),
-            "a.csv, line 1: \"1,2,3\" is not allowed; it must be 4 values, --size 2x2, not 3",
+            "a.csv, line 1: 3 values, wanted 4 of a frame or 2 of a row",
         ),
         (
             message("a.csv", ISCAN, &Settings { frames: Some([20, 25]), ..counts() }),
