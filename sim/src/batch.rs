@@ -61,8 +61,9 @@ impl<'a> Batch<'a> {
                 scene.name
             );
         }
-        // Only the bit-true model looks at them.
-        let peaks = if name == EngineName::Fixed { frames_of(scene, stress_MPa, 0)? } else { Vec::new() };
+        // Only the bit-true model of a scene without a full scale looks at them.
+        let looks = name == EngineName::Fixed && input.full_scale_MPa.is_none();
+        let peaks = if looks { frames_of(scene, stress_MPa, 0)? } else { Vec::new() };
         let engine = engines.engine(name, scene, &peaks)?;
         Ok(Batch { engine, scene, stress_MPa, cross_check, next: 0 })
     }

@@ -65,12 +65,12 @@ impl<'k> Parallel<'k, '_> {
         let s = &self.s;
         if let Some(contacts) = &s.contacts {
             return Status {
-                start: contacts.told,
-                part: contacts.told_label,
-                position: [contacts.told_x, contacts.told_y],
-                score: contacts.told_ln_sigma,
-                found: contacts.told_condition,
-                condition: contacts.told_condition,
+                start: contacts.status_valid,
+                part: contacts.status_label,
+                position: [contacts.status_x, contacts.status_y],
+                score: contacts.status_ln_sigma,
+                found: contacts.status_condition,
+                condition: contacts.status_condition,
             };
         }
         let (start, condition) = (c.values.settled, c.searched_condition);

@@ -108,19 +108,19 @@ block! {
         out positions_x: contacts * position_bits();
         /// The same of μ2; as `positions_x`.
         out positions_y: contacts * position_bits();
-        /// `told_…` is the status of label `told_label`, 0 for the taxels of no contact.
-        out told;
-        /// The label; valid with `told`.
-        out told_label: label_bits(*contacts);
-        /// Position of its μ1, 0 where there is no such contact; valid with `told`.
-        out told_x: position_bits();
-        /// Position of its μ2; as `told_x`.
-        out told_y: position_bits();
-        /// Its word of both ln σ, 0 where it does not meet the condition; valid with `told`.
-        out told_ln_sigma: score_bits;
-        /// Whether it meets the condition; valid with `told`.
-        out told_condition;
-        /// Beats may be requested: the last status has been told; high for one cycle.
+        /// `status_…` is the status of label `status_label`, 0 for the taxels of no contact.
+        out status_valid;
+        /// The label; valid with `status_valid`.
+        out status_label: label_bits(*contacts);
+        /// Position of its μ1, 0 where there is no such contact; valid with `status_valid`.
+        out status_x: position_bits();
+        /// Position of its μ2; as `status_x`.
+        out status_y: position_bits();
+        /// Its word of both ln σ, 0 where it does not meet the condition; valid with `status_valid`.
+        out status_ln_sigma: score_bits;
+        /// Whether it meets the condition; valid with `status_valid`.
+        out status_condition;
+        /// Beats may be requested: the last status has left; high for one cycle.
         out begins;
         /// The subarray is out of the passes and the search; high for one cycle.
         out ended;
@@ -139,7 +139,7 @@ enum State {
     Contact,
     Step,
     Result,
-    Tell,
+    Status,
 }
 
 impl Contacts {
@@ -200,9 +200,9 @@ impl Block for Contacts {
         let stepped = k.wire("stepped", is(State::Step) & complete);
         let last_step = step.is(self.steps as u64 - 1);
         let steps = k.wire("steps", (segmented & !io.count.any()) | (known & last_contact) | (stepped & !last_step));
-        let tells = k.wire("tells", is(State::Result) & io.values_begin);
-        let tells_of = k.register("tells_of", Type::unsigned(label_bits));
-        let ends = k.wire("ends", is(State::Tell) & tells_of.is(self.contacts as u64));
+        let status_begins = k.wire("status_begins", is(State::Result) & io.values_begin);
+        let status_of = k.register("status_of", Type::unsigned(label_bits));
+        let ends = k.wire("ends", is(State::Status) & status_of.is(self.contacts as u64));
 
         k.when(segments, || goes(State::Segment));
         k.when(segmented, || {
@@ -222,11 +222,11 @@ impl Block for Contacts {
         });
         k.when(stepped & !last_step, || step.set(step.plus(1)));
         k.when(stepped & last_step, || goes(State::Result));
-        k.when(tells, || {
-            goes(State::Tell);
-            tells_of.set(k.constant(label_bits, 0));
+        k.when(status_begins, || {
+            goes(State::Status);
+            status_of.set(k.constant(label_bits, 0));
         });
-        k.when(is(State::Tell), || tells_of.set(tells_of.plus(1)));
+        k.when(is(State::Status), || status_of.set(status_of.plus(1)));
         k.when(ends, || goes(State::Idle));
         k.when(io.start, || {
             goes(State::First);
@@ -269,16 +269,16 @@ impl Block for Contacts {
         ln_sigma.write(known, *contact, io.ln_sigma);
 
         k.comment("Contacts that there are not have no condition, and what has no condition has no μ.");
-        pulse("told", is(State::Tell));
-        io.told_label.delay(*tells_of);
-        let condition = k.wire("condition_of", self.of_label(k, *tells_of, |at| conditions.at(at)));
-        io.told_condition.delay(condition);
-        for (axis, name) in ["told_x", "told_y"].into_iter().enumerate() {
-            let position = self.of_label(k, *tells_of, |at| positions[axis].slice(index(at), position_bits()));
+        pulse("status_valid", is(State::Status));
+        io.status_label.delay(*status_of);
+        let condition = k.wire("condition_of", self.of_label(k, *status_of, |at| conditions.at(at)));
+        io.status_condition.delay(condition);
+        for (axis, name) in ["status_x", "status_y"].into_iter().enumerate() {
+            let position = self.of_label(k, *status_of, |at| positions[axis].slice(index(at), position_bits()));
             k.delay(name, position & condition.repeat(position_bits()));
         }
-        let word = ln_sigma.read(tells_of.minus(1).low(contact.bits()));
-        io.told_ln_sigma.delay(word & condition.repeat(self.score_bits));
+        let word = ln_sigma.read(status_of.minus(1).low(contact.bits()));
+        io.status_ln_sigma.delay(word & condition.repeat(self.score_bits));
     }
 }
 
@@ -303,9 +303,9 @@ mod tests {
         Mu(usize),
         /// The step of this index.
         Step(usize),
-        Tell,
-        /// The status of this label is told.
-        Telling(usize),
+        Values,
+        /// The status of this label leaves.
+        Status(usize),
     }
 
     /// Place of each input that is more than a pulse.
@@ -314,8 +314,8 @@ mod tests {
     const MU: usize = 9;
     const FOLD: usize = 13;
 
-    /// What is told of a contact: whether it has a μ, the position of μ, ln σ.
-    type Told = (bool, [Word; 2], Word);
+    /// What the status of a contact has: whether it has a μ, the position of μ, ln σ.
+    type ContactStatus = (bool, [Word; 2], Word);
 
     /// Inputs in the order of the block. What pulses next follows from what was waited for.
     struct Sequence {
@@ -325,17 +325,17 @@ mod tests {
         section: Option<u64>,
         contact: Option<usize>,
         /// The contacts that are known.
-        all: Vec<Told>,
+        all: Vec<ContactStatus>,
         /// The pulses of this cycle: segment, window, shear, end, free.
         pulses: [bool; 5],
-        /// The label that is told in this cycle, and what is told if it has a μ.
-        told: Option<(usize, Option<Told>)>,
+        /// The label whose status leaves in this cycle, and what that has if there is a μ.
+        status: Option<(usize, Option<ContactStatus>)>,
     }
 
     impl Sequence {
         fn new() -> Self {
             let (waits, section, contact) = (None, None, None);
-            Sequence { waits, quads: 0, count: 0, section, contact, all: Vec::new(), pulses: [false; 5], told: None }
+            Sequence { waits, quads: 0, count: 0, section, contact, all: Vec::new(), pulses: [false; 5], status: None }
         }
 
         /// The positions on an axis, once those of all contacts are known.
@@ -357,8 +357,8 @@ mod tests {
             let bit = |value: bool| known.then(|| value.into());
             let high = |input: usize| inputs[input].number() == 1;
             let [segment, window, shear, ended, free] = self.pulses;
-            let own = self.told.as_ref().map(|told| &told.1);
-            let word = |of: &dyn Fn(&Told) -> Word| own.map(|own| own.as_ref().map_or(Word::default(), of));
+            let own = self.status.as_ref().map(|status| &status.1);
+            let word = |of: &dyn Fn(&ContactStatus) -> Word| own.map(|own| own.as_ref().map_or(Word::default(), of));
             let reads = matches!(self.waits, Some(Waits::Mu(_)));
             let [fold, at_window, at_shear, at_forces, at_sent] = [0, 1, 2, 3, 4].map(|own| inputs[FOLD + own]);
             let labels = match self.waits {
@@ -386,8 +386,8 @@ mod tests {
                 bit(window || shear || high(2)),
                 self.positions(0),
                 self.positions(1),
-                bit(self.told.is_some()),
-                self.told.as_ref().map(|told| Word::from(told.0 as u64)),
+                bit(self.status.is_some()),
+                self.status.as_ref().map(|status| Word::from(status.0 as u64)),
                 own.map(|own| own.is_some().into()),
                 word(&|own| own.1[0]),
                 word(&|own| own.1[1]),
@@ -400,8 +400,8 @@ mod tests {
             let (rst, start, taxels, segmented) = (high(0), high(1), high(3), high(4));
             let (known, begins) = (high(6), high(12));
             self.pulses = [false; 5];
-            self.told = match self.waits {
-                Some(Waits::Telling(label)) => {
+            self.status = match self.waits {
+                Some(Waits::Status(label)) => {
                     Some((label, label.checked_sub(1).and_then(|at| self.all.get(at)).filter(|own| own.0).copied()))
                 }
                 _ => None,
@@ -432,13 +432,13 @@ mod tests {
                 }
                 Some(Waits::Step(step)) if complete => {
                     let last = step + 1 == SHAPE.steps;
-                    next = Some(if last { Waits::Tell } else { Waits::Step(step + 1) });
+                    next = Some(if last { Waits::Values } else { Waits::Step(step + 1) });
                     self.pulses[2] = !last;
                 }
-                Some(Waits::Tell) if begins => next = Some(Waits::Telling(0)),
-                Some(Waits::Telling(label)) => {
+                Some(Waits::Values) if begins => next = Some(Waits::Status(0)),
+                Some(Waits::Status(label)) => {
                     self.pulses[3] = label == SHAPE.contacts;
-                    next = Some(if self.pulses[3] { Waits::Start } else { Waits::Telling(label + 1) });
+                    next = Some(if self.pulses[3] { Waits::Start } else { Waits::Status(label + 1) });
                 }
                 _ => {}
             }
@@ -448,7 +448,7 @@ mod tests {
                 self.waits = self.waits.map(|_| Waits::First);
             }
             if rst {
-                (self.waits, self.pulses, self.told) = (Some(Waits::Start), [false; 5], None);
+                (self.waits, self.pulses, self.status) = (Some(Waits::Start), [false; 5], None);
             }
         }
     }
@@ -477,7 +477,7 @@ mod tests {
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     Word::of_fields(&[random.i64(-384..=384)], position_bits()),
                     random_word(random, SHAPE.score_bits),
-                    answer(waits == Some(Waits::Tell)),
+                    answer(waits == Some(Waits::Values)),
                 ];
                 inputs.extend((0..5).map(|_| Word::from(random.u64(..SHAPE.quads as u64))));
                 inputs.push(random.bool().into());
@@ -499,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_start_one_after_the_other_and_every_contact_is_told() {
+    fn stages_start_one_after_the_other_and_every_contact_has_its_status() {
         check(&kernel_of(&SHAPE), &stimulus(), &mut Sequence::new());
     }
 }

@@ -63,7 +63,7 @@ impl Kind {
     }
 }
 
-/// When and as the how-manieth result a message is recorded.
+/// Number of the result that a message belongs to, and the time at which it is recorded.
 #[derive(Clone, Copy, Debug)]
 pub struct Stamp {
     /// Number of the result.

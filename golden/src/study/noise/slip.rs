@@ -70,10 +70,11 @@ pub fn slip_study(
     for (level, &noise) in study.levels.iter().enumerate() {
         let converter = study.converter(level);
         let stated = stated(scene, &converter, study.told);
+        let read = drawn.iter().map(|(_, drawn)| readings(drawn, &converter, &stated));
+        let read = read.collect::<Result<Vec<_>, _>>()?;
         for &candidate in &study.candidates {
-            for (slip, drawn) in &drawn {
-                let readings = readings(drawn, &converter, &stated)?;
-                let all = outcomes(candidate, &candidate.stated(&stated), drawn, &readings, &step)?;
+            for ((slip, drawn), readings) in drawn.iter().zip(&read) {
+                let all = outcomes(candidate, &candidate.stated(&stated), drawn, readings, &step)?;
                 rows.push(row(noise, candidate.name(&stated), *slip, &all));
             }
         }
