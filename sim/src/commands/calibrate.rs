@@ -11,6 +11,7 @@ use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use serde::Serialize;
 
+use super::layout::LayoutArguments;
 use crate::report;
 
 /// Arguments of `dermis calibrate`.
@@ -29,6 +30,8 @@ pub struct Arguments {
     /// Stress in MPa and the recording under it, a file or a folder; repeatable, at least two.
     #[arg(long = "load", value_name = "MPA=FILE", required = true)]
     loads: Vec<LoadFile>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// File for the table.
     #[arg(long, value_name = "FILE", required_unless_present = "json")]
     out: Option<PathBuf>,
@@ -78,7 +81,10 @@ struct Answer<'a> {
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
     let load = |LoadFile { stress_MPa, path }: &LoadFile| -> Result<KnownLoad> {
-        Ok(KnownLoad { stress_MPa: *stress_MPa, frames: Frame::load_all(path, Some(&scene))? })
+        Ok(KnownLoad {
+            stress_MPa: *stress_MPa,
+            frames: Frame::load_all_as(path, Some(&scene), &arguments.layout.stated())?,
+        })
     };
     let loads = arguments.loads.iter().map(load).collect::<Result<Vec<_>>>()?;
     let fit = LoadFit::new(&scene, &loads).map_err(|error| anyhow!("--load: {error}"))?;

@@ -13,6 +13,7 @@ use dermis_golden::spec::scene::{Scene, SearchSpec};
 use dermis_golden::write::write;
 use toml_edit::{value, DocumentMut};
 
+use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
 use crate::progress::Progress;
 use crate::stream::{line, Source};
@@ -33,6 +34,8 @@ pub(super) struct NoiseArguments {
     /// Bit rate of a serial port; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
+    #[command(flatten)]
+    layout: LayoutArguments,
 }
 
 impl NoiseArguments {
@@ -47,7 +50,7 @@ impl NoiseArguments {
         let (input, name) = open(source, &scene, self.baud)?;
         let bar = Progress::steps(&format!("{}: frames without load", scene.name), u64::from(self.frames));
         let (mut input, mut bytes, mut frames) = (BufReader::new(input), Vec::new(), Vec::new());
-        let mut lines = line::Frames::new(&scene.sensor);
+        let mut lines = line::Frames::new(&scene.sensor, self.layout.stated());
         for number in 1.. {
             if frames.len() == self.frames as usize {
                 break;
@@ -79,7 +82,7 @@ impl NoiseArguments {
 /// The frame of a line, none of a comment and a header, or why there is none.
 fn frame(lines: &mut line::Frames, bytes: &[u8], number: u64) -> Result<Option<Frame>, String> {
     let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-    lines.frame(text, number).map(|frame| frame.map(|(_, frame)| frame)).map_err(|none| none.reason)
+    lines.frame(text, number).map(|read| read.map(|line| line.frame)).map_err(|none| none.reason)
 }
 
 /// With the digits that are written.

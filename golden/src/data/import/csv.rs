@@ -1,20 +1,18 @@
 //! Plain text: lines of numbers, as [`crate::data::text`] reads them.
 //!
-//! Times of a date, and seconds or milliseconds since 1970, are taken from the first frame on.
+//! Times since 1970 are taken from the first frame on.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
 use super::Settings;
-use crate::data::text::{frames, TimeUnit};
+use crate::data::text::{frames, is_date};
 
 /// Reads a recording of the stated size.
 pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
     let shape = settings.size.ok_or_else(|| source.missing("the size", "give it with --size ROWSxCOLS"))?;
     let read = frames(text, shape, &settings.layout).map_err(|reason| source.text(reason))?;
-    let unit = read.layout.as_ref().and_then(|layout| layout.time).map(|(_, unit)| unit);
-    let is_date = matches!(unit, Some(TimeUnit::Iso | TimeUnit::Number { since_1970: true, .. }));
-    let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|_| is_date).unwrap_or(0);
+    let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|ns| is_date(*ns)).unwrap_or(0);
     let mut own = Vec::with_capacity(read.frames.len());
     for (index, frame) in read.frames.into_iter().enumerate() {
         if let Some(large) = frame.readings.iter().find(|value| value.abs() > LARGEST_READING) {
