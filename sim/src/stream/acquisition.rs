@@ -22,6 +22,8 @@ pub struct Acquisition {
     clock: Option<(i64, i64)>,
     first_ns: i64,
     last_ns: i64,
+    /// Frames whose line states a time, and all.
+    stated: u64,
     frames: u64,
     gaps: u64,
     largest_ns: i64,
@@ -41,6 +43,7 @@ impl Acquisition {
             }
             None => arrival,
         };
+        self.stated += u64::from(stated.is_some());
         self.count(time_ns);
         time_ns
     }
@@ -68,7 +71,8 @@ impl fmt::Display for Acquisition {
             return Ok(());
         }
         let (rate, largest_ms) = ((self.frames - 1) as f64 / took_s, 1e-6 * self.largest_ns as f64);
-        write!(f, "; acquired at {rate:.1} per second, {} gaps, the largest step {largest_ms:.1} ms", self.gaps)?;
+        let word = if self.stated > 0 { "acquired" } else { "arrived" };
+        write!(f, "; {word} at {rate:.1} per second, {} gaps, the largest step {largest_ms:.1} ms", self.gaps)?;
         match self.back {
             0 => Ok(()),
             back => write!(f, ", {back} times earlier than the frame before"),

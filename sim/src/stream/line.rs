@@ -75,7 +75,10 @@ impl Frames {
         let line = usize::try_from(number).unwrap_or(usize::MAX);
         let read = self.reader.push(Line { number: line, text }).pop();
         if let Some(layout) = self.reader.layout().filter(|layout| self.layout.as_ref() != Some(*layout)) {
-            self.note = (!layout.is_plain()).then(|| format!("lines from {number} on: {layout}"));
+            // What stands above the line was not the header of a file.
+            let mut shown = layout.clone();
+            shown.first_line = 1;
+            self.note = (!layout.is_plain()).then(|| format!("lines from {number} on: {shown}"));
             self.layout = Some(layout.clone());
         }
         match read {
@@ -156,7 +159,7 @@ mod tests {
         assert_eq!((frames.frame("a,b,c,d", 1), frames.note().as_deref()), (Ok(None), Some("line 1 is a header")));
         assert_eq!((frames.frame("# a remark", 2), frames.note()), (Ok(None), None));
         assert!(frames.frame("1;2;3;4", 3).unwrap().is_some());
-        let layout = "lines from 3 on: a frame per line, separated by semicolons, header above line 3, readings in columns 1 to 4";
+        let layout = "lines from 3 on: a frame per line, separated by semicolons, readings in columns 1 to 4";
         assert_eq!(frames.note().as_deref(), Some(layout));
         let other = frames.frame("1,2,3,4", 4).unwrap_err().reason;
         assert_eq!(

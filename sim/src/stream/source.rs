@@ -17,7 +17,6 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
 
-use serialport::SerialPort;
 
 /// How often a file that grows is looked at.
 const POLL: Duration = Duration::from_millis(5);
@@ -136,13 +135,13 @@ impl Read for Growing {
 }
 
 /// A serial port, which has no end. What comes before its first end of a line is left out.
-struct Serial {
-    port: Box<dyn SerialPort>,
+struct Serial<P> {
+    port: P,
     /// A line has ended: what came before its end may be the rest of one.
     begun: bool,
 }
 
-impl Read for Serial {
+impl<P: Read> Read for Serial<P> {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
         loop {
             match self.port.read(buffer) {
@@ -203,6 +202,23 @@ mod tests {
         assert_eq!(loses, [false, true, true, false]);
         let absent = source("absent.csv").unwrap().open(Some(9600)).err().unwrap().to_string();
         assert!(absent.starts_with("absent.csv: No such file"), "{absent}");
+    }
+
+    #[test]
+    fn a_serial_port_is_read_from_its_first_end_of_a_line_on() {
+        // The first piece has lost the begin of its first number.
+        for (bytes, wanted) in
+            [("1,0.02\r\n0.01,0.02\n", "\n0.01,0.02\n"), ("\n0.01,0.02\n", "\n0.01,0.02\n"), ("1,0.02", "")]
+        {
+            for size in [1, 4, 64] {
+                let mut serial = Serial { port: bytes.as_bytes(), begun: false };
+                let (mut read, mut buffer) = (Vec::new(), vec![0; size]);
+                while let count @ 1.. = serial.read(&mut buffer).unwrap() {
+                    read.extend(&buffer[..count]);
+                }
+                assert_eq!(String::from_utf8(read).unwrap(), wanted, "{size} bytes at once");
+            }
+        }
     }
 
     #[test]

@@ -122,7 +122,7 @@ fn the_program_sends_checks_tares_and_streams() {
         assert!(answer["answered_s"].as_f64() > answer["sent_s"].as_f64(), "{answer}");
         assert_eq!(answer["forces_N"]["fz"].as_array().unwrap().len(), 64);
     }
-    assert_eq!(lines[1]["error"], "8: stress_MPa has 1 values, wanted 64");
+    assert_eq!(lines[1]["error"], "stress_MPa has 1 values, wanted 64");
     assert_eq!(text(&streamed.stderr).lines().last(), Some("error: standard input: 1 of 3 lines were refused"));
 
     let other = host(&terminal, "sensor-1", &[], "");

@@ -149,7 +149,7 @@ fn the_newest_frame_of_a_stream_is_drawn_and_older_ones_are_left_out() {
     input.write_all(line(&frames[0]).as_bytes()).unwrap();
     browser.wait_for("document.querySelector('#state').innerText.includes('frame 0 ')");
     let state = browser.evaluate("document.querySelector('#state').innerText");
-    let refusal = "1 refused (line 1: stress_MPa has 2 values, wanted 64)";
+    let refusal = "1 refused (line 1: 2 values, wanted 64)";
     assert!(state.as_str().unwrap().contains(refusal), "{state}");
     assert_eq!(browser.evaluate("document.querySelector('#true').hidden"), true);
     // From now on the page notes what it draws; while it is busy many frames arrive.

@@ -52,10 +52,7 @@ fn a_bad_line_is_answered_by_its_number_and_the_stream_goes_on() {
         assert!(answer["contacts"][0]["sigma_N"].is_array(), "{answer}");
     }
     input.write_all(b"1,2\n").unwrap();
-    assert_eq!(
-        answers.next().unwrap(),
-        serde_json::json!({"line": 3, "error": "line 3: stress_MPa has 2 values, wanted 64"})
-    );
+    assert_eq!(answers.next().unwrap(), serde_json::json!({"line": 3, "error": "2 values, wanted 64"}));
     input.write_all(line(&frames[2]).as_bytes()).unwrap();
     assert_eq!(answers.next().unwrap()["sequence"], 2);
     drop(input);
@@ -143,7 +140,7 @@ fn a_serial_port_is_read() {
     // Lines that come faster than results: the newest are answered, all others counted, and no write is held up for long.
     ours.write_all(line(&frames[1]).repeat(400).as_bytes()).unwrap();
     ours.write_all(b"end\n").unwrap();
-    let is_end = |answer: &Value| answer["error"].as_str().is_some_and(|error| error.contains("\"end\""));
+    let is_end = |answer: &Value| answer["error"].as_str().is_some_and(|error| error.starts_with("1 values, wanted"));
     assert!(answers.any(|answer| is_end(&answer)));
     ours.write_all(line(&frames[1]).as_bytes()).unwrap();
     let last = answers.find(|answer| answer["error"].is_null()).unwrap();

@@ -99,7 +99,7 @@ impl<'t> Columns<'t> {
             let ends = [0, readings].map(|column| self.beside(column));
             match ends {
                 [None, Some(Beside::Time(_))] if self.rises(readings) => return self.with_time(0, readings, None),
-                [Some(Beside::Time(_)), Some(Beside::Time(_))]
+                [Some(Beside::Time(_) | Beside::Index), Some(Beside::Time(_) | Beside::Index)]
                     if self.rises(0) && self.rises(readings) && !self.rises(readings / 2) =>
                 {
                     let last = readings + 1;

@@ -100,7 +100,7 @@ impl Layout {
 
     /// Whether lines are readings separated by commas, and nothing else.
     pub fn is_plain(&self) -> bool {
-        self.separator == Separator::Comma && self.readings == self.cells && self.first_line == 1
+        self.separator == Separator::Comma && self.readings == self.cells
     }
 
     /// The cells of a line.
@@ -235,7 +235,8 @@ impl<'s> Table<'s> {
             Some(form) if own >= of(form).1 || got == of(form).1 => Ok(of(form)),
             None if got == taxels || own >= taxels => Ok(of(Form::Line)),
             None if got == cols || own == cols => Ok(of(Form::Grid)),
-            _ => Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row")),
+            Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
+            None => Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row")),
         }
     }
 
