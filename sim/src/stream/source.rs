@@ -17,7 +17,6 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
 
-
 /// How often a file that grows is looked at.
 const POLL: Duration = Duration::from_millis(5);
 /// Wait for a byte of a serial port, after which it is tried again.

@@ -2,6 +2,7 @@
 //! missing reading.
 
 use super::{Contact, Forces, Frame, FrameError};
+use crate::data::text::without_nan;
 use crate::spec::plain_text::json_schema;
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
@@ -79,7 +80,9 @@ impl Frame {
 
 /// Reads a frame; `stem` is its id if the text has none, and the scene's sensor is taken if the text has none.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-    let mut reader = serde_json::Deserializer::from_str(text);
+    // Python writes NaN for a missing reading.
+    let text = without_nan(text);
+    let mut reader = serde_json::Deserializer::from_str(&text);
     let raw: Raw = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let path = error.path().to_string();
         // The reader calls the top level "."; where it cannot tell an entry's name, it writes "?".

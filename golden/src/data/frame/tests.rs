@@ -36,7 +36,8 @@ fn csv_is_rows_of_numbers() {
 /// A frame with missing readings is written and read again, in every form of text.
 #[test]
 fn missing_readings_are_read_and_written() {
-    let frame = json(r#""stress_MPa":[1,null,3,null]"#).unwrap();
+    let frame = json(r#""stress_MPa":[1,null,3,NaN],"notes":"NaN""#).unwrap();
+    assert_eq!(frame.notes.as_deref(), Some("NaN"));
     assert_eq!((frame.stress_MPa.as_slice(), frame.missing.as_slice()), (&[1.0, 0.0, 3.0, 0.0][..], &[1, 3][..]));
     assert!(frame.readings().iter().zip([false, true, false, true]).all(|(b, missing)| b.is_nan() == missing));
     assert!(frame.to_json().contains("[1.0,null,3.0,null]"), "{}", frame.to_json());

@@ -36,6 +36,7 @@ mod time;
 
 pub use cells::{reading, Separator};
 pub use layout::{Form, Layout, Stated};
+pub(crate) use reader::without_nan;
 pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
 pub use time::{is_date, TimeUnit};
 
