@@ -5,13 +5,18 @@
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
-use super::Settings;
+use super::{loggers, Settings};
 use crate::data::text::{frames, TimeUnit};
 
 /// Reads a recording of the stated size.
 pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
-    let shape = settings.size.ok_or_else(|| source.missing("the size", "give it with --size ROWSxCOLS"))?;
-    let read = frames(text, shape, &settings.layout).map_err(|reason| source.text(reason))?;
+    let logger = loggers::of(text);
+    let shape = settings.size.ok_or_else(|| {
+        let of = logger.as_ref().map_or(String::new(), |own| format!("; a file of {} does not state it", own.name));
+        source.missing("the size", format!("give it with --size ROWSxCOLS{of}"))
+    })?;
+    let stated = logger.as_ref().map_or(settings.layout, |own| own.stated(&settings.layout));
+    let read = frames(text, shape, &stated).map_err(|reason| source.text(reason))?;
     let unit = read.layout.as_ref().and_then(|layout| layout.time).map(|(_, unit)| unit);
     let is_date = matches!(unit, Some(TimeUnit::Iso | TimeUnit::Number { since_1970: true, .. }));
     let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|_| is_date).unwrap_or(0);
@@ -21,9 +26,11 @@ pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<
             return Err(source.line(frame.line, &large.to_string(), "a number up to 1e9 in magnitude"));
         }
         let time_s = frame.time_ns.map(|ns| (ns - start_ns) as f64 * 1e-9);
-        own.push(RawFrame { number: index + 1, time_s, values: frame.readings, device: None });
+        own.push(RawFrame { number: index + 1, time_s, values: frame.readings, stated: None, device: None });
     }
     let layout = read.layout.map(|layout| layout.to_string());
     let left_out = read.left_out.iter().map(|left_out| left_out.reason.to_string()).collect();
-    Ok(Recording { layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
+    let device = logger.as_ref().map(|own| own.name.to_owned());
+    let unit = logger.and_then(|own| own.unit);
+    Ok(Recording { device, unit, layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
 }
