@@ -241,7 +241,7 @@ fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Resu
         Format::Lst => lst::parse(&decoded(bytes), source),
         Format::Xsensor => xsensor::parse(&decoded(bytes), source),
         Format::Npy => npy::parse(bytes, settings.size, source),
-        Format::Csv => csv::parse(&decoded(bytes), settings, source),
+        Format::Csv => csv::parse(&decoded(bytes), settings.size, &settings.layout, source),
     }
 }
 

@@ -38,6 +38,9 @@ impl Correction {
         if self.changes_readings() {
             self.level(recording, source)?;
         }
+        if !(self.transpose || self.flip_x || self.flip_y) {
+            return Ok(());
+        }
         let (order, rows) = (self.order([recording.rows, recording.cols]), recording.rows);
         for frame in &mut recording.frames {
             frame.values = order.iter().map(|k| frame.values[*k]).collect();

@@ -4,18 +4,23 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
+use super::loggers;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
-use super::{loggers, Settings};
-use crate::data::text::{frames, TimeUnit};
+use crate::data::text::{frames, Stated, TimeUnit};
 
-/// Reads a recording of the stated size.
-pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
+/// Reads a recording of the stated size and layout.
+pub(super) fn parse(
+    text: &str,
+    size: Option<[usize; 2]>,
+    layout: &Stated,
+    source: &Source,
+) -> Result<Recording, ImportError> {
     let logger = loggers::of(text);
-    let shape = settings.size.ok_or_else(|| {
+    let shape = size.ok_or_else(|| {
         let of = logger.as_ref().map_or(String::new(), |own| format!("; a file of {} does not state it", own.name));
         source.missing("the size", format!("give it with --size ROWSxCOLS{of}"))
     })?;
-    let stated = logger.as_ref().map_or(settings.layout, |own| own.stated(&settings.layout));
+    let stated = logger.as_ref().map_or(*layout, |own| own.stated(layout));
     let read = frames(text, shape, &stated).map_err(|reason| source.text(reason))?;
     let unit = read.layout.as_ref().and_then(|layout| layout.time).map(|(_, unit)| unit);
     let is_date = matches!(unit, Some(TimeUnit::Iso | TimeUnit::Number { since_1970: true, .. }));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{loggers, xsensor};
+use super::loggers;
 use serde::{Deserialize, Serialize};
 
 /// First bytes of a NumPy file.
@@ -59,7 +59,7 @@ impl Format {
         if head.contains("Pict-No") || (head.contains("novel") && head.contains("Matrix:")) {
             return Some(Format::Lst);
         }
-        if xsensor::is_own(&head) {
+        if has_line("SENSELS") && has_line("Rows") && has_line("Columns") {
             return Some(Format::Xsensor);
         }
         if loggers::of(&head).is_some() {

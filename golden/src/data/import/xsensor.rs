@@ -15,12 +15,6 @@ use super::format::Format;
 use super::recording::{sensel, side, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
 
-/// Whether a file's first lines are of such a file.
-pub(super) fn is_own(head: &str) -> bool {
-    let has = |key: &str| head.lines().any(|line| cell(line.split(',').next().unwrap_or("")) == key);
-    has("SENSELS") && has("Rows") && has("Columns")
-}
-
 /// A key without quotes and colon.
 fn cell(text: &str) -> &str {
     text.trim().trim_matches('"').trim_end_matches(':').trim()
@@ -86,7 +80,8 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         if shape.replace([rows, cols]).is_some_and(|before| before != [rows, cols]) {
             return Err(source.field("Rows and Columns", format!("{rows}×{cols}"), "those of the frames before"));
         }
-        let mut values = Vec::with_capacity(rows * cols);
+        // Grown with the file: a header may state more than there is.
+        let mut values = Vec::new();
         for row in 0..rows {
             let Some((line, text)) = lines.next().filter(|(_, text)| !text.trim().is_empty()) else {
                 let allowed = format!("{rows} rows below SENSELS, not {row}");
