@@ -61,18 +61,19 @@ fn main() -> anyhow::Result<()> {
     let result = &Golden::reference(&scene)?.run(frame)?;
     let newest = Arc::new(Newest::default());
     let (sequence, line, dropped, received_s, answered_s) = (0, 1, 0, 0.0, 0.0);
-    let (frames, received) = (std::slice::from_ref(frame), &[received_s][..]);
+    let frames = std::slice::from_ref(frame);
     let (estimator, estimator_change) = ("search", None);
     let answer = Answer {
         sequence,
         line,
         received_s,
         answered_s,
+        time_ns: 0,
+        times_ns: &[0],
         dropped,
         estimator,
         estimator_change,
         frames,
-        received,
         result,
     };
     Show::new(&newest).outcome(&Outcome::Answer(answer))?;

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use anyhow::ensure;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::text::Stated;
 use dermis_golden::engine::CheckPace;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
@@ -25,7 +26,7 @@ fn rate(scene: &Scene, name: EngineName, frames: usize) -> anyhow::Result<f64> {
     let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     let text: String = shipped.iter().cycle().take(frames).map(line).collect();
     let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
-    let options = StreamOptions { queue: 64, policy: Policy::All, live: false };
+    let options = StreamOptions { queue: 64, policy: Policy::All, live: false, layout: Stated::default() };
     let begin = Instant::now();
     let counts = run(
         Estimators::only(&*engine, CheckPace::Never),

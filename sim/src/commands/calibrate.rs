@@ -12,6 +12,7 @@ use dermis_golden::write::write;
 use serde::Serialize;
 use toml_edit::Value;
 
+use super::layout::LayoutArguments;
 use super::scene_file::{has_file, lines, state, Measured};
 use crate::report;
 
@@ -32,6 +33,8 @@ pub struct Arguments {
     /// Stress in MPa and the recording under it, a file or a folder; repeatable, at least two.
     #[arg(long = "load", value_name = "MPA=FILE", required = true)]
     loads: Vec<LoadFile>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// File for the table.
     #[arg(long, value_name = "FILE", required_unless_present = "json")]
     out: Option<PathBuf>,
@@ -81,7 +84,10 @@ struct Answer<'a> {
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
     let load = |LoadFile { stress_MPa, path }: &LoadFile| -> Result<KnownLoad> {
-        Ok(KnownLoad { stress_MPa: *stress_MPa, frames: Frame::load_all(path, Some(&scene))? })
+        Ok(KnownLoad {
+            stress_MPa: *stress_MPa,
+            frames: Frame::load_all_as(path, Some(&scene), &arguments.layout.stated())?,
+        })
     };
     let loads = arguments.loads.iter().map(load).collect::<Result<Vec<_>>>()?;
     let fit = LoadFit::new(&scene, &loads).map_err(|error| anyhow!("--load: {error}"))?;
@@ -210,7 +216,13 @@ mod tests {
         };
         fs::create_dir(at("more")).unwrap();
         let loads = [0.0, 0.05, 0.1].map(load).to_vec();
-        let arguments = Arguments { scene: at("pad.toml"), loads, out: Some(at(out).into()), json: false };
+        let arguments = Arguments {
+            scene: at("pad.toml"),
+            loads,
+            out: Some(at(out).into()),
+            layout: LayoutArguments::default(),
+            json: false,
+        };
         let printed = run(&arguments).unwrap();
         let text = fs::read_to_string(at("pad.toml")).unwrap();
         // What is written is a scene that finds its table.

@@ -10,6 +10,7 @@ use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
 use dermis_golden::spec::scene::{Scene, SearchSpec};
 
+use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
 use super::scene_file::{has_file, state, Measured};
 use crate::progress::Progress;
@@ -31,6 +32,8 @@ pub(super) struct NoiseArguments {
     /// Bit rate of a serial port; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
+    #[command(flatten)]
+    layout: LayoutArguments,
 }
 
 impl NoiseArguments {
@@ -45,7 +48,7 @@ impl NoiseArguments {
         let (input, name) = open(source, &scene, self.baud)?;
         let bar = Progress::steps(&format!("{}: frames without load", scene.name), u64::from(self.frames));
         let (mut input, mut bytes, mut frames) = (BufReader::new(input), Vec::new(), Vec::new());
-        let mut lines = line::Frames::new(&scene.sensor);
+        let mut lines = line::Frames::new(&scene.sensor, self.layout.stated());
         for number in 1.. {
             if frames.len() == self.frames as usize {
                 break;
@@ -77,7 +80,7 @@ impl NoiseArguments {
 /// The frame of a line, none of a comment and a header, or why there is none.
 fn frame(lines: &mut line::Frames, bytes: &[u8], number: u64) -> Result<Option<Frame>, String> {
     let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-    lines.frame(text, number).map(|frame| frame.map(|(_, frame)| frame)).map_err(|none| none.reason)
+    lines.frame(text, number).map(|read| read.map(|line| line.frame)).map_err(|none| none.reason)
 }
 
 /// With the digits that are written.

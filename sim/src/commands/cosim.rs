@@ -6,6 +6,7 @@ use anyhow::{bail, Result};
 use clap::{Args, ValueEnum};
 
 use super::inputs::{resolve_specimen, BoardOverride};
+use super::layout::LayoutArguments;
 use crate::cosim::hardware::Simulator;
 use crate::cosim::scan::{verify_scan, Fault};
 use crate::cosim::verify::verify_specimen;
@@ -30,6 +31,8 @@ pub struct Arguments {
     /// Frame file (.json, .csv; .mcap: all frames, .mcap:N: frame N from 1) or `eq2`, repeatable; default: all shipped frames of the scene.
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// Print the report as JSON and nothing else.
     #[arg(long)]
     json: bool,
@@ -92,8 +95,8 @@ impl DeviceChoice {
 /// # Errors
 /// Wrong input, a scene without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
-    let Arguments { scene, frames, json, tables, device, waves: with_waves, wire, target } = arguments;
-    let (scene, specimen, frames) = resolve_specimen(scene.as_deref(), tables.as_deref(), frames)?;
+    let Arguments { scene, frames, layout, json, tables, device, waves: with_waves, wire, target } = arguments;
+    let (scene, specimen, frames) = resolve_specimen(scene.as_deref(), tables.as_deref(), frames, layout)?;
     let scene = target.apply(scene);
     if scene.hardware.adc_scan.is_some() && !with_waves {
         let verified = verify_scan(&scene, specimen.as_ref(), &frames, device.simulators(), *wire, build_dir)?;

@@ -17,6 +17,7 @@ use dermis_golden::wire::link::{Counters, Identity, Kind};
 use dermis_golden::write::write;
 
 use super::inputs::{frames_of, resolve, BoardOverride};
+use super::layout::LayoutArguments;
 use crate::link::stream::{self, FramesSent};
 use crate::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
 use crate::progress::Progress;
@@ -29,6 +30,8 @@ pub struct Arguments {
     /// Frame files (.json, .csv); default: all shipped frames of the scene.
     #[arg(value_name = "FILE", conflicts_with = "stream")]
     frames: Vec<String>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// Serial port of the board.
     #[arg(long, value_name = "PATH")]
     port: String,
@@ -97,10 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let (scene, frames) = match named {
         Some(scene) if arguments.stream || scans => (scene, Vec::new()),
         Some(scene) => {
-            let frames = frames_of(specimen.as_ref().unwrap_or(&scene), &arguments.frames)?;
+            let frames = frames_of(specimen.as_ref().unwrap_or(&scene), &arguments.frames, &arguments.layout)?;
             (scene, frames)
         }
-        None => resolve(None, &arguments.frames)?,
+        None => resolve(None, &arguments.frames, &arguments.layout)?,
     };
     let scene = arguments.target.apply(scene);
     let model = Model::new(&scene)?;
@@ -119,7 +122,12 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let begun = Instant::now();
     let ids = (1..=arguments.scans.unwrap_or(1)).map(|number| format!("scan-{number}"));
     let sent = match (arguments.stream, scans) {
-        (true, false) => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
+        (true, false) => stream::run(
+            &mut session,
+            arguments.layout.stated(),
+            &mut std::io::stdin().lock(),
+            &mut std::io::stdout().lock(),
+        )?,
         (true, true) => stream::run_scans(&mut session, ids, &mut std::io::stdout().lock())?,
         (false, false) => send(&mut session, &frames, |session, frame| session.request(frame))?,
         (false, true) => {

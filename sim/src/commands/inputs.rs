@@ -17,6 +17,7 @@ use dermis_golden::data::input::Input;
 use dermis_golden::result::flags;
 use dermis_golden::spec::scene::Scene;
 
+use super::layout::LayoutArguments;
 use crate::report;
 
 /// `--frame` value for the stress of the paper's Eq. 2.
@@ -77,7 +78,7 @@ pub(super) fn note_hardware(scene: &Scene) -> Result<()> {
 ///
 /// # Errors
 /// Unknown scene, unreadable frame, a frame of another sensor, neither scene nor sensor given, no frames.
-pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Frame>)> {
+pub fn resolve(scene: Option<&str>, frames: &[String], layout: &LayoutArguments) -> Result<(Scene, Vec<Frame>)> {
     let scene = match (scene, frames.first().map(String::as_str)) {
         (Some(scene), _) => Scene::load(scene)?,
         (None, Some(first)) if first != EQ2 => scene_of_frame(first)?,
@@ -87,7 +88,7 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
             Scene::builtin_names().join(", ")
         ),
     };
-    let frames = frames_of(&scene, frames)?;
+    let frames = frames_of(&scene, frames, layout)?;
     Ok((scene, frames))
 }
 
@@ -95,9 +96,9 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
 ///
 /// # Errors
 /// Unreadable frame, a frame of another sensor, no frames.
-pub(super) fn frames_of(scene: &Scene, files: &[String]) -> Result<Vec<Frame>> {
+pub(super) fn frames_of(scene: &Scene, files: &[String], layout: &LayoutArguments) -> Result<Vec<Frame>> {
     if !files.is_empty() {
-        return files.iter().map(|path| load(path, scene)).collect::<Result<Vec<_>>>().map(|all| all.concat());
+        return files.iter().map(|path| load(path, scene, layout)).collect::<Result<Vec<_>>>().map(|all| all.concat());
     }
     let shipped = Frame::shipped(scene);
     if shipped.is_empty() {
@@ -115,8 +116,9 @@ pub(super) fn resolve_specimen(
     hardware: Option<&str>,
     tables: Option<&str>,
     frames: &[String],
+    layout: &LayoutArguments,
 ) -> Result<(Scene, Option<Scene>, Vec<Frame>)> {
-    let (scene, frames) = resolve(tables.or(hardware), frames)?;
+    let (scene, frames) = resolve(tables.or(hardware), frames, layout)?;
     match (tables, hardware) {
         (None, _) => Ok((scene, None, frames)),
         (Some(_), Some(hardware)) => Ok((Scene::load(hardware)?, Some(scene), frames)),
@@ -129,15 +131,16 @@ pub(super) fn resolve_specimen(
 ///
 /// # Errors
 /// As [`resolve`]; a number of frames other than 2^k.
-pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<Frame>)> {
+pub fn resolve_one(scene: Option<&str>, files: &[String], layout: &LayoutArguments) -> Result<(Scene, Vec<Frame>)> {
     let named = scene;
-    let (scene, mut frames) = resolve(named, files)?;
+    let (scene, mut frames) = resolve(named, files, layout)?;
     let (average, wanted) = (scene.input.average, scene.input.frames_per_result());
     if files.is_empty() && wanted == 1 {
         frames.truncate(1);
     } else if !scene.input.has_memory() && frames.len() != wanted {
         let (origin, got) = (named.unwrap_or(&scene.name), frames.len());
-        let hint = if got > files.len() { "; FILE.mcap:N is frame N of a recording" } else { "" };
+        let hint =
+            if got > files.len() { "; FILE.mcap:N is frame N of a recording, --stream takes every line" } else { "" };
         bail!(
             "{origin}: input.average = {average}: the number of frames must be 2^{average} = {wanted}, got {got}{hint}"
         );
@@ -145,12 +148,12 @@ pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<
     Ok((scene, frames))
 }
 
-/// The frame of a file, all of a recording.
-fn load(path: &str, scene: &Scene) -> Result<Vec<Frame>> {
+/// The frames of a file.
+fn load(path: &str, scene: &Scene, layout: &LayoutArguments) -> Result<Vec<Frame>> {
     if path == EQ2 {
         return Ok(vec![Frame::eq2(&scene.sensor)]);
     }
-    let frames = Frame::load_recorded(path, Some(scene))?;
+    let frames = Frame::load_all_as(path, Some(scene), &layout.stated())?;
     frames.iter().try_for_each(|frame| frame.check(scene))?;
     Ok(frames)
 }

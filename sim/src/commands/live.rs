@@ -15,6 +15,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_hardware, BoardOverride};
+use super::layout::LayoutArguments;
 use super::reconstruct_stream::{faster, open, rate_Hz, software_engine, stream_engine};
 use crate::engine::EngineName;
 use crate::link::{open_board, BoardEngine, Session};
@@ -31,7 +32,7 @@ use crate::stream::{run as run_stream, Clock, Estimators, Outcome, Policy, Sourc
   sensor-program | dermis live pad.toml --stream           one frame per line, as dermis reconstruct --stream takes them
   dermis live pad.toml --stream=udp:127.0.0.1:9000
   dermis live pad.toml --stream=/dev/ttyUSB0 --baud 115200
-  dermis live sensor-1 --recording press.mcap --loop       recorded frames, as far apart as they were received
+  dermis live sensor-1 --recording press.mcap --loop       recorded frames, as far apart as they were acquired
   dermis live sensor-1 --board /dev/ttyUSB0                the finger's frames, the board's forces
   dermis live sensor-1 --listen 192.168.1.7:8317           for a phone in the same network, without any password
 
@@ -47,7 +48,9 @@ pub struct Arguments {
     /// Bit rate of the stream's serial port; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S", requires = "stream")]
     baud: Option<u32>,
-    /// Show the frames of a recording, as far apart as they were received.
+    #[command(flatten)]
+    layout: LayoutArguments,
+    /// Show the frames of a recording, as far apart as they were acquired.
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "stream")]
     recording: Option<PathBuf>,
     /// Begin the recording again at its end.
@@ -170,7 +173,8 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
             hand.run(estimators, *noise, period, &mut output)?;
         }
         (None, Some((input, name))) => {
-            let options = StreamOptions { queue: 1, policy: Policy::Latest, live: true };
+            let options =
+                StreamOptions { queue: 1, policy: Policy::Latest, live: true, layout: arguments.layout.stated() };
             let counts = run_stream(estimators, (input, &name), options, &mut output)?;
             let answered = counts.answered;
             eprintln!("{}: {name} has ended after {answered} results; {counts}; the last one is shown", scene.name);

@@ -7,6 +7,7 @@ use clap::Args;
 use dermis_golden::fixed::Model;
 
 use super::inputs::{note_hardware, resolve, BoardOverride};
+use super::layout::LayoutArguments;
 use crate::cosim::hardware::Hardware;
 use crate::cosim::power::{energies, estimate_power};
 use crate::report;
@@ -26,6 +27,8 @@ pub struct Arguments {
     /// Frame file (.json, .csv; .mcap: all frames, .mcap:N: frame N from 1) or `eq2`, repeatable; default: all shipped frames of the scene.
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// Print the estimate as JSON and nothing else.
     #[arg(long)]
     json: bool,
@@ -38,7 +41,7 @@ pub struct Arguments {
 /// # Errors
 /// Wrong input, a scene without hardware, a board whose device has no energies, no Verilator.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<String> {
-    let (scene, frames) = resolve(arguments.scene.as_deref(), &arguments.frames)?;
+    let (scene, frames) = resolve(arguments.scene.as_deref(), &arguments.frames, &arguments.layout)?;
     let scene = arguments.target.apply(scene);
     let model = Model::for_frames(&scene, &frames)?;
     energies(&model.board)?;

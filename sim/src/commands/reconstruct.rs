@@ -12,6 +12,7 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_hardware, resolve_one, BoardOverride};
+use super::layout::LayoutArguments;
 use super::reconstruct_stream::StreamArguments;
 use crate::compare::{comparable_forces, difference};
 use crate::engine::{self, EngineName};
@@ -36,10 +37,12 @@ estimator evidence reads the frames of another one too; checks.cross_check_age i
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.
     scene: Option<String>,
-    /// Frame file (.json, .csv; .mcap:N: frame N from 1) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
+    /// Frame file (.json, .csv, .mcap; .mcap:N: frame N from 1) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
     /// scene has input.average = k, any number of times with input.mean = "sliding".
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,
+    #[command(flatten)]
+    layout: LayoutArguments,
     /// Model or hardware that computes the forces.
     #[arg(long, value_enum, default_value = "golden")]
     engine: EngineName,
@@ -57,12 +60,12 @@ pub struct Arguments {
 /// # Errors
 /// Wrong input, a scene without hardware where that is asked for, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
-    let Arguments { scene, frames, engine: name, json, stream, target } = arguments;
+    let Arguments { scene, frames, layout, engine: name, json, stream, target } = arguments;
     if stream.wanted() {
         let named = scene.as_deref().ok_or_else(|| anyhow!("--stream: name the scene"))?;
-        return stream.run(&target.apply(Scene::load(named)?), *name);
+        return stream.run(&target.apply(Scene::load(named)?), *name, layout);
     }
-    let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
+    let (scene, frames) = resolve_one(scene.as_deref(), frames, layout)?;
     let scene = target.apply(scene);
     // Large matrices take seconds.
     let _progress = Progress::start(&format!("{}: reconstruction", scene.name));

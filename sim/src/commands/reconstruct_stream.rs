@@ -11,6 +11,7 @@ use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_hardware;
+use super::layout::LayoutArguments;
 use crate::engine::EngineName;
 use crate::jobs::{Interrupt, Interrupted};
 use crate::recording::Recorder;
@@ -74,7 +75,7 @@ impl StreamArguments {
     ///
     /// # Errors
     /// A scene without that engine, a source that cannot be read, lines that were refused.
-    pub(super) fn run(&self, scene: &Scene, name: EngineName) -> Result<String> {
+    pub(super) fn run(&self, scene: &Scene, name: EngineName, layout: &LayoutArguments) -> Result<String> {
         let Some(source) = &self.stream else { return Ok(String::new()) };
         let engine = stream_engine(scene, name)?;
         let loses = source.loses_lines();
@@ -86,7 +87,7 @@ impl StreamArguments {
             (false, false) => (Policy::All, QUEUE_OF_ALL),
         };
         let queue = self.queue.unwrap_or(queue) as usize;
-        let options = StreamOptions { queue, policy, live: source.is_live() };
+        let options = StreamOptions { queue, policy, live: source.is_live(), layout: layout.stated() };
         let pace = match (self.check_every, latest || self.rate.is_some()) {
             (Some(period), _) => CheckPace::Every(period),
             (None, true) => CheckPace::Beside,

@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Write so many frames per second; default: as fast as they are read.
     #[arg(long, value_name = "N", conflicts_with = "real_time")]
     rate: Option<f64>,
-    /// Write frames as far apart as they were received.
+    /// Write frames as far apart as they were acquired.
     #[arg(long)]
     real_time: bool,
     /// Exit with 0 although the file is cut within a record.

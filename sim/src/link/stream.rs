@@ -5,6 +5,7 @@ use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::text::Stated;
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
 use serde::Serialize;
@@ -13,13 +14,16 @@ use serde_json::Value;
 use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
-use crate::stream::line::{self, Frames, NoFrame};
-use crate::stream::{seconds, LONGEST_LINE};
+use crate::stream::acquisition::Acquisition;
+use crate::stream::line::{self, Frames, LineFrame, NoFrame};
+use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
 
 /// An output line with an answer.
 #[derive(Serialize)]
 struct Reply {
     id: Value,
+    /// Nanoseconds since 1970 when the frame was acquired: as its line states, else when it was sent or asked for.
+    time_ns: i64,
     /// Seconds since 1970 when the frame was sent, and when its answer was complete.
     sent_s: f64,
     answered_s: f64,
@@ -31,18 +35,19 @@ struct Reply {
 }
 
 impl Reply {
-    /// The line for an answer to `readings`, which were asked for at `sent_s`, with `checks`.
+    /// The line for an answer to `readings`, which were acquired at `time_ns` and asked for at `sent`, with `checks`.
     fn new(
         model: &Model,
         checks: &mut StreamChecks,
         id: Value,
-        sent_s: f64,
+        (time_ns, sent): (i64, SystemTime),
         readings: &Frame,
         answer: &Answer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
         checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.diagnostics());
-        Ok(Reply { id, sent_s, answered_s: seconds(answer.received_at), readings: None, answer: physical })
+        let (sent_s, answered_s) = (seconds(sent), seconds(answer.received_at));
+        Ok(Reply { id, time_ns, sent_s, answered_s, readings: None, answer: physical })
     }
 }
 
@@ -72,20 +77,24 @@ pub(crate) struct FramesSent {
 /// A board that does not answer, streams that fail.
 pub(crate) fn run<P: Read + Write>(
     session: &mut Session<P>,
+    layout: Stated,
     input: &mut dyn BufRead,
     output: &mut dyn Write,
 ) -> Result<FramesSent> {
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     let (mut bytes, mut checks) = (Vec::new(), StreamChecks::new(&session.model, CheckPace::Beside));
-    let mut frames = Frames::new(&session.model.scene.sensor);
+    let (mut times, mut frames) = (Acquisition::default(), Frames::new(&session.model.scene.sensor, layout));
     for number in 1.. {
         let text =
             match line::read(input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))? {
                 None => break,
                 Some(false) => Err((Value::Null, anyhow!("over {LONGEST_LINE} bytes"))),
                 Some(true) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
-                Some(true) => answer(session, &mut checks, &mut frames, &bytes, number),
+                Some(true) => answer(session, &mut checks, (&mut frames, &mut times), &bytes, number),
             };
+        if let Some(note) = frames.note() {
+            eprintln!("standard input: {note}");
+        }
         let text = match text {
             Ok(None) => continue,
             Ok(Some(reply)) => {
@@ -111,25 +120,27 @@ pub(crate) fn run<P: Read + Write>(
 fn answer<P: Read + Write>(
     session: &mut Session<P>,
     checks: &mut StreamChecks,
-    frames: &mut Frames,
+    (frames, times): (&mut Frames, &mut Acquisition),
     bytes: &[u8],
     number: u64,
 ) -> Result<Option<Reply>, (Value, anyhow::Error)> {
     let text = std::str::from_utf8(bytes).map_err(|error| (Value::Null, error.into()))?;
     let frame = frames.frame(text, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    let Some((id, frame)) = frame else { return Ok(None) };
-    reply(session, checks, &id, &frame).map(Some).map_err(|error| (id, error))
+    let Some(LineFrame { id, frame, time_ns }) = frame else { return Ok(None) };
+    let sent = SystemTime::now();
+    let time_ns = times.time_ns(time_ns, nanoseconds(sent));
+    reply(session, checks, &id, (time_ns, sent), &frame).map(Some).map_err(|error| (id, error))
 }
 
 fn reply<P: Read + Write>(
     session: &mut Session<P>,
     checks: &mut StreamChecks,
     id: &Value,
+    times: (i64, SystemTime),
     frame: &Frame,
 ) -> Result<Reply> {
-    let sent_s = seconds(SystemTime::now());
     let (frame, answer) = session.request(frame)?;
-    Reply::new(&session.model, checks, id.clone(), sent_s, &frame, &answer)
+    Reply::new(&session.model, checks, id.clone(), times, &frame, &answer)
 }
 
 /// Writes a line for each of so many scans of a board that scans its array.
@@ -144,9 +155,10 @@ pub(crate) fn run_scans<P: Read + Write>(
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     let mut checks = StreamChecks::new(&session.model, CheckPace::Beside);
     for id in scans {
-        let sent_s = seconds(SystemTime::now());
+        let asked = SystemTime::now();
         let (readings, answer) = session.scan(&id)?;
-        let reply = Reply::new(&session.model, &mut checks, id.into(), sent_s, &readings, &answer)?;
+        let reply =
+            Reply::new(&session.model, &mut checks, id.into(), (nanoseconds(asked), asked), &readings, &answer)?;
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;

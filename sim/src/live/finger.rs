@@ -114,7 +114,7 @@ impl Hand {
             let frames = vec![frame; scene.input.frames_per_result()];
             let result = estimators.next(&frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
-            let (line, received): (u64, Vec<f64>) = (sequence + 1, vec![received_s; frames.len()]);
+            let (line, time_ns) = (sequence + 1, (received_s * 1e9) as i64);
             output(&Outcome::Answer(Answer {
                 sequence,
                 line,
@@ -124,7 +124,8 @@ impl Hand {
                 estimator: estimators.name(),
                 estimator_change: change.take().as_deref(),
                 frames: &frames,
-                received: &received,
+                time_ns,
+                times_ns: &vec![time_ns; frames.len()],
                 result: &result,
             }))?;
             if let Some(Note { text, changed }) = estimators.after(line, received_at, 0) {

@@ -14,7 +14,7 @@ pub enum Pace {
     Unbounded,
     /// This many per second.
     Rate(f64),
-    /// As far apart as they were received.
+    /// As far apart as they were acquired.
     Recorded,
 }
 
@@ -28,7 +28,7 @@ pub struct Lines {
     /// Take a file that is cut like one that ends.
     partial: bool,
     frames: Frames,
-    /// When the first frame is handed out, and when it was received.
+    /// When the first frame is handed out, and when it was acquired.
     begun: Option<(Instant, u64)>,
     /// Number of frames since then.
     count: u64,
@@ -72,19 +72,21 @@ impl Lines {
         }
         let Some(frame) = next else { return Ok(false) };
         // From the last frame to the first one as long as from the last but one to the last.
-        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, frame.received));
+        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, frame.time_ns));
         let due = match self.pace {
             Pace::Unbounded => Duration::ZERO,
             Pace::Rate(rate) => Duration::try_from_secs_f64(self.count as f64 / rate).unwrap_or(Duration::MAX),
-            Pace::Recorded => Duration::from_nanos(frame.received.saturating_sub(first)),
+            Pace::Recorded => Duration::from_nanos(frame.time_ns.saturating_sub(first)),
         };
         let wait = begun.checked_add(due).map_or(due, |at| at.saturating_duration_since(Instant::now()));
         std::thread::sleep(wait);
-        // Received times may go back.
+        // Times may go back.
         (self.gap, self.due) = (due.saturating_sub(self.due), due);
         self.count += 1;
         // NaN, a missing reading, is written as null.
-        self.line = Cursor::new(format!("{}\n", json!({"stress_MPa": frame.stress_MPa})).into_bytes());
+        self.line = Cursor::new(
+            format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})).into_bytes(),
+        );
         Ok(true)
     }
 }
@@ -118,7 +120,8 @@ mod tests {
         let path = folder.join("press.mcap");
         let mut recorder = Recorder::create(&path, &scene).unwrap();
         for (sequence, received_s) in (0..).zip(seconds) {
-            let (received_s, received, frames) = (*received_s, &[*received_s][..], &frames[..]);
+            let (received_s, frames) = (*received_s, &frames[..]);
+            let time_ns = (received_s * 1e9).round() as i64;
             let answer = Answer {
                 sequence,
                 line: sequence + 1,
@@ -128,7 +131,8 @@ mod tests {
                 estimator: "search",
                 estimator_change: None,
                 frames,
-                received,
+                time_ns,
+                times_ns: &[time_ns],
                 result,
             };
             recorder.outcome(&Outcome::Answer(answer)).unwrap();
@@ -141,13 +145,14 @@ mod tests {
     fn frames_are_lines_at_their_pace_and_again() {
         let folder = tempfile::tempdir().unwrap();
         let (path, frame) = recorded(folder.path(), &[100.0, 100.05, 100.15]);
-        let line = json!({"stress_MPa": frame.stress_MPa}).to_string();
+        let of = |ms: i64| json!({"time_ns": ms * 1_000_000, "stress_MPa": frame.stress_MPa}).to_string();
+        let recorded = [100_000, 100_050, 100_150].map(of);
         let options = || FrameOptions { shape: Some([8, 8]), ..FrameOptions::default() };
         let read = |pace, repeat, count: usize| {
             let begun = Instant::now();
             let lines = BufReader::new(Lines::open(path.clone(), options(), pace, [repeat, false]).unwrap()).lines();
             let lines: Vec<String> = lines.take(count).map(Result::unwrap).collect();
-            assert!(lines.iter().all(|own| *own == line));
+            assert!(lines.iter().zip(recorded.iter().cycle()).all(|(own, line)| own == line));
             (lines.len(), begun.elapsed().as_secs_f64())
         };
         assert_eq!(read(Pace::Unbounded, false, 9).0, 3);

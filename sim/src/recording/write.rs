@@ -127,13 +127,13 @@ impl Recorder {
     }
 
     fn answer(&self, answer: &Answer, entry: &mut Entry) -> Result<()> {
-        for (frame, received_s) in answer.frames.iter().zip(answer.received) {
+        for (frame, time_ns) in answer.frames.iter().zip(answer.times_ns) {
             let shape = [self.sensor.rows, self.sensor.cols];
-            for (topic, cdr) in frame_messages(shape, &header(*received_s), &frame.readings())? {
+            for (topic, cdr) in frame_messages(shape, &header(*time_ns), &frame.readings())? {
                 entry.messages.push((topic.to_owned(), Kind::of::<Image>(), cdr));
             }
         }
-        let header = header(answer.received_s);
+        let header = header(answer.time_ns);
         if !answer.result.forces_N.fz.is_empty() {
             let points = Points::new(&self.sensor, answer.result);
             entry.add(FORCES, &points.cloud(&self.sensor, header.clone()))?;
@@ -199,8 +199,8 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-fn header(received_s: f64) -> Header {
-    Header { stamp: Time::from(nanoseconds(received_s)), frame_id: FRAME_ID.into() }
+fn header(time_ns: i64) -> Header {
+    Header { stamp: Time::from(u64::try_from(time_ns).unwrap_or(0)), frame_id: FRAME_ID.into() }
 }
 
 /// Torque in N·m about the array's centre of a force in N that acts on the surface at a place in mm.

@@ -7,12 +7,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
+use dermis_golden::data::text::Stated;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
 
+use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
-use super::line;
+use super::line::{self, LineFrame};
 use super::queue::{Policy, Queue};
 use super::rate::Clock;
 use super::stop::Stop;
@@ -27,6 +29,8 @@ pub struct StreamOptions {
     pub policy: Policy,
     /// Whether frames arrive in their own time, so that a stream can fall behind them; a file waits.
     pub live: bool,
+    /// What is stated of the lines' layout.
+    pub layout: Stated,
 }
 
 /// What a stream had.
@@ -42,6 +46,8 @@ pub struct Counts {
     pub largest_lag: Duration,
     /// Results of each estimator, by name, in the order in which they were taken.
     pub by_estimator: Vec<(&'static str, u64)>,
+    /// When the frames were acquired.
+    pub acquisition: Acquisition,
 }
 
 impl Counts {
@@ -58,14 +64,14 @@ impl Counts {
 
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Counts { refused, dropped, largest_lag, by_estimator, .. } = self;
+        let Counts { refused, dropped, largest_lag, by_estimator, acquisition, .. } = self;
         let lag_ms = 1e3 * largest_lag.as_secs_f64();
         write!(f, "{refused} lines refused, {dropped} dropped; largest lag {lag_ms:.1} ms")?;
         let own: Vec<String> = by_estimator.iter().map(|(name, results)| format!("{results} by {name}")).collect();
-        match own.is_empty() {
-            true => Ok(()),
-            false => write!(f, "; {}", own.join(", ")),
+        if !own.is_empty() {
+            write!(f, "; {}", own.join(", "))?;
         }
+        write!(f, "{acquisition}")
     }
 }
 
@@ -98,6 +104,8 @@ pub struct Answer<'a> {
     pub sequence: u64,
     /// Number of its last line, from 1.
     pub line: u64,
+    /// Nanoseconds since 1970 when its last frame was acquired: the time in its line if there is one, else that of its arrival.
+    pub time_ns: i64,
     /// Seconds since 1970 when that line was read.
     pub received_s: f64,
     /// Seconds since 1970 when the result was ready.
@@ -112,9 +120,9 @@ pub struct Answer<'a> {
     /// The frames of the block, the last one of that line; no part of the output line.
     #[serde(skip)]
     pub frames: &'a [Frame],
-    /// Seconds since 1970 when the line of each was read; no part of the output line.
+    /// Nanoseconds since 1970 when each was acquired; no part of the output line.
     #[serde(skip)]
-    pub received: &'a [f64],
+    pub times_ns: &'a [i64],
     /// The result.
     #[serde(flatten)]
     pub result: &'a Reconstruction,
@@ -194,9 +202,9 @@ pub fn run_until(
         })
     };
     stop.add(&queue);
-    let (times, counts) = (Vec::new(), Counts::default());
-    let frames = line::Frames::new(&estimators.scene().sensor);
-    let mut stream = Stream { estimators, frames, change: None, times, counts };
+    let (times_ns, counts) = (Vec::new(), Counts::default());
+    let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
+    let mut stream = Stream { estimators, frames, change: None, times_ns, counts };
     stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
     loop {
         if stop.stopped() {
@@ -251,8 +259,8 @@ struct Stream<'a> {
     frames: line::Frames,
     /// Why the next result has another estimator than the last one.
     change: Option<String>,
-    /// Seconds since 1970 when the line of each frame of a block that is not complete was read.
-    times: Vec<f64>,
+    /// Nanoseconds since 1970 when each frame of a block that is not complete was acquired.
+    times_ns: Vec<i64>,
     counts: Counts,
 }
 
@@ -265,11 +273,15 @@ impl Stream<'_> {
 
     /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
     fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
-        let result = self.frame(received).and_then(|frame| {
-            let Some(frame) = frame else { return Ok(None) };
-            self.times.push(seconds(received.time));
+        let frame = self.frame(received);
+        if let Some(note) = self.frames.note() {
+            output(&Outcome::Note(&note))?;
+        }
+        let result = frame.and_then(|frame| {
+            let Some(LineFrame { frame, time_ns, .. }) = frame else { return Ok(None) };
+            self.times_ns.push(self.counts.acquisition.time_ns(time_ns, nanoseconds(received.time)));
             self.estimators.push(frame).map_err(|error| {
-                self.times.clear();
+                self.times_ns.clear();
                 typed(error).to_string()
             })
         });
@@ -282,7 +294,7 @@ impl Stream<'_> {
                 return output(&Outcome::Refusal(Refusal { line, error: &error }));
             }
         };
-        let (times, change) = (std::mem::take(&mut self.times), self.change.take());
+        let (times_ns, change) = (std::mem::take(&mut self.times_ns), self.change.take());
         let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
         let estimator = self.estimators.name();
         self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(received.at));
@@ -290,13 +302,15 @@ impl Stream<'_> {
         output(&Outcome::Answer(Answer {
             sequence,
             line,
+            // A frame of its own completes the block.
+            time_ns: times_ns.last().copied().unwrap_or(0),
             received_s,
             answered_s,
             dropped,
             estimator,
             estimator_change: change.as_deref(),
             frames: &frames,
-            received: &times,
+            times_ns: &times_ns,
             result: &result,
         }))?;
         let Some(Note { text, changed }) = self.estimators.after(line, received.at, full) else { return Ok(()) };
@@ -306,14 +320,16 @@ impl Stream<'_> {
     }
 
     /// The frame in a line; `None` for a comment and a header.
-    fn frame(&mut self, received: &Received) -> Result<Option<Frame>, String> {
+    fn frame(&mut self, received: &Received) -> Result<Option<LineFrame>, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
         let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-        match self.frames.frame(text, received.number) {
-            Ok(frame) => Ok(frame.map(|(_, frame)| frame)),
-            Err(none) => Err(none.reason),
-        }
+        self.frames.frame(text, received.number).map_err(|none| none.reason)
     }
+}
+
+/// Nanoseconds since 1970.
+pub(crate) fn nanoseconds(time: SystemTime) -> i64 {
+    time.duration_since(UNIX_EPOCH).map_or(0, |since| i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
 }
 
 /// Seconds since 1970.
@@ -355,7 +371,12 @@ mod tests {
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }
 
-    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, live: false };
+    const ALL: StreamOptions = StreamOptions {
+        queue: 4,
+        policy: Policy::All,
+        live: false,
+        layout: Stated { columns: None, time_column: None, skip_rows: 0, form: None },
+    };
 
     fn scene() -> Scene {
         Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search)
@@ -375,7 +396,7 @@ mod tests {
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
             assert_eq!(answers[1]["error"], "2 values, wanted 64");
-            assert!(answers[3]["error"].as_str().unwrap().starts_with("missing field `stress_MPa`"));
+            assert!(answers[3]["error"].as_str().unwrap().contains("missing field `stress_MPa`"));
             for (answer, frame, sequence) in [(&answers[0], &frames[0], 0), (&answers[2], &frames[1], 1)] {
                 let plain = Frame { resultant_N: None, ..frame.clone() };
                 let result = CheckedEngine::new(engine_of(&scene, name)).result(&[plain], true).unwrap();
@@ -431,7 +452,7 @@ mod tests {
     #[test]
     fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let options = StreamOptions { queue: 1, policy: Policy::Latest, live: true };
+        let options = StreamOptions { queue: 1, policy: Policy::Latest, live: true, layout: Stated::default() };
         let (counts, answers) = answers(&scene, EngineName::Golden, csv(&frames[0]).repeat(2000), options, true);
         assert_eq!(counts.answered + counts.dropped, 2000);
         assert!(counts.dropped > 0);
@@ -476,15 +497,32 @@ mod tests {
         let mut output = |outcome: &Outcome| {
             if let Outcome::Answer(answer) = outcome {
                 let stress = answer.frames.iter().map(|frame| frame.stress_MPa.clone());
-                seen.push((stress.collect::<Vec<_>>(), answer.received.to_vec(), answer.received_s));
+                seen.push((stress.collect::<Vec<_>>(), answer.times_ns.to_vec(), answer.time_ns));
             }
             Ok(())
         };
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
         run(Estimators::only(&*engine, CheckPace::Never), (input, "memory"), ALL, &mut output).unwrap();
-        let [(stress, received, last)] = &seen[..] else { panic!("{} answers", seen.len()) };
+        let [(stress, times_ns, last)] = &seen[..] else { panic!("{} answers", seen.len()) };
         assert_eq!(*stress, [frames[0].stress_MPa.clone(), frames[1].stress_MPa.clone()]);
-        assert!(received.len() == 2 && received[0] <= received[1] && received[1] == *last, "{received:?}, {last}");
+        assert!(times_ns.len() == 2 && times_ns[0] <= times_ns[1] && times_ns[1] == *last, "{times_ns:?}, {last}");
+    }
+
+    #[test]
+    fn the_time_in_a_line_is_that_of_its_result() {
+        let (scene, frame) = (scene(), Frame::shipped(&scene()).remove(0));
+        let json = |field: &str| format!("{{{field}, \"stress_MPa\": {:?}}}\n", frame.stress_MPa);
+        let lines = [
+            format!("time,{}\n1732770000.000000001,{}", vec!["p"; 64].join(","), csv(&frame)),
+            format!("1732770000.010000002,{}", csv(&frame)),
+            json("\"time_ns\": 1732770000020000003"),
+            json("\"timestamp\": \"2024-11-28T05:00:00.030000004Z\""),
+        ];
+        let (counts, answers) = answers(&scene, EngineName::Fixed, lines.concat(), ALL, true);
+        let times: Vec<i64> = answers.iter().map(|answer| answer["time_ns"].as_i64().unwrap()).collect();
+        assert_eq!(times, [1, 10_000_002, 20_000_003, 30_000_004].map(|ns| 1_732_770_000_000_000_000 + ns));
+        let words = "; 4 by search; acquired at 100.0 per second, 0 gaps, the largest step 10.0 ms";
+        assert!(counts.to_string().ends_with(words), "{counts}");
     }
 
     /// An engine whose results take a millisecond, and any time by a clock of its own.
@@ -602,7 +640,7 @@ mod tests {
             (run(estimators, (input, "memory"), options, &mut output).unwrap(), all_read)
         };
         for queue in [1, 16] {
-            let options = StreamOptions { queue, policy: Policy::Latest, live: true };
+            let options = StreamOptions { queue, policy: Policy::Latest, live: true, layout: Stated::default() };
             let (counts, all_read) = drained(options, Duration::from_secs(60));
             assert_eq!((all_read, counts.answered + counts.dropped), (Some(true), 600));
             assert!(counts.answered <= queue as u64 + 1, "{counts:?}");

@@ -3,12 +3,22 @@
 use std::io::{self, BufRead, Read as _};
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::text::{Form, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
+use dermis_golden::data::text::{Form, Layout, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
 use dermis_golden::spec::sensor::Sensor;
 use serde_json::Value;
 
 /// Longest input line in bytes; 65536 taxels of 25 characters take 1.6 MB.
 pub const LONGEST_LINE: u64 = 4 << 20;
+
+/// The frame in a line.
+#[derive(Debug, PartialEq)]
+pub(crate) struct LineFrame {
+    /// Null if the line has none.
+    pub(crate) id: Value,
+    pub(crate) frame: Frame,
+    /// Time that the line states, in ns since 1970 or another moment.
+    pub(crate) time_ns: Option<i64>,
+}
 
 /// Why a line holds no frame, with its id if that could be read.
 #[derive(Debug, PartialEq)]
@@ -42,31 +52,49 @@ pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Op
 pub(crate) struct Frames {
     reader: Reader,
     sensor: Sensor,
+    /// The layout of the lines so far.
+    layout: Option<Layout>,
+    note: Option<String>,
 }
 
 impl Frames {
-    pub(crate) fn new(sensor: &Sensor) -> Frames {
-        let stated = Stated { form: Some(Form::Line), ..Stated::default() };
-        Frames { reader: Reader::new([sensor.rows, sensor.cols], stated), sensor: sensor.clone() }
+    /// Of lines whose layout is `stated`, but for the form: each is a frame.
+    pub(crate) fn new(sensor: &Sensor, stated: Stated) -> Frames {
+        let reader = Reader::new([sensor.rows, sensor.cols], Stated { form: Some(Form::Line), ..stated });
+        Frames { reader, sensor: sensor.clone(), layout: None, note: None }
+    }
+
+    /// What is to be said of the last line: a header, or a layout that is not plain.
+    pub(crate) fn note(&mut self) -> Option<String> {
+        self.note.take()
     }
 
     /// The frame in a line and its id; `number` names a frame without one. `None` for a comment and a header.
-    pub(crate) fn frame(&mut self, text: &str, number: u64) -> Result<Option<(Value, Frame)>, NoFrame> {
+    pub(crate) fn frame(&mut self, text: &str, number: u64) -> Result<Option<LineFrame>, NoFrame> {
         // A line of its own: it brings one thing at most.
         let line = usize::try_from(number).unwrap_or(usize::MAX);
-        match self.reader.push(Line { number: line, text }).pop() {
-            None | Some(Read::Header) => Ok(None),
+        let read = self.reader.push(Line { number: line, text }).pop();
+        if let Some(layout) = self.reader.layout().filter(|layout| self.layout.as_ref() != Some(*layout)) {
+            self.note = (!layout.is_plain()).then(|| format!("lines from {number} on: {layout}"));
+            self.layout = Some(layout.clone());
+        }
+        match read {
+            None => Ok(None),
+            Some(Read::Header) => {
+                self.note = Some(format!("line {number} is a header"));
+                Ok(None)
+            }
             Some(Read::LeftOut(LeftOut { id, reason })) => {
                 Err(NoFrame { id, reason: NoReadings { line: None, ..reason }.to_string() })
             }
-            Some(Read::Frame(TextFrame { id, readings, .. })) => {
+            Some(Read::Frame(TextFrame { id, readings, time_ns, .. })) => {
                 let name = match &id {
                     Value::Null => format!("line {number}"),
                     Value::String(name) => name.clone(),
                     other => other.to_string(),
                 };
                 match Frame::from_stress(&name, &self.sensor, readings) {
-                    Ok(frame) => Ok(Some((id, frame))),
+                    Ok(frame) => Ok(Some(LineFrame { id, frame, time_ns })),
                     Err(error) => Err(NoFrame { id, reason: error.to_string() }),
                 }
             }
@@ -84,7 +112,8 @@ mod tests {
 
     /// The frame of a line that is the only one.
     fn frame(text: &str, number: u64) -> Result<(Value, Frame), NoFrame> {
-        Frames::new(&small()).frame(text, number).map(Option::unwrap)
+        let read = Frames::new(&small(), Stated::default()).frame(text, number).map(Option::unwrap);
+        read.map(|LineFrame { id, frame, .. }| (id, frame))
     }
 
     #[test]
@@ -123,9 +152,12 @@ mod tests {
             let reason = frame(text, 1).unwrap_err().reason;
             assert!(reason.starts_with(wanted), "{text}: {reason}");
         }
-        let mut frames = Frames::new(&small());
-        assert!(frames.frame("a,b,c,d", 1).unwrap().is_none() && frames.frame("# a remark", 2).unwrap().is_none());
+        let mut frames = Frames::new(&small(), Stated::default());
+        assert_eq!((frames.frame("a,b,c,d", 1), frames.note().as_deref()), (Ok(None), Some("line 1 is a header")));
+        assert_eq!((frames.frame("# a remark", 2), frames.note()), (Ok(None), None));
         assert!(frames.frame("1;2;3;4", 3).unwrap().is_some());
+        let layout = "lines from 3 on: a frame per line, separated by semicolons, header above line 3, readings in columns 1 to 4";
+        assert_eq!(frames.note().as_deref(), Some(layout));
         let other = frames.frame("1,2,3,4", 4).unwrap_err().reason;
         assert_eq!(
             other,

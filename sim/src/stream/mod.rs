@@ -28,6 +28,7 @@
 //! | [`estimators`] | the estimator that is taken, and its results |
 //! | [`answers`] | results and refusals |
 
+pub mod acquisition;
 pub mod answers;
 pub mod estimators;
 pub(crate) mod line;
@@ -36,6 +37,7 @@ pub mod rate;
 pub mod source;
 pub mod stop;
 
+pub(crate) use answers::nanoseconds;
 pub use answers::{
     as_lines, require_blocks, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions,
 };

@@ -6,6 +6,7 @@ use std::io::{Cursor, Read};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::import::{import, Settings, Unit};
 use dermis_golden::data::recording::FrameOptions;
+use dermis_golden::data::text::Stated;
 use dermis_golden::engine::{CheckPace, Engine, State};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
@@ -83,7 +84,8 @@ fn lines(stress: &[f64]) -> Vec<String> {
 
 /// The results of a stream, all but the frame's name; and the recording of it.
 fn streamed(engine: &dyn Engine, input: Box<dyn Read + Send>, recorder: &mut Recorder) -> Vec<Reconstruction> {
-    let (options, mut all) = (StreamOptions { queue: 4, policy: Policy::All, live: false }, Vec::new());
+    let (options, mut all) =
+        (StreamOptions { queue: 4, policy: Policy::All, live: false, layout: Stated::default() }, Vec::new());
     let mut output = |outcome: &Outcome| match outcome {
         Outcome::Answer(answer) => {
             all.push(answer.result.clone());

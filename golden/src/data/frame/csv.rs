@@ -6,7 +6,7 @@ use crate::spec::scene::Scene;
 
 /// Reads a frame of the scene's sensor.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-    let mut frames = parse_all(text, file, stem, scene)?;
+    let mut frames = parse_all(text, file, stem, scene, &Stated::default())?;
     match (frames.pop(), frames.len()) {
         (Some(frame), 0) => Ok(frame),
         (_, others) => {
@@ -17,13 +17,19 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
 }
 
 /// Reads one or more frames of the scene's sensor; a line that holds none is an error.
-pub(super) fn parse_all(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+pub(super) fn parse_all(
+    text: &str,
+    file: &str,
+    stem: &str,
+    scene: Option<&Scene>,
+    stated: &Stated,
+) -> Result<Vec<Frame>, FrameError> {
     let sensor = match scene {
         Some(scene) => &scene.sensor,
         None => return Err(FrameError::NoSensor { file: file.to_string() }),
     };
     let wrong = |reason: NoReadings| FrameError::Text { file: file.to_string(), reason };
-    let read = frames(text, [sensor.rows, sensor.cols], &Stated::default()).map_err(wrong)?;
+    let read = frames(text, [sensor.rows, sensor.cols], stated).map_err(wrong)?;
     if let Some(left_out) = read.left_out.into_iter().next() {
         return Err(wrong(left_out.reason));
     }

@@ -2,6 +2,7 @@
 
 use super::recorded::Recording;
 use super::{csv, json, Frame, FrameError};
+use crate::data::text::Stated;
 use crate::spec::scene::Scene;
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read};
@@ -9,6 +10,8 @@ use std::path::Path;
 
 /// Largest frame file in bytes: 64 MB.
 pub const LARGEST_FILE: u64 = 64 << 20;
+/// Spreadsheets mark UTF-8 with it; it belongs to no value.
+const MARK: char = '\u{feff}';
 
 impl Frame {
     /// Reads a frame from a `.json` or `.csv` file, or frame N from 1 of a recording, `FILE.mcap:N`; N may be left out where
@@ -31,17 +34,6 @@ impl Frame {
         Frame::parsed(parser, &read(path, &file)?, path, scene)
     }
 
-    /// As [`Frame::load`], but all frames of a recording whose frame is not named.
-    ///
-    /// # Errors
-    /// As [`Frame::load`].
-    pub fn load_recorded(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
-        match Recording::named(path.as_ref()) {
-            Some(recording) => recording.load(scene),
-            None => Frame::load(path, scene).map(|frame| vec![frame]),
-        }
-    }
-
     /// Reads every frame of a recording: of a folder the `.json`, `.csv` and `.mcap` files in the order of their names, of a CSV
     /// file or an MCAP file one frame after the other, of a JSON file its frame.
     ///
@@ -60,6 +52,18 @@ impl Frame {
     /// # Errors
     /// As [`Frame::load`]; [`FrameError::NoFrames`] for a folder without frames.
     pub fn load_all(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+        Frame::load_all_as(path, scene, &Stated::default())
+    }
+
+    /// As [`Frame::load_all`], of texts whose layout is `stated`.
+    ///
+    /// # Errors
+    /// As [`Frame::load_all`].
+    pub fn load_all_as(
+        path: impl AsRef<Path>,
+        scene: Option<&Scene>,
+        stated: &Stated,
+    ) -> Result<Vec<Frame>, FrameError> {
         let path = path.as_ref();
         let file = path.display().to_string();
         if path.is_dir() {
@@ -70,7 +74,7 @@ impl Frame {
             files.retain(|path| parser(path).is_ok() || Recording::named(path).is_some());
             files.sort();
             let frames: Vec<Vec<Frame>> =
-                files.iter().map(|path| Frame::load_all(path, scene)).collect::<Result<_, _>>()?;
+                files.iter().map(|path| Frame::load_all_as(path, scene, stated)).collect::<Result<_, _>>()?;
             let frames = frames.concat();
             return if frames.is_empty() { Err(FrameError::NoFrames { file }) } else { Ok(frames) };
         }
@@ -79,7 +83,7 @@ impl Frame {
         }
         if is_csv(path) {
             let text = read(path, &file)?;
-            return csv::parse_all(without_mark(&text), &file, &stem(path), scene);
+            return csv::parse_all(&text, &file, &stem(path), scene, stated);
         }
         Ok(vec![Frame::load(path, scene)?])
     }
@@ -111,15 +115,10 @@ impl Frame {
 
     fn parsed(parser: Parser, text: &str, path: &Path, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let file = path.display().to_string();
-        let frame = parser(without_mark(text), &file, &stem(path), scene)?;
+        let frame = parser(text.strip_prefix(MARK).unwrap_or(text), &file, &stem(path), scene)?;
         frame.check_missing(&file, scene)?;
         Ok(frame)
     }
-}
-
-/// Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
-fn without_mark(text: &str) -> &str {
-    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// The file's name without its ending.

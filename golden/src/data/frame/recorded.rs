@@ -107,7 +107,6 @@ mod tests {
         let numbered = |number: usize| format!("{}:{number}", path.display());
         assert_eq!(Frame::load_all(&path, Some(&scene)).unwrap(), frames);
         assert_eq!(Frame::load_all(folder.path(), Some(&scene)).unwrap(), frames);
-        assert_eq!(Frame::load_recorded(&path, Some(&scene)).unwrap(), frames);
         for (k, frame) in frames.iter().enumerate() {
             assert_eq!(Frame::load(numbered(k + 1), Some(&scene)).unwrap(), *frame);
             assert_eq!(Frame::load_all(numbered(k + 1), Some(&scene)).unwrap(), std::slice::from_ref(frame));

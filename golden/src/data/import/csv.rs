@@ -1,12 +1,12 @@
 //! Plain text: lines of numbers, as [`crate::data::text`] reads them.
 //!
-//! Times of a date, and seconds or milliseconds since 1970, are taken from the first frame on.
+//! Times since 1970 are taken from the first frame on.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::loggers;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
-use crate::data::text::{frames, Stated, TimeUnit};
+use crate::data::text::{frames, is_date, Stated};
 
 /// Reads a recording of the stated size and layout.
 pub(super) fn parse(
@@ -22,9 +22,7 @@ pub(super) fn parse(
     })?;
     let stated = logger.as_ref().map_or(*layout, |own| own.stated(layout));
     let read = frames(text, shape, &stated).map_err(|reason| source.text(reason))?;
-    let unit = read.layout.as_ref().and_then(|layout| layout.time).map(|(_, unit)| unit);
-    let is_date = matches!(unit, Some(TimeUnit::Iso | TimeUnit::Number { since_1970: true, .. }));
-    let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|_| is_date).unwrap_or(0);
+    let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|ns| is_date(*ns)).unwrap_or(0);
     let mut own = Vec::with_capacity(read.frames.len());
     for (index, frame) in read.frames.into_iter().enumerate() {
         if let Some(large) = frame.readings.iter().find(|value| value.abs() > LARGEST_READING) {

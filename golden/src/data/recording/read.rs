@@ -207,8 +207,8 @@ fn named(error: McapError) -> RecordingError {
 /// One recorded frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedFrame {
-    /// Nanoseconds since 1970 when it was received.
-    pub received: u64,
+    /// Nanoseconds since 1970 when it was acquired.
+    pub time_ns: u64,
     /// Rows and columns.
     pub shape: [usize; 2],
     /// Stress of each taxel in MPa, row-major; NaN where a reading is missing.
@@ -318,7 +318,7 @@ impl Frames {
             let (row, col) = (taxel / shape[1], taxel % shape[1]);
             return Err(format!("row {row}, column {col}: {} is not a finite number", stress_MPa[taxel]));
         }
-        Ok(RecordedFrame { received: image.header.stamp.nanoseconds(), shape, stress_MPa })
+        Ok(RecordedFrame { time_ns: image.header.stamp.nanoseconds(), shape, stress_MPa })
     }
 }
 
@@ -391,7 +391,7 @@ mod tests {
         let stress: Vec<&[f64]> = read.iter().map(|frame| &frame.stress_MPa[..]).collect();
         let small = [0.5, 1.5, -2.0, 0.0, 4.0, 8.0];
         assert_eq!(stress, [&VALUES[..], &small, &small]);
-        assert_eq!((read[0].received, read[0].shape), (1_000_000_002, [2, 3]));
+        assert_eq!((read[0].time_ns, read[0].shape), (1_000_000_002, [2, 3]));
     }
 
     #[test]

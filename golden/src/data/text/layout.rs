@@ -98,6 +98,11 @@ impl Layout {
         }))
     }
 
+    /// Whether lines are readings separated by commas, and nothing else.
+    pub fn is_plain(&self) -> bool {
+        self.separator == Separator::Comma && self.readings == self.cells && self.first_line == 1
+    }
+
     /// The cells of a line.
     pub(super) fn split<'t>(&self, text: &'t str) -> Vec<Cow<'t, str>> {
         self.separator.cells(text)

@@ -37,7 +37,7 @@ mod time;
 pub use cells::{reading, Separator};
 pub use layout::{Form, Layout, Stated};
 pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
-pub use time::TimeUnit;
+pub use time::{is_date, TimeUnit};
 
 use std::fmt;
 

@@ -19,7 +19,7 @@ pub struct TextFrame {
     pub line: usize,
     /// `id` of a line of JSON.
     pub id: Value,
-    /// Time in ns, since 1970 or since a moment that the file does not say, if there is one.
+    /// Time in ns, since 1970 ([`super::is_date`]) or since a moment that the file does not say, if there is one.
     pub time_ns: Option<i64>,
     /// Readings, row-major; NaN where one is missing.
     pub readings: Vec<f64>,
