@@ -9,6 +9,7 @@ use dermis_golden::fixed::stages::send::{status_fields, STATUS_BEATS};
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
 use dermis_golden::result::flags::StatusField;
 use dermis_golden::spec::partition::Case;
+use dermis_golden::spec::scene::identifier;
 use dermis_golden::wire::link::c_header;
 use serde::Serialize;
 use serde_json::json;
@@ -193,10 +194,9 @@ fn attributes(memories: &[PlacedMemory]) -> Attributes {
     memories.iter().map(attribute).collect()
 }
 
-/// `dermis_` and the scene's name, every character except ASCII letters and digits replaced by an underscore.
+/// `dermis_` and the scene's name as an identifier.
 pub(crate) fn top_name(scene: &str) -> String {
-    let tame = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    format!("dermis_{}", scene.chars().map(tame).collect::<String>())
+    format!("dermis_{}", identifier(scene, false))
 }
 
 fn header(model: &Model, top: &str) -> String {

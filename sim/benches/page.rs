@@ -80,7 +80,7 @@ fn main() -> anyhow::Result<()> {
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let url = format!("http://{}/", listener.local_addr()?);
     let server = Server::new(&scene, "bench", newest, None);
-    std::thread::spawn(move || server.run(&listener));
+    std::thread::spawn(move || server.run(&listener, |text| eprintln!("{text}")));
     let mut browser = Browser::open(&url);
     browser.call("Performance.enable", json!({"timeDomain": "threadTicks"}));
     let [before, measured] = PICTURES.map(|count| DRAW.replace("COUNT", &count.to_string()));

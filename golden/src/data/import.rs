@@ -1,15 +1,17 @@
 //! Import: recordings of real pressure arrays become a scene and frames.
 //!
 //! ```text
-//! file ── format ── tekscan │ lst │ npy │ csv ── readings ── crop ── ÷ units per MPa ┬─ scene, dead taxels
-//!                                                                                    ├─ frames
-//!                                                                                    └─ summary: codes, noise, closure
+//! file ── format ── tekscan │ lst │ npy │ xsensor │ csv ── readings ── correction ── crop ── ÷ units per MPa ┬─ scene, dead taxels
+//!                                                                                                            ├─ frames
+//!                                                                                                            └─ summary: codes, noise, closure
 //! ```
 //!
 //! | format | recognised by | states | to be given |
 //! |---|---|---|---|
 //! | Tekscan ASF, CSV | `DATA_TYPE`, `ASCII_DATA` | size, pitch, unit, missing sensels (`B`) | full scale for raw counts |
 //! | novel LST | `Pict-No` | size, pitch, force per picture | |
+//! | XSENSOR CSV | `SENSELS` | size, pitch, unit, force | |
+//! | novel pliance and pedar `.asc`, BodiTrak CSV | their headers | unit, times | size, pitch |
 //! | NumPy `.npy` | first six bytes | size | unit, pitch |
 //! | lines of numbers | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch; layout where it can be read in two ways |
 //!
@@ -17,11 +19,13 @@
 //! press on it, as outside the outline of an insole, it may be stated to read 0 instead. A sensel without a reading in some
 //! frames is missing in those. A frame that lacks more readings than `input.missing_share` allows is left out. Counts have no stress: without a stated full scale they are refused.
 
+mod correction;
 mod crop;
 mod csv;
 mod error;
 mod folder;
 mod format;
+mod loggers;
 mod lst;
 mod measure;
 mod npy;
@@ -33,7 +37,9 @@ mod tekscan;
 #[cfg(test)]
 mod tests;
 mod units;
+mod xsensor;
 
+pub use correction::Correction;
 pub use crop::{Crop, Window, CONTACT_SHARE, MARGIN, MOST_TAXELS};
 pub use error::ImportError;
 pub use format::Format;
@@ -83,6 +89,8 @@ pub struct Settings {
     pub thickness_mm: Option<f64>,
     /// Layout of the lines of a plain text.
     pub layout: Stated,
+    /// Zero, sign and orientation of the readings, which the file has otherwise.
+    pub correction: Correction,
 }
 
 /// An imported recording.
@@ -139,6 +147,7 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     settings.check(&source)?;
     let mut recording = parse(file, bytes, settings, &source)?;
     let frames_in_file = recording.frames.len();
+    settings.correction.apply(&mut recording, &source)?;
     select(&mut recording, settings.frames, &source)?;
     let (unit, per_MPa) = scale(&recording, settings, &source)?;
     let pitch = settings.pitch_mm.or(recording.pitch_mm);
@@ -159,7 +168,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     let left_out = scene::leave_out(&mut recording, window, &lacking, &source)?;
     let (frames, records) = scene::frames(&recording, window, &lacking, per_MPa)?;
     let alive: Vec<bool> = dead.iter().map(|dead| !dead).collect();
-    let readings: Vec<f64> = window_readings(&recording, window);
+    let readings: Vec<f64> = window_readings(&recording, window, |frame| &frame.values);
+    let stated = window_readings(&recording, window, |frame| frame.stated.as_ref().unwrap_or(&frame.values));
     let largest_MPa = readings.iter().fold(0.0f64, |most, reading| most.max((reading / per_MPa).abs()));
     let stated_MPa = settings.full_scale_MPa.or(recording.full_scale.map(|reading| reading / per_MPa));
     let most_MPa = largest_MPa.max(stated_MPa.unwrap_or(0.0));
@@ -181,12 +191,13 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         layout: recording.layout.clone(),
         lines_left_out: recording.left_out.clone(),
         missing_as_zero: settings.missing_as_zero,
+        correction: settings.correction,
         unit,
         units_per_MPa: per_MPa,
         full_scale_MPa,
         covered: settings.thickness_mm.is_some(),
         frames_in_file,
-        codes: measure::codes(readings, per_MPa, stated_MPa, full_scale_MPa),
+        codes: measure::codes(stated, per_MPa, stated_MPa, full_scale_MPa),
         noise: noise(&stress, &alive),
         idle: idle(&stress, &alive),
         frames: records,
@@ -228,8 +239,9 @@ fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Resu
     match format.ok_or_else(|| ImportError::Unrecognised { file: file.to_string() })? {
         Format::Tekscan => tekscan::parse(&decoded(bytes), source),
         Format::Lst => lst::parse(&decoded(bytes), source),
+        Format::Xsensor => xsensor::parse(&decoded(bytes), source),
         Format::Npy => npy::parse(bytes, settings.size, source),
-        Format::Csv => csv::parse(&decoded(bytes), settings, source),
+        Format::Csv => csv::parse(&decoded(bytes), settings.size, &settings.layout, source),
     }
 }
 
@@ -268,10 +280,10 @@ fn scale(recording: &Recording, settings: &Settings, source: &Source) -> Result<
 }
 
 /// The readings of all sensels that exist in the window.
-fn window_readings(recording: &Recording, window: Window) -> Vec<f64> {
+fn window_readings(recording: &Recording, window: Window, of: fn(&RawFrame) -> &Vec<f64>) -> Vec<f64> {
     let alive: Vec<usize> = window.indices(recording.cols).filter(|k| !recording.missing[*k]).collect();
-    let of = |frame: &RawFrame| alive.iter().map(|k| frame.values[*k]).filter(|reading| !reading.is_nan()).collect();
-    recording.frames.iter().flat_map::<Vec<f64>, _>(of).collect()
+    let there = |values: &Vec<f64>| alive.iter().map(|k| values[*k]).filter(|reading| !reading.is_nan()).collect();
+    recording.frames.iter().map(of).flat_map::<Vec<f64>, _>(there).collect()
 }
 
 /// A scene's name from a file's.

@@ -12,6 +12,7 @@ mod error;
 mod estimator;
 mod estimator_choice;
 mod field;
+mod identifier;
 pub mod inverse;
 mod inversion;
 mod kinds;
@@ -27,6 +28,7 @@ mod zero;
 pub use declared::Declared;
 pub use error::SceneError;
 pub use estimator::EstimatorKind;
+pub use identifier::identifier;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 pub use zero::{RunningZero, Zero};
 

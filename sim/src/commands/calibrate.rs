@@ -1,6 +1,6 @@
 //! `dermis calibrate`: the calibration table of a sensor, from recordings under known uniform stresses.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{anyhow, Result};
@@ -10,20 +10,23 @@ use dermis_golden::data::input::known_loads::{KnownLoad, LoadFit, Residual};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use serde::Serialize;
+use toml_edit::Value;
 
 use super::layout::LayoutArguments;
+use super::scene_file::{has_file, lines, state, Measured};
 use crate::report;
 
 /// Arguments of `dermis calibrate`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  dermis calibrate my-scene.toml --load 0=zero.csv --load 0.05=half.csv --load 0.1=full.csv --out table.csv
-  dermis calibrate my-scene.toml --load 0=zero.csv --load 0.1=full.csv --json
+  dermis calibrate mat.toml --load 0=zero.csv --load 0.05=half.csv --load 0.1=full.csv --out table.csv
+  dermis calibrate mat.toml --load 0=zero.csv --load 0.1=full.csv --json
 
-A recording is a CSV or MCAP file with one frame after the other, a JSON frame, or a folder of such files, in the unit of the
-readings. Each must be taken under the same stress on every taxel, as air pressure on a foil applies it. With three loads
+A recording is a text with one frame per line or one row per line, as a stream has them, an MCAP file, a JSON frame, or a folder of such files,
+in the unit of the readings. Each must be taken under the same stress on every taxel, as air pressure on a foil applies it. With three loads
 or more each is left out once, and the table of the others is compared with it. The table is what `input.calibration`
-reads.")]
+reads; that field and those of full scale, dead taxels and noise are written into the file of the scene, where all else
+stays.")]
 pub struct Arguments {
     /// Built-in name or path of the scene that defines the sensor.
     scene: String,
@@ -88,12 +91,22 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     };
     let loads = arguments.loads.iter().map(load).collect::<Result<Vec<_>>>()?;
     let fit = LoadFit::new(&scene, &loads).map_err(|error| anyhow!("--load: {error}"))?;
+    let table = arguments.out.as_ref().map(|out| out.display().to_string());
+    let fields = fields(&fit, &scene, arguments)?;
     if let Some(out) = &arguments.out {
         write(out, fit.table.to_csv(&scene.sensor).as_bytes())?;
+        if has_file(&arguments.scene) {
+            state(Path::new(&arguments.scene), &fields)?;
+        }
     }
-    let table = arguments.out.as_ref().map(|out| out.display().to_string());
     if !arguments.json {
-        return Ok(report::calibration(&fit, &table.unwrap_or_default()));
+        let whither = match has_file(&arguments.scene) {
+            true => format!("written into {}", arguments.scene),
+            false => "for the scene".to_owned(),
+        };
+        let (table, taxels) = (table.unwrap_or_default(), fit.table.gain.len());
+        let stand = format!("{table}: offset and gain of {taxels} taxels; {whither}");
+        return Ok(report::calibration(&fit, &stand, &lines(&fields)));
     }
     let answer = Answer {
         scene: &scene.name,
@@ -109,4 +122,139 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         residuals: &fit.residuals,
     };
     Ok(serde_json::to_string(&answer)? + "\n")
+}
+
+/// Step of the full scale in MPa.
+const STEP: f64 = 1e-3;
+/// Share of a full scale that the arithmetic may add.
+const ROUNDING: f64 = 1e-12;
+
+/// The fields of the scene that follow from a calibration.
+fn fields(fit: &LoadFit, scene: &Scene, arguments: &Arguments) -> Result<Vec<Measured>> {
+    let mut fields = Vec::new();
+    if let Some(out) = &arguments.out {
+        let table = beside_scene(out, Path::new(&arguments.scene))?;
+        fields.push(Measured::new("input", "calibration", table, "from readings under known loads"));
+    }
+    // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
+    let least = (fit.full_scale_MPa * (1.0 - ROUNDING) / STEP).ceil() * STEP;
+    let full_scale_MPa = rounded(&format!("{:.3}", least.max(scene.input.full_scale_MPa.unwrap_or(0.0))))?;
+    fields.push(Measured::new(
+        "input",
+        "full_scale_MPa",
+        full_scale_MPa,
+        "at least; covers the readings of these loads",
+    ));
+    let mut dead = [&scene.input.dead[..], &fit.dead].concat();
+    dead.sort_unstable();
+    dead.dedup();
+    if !fit.dead.is_empty() {
+        // Rows and columns are small.
+        let place = |place: &[usize; 2]| Value::Array(place.iter().map(|k| *k as i64).collect());
+        let dead = Value::Array(dead.iter().map(place).collect());
+        fields.push(Measured::new("input", "dead", dead, "readings do not follow the load"));
+    }
+    if let Some(noise_MPa) = fit.noise_MPa.filter(|noise_MPa| *noise_MPa > 0.0) {
+        let noise_MPa = rounded(&format!("{noise_MPa:.2e}"))?;
+        fields.push(Measured::new("search", "noise_floor_MPa", noise_MPa, "of one frame, as these loads show it"));
+    }
+    Ok(fields)
+}
+
+/// The number that is shown so.
+fn rounded(shown: &str) -> Result<f64> {
+    shown.parse().map_err(|error| anyhow!("{shown}: {error}"))
+}
+
+/// The table as the scene's file names it: relative where it lies in the same folder, else absolute.
+fn beside_scene(table: &Path, scene: &Path) -> Result<String> {
+    let folder = |path: &Path| std::path::absolute(path).map(|path| path.parent().map(Path::to_owned));
+    let same = folder(table).and_then(|own| Ok(own == folder(scene)?));
+    let found = match same? {
+        true => table.file_name().map(PathBuf::from).unwrap_or_else(|| table.to_owned()),
+        false => std::path::absolute(table)?,
+    };
+    Ok(found.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::data::input::calibration::Calibration;
+    use std::fs;
+
+    const SENSOR: &str =
+        "# my pad\n[sensor]\nrows = 2\ncols = 3\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3 # of foam\n";
+
+    /// Counts under a stress, 8 frames in one form or the other: a taxel has 120 and more without load, 2000 and more per MPa;
+    /// the last one does not follow.
+    fn counts(stress_MPa: f64, a_line_per_frame: bool) -> String {
+        let reading = |t: usize, k: usize| {
+            120 + k + t % 2 + if k < 5 { (stress_MPa * (2000 + 100 * k) as f64) as usize } else { 0 }
+        };
+        let frame = |t: usize| {
+            let cells: Vec<String> = (0..6).map(|k| reading(t, k).to_string()).collect();
+            let rows = if a_line_per_frame {
+                vec![cells.join(",")]
+            } else {
+                cells.chunks(3).map(|row| row.join(",")).collect()
+            };
+            rows.join("\n") + "\n"
+        };
+        (0..8).map(frame).collect()
+    }
+
+    /// The scene's text and what was printed after a calibration in a folder with these frames.
+    fn calibrated(scene: &str, a_line_per_frame: bool, out: &str) -> (String, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name).display().to_string();
+        fs::write(at("pad.toml"), scene).unwrap();
+        let load = |stress_MPa: f64| {
+            let path = PathBuf::from(at(&format!("{stress_MPa}.csv")));
+            fs::write(&path, counts(stress_MPa, a_line_per_frame)).unwrap();
+            LoadFile { stress_MPa, path }
+        };
+        fs::create_dir(at("more")).unwrap();
+        let loads = [0.0, 0.05, 0.1].map(load).to_vec();
+        let arguments = Arguments {
+            scene: at("pad.toml"),
+            loads,
+            out: Some(at(out).into()),
+            layout: LayoutArguments::default(),
+            json: false,
+        };
+        let printed = run(&arguments).unwrap();
+        let text = fs::read_to_string(at("pad.toml")).unwrap();
+        // What is written is a scene that finds its table.
+        let scene = Scene::load(&at("pad.toml")).unwrap();
+        let table = Calibration::load(scene.input.calibration.as_ref().unwrap(), &scene.sensor).unwrap();
+        assert!((table.gain[0] - 1.0 / 2000.0).abs() < 1e-6, "{table:?}");
+        let place = folder.path().canonicalize().unwrap().display().to_string();
+        (text.replace(&place, "FOLDER").replace(&folder.path().display().to_string(), "FOLDER"), printed)
+    }
+
+    #[test]
+    fn fields_are_written_into_the_scene_whatever_form_the_frames_have() {
+        let (text, printed) = calibrated(SENSOR, true, "table.csv");
+        let written = text.strip_prefix(SENSOR).unwrap();
+        for line in
+            ["calibration = \"table.csv\"", "dead = [[1, 2]]", "noise_floor_MPa = 0.0002", "full_scale_MPa = 0.1"]
+        {
+            assert!(written.contains(line) && printed.contains(line), "{line}: {text}{printed}");
+        }
+        assert_eq!(calibrated(SENSOR, false, "table.csv").0, text);
+        // Once more: nothing twice, and a comment stays.
+        assert_eq!(calibrated(&text, true, "table.csv").0, text);
+        let beside = calibrated(&text, true, "more/table.csv").0;
+        assert!(beside.contains("calibration = \"FOLDER/more/table.csv\""), "{beside}");
+    }
+
+    #[test]
+    fn what_the_scene_states_beyond_the_loads_stays() {
+        let stated = format!("{SENSOR}\n[input]\nfull_scale_MPa = 0.7\ndead = [[0, 1]]\n\n[search]\nmu_max = 0.4\n");
+        let (text, _) = calibrated(&stated, true, "table.csv");
+        for line in ["full_scale_MPa = 0.7 ", "dead = [[0, 1], [1, 2]]", "mu_max = 0.4\nnoise_floor_MPa"] {
+            assert!(text.contains(line), "{line}: {text}");
+        }
+    }
 }

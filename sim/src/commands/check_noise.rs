@@ -1,6 +1,5 @@
 //! `dermis check --stream`: the noise of a device from frames without load, written into the scene's file.
 
-use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -10,11 +9,10 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
 use dermis_golden::spec::scene::{Scene, SearchSpec};
-use dermis_golden::write::write;
-use toml_edit::{value, DocumentMut};
 
 use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
+use super::scene_file::{has_file, state, Measured};
 use crate::progress::Progress;
 use crate::stream::{line, Source};
 
@@ -69,11 +67,11 @@ impl NoiseArguments {
         let noise_MPa = rounded(found);
         let stated = format!("noise_floor_MPa = {noise_MPa:?}");
         let measured = format!("measured from {} frames without load", frames.len());
-        if Scene::builtin_names().contains(&target) {
-            eprintln!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
-        } else {
-            state(Path::new(target), noise_MPa, &measured)?;
+        if has_file(target) {
+            state(Path::new(target), &[Measured::new("search", "noise_floor_MPa", noise_MPa, &measured)])?;
             eprintln!("{target}: {stated}, {measured}, is written");
+        } else {
+            eprintln!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
         }
         Ok(Scene { search: SearchSpec { noise_floor_MPa: Some(noise_MPa), ..scene.search.clone() }, ..scene })
     }
@@ -93,22 +91,6 @@ fn rounded(noise_MPa: f64) -> f64 {
     format!("{:.*e}", DIGITS as usize - 1, text.parse().unwrap_or(noise_MPa)).parse().unwrap_or(noise_MPa)
 }
 
-/// Writes the noise into the table `[search]` of a scene's file; all else in it stays, comments too.
-fn state(path: &Path, noise_MPa: f64, measured: &str) -> Result<()> {
-    let file = path.display();
-    let text = fs::read_to_string(path).with_context(|| file.to_string())?;
-    let mut document: DocumentMut = text.parse().with_context(|| file.to_string())?;
-    let mut noise = value(noise_MPa);
-    if let Some(value) = noise.as_value_mut() {
-        value.decor_mut().set_suffix(format!("  # {measured}"));
-    }
-    document["search"].or_insert(toml_edit::table())["noise_floor_MPa"] = noise;
-    let stated = document.to_string();
-    let reads = Scene::parse(&stated, &file.to_string())?.search.noise_floor_MPa;
-    ensure!(reads == Some(noise_MPa), "{file}: write [search] noise_floor_MPa = {noise_MPa:?} by hand");
-    Ok(write(path, stated.as_bytes())?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,24 +98,5 @@ mod tests {
     #[test]
     fn noise_is_rounded_to_the_digits_that_are_written() {
         assert_eq!([1.23456e-4, 9.996e-4, 0.5].map(rounded), [1.23e-4, 1e-3, 0.5]);
-    }
-
-    #[test]
-    fn all_else_in_the_file_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("pad.toml");
-        let sensor = "# my pad\n[sensor]\nrows = 2 # two\ncols = 2\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n";
-        for (search, wanted) in [
-            ("", "\n[search]\nnoise_floor_MPa = 0.001  # measured\n"),
-            ("[search]\nmu_max = 0.5 # wood\n", "[search]\nmu_max = 0.5 # wood\nnoise_floor_MPa = 0.001  # measured\n"),
-            (
-                "[search]\nnoise_floor_MPa = 9 # old\nmu_max = 0.5\n",
-                "[search]\nnoise_floor_MPa = 0.001  # measured\nmu_max = 0.5\n",
-            ),
-        ] {
-            fs::write(&path, format!("{sensor}{search}")).unwrap();
-            state(&path, 1e-3, "measured").unwrap();
-            assert_eq!(fs::read_to_string(&path).unwrap(), format!("{sensor}{wanted}"));
-        }
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
-use dermis_golden::data::import::{load, Crop, Format, Settings, Summary, Unit};
+use dermis_golden::data::import::{load, Correction, Crop, Format, Settings, Summary, Unit};
 use dermis_golden::data::text::Form;
 
 use super::layout::LayoutArguments;
@@ -18,7 +18,7 @@ use crate::report::document::percent_text;
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// Recording: Tekscan ASF or CSV, novel LST, NumPy .npy, or CSV with one frame per line.
+    /// Recording: Tekscan ASF or CSV, novel LST or .asc, XSENSOR or BodiTrak CSV, NumPy .npy, or lines of numbers.
     file: PathBuf,
     /// Folder for scene, frames and recording.json; default: recordings/NAME in the build folder.
     #[arg(long, value_name = "DIR")]
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Name of the scene; default: the file's.
     #[arg(long)]
     name: Option<String>,
-    /// Format, if it is not recognised: tekscan, lst, npy or csv.
+    /// Format, if it is not recognised: tekscan, lst, npy, xsensor or csv.
     #[arg(long, value_name = "NAME", value_parser = format)]
     format: Option<Format>,
     /// Unit of the readings: Pa, kPa, MPa, N/cm2, psi, mmHg, kg/cm2, g/cm2 or raw; default: the file's.
@@ -59,9 +59,51 @@ pub struct Arguments {
     /// What missing sensels become: dead taxels, on which forces continue those around them, or taxels that read 0.
     #[arg(long, value_enum, default_value = "dead")]
     missing: Missing,
+    #[command(flatten)]
+    correction: CorrectionArguments,
     /// Print the summary as JSON and nothing else.
     #[arg(long)]
     json: bool,
+}
+
+/// Zero, sign and orientation of the readings. `--size` is that of the file; `--pitch`, `--crop` and the scene are those of the
+/// array after them.
+#[derive(Args, Clone, Debug, Default)]
+struct CorrectionArguments {
+    /// Frames without load at the begin of the file, first:N: the mean of each taxel over them is its zero.
+    #[arg(long, value_name = "first:N", value_parser = zero_frames)]
+    zero: Option<usize>,
+    /// Change the sign of the readings, after the zero: for those that fall with the load.
+    #[arg(long)]
+    invert: bool,
+    /// Make rows columns.
+    #[arg(long)]
+    transpose: bool,
+    /// Mirror along x, the other order of the columns, or along y, that of the rows; after --transpose.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    flip: Vec<Axis>,
+}
+
+/// An axis of the array.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Axis {
+    /// Along the columns.
+    X,
+    /// Along the rows.
+    Y,
+}
+
+impl CorrectionArguments {
+    fn correction(&self) -> Correction {
+        let flips = |axis| self.flip.contains(&axis);
+        let (flip_x, flip_y) = (flips(Axis::X), flips(Axis::Y));
+        Correction { zero_frames: self.zero, invert: self.invert, transpose: self.transpose, flip_x, flip_y }
+    }
+}
+
+fn zero_frames(text: &str) -> Result<usize, String> {
+    let number = text.strip_prefix("first:").and_then(|number| number.parse().ok());
+    number.filter(|number| *number > 0).ok_or_else(|| "the number of frames without load, as first:20".to_owned())
 }
 
 /// What missing sensels become.
@@ -78,6 +120,8 @@ const EXAMPLES: &str = "Examples:
   dermis import finger.csv --full-scale 0.4 --crop contact --frames 1..20 --out finger
   dermis import press.npy --units kPa --pitch 2.5,2.5 --thickness 3
   dermis import log.csv --size 4x4 --units N/cm2 --pitch 5,5 --json
+  dermis import glove.csv --size 4x4 --units raw --bits 12 --full-scale 0.1 --pitch 5,5 --invert --zero first:20
+  dermis import left.csv --size 4x4 --units kPa --pitch 5,5 --transpose --flip x
 
 Reads the size, pitch and unit that the file states. A sensel without a reading (B, NaN, empty) in any
 frame becomes a dead taxel; one without a reading in some frames is missing in those. An array of
@@ -130,6 +174,7 @@ impl Arguments {
             missing_as_zero: self.missing == Missing::Zero,
             thickness_mm: self.thickness,
             layout,
+            correction: self.correction.correction(),
         })
     }
 }
@@ -159,6 +204,9 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     }
     if let Some(first) = summary.lines_left_out.first() {
         writeln!(text, "left out        {} lines without a frame; {first}", summary.lines_left_out.len())?;
+    }
+    if summary.correction != Correction::default() {
+        writeln!(text, "corrected       {}", summary.correction)?;
     }
     if summary.missing > 0 {
         let what = match summary.missing_as_zero {
@@ -198,9 +246,13 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     }
     if let Some((share, idle)) = summary.idle_share().zip(summary.idle) {
         let level = format!("{:.1} kPa, {} of full scale", 1e3 * idle.level_MPa, percent_text(share));
+        let zero = match idle.frames {
+            0 => "--zero first:N with N frames without load at the begin of the file".to_owned(),
+            frames => format!("--zero first:{frames}"),
+        };
         let what = match idle.falls {
-            true => "readings fall with the load: dermis calibrate makes a table with zeros and negative gains",
-            false => "without load: give an unloaded frame as input.tare",
+            true => format!("readings fall with the load: import with --invert {zero}"),
+            false => format!("without load: import with {zero}"),
         };
         writeln!(text, "zero            {level}; {what}")?;
     }

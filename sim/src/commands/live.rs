@@ -155,7 +155,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
         None => format!("finger, noise {noise}"),
     };
     let server = Server::new(&scene, &source, Arc::clone(&newest), hand.clone());
-    let serving = std::thread::spawn(move || server.run(&listener));
+    let serving = std::thread::spawn(move || server.run(&listener, |text| eprintln!("{address}: {text}")));
     print(&format!("http://{address}/\n"))?;
     let mut show = Show::new(&newest);
     let mut output = |outcome: &Outcome| {
@@ -181,9 +181,8 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
         }
         (None, None) => (),
     }
-    match serving.join() {
-        Ok(outcome) => outcome.map_err(|error| anyhow!("{address}: {error}"))?,
-        Err(_) => bail!("{address}: the thread that serves the page has ended"),
+    if serving.join().is_err() {
+        bail!("{address}: the thread that serves the page has ended");
     }
     Ok(String::new())
 }

@@ -46,6 +46,9 @@ pub struct Arguments {
     /// Stress of the largest reading in MPa.
     #[arg(long, value_name = "MPA")]
     full_scale: Option<f64>,
+    /// Whether readings go below zero in tension; FSR mats, other piezoresistive and most capacitive arrays read pressure alone.
+    #[arg(long, value_enum)]
+    tension: Option<Tension>,
     /// Largest ratio of shear to normal force.
     #[arg(long, value_name = "MU")]
     friction: Option<f64>,
@@ -75,6 +78,23 @@ impl FromStr for Cover {
 
     fn from_str(text: &str) -> Result<Cover, String> {
         <Cover as ValueEnum>::from_str(text, true)
+    }
+}
+
+/// Whether an array reads tension.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Tension {
+    /// Readings go below zero where the cover pulls.
+    Yes,
+    /// They stay at zero: `input.unipolar`.
+    No,
+}
+
+impl FromStr for Tension {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Tension, String> {
+        <Tension as ValueEnum>::from_str(text, true)
     }
 }
 
@@ -158,6 +178,15 @@ impl Asker<'_> {
     }
 }
 
+/// Axes, signs and the first taxel, as the guide's page "your sensor" has them.
+const AXES: &str = "\
+            column 0   1   2
+     row 0         o---.---.--> x    o: the first reading of a frame, row 0 and column 0
+         1         |   .   .         seen from above: x to the right, from column to column;
+         2         v   .   .         y down, from row to row
+                   y                 normal stress and force are positive in pressure, forces act on the cover
+";
+
 /// The scene as a commented file.
 fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let rows = asker.required(&arguments.rows, "rows", "number of rows")?;
@@ -168,9 +197,12 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let medium = medium_fields(arguments, asker)?;
     let noise = asker.optional(&arguments.noise, "standard deviation of one reading in MPa")?;
     let full_scale = asker.optional(&arguments.full_scale, "stress of the largest reading in MPa")?;
+    let tension = "whether readings go below zero in tension, yes or no; most arrays, as of FSR, read pressure alone";
+    let unipolar = asker.optional(&arguments.tension, tension)?.map(|reads| (reads == Tension::No).to_string());
     let mut text =
         "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
             .to_owned();
+    AXES.lines().for_each(|line| text += &format!("# {line}\n"));
     let number = |value: f64| Some(format!("{value:?}"));
     for (table, lines) in [
         (
@@ -189,6 +221,7 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
             "input",
             vec![
                 ("full_scale_MPa", full_scale.and_then(number)),
+                ("unipolar", unipolar),
                 ("calibration", None),
                 ("tare", None),
                 ("dead", None),
@@ -279,8 +312,11 @@ mod tests {
     fn answers_and_options_give_the_same_scene() {
         let options = ["--rows", "4", "--cols", "6", "--pitch", "3,2.5", "--thickness", "2", "--noise", "0.001"];
         let (by_options, questions) = written(&[&options[..], &["--cover", "free"]].concat(), "");
-        assert_eq!(questions, "stress of the largest reading in MPa; empty: unknown: ");
-        let (by_answers, questions) = written(&[], "4\nsix\n6\n3,2.5\n2\nfree\n0.001\n\n");
+        let tension =
+            "whether readings go below zero in tension, yes or no; most arrays, as of FSR, read pressure alone";
+        let asked = format!("stress of the largest reading in MPa; empty: unknown: {tension}; empty: unknown: ");
+        assert_eq!(questions, asked);
+        let (by_answers, questions) = written(&[], "4\nsix\n6\n3,2.5\n2\nfree\n0.001\n\n\n");
         assert!(questions.contains("number of columns: \"six\" is not understood\nnumber of columns: "), "{questions}");
         let text = by_options.unwrap();
         assert_eq!(text, by_answers.unwrap());
@@ -314,6 +350,16 @@ mod tests {
         for (options, answers) in [(&[][..], ""), (&[], "\n"), (&[], "Bonded\n"), (&["--cover", "bonded"], "")] {
             assert_eq!(parsed(options, answers), Scene { medium, ..free.clone() }, "{options:?} {answers:?}");
         }
+        // Two questions before it: noise and full scale.
+        for (options, answers, unipolar) in [
+            (&[][..], "\n\n\n\n", false),
+            (&[], "\n\n\nno\n", true),
+            (&[], "\n\n\nYes\n", false),
+            (&["--tension", "no"], "", true),
+            (&["--tension", "yes"], "", false),
+        ] {
+            assert_eq!(parsed(options, answers).input.unipolar, unipolar, "{options:?} {answers:?}");
+        }
         let refused = written(&[&needed[..], &["--cover", "free", "--poisson", "0.4"]].concat(), "").0.unwrap_err();
         assert!(refused.to_string().starts_with("--poisson 0.4: only with --cover bonded"), "{refused}");
     }
@@ -324,5 +370,16 @@ mod tests {
         let error = scene_text(&arguments, &mut Asker::Nobody).unwrap_err().to_string();
         assert_eq!(error, "--cols is missing: number of columns");
         assert!(written(&["--rows", "4"], "4\n").0.unwrap_err().to_string().starts_with("--pitch is missing"));
+    }
+
+    #[test]
+    fn axes_are_those_of_the_guide_and_of_the_model() {
+        let text = written(&["--rows", "4", "--cols", "4", "--pitch", "4", "--thickness", "4"], "").0.unwrap();
+        assert!(AXES.lines().all(|line| text.contains(&format!("# {line}\n"))), "{text}");
+        assert!(include_str!("../../guide/your-sensor.md").contains(AXES));
+        // The first reading is that of the taxel with the least x and y, the next one has more x.
+        let sensor = Scene::parse(&text, "pad.toml").unwrap().sensor;
+        let [first, next, below] = [(0, 0), (0, 1), (1, 0)].map(|(row, col)| sensor.position_mm(row, col));
+        assert!(next[0] > first[0] && next[1] == first[1] && below[1] > first[1] && below[0] == first[0]);
     }
 }

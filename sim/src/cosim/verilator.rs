@@ -160,7 +160,7 @@ impl VerilatedBench {
     pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
         let path = library(design, bench, cache)?;
         let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
-        // SAFETY: the library was built from this module's shim, whose symbols have these types and
+        // SAFETY: the library was built by this user from this module's shim (`artifact_cache`), whose symbols have these types and
         // whose constructors have no side effects; the layout is checked before the first cycle.
         unsafe {
             let library = Library::new(&path).map_err(|e| fail(e.to_string()))?;
@@ -359,7 +359,9 @@ fn compile(design: &Design, sources: &[(&str, &str)], work: &Path, cache: &Path)
         verilator.arg("--public-flat-rw");
     }
     succeed(verilator.args(verilog))?;
-    let runtime = Runtime::new(&[design.optimisation.argument(), SHARED], cache).map_err(|error| error.to_string())?;
+    // In a folder whose name nobody else knows: it is linked into what is loaded.
+    let own = cache.join(fingerprint(&[], "runtime"));
+    let runtime = Runtime::new(&[design.optimisation.argument(), SHARED], &own).map_err(|error| error.to_string())?;
     succeed(runtime.compile(work, &[SHIM_FILE], LIBRARY).map_err(|error| error.to_string())?.args(LINK))
 }
 

@@ -5,6 +5,8 @@
 //! | pressed | a Hertzian circle there, with the normal force of the page's slider |
 //! | dragged | a tangential force along the way from where it was pressed, up to friction; beyond it the contact slides |
 //! | released | none: a frame of zeros |
+//!
+//! Until a mouse is pressed for the first time, a press plays: a finger that goes round and is sheared on its way.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -23,6 +25,12 @@ use crate::stream::{seconds, Answer, Estimators, Note, Outcome, Output};
 const RADIUS_IN_PITCHES: f64 = 2.0;
 /// Largest normal force in N that is taken from the page.
 const MOST_N: f64 = 1000.0;
+/// Time in s in which the finger that plays goes round.
+const ROUND_S: f64 = 8.0;
+/// Its distance from the array's centre over half the array's size.
+const ROUND_SHARE: f64 = 0.4;
+/// Its mean normal force in N, and its tangential force over the normal one.
+const PLAYED: (f64, f64) = (4.0, 0.3);
 
 /// What the page's mouse does.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
@@ -52,6 +60,17 @@ impl Finger {
         Ok(finger)
     }
 
+    /// The finger that plays, some time after its start.
+    fn playing(scene: &Scene, time_s: f64) -> Finger {
+        let (normal, shear) = PLAYED;
+        let (sin, cos) = (std::f64::consts::TAU * time_s / ROUND_S).sin_cos();
+        let [x, y] = scene.sensor.half_mm();
+        // Between half and one and a half of the mean, as it goes round.
+        let normal = normal * (1.0 + 0.5 * sin);
+        let along = [-sin, cos].map(|direction| shear * normal * direction);
+        Finger { centre_mm: [ROUND_SHARE * x * cos, ROUND_SHARE * y * sin], force_N: [along[0], along[1], normal] }
+    }
+
     fn contact(&self, scene: &Scene) -> Contact {
         let [x, y, normal] = self.force_N;
         Contact {
@@ -65,18 +84,20 @@ impl Finger {
     }
 }
 
-/// The finger as it was last described.
+/// The finger as the mouse last described it; `None` before its first word, while a press plays.
 #[derive(Default)]
-pub struct Hand(Mutex<Option<Finger>>);
+pub struct Hand(Mutex<Option<Option<Finger>>>);
 
 impl Hand {
     /// Takes what the mouse does now.
     pub fn set(&self, finger: Option<Finger>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = finger;
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(finger);
     }
 
-    fn now(&self) -> Option<Finger> {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The finger `time_s` after the start.
+    fn now(&self, scene: &Scene, time_s: f64) -> Option<Finger> {
+        let mouse = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        mouse.unwrap_or_else(|| Some(Finger::playing(scene, time_s)))
     }
 
     /// Draws, reconstructs and shows a frame in every `period`, or as soon as the one before is done; `noise` is its
@@ -85,11 +106,11 @@ impl Hand {
     /// # Errors
     /// A scene that generator or engine refuse, an output that fails.
     pub fn run(&self, mut estimators: Estimators, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
-        let (scene, mut change) = (estimators.scene(), None);
+        let (scene, mut change, start) = (estimators.scene(), None, Instant::now());
         for sequence in 0.. {
             let begun = Instant::now();
             let (received_s, received_at) = (seconds(SystemTime::now()), estimators.clock().now());
-            let frame = self.frame(scene, noise, sequence)?;
+            let frame = self.frame(scene, noise, sequence, (begun - start).as_secs_f64())?;
             let frames = vec![frame; scene.input.frames_per_result()];
             let result = estimators.next(&frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
@@ -116,10 +137,10 @@ impl Hand {
         Ok(())
     }
 
-    /// The frame of the finger now.
-    fn frame(&self, scene: &Scene, noise: f64, seed: u64) -> Result<Frame> {
+    /// The frame of the finger `time_s` after the start.
+    fn frame(&self, scene: &Scene, noise: f64, seed: u64, time_s: f64) -> Result<Frame> {
         let id = format!("finger {seed}");
-        let Some(finger) = self.now() else {
+        let Some(finger) = self.now(scene, time_s) else {
             let taxels = scene.sensor.taxels();
             let mut frame = Frame::from_stress(&id, &scene.sensor, vec![0.0; taxels])?;
             (frame.resultant_N, frame.cell_forces_N) = (Some([0.0; 3]), Some(Forces::zeros(taxels)));
@@ -159,12 +180,32 @@ mod tests {
     fn the_frame_has_the_forces_of_the_finger() {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let hand = Hand::default();
-        let none = hand.frame(&scene, 0.01, 0).unwrap();
+        hand.set(None);
+        let none = hand.frame(&scene, 0.01, 0, 0.0).unwrap();
         assert_eq!((none.peak_MPa(), none.resultant_N), (0.0, Some([0.0; 3])));
         hand.set(Some(Finger { centre_mm: [1.0, -2.0], force_N: [0.5, 0.0, 2.0] }));
-        let [one, same, other] = [1, 1, 2].map(|seed| hand.frame(&scene, 0.01, seed).unwrap());
+        let [one, same, other] = [1, 1, 2].map(|seed| hand.frame(&scene, 0.01, seed, 0.0).unwrap());
         assert_eq!(one.resultant_N, Some([0.5, 0.0, 2.0]));
         assert_eq!(one.stress_MPa, same.stress_MPa);
         assert_ne!(one.stress_MPa, other.stress_MPa);
+    }
+
+    #[test]
+    fn a_press_plays_on_the_array_until_the_mouse_takes_over() {
+        for name in Scene::builtin_names() {
+            let scene = Scene::builtin(name).unwrap();
+            let hand = Hand::default();
+            let played: Vec<Finger> = (0..80).map(|t| hand.now(&scene, f64::from(t) / 10.0).unwrap()).collect();
+            for finger in &played {
+                // What the page may send, and below friction.
+                let body = serde_json::json!({"centre_mm": finger.centre_mm, "force_N": finger.force_N}).to_string();
+                assert_eq!(Finger::read(body.as_bytes(), &scene), Ok(Some(*finger)), "{name}");
+                let [x, y, normal] = finger.force_N;
+                assert!(x.hypot(y) > 0.2 * normal && x.hypot(y) < 0.5 * normal, "{name}: {finger:?}");
+            }
+            assert!(played.windows(2).all(|pair| pair[0].centre_mm != pair[1].centre_mm), "{name}");
+            hand.set(None);
+            assert_eq!(hand.now(&scene, 1.0), None);
+        }
     }
 }

@@ -30,6 +30,13 @@ class ArrayMap {
     const lines = (count, line) => Array.from({ length: count + 1 }, (_, k) => line(k)).join("");
     svg(this.svg, "path", { class: "grid", d: lines(cols, c => `M${c} 0v${rows * HIGH}`)
       + lines(rows, r => `M0 ${r * HIGH}h${cols}`) });
+    // The first taxel, row 0 and column 0, with the axes from its centre.
+    const [x, y, long] = [0.5, 0.5 * HIGH, Math.min(1.5, cols - 0.5, (rows - 0.5) * HIGH)];
+    svg(this.svg, "circle", { class: "first", cx: x, cy: y, r: 0.12 });
+    svg(this.svg, "path", { class: "axes", d: arrow(x, y, long, 0, 0.25) + arrow(x, y, 0, long, 0.25) });
+    for (const [axis, at] of [["x", [x + long, y - 0.1]], ["y", [x + 0.12, y + long]]]) {
+      text(svg(this.svg, "text", { class: "axis", x: at[0], y: at[1], "font-size": 0.45 }), axis);
+    }
     this.missing = svg(this.svg, "path", { class: "missing" });
     this.arrows = svg(this.svg, "path", { class: "arrows" });
     this.contact = svg(this.svg, "path", { class: "contact" });
@@ -128,7 +135,8 @@ function draw(picture, now) {
   if (truth) real.draw(stress, peak, truth, longest, [], largest);
   text(at("scale"), `Full colour ${digits(peak)} MPa: pressure red, tension blue. Longest thin arrow ${digits(longest)} N, `
     + `a taxel's tangential force; thick arrow: a contact's, up to ${digits(largest)} N, with one standard deviation. `
-    + `Scales: the largest of the last ${SECONDS} s.`);
+    + `Scales: the largest of the last ${SECONDS} s. Dot: the first taxel, row 0 and column 0; x to the right, y down, `
+    + `normal forces positive in pressure.`);
   table(picture, contacts);
   const flags = result.flags.join();
   if (at("flags").dataset.flags !== flags) {
@@ -136,6 +144,8 @@ function draw(picture, now) {
     at("flags").replaceChildren(...result.flags.map(flag => {
       const chip = document.createElement("span");
       chip.textContent = flag;
+      // A sensor at rest is no alarm.
+      chip.classList.toggle("rest", result.flags.includes("no-contact"));
       return chip;
     }));
   }
@@ -174,6 +184,13 @@ async function follow() {
   }
 }
 
+/** Words on a map until they are removed. */
+function hint(map, words) {
+  const shown = svg(map.svg, "text", { class: "hint", x: cols / 2, y: rows * HIGH * 0.93, "font-size": cols / 16 });
+  text(shown, words);
+  return shown;
+}
+
 /** The mouse as finger: sticks where it is pressed until the drag reaches the friction, then slides after the mouse. */
 function finger() {
   const reach = 0.25 * Math.min(cols * pitchX, rows * pitchY), slider = at("press").querySelector("input");
@@ -204,7 +221,9 @@ function finger() {
     send();
   };
   found.svg.classList.add("finger");
+  const words = hint(found, "press here and drag");
   found.svg.addEventListener("pointerdown", event => {
+    words.remove();
     found.svg.setPointerCapture(event.pointerId);
     move(event);
     [pressed, stuck] = [true, mouse];

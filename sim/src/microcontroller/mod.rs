@@ -26,7 +26,7 @@ use dermis_golden::fixed::stages::send::status_fields;
 use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::result::flags::{Flag, StatusField};
-use dermis_golden::spec::scene::{Scene, SceneError};
+use dermis_golden::spec::scene::{identifier, Scene, SceneError};
 use dermis_hdl::GeneratedFile;
 use serde::Serialize;
 
@@ -95,8 +95,7 @@ impl Needs {
 
 /// Name of function and files of a scene.
 fn c_name(scene: &Scene) -> String {
-    let tame = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
-    format!("dermis_{}", scene.name.chars().map(tame).collect::<String>())
+    format!("dermis_{}", identifier(&scene.name, true))
 }
 
 impl Needs {

@@ -1,17 +1,12 @@
-//! What `dermis calibrate` prints: the fields for the scene, and the residuals of the loads.
+//! What `dermis calibrate` prints: the fields of the scene, and the residuals of the loads.
 
 use dermis_golden::data::input::known_loads::LoadFit;
 
 use super::document::percent_text;
 use super::table::{markdown, significant_digits};
 
-/// Step of the full scale in MPa.
-const SHOWN: f64 = 1e-3;
-/// Share of a full scale that the arithmetic may add.
-const ROUNDING: f64 = 1e-12;
-
-/// The scene's fields that follow from a calibration whose table is in the file `table`, and its residuals.
-pub fn calibration(fit: &LoadFit, table: &str) -> String {
+/// What a calibration found: the `fields` of the scene that follow from it, with where they stand in words, and its residuals.
+pub fn calibration(fit: &LoadFit, stand: &str, fields: &str) -> String {
     let mut text = String::new();
     for stress_MPa in &fit.saturated_MPa {
         text += &format!(
@@ -24,19 +19,9 @@ pub fn calibration(fit: &LoadFit, table: &str) -> String {
             "curved: the readings are no straight line of the load, off by {off} of the largest one; see below\n"
         );
     }
-    text += &format!("{table}: offset and gain of {} taxels; for the scene:\n\n", fit.table.gain.len());
-    text += &format!("[input]\ncalibration = {table:?}\n");
-    // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
-    let full_scale_MPa = (fit.full_scale_MPa * (1.0 - ROUNDING) / SHOWN).ceil() * SHOWN;
-    text += &format!("full_scale_MPa = {full_scale_MPa:.3}       # at least; covers the readings of these loads\n");
-    if !fit.dead.is_empty() {
-        text += &format!("dead = {:?}       # readings do not follow the load\n", fit.dead);
-    }
-    match fit.noise_MPa {
-        Some(noise) => {
-            text += &format!("\n[search]\nnoise_floor_MPa = {noise:.2e}       # of one frame, as these loads show it\n")
-        }
-        None => text += "\nnoise unknown: no load has more than one frame\n",
+    text += &format!("{stand}:\n\n{fields}");
+    if fit.noise_MPa.is_none() {
+        text += "\nnoise unknown: no load has more than one frame\n";
     }
     if fit.residuals.is_empty() {
         return text + "\nresiduals unknown: three different loads are needed, so that one can be left out\n";

@@ -5,15 +5,15 @@
 //! | `-` | standard input | with it | waits |
 //! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never | loses lines |
 //! | a character device | a serial port, from its first end of a line on | with an error, when it is unplugged | loses lines |
-//! | a regular file | the file from its start, then what is added; from its start again if it becomes shorter | never | waits |
+//! | a regular file | the file from its start, then what is added; from the start again, with a word, if it becomes shorter or another file takes its name | never | waits |
 //! | a pipe | the pipe | with it | waits |
 
 use std::fs::File;
 use std::io::{Cursor, Error, ErrorKind, Read, Result, Seek};
 use std::net::UdpSocket;
 use std::os::fd::AsFd;
-use std::os::unix::fs::FileTypeExt;
-use std::path::Path;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -74,7 +74,7 @@ impl Source {
                 } else {
                     let file = File::open(Path::new(path)).map_err(|error| named(path, error))?;
                     match kind.is_file() {
-                        true => Box::new(Growing { file, at: 0 }),
+                        true => Box::new(Growing { path: path.into(), file, at: 0, whole: true, rest: &[] }),
                         false => Box::new(file),
                     }
                 };
@@ -108,26 +108,58 @@ impl Source {
     }
 }
 
-/// A file that another program adds to.
+/// A file that another program adds to, cuts, or replaces by a new one of the same name.
 struct Growing {
+    path: PathBuf,
     file: File,
     /// Bytes read.
     at: u64,
+    /// The last byte was the end of a line.
+    whole: bool,
+    /// To be read before the next byte of the file.
+    rest: &'static [u8],
+}
+
+impl Growing {
+    /// Put behind a line whose end the file lost, so that a number that was cut is not taken for another one.
+    const CUT: &'static [u8] = b" cut off\n";
+
+    /// Goes to the start of the file of that name if the one that is read was cut or replaced; otherwise waits.
+    fn look(&mut self) -> Result<()> {
+        let own = self.file.metadata()?;
+        // Between two files of the name there may be none.
+        let named = std::fs::metadata(&self.path).ok();
+        let replaced = named.is_some_and(|named| (named.dev(), named.ino()) != (own.dev(), own.ino()));
+        if !replaced && own.len() >= self.at {
+            std::thread::sleep(POLL);
+            return Ok(());
+        }
+        let what = if replaced { "another file has this name" } else { "the file was cut" };
+        eprintln!("{}: {what}: read from its start", self.path.display());
+        if replaced {
+            self.file = File::open(&self.path)?;
+        } else {
+            self.file.rewind()?;
+        }
+        self.rest = if self.whole { &[] } else { Growing::CUT };
+        (self.at, self.whole) = (0, true);
+        Ok(())
+    }
 }
 
 impl Read for Growing {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
         loop {
-            let bytes = self.file.read(buffer)?;
-            if bytes > 0 {
-                self.at += bytes as u64;
-                return Ok(bytes);
+            if !self.rest.is_empty() {
+                return self.rest.read(buffer);
             }
-            if self.file.metadata()?.len() < self.at {
-                self.file.rewind()?;
-                self.at = 0;
-            } else {
-                std::thread::sleep(POLL);
+            match self.file.read(buffer)? {
+                0 => self.look()?,
+                bytes => {
+                    self.at += bytes as u64;
+                    self.whole = buffer[bytes - 1] == b'\n';
+                    return Ok(bytes);
+                }
             }
         }
     }
@@ -232,17 +264,24 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_followed_and_begun_again_when_cut() {
-        let mut file = tempfile::NamedTempFile::new().unwrap();
-        let source: Source = file.path().to_str().unwrap().parse().unwrap();
-        write!(file, "first\nsec").unwrap();
-        let mut lines = BufReader::new(source.open(None).unwrap().0).lines();
-        assert_eq!(lines.next().unwrap().unwrap(), "first");
-        writeln!(file, "ond").unwrap();
-        assert_eq!(lines.next().unwrap().unwrap(), "second");
-        file.as_file().set_len(0).unwrap();
-        file.rewind().unwrap();
-        writeln!(file, "new").unwrap();
-        assert_eq!(lines.next().unwrap().unwrap(), "new");
+    fn a_file_is_followed_and_begun_again_when_cut_or_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        std::fs::write(&path, "first\nsec").unwrap();
+        let add = |text: &str| std::fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(text.as_bytes());
+        let mut lines = BufReader::new(path.to_str().unwrap().parse::<Source>().unwrap().open(None).unwrap().0).lines();
+        let mut next = || lines.next().unwrap().unwrap();
+        assert_eq!(next(), "first");
+        add("ond\n").unwrap();
+        assert_eq!(next(), "second");
+        std::fs::write(&path, "new\n").unwrap();
+        assert_eq!(next(), "new");
+        // As logrotate does: moved away and begun anew, the last line of the old file cut inside a number.
+        add("0.1,0.25").unwrap();
+        std::thread::sleep(4 * POLL);
+        std::fs::rename(&path, folder.path().join("log.csv.1")).unwrap();
+        std::thread::sleep(4 * POLL);
+        std::fs::write(&path, "3\n").unwrap();
+        assert_eq!([next(), next()], ["0.1,0.25 cut off", "3"]);
     }
 }

@@ -130,7 +130,10 @@ fn prepare(work: &Path) {
     write_example(work);
     let scene =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();
-    fs::write(work.join("my-scene.toml"), &scene).unwrap();
+    // A calibration is written into its scene.
+    for name in ["my-scene.toml", "mat.toml"] {
+        fs::write(work.join(name), &scene).unwrap();
+    }
     fs::write(work.join("averaging.toml"), format!("{scene}\n[input]\naverage = 1\n")).unwrap();
     let array = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/eight-by-eight.toml"));
     let written = "\n[input]\nfull_scale_MPa = 1.0\n\n[hardware]\ntables = \"writable\"\n";
@@ -163,7 +166,9 @@ fn prepare(work: &Path) {
     {
         fs::copy(recordings.join(file), work.join(name)).unwrap();
     }
-    fs::write(work.join("log.csv"), "0,0,0,0,0,5,6,0,0,7,9,0,0,0,0,0\n".repeat(3)).unwrap();
+    for name in ["log.csv", "glove.csv", "left.csv"] {
+        fs::write(work.join(name), "0,0,0,0,0,5,6,0,0,7,9,0,0,0,0,0\n".repeat(20)).unwrap();
+    }
 }
 
 /// Runs a command line in which the program is found by its name.

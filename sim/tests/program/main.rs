@@ -10,6 +10,7 @@ mod contacts;
 mod contract;
 mod examples;
 mod fake;
+mod firmware;
 mod guide;
 mod guide_links;
 mod host;

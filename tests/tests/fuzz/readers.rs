@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::import::{import, Format, Settings, Unit};
+use dermis_golden::data::import::{import, Correction, Format, Settings, Unit};
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::spec::board::Board;
 use dermis_golden::spec::scene::Scene;
@@ -14,7 +14,7 @@ use dermis_hdl::manifest;
 /// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
 type Target = (&'static str, fn(&[u8]) -> bool);
 /// All readers.
-pub const TARGETS: [Target; 11] = [
+pub const TARGETS: [Target; 12] = [
     ("scene", scene),
     ("board", board),
     ("frame.json", json),
@@ -25,6 +25,7 @@ pub const TARGETS: [Target; 11] = [
     ("import.tekscan", |bytes| recording("fuzz.asf", Format::Tekscan, bytes)),
     ("import.lst", |bytes| recording("fuzz.lst", Format::Lst, bytes)),
     ("import.npy", |bytes| recording("fuzz.npy", Format::Npy, bytes)),
+    ("import.xsensor", |bytes| recording("fuzz.csv", Format::Xsensor, bytes)),
     ("import.csv", |bytes| recording("fuzz.csv", Format::Csv, bytes)),
 ];
 
@@ -130,6 +131,11 @@ fn packets(bytes: &[u8]) -> bool {
 /// Imports a recording of 3×4 sensels, where its format does not state the size, in the format's unit or as counts.
 fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
     let plain = matches!(format, Format::Npy | Format::Csv);
+    // Some are corrected.
+    let [corrected, turned] = [3, 5].map(|k| bytes.len().is_multiple_of(k));
+    let zero_frames = corrected.then_some(1);
+    let correction =
+        Correction { zero_frames, invert: corrected, transpose: turned, flip_x: turned, flip_y: corrected };
     let settings = Settings {
         format: Some(format),
         // NumPy states the size, but for lines of sensels.
@@ -137,6 +143,7 @@ fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
         unit: plain.then_some(Unit::KiloPa),
         pitch_mm: plain.then_some([2.0, 3.0]),
         full_scale_MPa: (format == Format::Tekscan).then_some(1.0),
+        correction,
         ..Settings::default()
     };
     match import(name, bytes, &settings) {

@@ -4,14 +4,24 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
+use super::loggers;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
-use super::Settings;
-use crate::data::text::{frames, is_date};
+use crate::data::text::{frames, is_date, Stated};
 
-/// Reads a recording of the stated size.
-pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
-    let shape = settings.size.ok_or_else(|| source.missing("the size", "give it with --size ROWSxCOLS"))?;
-    let read = frames(text, shape, &settings.layout).map_err(|reason| source.text(reason))?;
+/// Reads a recording of the stated size and layout.
+pub(super) fn parse(
+    text: &str,
+    size: Option<[usize; 2]>,
+    layout: &Stated,
+    source: &Source,
+) -> Result<Recording, ImportError> {
+    let logger = loggers::of(text);
+    let shape = size.ok_or_else(|| {
+        let of = logger.as_ref().map_or(String::new(), |own| format!("; a file of {} does not state it", own.name));
+        source.missing("the size", format!("give it with --size ROWSxCOLS{of}"))
+    })?;
+    let stated = logger.as_ref().map_or(*layout, |own| own.stated(layout));
+    let read = frames(text, shape, &stated).map_err(|reason| source.text(reason))?;
     let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|ns| is_date(*ns)).unwrap_or(0);
     let mut own = Vec::with_capacity(read.frames.len());
     for (index, frame) in read.frames.into_iter().enumerate() {
@@ -19,9 +29,11 @@ pub(super) fn parse(text: &str, settings: &Settings, source: &Source) -> Result<
             return Err(source.line(frame.line, &large.to_string(), "a number up to 1e9 in magnitude"));
         }
         let time_s = frame.time_ns.map(|ns| (ns - start_ns) as f64 * 1e-9);
-        own.push(RawFrame { number: index + 1, time_s, values: frame.readings, device: None });
+        own.push(RawFrame { number: index + 1, time_s, values: frame.readings, stated: None, device: None });
     }
     let layout = read.layout.map(|layout| layout.to_string());
     let left_out = read.left_out.iter().map(|left_out| left_out.reason.to_string()).collect();
-    Ok(Recording { layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
+    let device = logger.as_ref().map(|own| own.name.to_owned());
+    let unit = logger.and_then(|own| own.unit);
+    Ok(Recording { device, unit, layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
 }

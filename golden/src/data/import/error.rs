@@ -27,7 +27,7 @@ pub enum ImportError {
         limit: u64,
     },
     /// No format matches the content.
-    #[error("{file}: the format is not recognised; give it with --format, one of {}", Format::names().join(", "))]
+    #[error("{file}: the format is not recognised; give it with --format, one of {}; csv: lines of numbers, with --size, --units and --columns", Format::names().join(", "))]
     Unrecognised {
         /// Path as given.
         file: String,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::loggers;
 use serde::{Deserialize, Serialize};
 
 /// First bytes of a NumPy file.
@@ -17,17 +18,24 @@ pub enum Format {
     Lst,
     /// NumPy array.
     Npy,
+    /// CSV of XSENSOR.
+    Xsensor,
     /// Values separated by commas, semicolons, tabs or spaces, one frame per line.
     Csv,
 }
 
 impl Format {
     /// Every format with its name.
-    pub const ALL: [(&'static str, Format); 4] =
-        [("tekscan", Format::Tekscan), ("lst", Format::Lst), ("npy", Format::Npy), ("csv", Format::Csv)];
+    pub const ALL: [(&'static str, Format); 5] = [
+        ("tekscan", Format::Tekscan),
+        ("lst", Format::Lst),
+        ("npy", Format::Npy),
+        ("xsensor", Format::Xsensor),
+        ("csv", Format::Csv),
+    ];
 
     /// The names of all formats.
-    pub fn names() -> [&'static str; 4] {
+    pub fn names() -> [&'static str; 5] {
         Format::ALL.map(|(name, _)| name)
     }
 
@@ -50,6 +58,12 @@ impl Format {
         }
         if head.contains("Pict-No") || (head.contains("novel") && head.contains("Matrix:")) {
             return Some(Format::Lst);
+        }
+        if has_line("SENSELS") && has_line("Rows") && has_line("Columns") {
+            return Some(Format::Xsensor);
+        }
+        if loggers::of(&head).is_some() {
+            return Some(Format::Csv);
         }
         let extension = Path::new(file).extension()?.to_str()?.to_ascii_lowercase();
         match extension.as_str() {

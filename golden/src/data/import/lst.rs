@@ -152,7 +152,7 @@ fn assemble(header: Header, pages: Vec<Page>, source: &Source) -> Result<Recordi
             values[start..start + readings.len()].copy_from_slice(readings);
         }
         let time_s = header.period_s.map(|period| period * page.number.saturating_sub(1) as f64);
-        RawFrame { number: page.number, time_s, values, device: page.force_N.map(DeviceFigure::Force) }
+        RawFrame { number: page.number, time_s, values, stated: None, device: page.force_N.map(DeviceFigure::Force) }
     });
     let frames: Vec<RawFrame> = frames.collect();
     let unit = header.pitch_mm.and_then(|pitch| unit(&frames, pitch[0] * pitch[1]));

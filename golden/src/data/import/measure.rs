@@ -42,6 +42,9 @@ const LEAST_EMPTY: usize = 8;
 /// Smallest ratio of how far readings that fall with the load are below the level without load to how far above it.
 const FALLS: f64 = 3.0;
 
+/// Largest range of the readings of a frame without load over that of the frame whose readings differ least.
+const UNLOADED: f64 = 2.0;
+
 /// Readings without load.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Idle {
@@ -49,6 +52,9 @@ pub struct Idle {
     pub level_MPa: f64,
     /// Whether readings fall with the load.
     pub falls: bool,
+    /// Frames without load before the first with one.
+    #[serde(default)]
+    pub frames: usize,
 }
 
 /// Temporal noise.
@@ -114,7 +120,8 @@ pub fn idle(frames: &[&[f64]], alive: &[bool]) -> Option<Idle> {
     let above = all.iter().map(|own| own[own.len() - 1] - middle).fold(0.0, f64::max);
     let falls = below > FALLS * above;
     let nearest = evenest.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    Some(Idle { level_MPa: if falls { middle } else { nearest }, falls })
+    let frames = all.iter().take_while(|own| range(own) <= UNLOADED * range(evenest)).count();
+    Some(Idle { level_MPa: if falls { middle } else { nearest }, falls, frames })
 }
 
 /// σ of the middle one of three frames, and σ over its peak, if the load is held.
@@ -239,7 +246,7 @@ mod tests {
                 let slices: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
                 let idle = idle(&slices, &alive).unwrap();
                 assert!(
-                    (idle.level_MPa - level).abs() < 0.01 && idle.falls == (sign < 0.0),
+                    (idle.level_MPa - level).abs() < 0.01 && idle.falls == (sign < 0.0) && idle.frames == 1,
                     "{level} {sign}: {idle:?}"
                 );
             }

@@ -54,7 +54,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
             }
             values.push(number);
         }
-        frames.push(RawFrame { number: frame + 1, time_s: None, values, device: None });
+        frames.push(RawFrame { number: frame + 1, time_s: None, values, stated: None, device: None });
     }
     Ok(Recording::bare(Format::Npy, [rows, cols], frames))
 }

@@ -28,6 +28,8 @@ pub(super) struct RawFrame {
     pub time_s: Option<f64>,
     /// Readings, row-major; NaN where one is missing.
     pub values: Vec<f64>,
+    /// The readings of the file where a correction has changed them.
+    pub stated: Option<Vec<f64>>,
     /// The device's own figure, if printed.
     pub device: Option<DeviceFigure>,
 }

@@ -1,5 +1,6 @@
 //! What an import found out: the content of `recording.json`.
 
+use super::correction::Correction;
 use super::crop::Window;
 use super::format::Format;
 use super::measure::{Codes, Idle, Noise};
@@ -69,6 +70,9 @@ pub struct Summary {
     pub lines_left_out: Vec<String>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
+    /// Zero, sign and orientation that were corrected.
+    #[serde(default)]
+    pub correction: Correction,
     /// Unit of the readings.
     pub unit: Unit,
     /// Units per MPa.

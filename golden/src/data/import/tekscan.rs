@@ -130,6 +130,7 @@ fn frame_line(text: &str, line: usize, period_s: Option<f64>, source: &Source) -
             .filter(|seconds: &f64| seconds.is_finite())
             .or(period_s.map(|s| s * number.saturating_sub(1) as f64)),
         values: Vec::new(),
+        stated: None,
         device: sum.and_then(|sum| sum.parse().ok()).filter(|sum: &f64| sum.is_finite()).map(DeviceFigure::Sum),
     })
 }
