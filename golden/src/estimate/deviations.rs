@@ -285,9 +285,9 @@ impl Deviations {
         [between(x, next[0]), between(y, next[1]), between(normal, next[2])]
     }
 
-    /// Adds the margin of the score and the share of negative pressure to a result, and where `noise_MPa`, the standard deviation of a taxel of the calibrated
-    /// `stress`, is finite and above 0, standard deviations to the searched subarrays and the figure of the shear's spread; with
-    /// the flags of both.
+    /// Adds the margin of the score and the share of negative pressure to a result, and where `noise_MPa`, the standard deviation of
+    /// a taxel of the calibrated `stress`, is finite and above 0, standard deviations to the searched subarrays and the figure of the
+    /// shear's spread; with the flags of all.
     pub fn add(&self, result: &mut Reconstruction, scene: &Scene, stress: &Frame, noise_MPa: f64) {
         let score_margin = self.score_margin(result, scene, stress);
         let most = self.least_push.map(|push| 1.0 / (1.0 + f64::from(push)));
