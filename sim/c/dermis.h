@@ -143,6 +143,10 @@ typedef enum {
    * `tare-suspect`
    */
   DERMIS_FLAG_TARE_SUSPECT = (1 << 29),
+  /**
+   * `negative-pressure`
+   */
+  DERMIS_FLAG_NEGATIVE_PRESSURE = (1 << 30),
 } dermis_flag;
 
 

@@ -15,7 +15,9 @@
 //! neither scene nor tare frames state the noise there are no deviations: that of a real array is far above its LSB.
 //! The maximum of the objective itself tells whether a frame is one of a contact without noise: a baseline, noise or a faulty
 //! taxel leaves forces where none can be, and lowers it. The table has the least one of the drawn frames whose noise hides no
-//! shear; a subarray with a lower one has the flag `score-low`.
+//! shear; a subarray with a lower one has the flag `score-low`. A faulty taxel leaves forces below zero, too, of which a press has
+//! few: the table has the least ratio of the forces that press to those that pull, rounded down; a result with a lower one has the
+//! flag `negative-pressure`.
 //!
 //! [`Subject`] has the fields of a scene that must be those of the table. A threshold takes forces away: with one there is no
 //! deviation of the normal force.
@@ -46,6 +48,8 @@ use thiserror::Error;
 
 /// Version of the file.
 const VERSION: u32 = 1;
+/// Largest [`Deviations::least_push`]: four bits.
+pub const MOST_PUSH: u32 = 15;
 /// Largest file in bytes.
 const LARGEST_FILE: u64 = 1 << 20;
 /// Largest size of a score in bits: some 20 bits for each of 65536 taxels, as a status word holds it.
@@ -90,6 +94,10 @@ pub struct Deviations {
     /// in tables of earlier versions.
     #[serde(default)]
     pub least_score: Option<f64>,
+    /// Least sum of the normal forces above zero over that of those below, of the same frames, rounded down, 1 to [`MOST_PUSH`]; `None`
+    /// in tables of earlier versions, and where frames without noise pull as much as they press.
+    #[serde(default)]
+    pub least_push: Option<u32>,
     /// Per level and class: standard deviation of μ, [x, y], and that of the normal force over the force.
     pub sigma: Vec<Vec<[f64; 3]>>,
 }
@@ -211,6 +219,7 @@ impl Deviations {
             (table.sigma.len() != table.levels.len(), "it has not a row per level"),
             (!table.sigma.iter().all(whole), "a row has not a deviation above 0 per class"),
             (table.least_score.is_some_and(|score| score.abs() > LARGEST_SCORE), "its least score is out of range"),
+            (table.least_push.is_some_and(|push| !(1..=MOST_PUSH).contains(&push)), "its least push is out of range"),
         ];
         match faults.into_iter().find(|(fault, _)| *fault) {
             None => Ok(table),
@@ -225,9 +234,19 @@ impl Deviations {
         levels: Vec<f64>,
         sizes: Vec<f64>,
         sigma: Vec<Vec<[f64; 3]>>,
-        least_score: Option<f64>,
+        (least_score, least_push): (Option<f64>, Option<u32>),
     ) -> Deviations {
-        Deviations { version: VERSION, subject, draws: draws as usize, seed, levels, sizes, sigma, least_score }
+        Deviations {
+            version: VERSION,
+            subject,
+            draws: draws as usize,
+            seed,
+            levels,
+            sizes,
+            sigma,
+            least_score,
+            least_push,
+        }
     }
 
     /// The file, JSON with a line per level.
@@ -235,7 +254,7 @@ impl Deviations {
         let line = |row: &Vec<[f64; 3]>| serde_json::json!(row).to_string();
         let rows: Vec<String> = self.sigma.iter().map(line).collect();
         format!(
-            "{{\"version\": {}, \"subject\": {},\n\"draws\": {}, \"seed\": {},\n\"levels\": {},\n\"sizes\": {},\n\"least_score\": {},\n\"sigma\": [\n{}\n]}}\n",
+            "{{\"version\": {}, \"subject\": {},\n\"draws\": {}, \"seed\": {},\n\"levels\": {},\n\"sizes\": {},\n\"least_score\": {},\n\"least_push\": {},\n\"sigma\": [\n{}\n]}}\n",
             self.version,
             serde_json::json!(self.subject),
             self.draws,
@@ -243,6 +262,7 @@ impl Deviations {
             serde_json::json!(self.levels),
             serde_json::json!(self.sizes),
             serde_json::json!(self.least_score),
+            serde_json::json!(self.least_push),
             rows.join(",\n")
         )
     }
@@ -265,11 +285,14 @@ impl Deviations {
         [between(x, next[0]), between(y, next[1]), between(normal, next[2])]
     }
 
-    /// Adds the margin of the score to a result, and where `noise_MPa`, the standard deviation of a taxel of the calibrated
-    /// `stress`, is finite and above 0, standard deviations to the searched subarrays and the figure of the shear's spread; with
-    /// the flags of both.
+    /// Adds the margin of the score and the share of negative pressure to a result, and where `noise_MPa`, the standard deviation of
+    /// a taxel of the calibrated `stress`, is finite and above 0, standard deviations to the searched subarrays and the figure of the
+    /// shear's spread; with the flags of all.
     pub fn add(&self, result: &mut Reconstruction, scene: &Scene, stress: &Frame, noise_MPa: f64) {
-        let checks = Checks { score_margin: self.score_margin(result, scene, stress), ..result.checks };
+        let score_margin = self.score_margin(result, scene, stress);
+        let most = self.least_push.map(|push| 1.0 / (1.0 + f64::from(push)));
+        let negative_pressure = result.negative_share().zip(most).map(|(share, most)| share / most);
+        let checks = Checks { score_margin, negative_pressure, ..result.checks };
         result.add_checks(scene, checks);
         if !(noise_MPa > 0.0 && noise_MPa.is_finite()) {
             return;

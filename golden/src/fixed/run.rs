@@ -9,7 +9,7 @@ use super::model::Model;
 use super::plan::contact_cycles::Course;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
-use super::stages::forces::Force;
+use super::stages::forces::{pulls, Force};
 use super::stages::load::Outcome;
 use super::stages::prepare::Prepared;
 use super::stages::receive::mask;
@@ -89,6 +89,7 @@ impl Model {
             part.scatter(sensor, &solved.forces(case, self.threshold), &mut forces);
         }
         let contact = forces.iter().any(|f| f.words[2] != 0);
+        let negative = self.push_limit.is_some_and(|push| pulls(&forces, push));
         let force_saturations = forces.iter().map(|f| f.saturations).sum();
         let beats_of = |s: &SubarrayTrace, told: Told| {
             let status = Status {
@@ -104,6 +105,7 @@ impl Model {
                         (Flag::NoContact, !contact),
                         (Flag::TooManyContacts, told.more_contacts),
                         (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
+                        (Flag::NegativePressure, negative),
                         (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
                         (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
                         (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),

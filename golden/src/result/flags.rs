@@ -138,10 +138,11 @@ flags! {
         raised_by: "all engines",
     }
     ShearUnreliable = 6 "shear-unreliable" {
-        raised_when: "stated noise, rounding of the codes, or the error of what is taken for missing readings, above 5·10⁻⁵ of the peak, with `sparse`; where no noise is stated, noise found by `dermis reconstruct` above 1.25·10⁻⁴ (`noise_MPa`)",
-        remedy: "average, another objective, more bits",
-        raised_by: "all engines, with a search",
-        figure: |checks| checks.noise_figure(),
+        raised_when: "stated noise, rounding of the codes, or the error of what is taken for missing readings, above 5·10⁻⁵ of the peak, with `sparse`; where no noise is stated, noise found by `dermis reconstruct` above 1.25·10⁻⁴ (`noise_MPa`). With every estimator: a quarter of the readings are one value to the bit, and the next is 0.4 % of the largest away from it (`coarse_share`)",
+        remedy: "average, another objective, more bits, no deadband",
+        raised_by: "all engines",
+        rule: |checks, scene| scene.search.mu_max > 0.0 && checks.is_coarse(),
+        figure: |checks| checks.rounding_figure(),
     }
     CoefficientsDamaged = 7 "coefficients-damaged" {
         raised_when: "the signature of the hardware's coefficient memory is wrong",
@@ -317,6 +318,16 @@ flags! {
         raised_by: "all engines",
         rule: |checks, _| checks.pull_share.is_some_and(|share| share > PULL),
         figure: |checks| checks.pull_share.map(|share| format!("{:.0} % of push and pull", 1e2 * share)),
+    }
+    NegativePressure = 30 "negative-pressure" {
+        raised_when: "the normal forces below zero are a larger share than in any drawn frame whose noise hides no shear (`negative_pressure` above 1), where there is a table of standard deviations",
+        remedy: "check zero, noise and taxels: nothing pulls on a cover",
+        raised_by: "all engines, with a search",
+        rule: |checks, _| checks.negative_pressure.is_some_and(|share| share > 1.0),
+        figure: |checks| checks.negative_pressure.map(|share| format!("{share:.2} times that of clean frames")),
+        bit: NEGATIVE_PRESSURE = StatusField::flag(
+            "negative_pressure", 15, Feature::WholeSearch, "forces below zero are a larger share than in frames without noise, where the scene has a table of deviations"
+        ),
     }
 }
 
@@ -520,6 +531,8 @@ mod tests {
             torn_share: Some(1.0),
             tangential_difference: Some(1.0),
             score_margin: Some(-1.0),
+            coarse_share: Some(0.1),
+            negative_pressure: Some(1.1),
             missing_share: Some(0.1),
             zero_share: Some(1.0),
             pull_share: Some(1.0),

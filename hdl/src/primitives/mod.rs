@@ -49,6 +49,7 @@ pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;
 pub use memory::enable_register::EnableRegister;
 pub use memory::ram::Ram;
+pub(crate) use output::balance::Balance;
 #[cfg(test)]
 pub(crate) use output::force_unit::tests::Requests;
 pub use output::force_unit::{ForceUnit, STEPS as FORCE_STEPS};

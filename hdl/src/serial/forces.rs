@@ -13,13 +13,13 @@ use dermis_golden::fixed::plan::serial::{polynomials, word_bits, BEAT, FACTOR_BI
 use dermis_golden::fixed::stages::send::{CONDITION, FOUND, FRAMING, STATUS_BEATS};
 use dermis_golden::fixed::words::formats::{FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
 use dermis_golden::fixed::Model;
-use dermis_golden::result::flags::{NO_CONTACT, SCORE_LOW};
+use dermis_golden::result::flags::{NEGATIVE_PRESSURE, NO_CONTACT, SCORE_LOW};
 
 use super::pass_sequencer::SATURATION_BITS;
 use super::rounder::SHIFT_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Net, Type};
-use crate::primitives::{count_bits, position_bits, status_bits};
+use crate::primitives::{count_bits, position_bits, status_bits, Balance};
 
 const WORD: usize = FORCE_BITS as usize;
 const FACTOR: usize = FACTOR_BITS as usize;
@@ -40,6 +40,8 @@ block! {
         wanted: usize,
         /// A larger score is that of no clean frame.
         score_limit: Option<i64>,
+        /// Sum of the normal forces that tells whether they pull, if it is taken.
+        balance: Option<Balance>,
         /// Width of a word from the bank, and of the value p(μ*) in it.
         word: usize,
         value: usize,
@@ -125,6 +127,7 @@ impl Forces {
             shift_base: i64::from(f.mu_fraction) + rescale_max - headroom,
             threshold: model.threshold,
             score_limit: model.score_limit.map(i64::from),
+            balance: Balance::of_model(model),
             taxels: 4 * f.quads as u64,
         }
     }
@@ -203,6 +206,8 @@ impl Block for Forces {
             let low = io.found & k.signed_constant(self.score, limit).less(io.score.signed());
             (SCORE_LOW, k.wire("score_low", low))
         }));
+        let balance = self.balance.map(|own| (own, k.register("balance", own.ty())));
+        bits.extend(balance.as_ref().map(|(_, sum)| (NEGATIVE_PRESSURE, sum.top())));
         let highest = bits.iter().map(|(field, _)| field.low).fold(0, u32::max);
         let state = Status {
             best,
@@ -246,6 +251,9 @@ impl Block for Forces {
                 counting.set(zero);
                 valid.set(one);
             });
+            k.when(beat_taken & is_force, || {
+                balance.iter().for_each(|(own, sum)| sum.set(own.sum(**sum, own.weighed(fz.signed()))));
+            });
             k.when(beat_taken, || {
                 phase.set(k.constant(4, AGAIN_PHASE));
                 valid.set(zero);
@@ -279,6 +287,7 @@ impl Block for Forces {
             ahead.set(k.constant(places, 0));
             force_saturations.set(k.constant(SATURATION_BITS, 0));
             contact.set(zero);
+            balance.iter().for_each(|(own, sum)| sum.set(k.signed_constant(own.ty().bits, 0)));
         });
         k.when(*counting, || first_cycles.set(first_cycles.plus(1)));
         k.when(io.frame_begin, || {

@@ -168,6 +168,8 @@ fn add_status(all: &mut Definitions, model: &Model) {
     }
     all.option("HAS_SCORE_LIMIT", model.score_limit.is_some());
     all.add("SCORE_LIMIT", format!("({})", model.score_limit.unwrap_or_default()));
+    all.option("HAS_PUSH_LIMIT", model.push_limit.is_some());
+    all.long("PUSH_LIMIT", i64::from(model.push_limit.unwrap_or_default()));
     let cycles = |words: Vec<i32>| CYCLES.get(&model.run_prepared(&Prepared { words, ..model.prepare.empty() }).status);
     all.unsigned("CYCLES_SEARCHED", cycles(loaded(model)));
     all.unsigned("CYCLES_NOT_SEARCHED", cycles(vec![0; model.scene.sensor.taxels()]));

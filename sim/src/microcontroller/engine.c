@@ -755,6 +755,22 @@ static void forces(const struct @NAME@_work *work, struct @NAME@_result *result,
     }
 }
 
+#if HAS_PUSH_LIMIT
+/* Whether the forces below zero, PUSH_LIMIT times, are more than those above. */
+static uint32_t pulls(const struct @NAME@_result *result)
+{
+    int64_t sum = 0;
+    uint32_t taxel;
+
+    for (taxel = 0U; taxel < TAXELS; taxel++) {
+        const int64_t size = result->force[taxel][2];
+
+        sum += (size < 0) ? (size * PUSH_LIMIT) : size;
+    }
+    return (sum < 0) ? 1U : 0U;
+}
+#endif
+
 /* Puts a field into the status. */
 static void put(struct @NAME@_result *result, uint32_t word, uint32_t low, uint32_t value)
 {
@@ -777,6 +793,9 @@ static void send(const struct @NAME@_work *work, struct @NAME@_result *result)
     put(result, STATUS_CONDITION, work->condition);
     put(result, STATUS_FOUND, work->found);
     put(result, STATUS_NO_CONTACT, 1U - contact);
+#if HAS_PUSH_LIMIT
+    put(result, STATUS_NEGATIVE_PRESSURE, pulls(result));
+#endif
 #if HAS_SCORE_LIMIT
     put(result, STATUS_SCORE_LOW, ((work->found != 0U) && (work->score > SCORE_LIMIT)) ? 1U : 0U);
 #endif

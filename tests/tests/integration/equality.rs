@@ -47,7 +47,12 @@ fn degenerate_frames_are_equal() {
         with("all in tension", tension),
         Frame::eq2(&scene.sensor),
     ];
-    check(&scene, &frames);
+    let verified = check(&scene, &frames);
+    let raised = |id: &str| {
+        let row = std::iter::zip(&frames, &verified.rows).find(|(frame, _)| frame.id == id).unwrap().1;
+        row.fixed.flags.contains(&Flag::NegativePressure)
+    };
+    assert_eq!(["zeros", "one corner in tension", "all in tension"].map(raised), [false, true, true]);
 }
 
 #[test]

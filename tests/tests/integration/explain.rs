@@ -66,6 +66,20 @@ fn the_code_check_costs_what_two_builds_differ_by() {
     assert!(has(&on) && !has(&off));
 }
 
+/// The sum of the forces that tells whether they pull: an adder, a register, no multiplier and no cycle.
+#[test]
+fn negative_pressure_costs_what_two_builds_differ_by() {
+    let on = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    let off = Model::new(&on.scene).unwrap().with_changed_plan(|plan| plan.push_limit = None).unwrap();
+    let [with, without] = [&on, &off].map(|model| total(&generate(model).unwrap().usage));
+    let of = |model: &Model| explain(model).unwrap().into_iter().find(|e| e.feature == "negative pressure");
+    let costs = of(&on).unwrap().costs.unwrap();
+    assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+    assert_eq!((costs.block_rams, costs.multipliers, costs.cycles), (0, 0, 0));
+    assert!((30..200).contains(&costs.luts) && costs.flip_flops < 120, "{costs:?}");
+    assert!(of(&off).is_none());
+}
+
 /// The width in use states its cost over the narrowest; a narrower one what the widest would cost.
 #[test]
 fn the_search_width_costs_what_two_builds_differ_by() {

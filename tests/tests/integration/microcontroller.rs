@@ -201,6 +201,7 @@ fn faults_of_codes_are_in_the_status() {
         let of_check = |plan: &mut Plan| {
             plan.prepare.gain = Some(vec![if falls { -65536 } else { 65536 }; 24]);
             plan.prepare.zero = Some(vec![0; 24]);
+            plan.push_limit = Some(5);
             plan.prepare.check.iter_mut().for_each(|check| check.falls = falls);
         };
         let model = Model::new(&parsed(4, 6, [4.0, 4.0], more)).unwrap().with_changed_plan(of_check).unwrap();

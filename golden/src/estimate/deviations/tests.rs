@@ -60,7 +60,8 @@ fn the_built_in_scenes_have_a_table_each() {
 fn between_levels_the_logarithm_is_linear() {
     let row = |sigma: f64| vec![[sigma, 2.0 * sigma, 0.1], [0.5, 0.5, 0.5]];
     let subject = Subject::of(&searched("sensor-1"), EstimatorKind::Search).unwrap();
-    let table = Deviations::new(subject, [9, 1], vec![1e-4, 1e-2], vec![4.0], vec![row(0.01), row(0.16)], None);
+    let table =
+        Deviations::new(subject, [9, 1], vec![1e-4, 1e-2], vec![4.0], vec![row(0.01), row(0.16)], (None, Some(3)));
     // Beyond the last level that of the normal force grows with the noise.
     let [x, _, normal] = table.at(1.0, 3.9);
     assert!((x - 0.16).abs() < 1e-9 && (normal - 10.0).abs() < 1e-9);

@@ -136,7 +136,7 @@ fn of_shapes(
         }
         planned.push(CasePlan { case, parts: parts(case, &scene.sensor)?, formats, quantised, storage });
     }
-    let score_limit = score_limit(&scene)?;
+    let (score_limit, push_limit) = clean_limits(&scene)?;
     if let [only] = cases[..] {
         scene.partition.case = only;
     }
@@ -153,6 +153,7 @@ fn of_shapes(
         threshold,
         prepare,
         score_limit,
+        push_limit,
         tables_version: 0,
         tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
@@ -173,13 +174,14 @@ fn of_shapes(
     })
 }
 
-/// The word of the least score, see [`Plan::score_limit`].
-fn score_limit(scene: &Scene) -> Result<Option<i32>, FixedError> {
+/// The word of the least score and the least push of clean frames, see [`Plan::score_limit`] and [`Plan::push_limit`].
+fn clean_limits(scene: &Scene) -> Result<(Option<i32>, Option<u32>), FixedError> {
     if scene.partition.case != Case::WHOLE {
-        return Ok(None);
+        return Ok((None, None));
     }
-    let least = Deviations::of_scene(scene, scene.hardware_estimator())?.and_then(|table| table.least_score);
-    Ok(least.map(|bits| -(bits * f64::from(1u32 << LOG_FRACTION)) as i32))
+    let Some(table) = Deviations::of_scene(scene, scene.hardware_estimator())? else { return Ok((None, None)) };
+    let score = table.least_score.map(|bits| -(bits * f64::from(1u32 << LOG_FRACTION)) as i32);
+    Ok((score, table.least_push))
 }
 
 /// What depends on the specimen of the array and on what its user wants to see.

@@ -35,6 +35,9 @@ pub struct Plan {
     /// Word of a score above which it is that of no clean frame, where the whole array is searched for one μ and there is a
     /// table of deviations. Words of scores fall with the objective.
     pub score_limit: Option<i32>,
+    /// Times that the forces below zero are below those above in every clean frame, 1 to 15, where there is such a limit; see
+    /// [`forces::pulls`](crate::fixed::stages::forces::pulls).
+    pub push_limit: Option<u32>,
     /// `threshold.min_force_N` in force LSBs, rounded up.
     pub threshold: i64,
     /// Version of the tables: 0 for those of the bitstream.

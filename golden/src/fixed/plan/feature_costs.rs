@@ -205,5 +205,13 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     if chosen && width == Quads::LANES {
         without("search width", &|s| s.hardware.search_width = Some(1));
     }
+    if let Some(push) = plan.push_limit {
+        all.push(Feature {
+            name: "negative pressure",
+            setting: format!("flagged above 1/{} of all", 1 + push),
+            with_feature: None,
+            without_feature: Some(Plan { push_limit: None, ..plan.clone() }),
+        });
+    }
     all
 }

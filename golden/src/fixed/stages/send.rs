@@ -220,8 +220,8 @@ mod tests {
         assert_eq!(Status::of_beats(&beats), Some(status));
         assert_eq!(Status::of_beats(&beats[..1]), None);
         // Condition; no_contact, coefficients, more_contacts, tables, rail; case; wrong_channel, score_low, zero_limit, clipped,
-        // line_fault; frames.
-        let flags = 1 | 1 << 2 | 0b1111 << 4 | 3 << 8 | 31 << 10 | 8191 << 16;
+        // line_fault, negative_pressure; frames.
+        let flags = 1 | 1 << 2 | 0b1111 << 4 | 3 << 8 | 63 << 10 | 8191 << 16;
         assert_eq!(beats, [[-3, 384, flags], [-70_000, 0, 0x8005_0003u32 as i32], [0, 0, 77]]);
     }
 

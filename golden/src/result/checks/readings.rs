@@ -4,7 +4,11 @@
 //! plateau     (k − 1) ln(D/q)      k equal largest readings, D above all others, q the smallest difference of two readings
 //! line share  the largest of       range of a row or column that the next one repeats to the bit
 //!                                  range beside rows or columns of one reading: on both sides, or of many steps on one
+//! coarse      d/D                  d from the value that most readings have to the bit to the next one, D to the farthest
 //! ```
+//!
+//! Equal readings are those of unloaded taxels: what they would differ by is below a converter's step or in a deadband, and no
+//! estimate sees it, as equal readings leave nothing unexplained. Of several frames it is their mean that counts.
 //!
 //! A reading that falls in steps of q is one of k equal largest by chance with q/D for each beside the first: the plateau is the
 //! negative logarithm of a probability. Ranges are relative to that of the frame, so that zeros and offsets do not count. Lines
@@ -17,6 +21,7 @@
 //! | in: readings of one reconstruction, dead taxels, sign of the gains | frames × taxels | unit of the readings |
 //! | out: plateau | scalar | ln of a probability, ≥ 0 |
 //! | out: line share | scalar | fraction of the frame's range |
+//! | out: coarse share | scalar | fraction of the farthest reading |
 //!
 //! The limits, [`PLATEAU`](super::PLATEAU) and [`LINE`](super::LINE), are above what drawn clean frames of 8 to 20 bits and 0 to 1 % noise have, but for one in a hundred; the tests
 //! draw them again.
@@ -43,6 +48,7 @@ impl Checks {
             full_scale_share: input.full_scale_share(readings),
             plateau: largest(&|own| own.plateau()),
             line_share: largest(&|own| own.line_share()),
+            coarse_share: coarse_share(input, readings),
             missing_share: readings.iter().filter_map(|frame| missing_share(input, frame)).reduce(f64::max),
             ..self
         }
@@ -56,8 +62,29 @@ fn missing_share(input: &Input, frame: &Frame) -> Option<f64> {
     (missing > 0).then(|| missing as f64 / alive.iter().filter(|alive| **alive).count() as f64)
 }
 
+/// Share of the readings from which on equal ones are unloaded.
+const EQUAL: f64 = 0.25;
+
 /// Share of the range below which a difference of readings is rounding, of stress that was computed.
 const ROUNDING: f64 = 1e-9;
+
+/// The coarse share of the mean of `readings`; `None` where few are equal. Zeros of a unipolar array do not count: they are clipped.
+fn coarse_share(input: &Input, readings: &[Frame]) -> Option<f64> {
+    let sensor = &readings.first()?.sensor;
+    let (alive, unipolar) = (input.spec().alive(sensor), input.spec().unipolar);
+    let there = |k: &usize| alive[*k] && readings.iter().all(|frame| !frame.lacks(*k));
+    let sum = |k: usize| readings.iter().map(|frame| frame.stress_MPa[k]).sum::<f64>();
+    let mut sums: Vec<f64> = (0..sensor.taxels()).filter(there).map(sum).collect();
+    let taxels = sums.len();
+    sums.retain(|sum| !unipolar || input.sign() * sum > 0.0);
+    sums.sort_by(f64::total_cmp);
+    let groups: Vec<&[f64]> = sums.chunk_by(|a, b| a == b).collect();
+    let at = (0..groups.len()).max_by_key(|at| groups[*at].len())?;
+    let distances =
+        (0..groups.len()).filter(|other| *other != at).map(|other| (groups[other][0] - groups[at][0]).abs());
+    let [next, farthest] = distances.fold([f64::INFINITY, 0.0], |[next, far], d| [d.min(next), d.max(far)]);
+    (groups[at].len() as f64 >= EQUAL * taxels as f64 && farthest > 0.0).then(|| next / farthest)
+}
 
 /// Largest less smallest reading; 0 without any.
 pub(super) fn range(readings: impl Iterator<Item = f64>) -> f64 {
@@ -284,6 +311,37 @@ mod tests {
         assert_eq!(changed(&|b| (0..8).for_each(|i| b[8 * i + 3] = b[8 * i + 4])), [false, true]);
         assert_eq!(changed(&|b| b[24..32].fill(0.0)), [false, true]);
         assert_eq!(changed(&|b| b[32..].fill(0.0)), [false, true]);
+    }
+
+    /// Codes of 8 bits and a deadband are flagged, codes of 10 bits are not, nor 8 bits whose rounding noise makes even; a mean of two
+    /// frames has half the step. A scene without shear has no flag.
+    #[test]
+    fn steps_that_hide_the_shear_are_flagged() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let exact = press(&scene.sensor, 5.0, 8.0, [1.5, 0.7]);
+        let peak = exact.peak_MPa();
+        let of = |scene: &Scene, frames: &[Frame]| {
+            let checks = Checks::default().with_readings(&Input::new(scene).unwrap(), frames);
+            (checks.coarse_share.is_some(), checks.flags(scene).any(|flag| flag == Flag::ShearUnreliable))
+        };
+        let changed = |change: &dyn Fn(f64) -> f64| {
+            let mut frame = exact.clone();
+            frame.stress_MPa.iter_mut().for_each(|b| *b = change(*b));
+            frame
+        };
+        let codes = |bits: i32| changed(&|b| (b / peak * 2f64.powi(bits - 1)).round());
+        let noisy = |seed| {
+            let converter = Converter { bits: Some(8), noise: 0.01, seed, ..Default::default() };
+            converter.convert(&exact).unwrap()
+        };
+        assert_eq!(of(&scene, std::slice::from_ref(&exact)), (false, false));
+        assert_eq!([8, 10].map(|bits| of(&scene, &[codes(bits)])), [(true, true), (true, false)]);
+        assert_eq!(of(&scene, &[changed(&|b| if b.abs() > 0.01 * peak { b } else { 0.0 })]), (true, true));
+        assert_eq!(of(&scene, &[noisy(1)]), (false, false));
+        let shifted = changed(&|b| ((b / peak + 0.002) * 128.0).round());
+        assert_eq!(of(&scene, &[codes(8), shifted]).1, false);
+        scene.search.mu_max = 0.0;
+        assert_eq!(of(&scene, &[codes(8)]), (true, false));
     }
 
     /// A press without shear on the array's centre is its own mirror image.

@@ -21,6 +21,13 @@ impl Reconstruction {
         }
         .with_missing(scene, frame)
     }
+
+    /// The share of Σ|fz| that is below zero; `None` where no taxel has a force.
+    pub(crate) fn negative_share(&self) -> Option<f64> {
+        let (below, all) =
+            self.forces_N.fz.iter().fold((0.0, 0.0), |(below, all), fz| (below + (-fz).max(0.0), all + fz.abs()));
+        (all > 0.0).then(|| below / all)
+    }
 }
 
 /// The largest |μ| over `mu_max` among the subarrays, or with `contacts` the regions, that carry a share of the load.

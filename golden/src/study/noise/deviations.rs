@@ -15,7 +15,7 @@ use super::StudyError;
 use crate::data::frame::Frame;
 use crate::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
 use crate::engine::Engine;
-use crate::estimate::deviations::{Deviations, Load, Subject};
+use crate::estimate::deviations::{Deviations, Load, Subject, MOST_PUSH};
 use crate::estimate::float::Golden;
 use crate::fixed::words::formats::LOG_FRACTION;
 use crate::fixed::Model;
@@ -45,6 +45,8 @@ const RATIO: [f64; 2] = [0.25, 0.83];
 struct Error {
     /// Maximum of the objective.
     score: f64,
+    /// Share of the array's normal forces that is below zero.
+    negative: f64,
     noise: f64,
     size: f64,
     off: [f64; 3],
@@ -83,10 +85,12 @@ pub fn measure_deviations(
         let class = |class: usize| within(own, &sizes, class).ok_or(StudyError::Unmeasured { noise: *level, draws });
         sigma.push((0..=sizes.len()).map(class).collect::<Result<Vec<_>, _>>()?);
     }
-    let quiet = errors.iter().flatten().filter(|error| error.noise <= SPARSE_NOISE_LIMIT);
+    let quiet = || errors.iter().flatten().filter(|error| error.noise <= SPARSE_NOISE_LIMIT);
     // As the hardware's word has it.
-    let least_score = quiet.map(|error| (SCORE_UNIT * error.score).floor() / SCORE_UNIT).reduce(f64::min);
-    Ok(Deviations::new(subject, [draws as u64, seed], levels, sizes, sigma, least_score))
+    let least_score = quiet().map(|error| (SCORE_UNIT * error.score).floor() / SCORE_UNIT).reduce(f64::min);
+    let push = quiet().map(|error| (1.0 - error.negative) / error.negative).reduce(f64::min);
+    let least_push = push.map(|push| push.min(f64::from(MOST_PUSH)) as u32).filter(|push| *push > 0);
+    Ok(Deviations::new(subject, [draws as u64, seed], levels, sizes, sigma, (least_score, least_push)))
 }
 
 /// How often errors of frames are within the deviations of a table: per level, of μ along x and y, and of the normal force.
@@ -199,6 +203,7 @@ fn errors_of(
     noise_MPa: f64,
 ) -> Vec<Error> {
     let Some(truth) = &drawn.frame.cell_forces_N else { return Vec::new() };
+    let negative = result.negative_share().unwrap_or(0.0);
     let counts = COUNTS_FROM * drawn.total_N[2];
     let of = |index: usize| {
         let load = Load::of(result, scene, reading, index, noise_MPa)?;
@@ -210,7 +215,7 @@ fn errors_of(
         let axes = [(&truth.fx, &own.fx), (&truth.fy, &own.fy), (&truth.fz, &own.fz)];
         let off = Some(axes).filter(|_| pressed)?.map(|(truth, own)| (sum(own) - sum(truth)).abs());
         let score = result.subarrays[index].objective_value?;
-        Some(Error { score, noise: load.noise, size: load.size, off: off.map(|off| off / load.normal_N) })
+        Some(Error { score, negative, noise: load.noise, size: load.size, off: off.map(|off| off / load.normal_N) })
     };
     (0..result.subarrays.len()).filter_map(of).collect()
 }

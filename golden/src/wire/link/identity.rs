@@ -130,6 +130,9 @@ pub fn scene_hash(plan: &Plan) -> u32 {
     if let (Some(scan), Some(timing)) = (scene.hardware.adc_scan, plan.scan_timing()) {
         text["scan"] = json!([scan.converter.name, scan.converters, scan.average, timing.period]);
     }
+    if let Some(push) = plan.push_limit {
+        text["push_limit"] = json!(push);
+    }
     if plan.prepare.check.is_some() {
         text["code_check"] = json!(true);
     }

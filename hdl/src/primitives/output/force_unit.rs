@@ -6,10 +6,11 @@ use dermis_golden::fixed::stages::send::{CASE, CONDITION, FOUND, FRAMES, FRAMING
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::result::flags::{
-    CLIPPED, COEFFICIENTS, LINE_FAULT, MORE_CONTACTS, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT,
+    CLIPPED, COEFFICIENTS, LINE_FAULT, MORE_CONTACTS, NEGATIVE_PRESSURE, NO_CONTACT, SCORE_LOW, TABLES, ZERO_LIMIT,
 };
 use dermis_golden::spec::quads::Quads;
 
+use super::balance::Balance;
 use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
@@ -57,6 +58,8 @@ block! {
         threshold: Option<u64>,
         /// A larger score is that of no clean frame.
         score_limit: Option<i64>,
+        /// Sum of the normal forces that tells whether they pull, if it is taken.
+        balance: Option<Balance>,
         /// The scene has the coefficient check.
         checks: bool,
         /// The codes of a frame are checked.
@@ -193,6 +196,7 @@ impl ForceUnit {
             base_shift: force_shift(f, 0, 0).into(),
             threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
             score_limit: model.score_limit.map(i64::from),
+            balance: Balance::of_model(model),
             checks: model.has_coefficient_check(),
             checks_codes: model.prepare.check.is_some(),
             marks: FrameMarks::new(model),
@@ -250,7 +254,13 @@ impl ForceUnit {
     }
 
     /// The word of flags of the beat that leaves.
-    fn flags<'k>(&self, io: &ForceUnitPorts<Inside<'k>>, kept: &Kept<'k>, contact: Expr<'k>) -> Expr<'k> {
+    fn flags<'k>(
+        &self,
+        io: &ForceUnitPorts<Inside<'k>>,
+        kept: &Kept<'k>,
+        contact: Expr<'k>,
+        balance: Option<Expr<'k>>,
+    ) -> Expr<'k> {
         let k = kept.k;
         let FrameMarks { frames_bits, limited } = self.marks;
         let marks = (self.marks != FrameMarks::default()).then(|| kept.status("frames_held", io.frames));
@@ -268,6 +278,7 @@ impl ForceUnit {
             let low = io.found & k.signed_constant(self.score_bits, limit).less(io.score.signed());
             (SCORE_LOW, kept.status("scores_low", low))
         }));
+        bits.extend(balance.map(|balance| (NEGATIVE_PRESSURE, balance.top())));
         bits.extend(marks.filter(|_| limited).map(|marks| (ZERO_LIMIT, marks.top())));
         bits.extend(
             self.checks_codes
@@ -419,7 +430,10 @@ impl Block for ForceUnit {
         let start_count = force_saturations.extend(SATURATION_BITS + 1);
         let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
         let count = k.wire("count", count);
-        let flags = self.flags(&io, &kept, *contact);
+        k.comment("What a force adds to the sum of all is registered beside the result of the threshold.");
+        let balance =
+            self.balance.map(|own| (own, k.register("balance", own.ty()), k.delay("weighed", own.weighed(z.word))));
+        let flags = self.flags(&io, &kept, *contact, balance.as_ref().map(|(_, sum, _)| **sum));
         let status = self.status(&io, &kept, beat_out, [flags, *cycles_held, *force_saturations]);
         let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
         let words = beat_out.is(0).mux(force, status);
@@ -440,12 +454,16 @@ impl Block for ForceUnit {
             k.when(beat_out.is(0), || {
                 let most = one.repeat(SATURATION_BITS);
                 force_saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
-                k.when(below.map_or(presses, |below| presses & !below), || contact.set(one));
+                k.when(below.map_or(presses, |below| presses & !below), || {
+                    contact.set(one);
+                    balance.iter().for_each(|(own, sum, weighed)| sum.set(own.sum(**sum, *weighed)));
+                });
             });
         });
         k.when(io.begin_frame, || {
             counting.set(one);
             contact.set(zero);
+            balance.iter().for_each(|(own, sum, _)| sum.set(k.signed_constant(own.ty().bits, 0)));
             force_saturations.set(k.constant(SATURATION_BITS, 0));
         });
     }

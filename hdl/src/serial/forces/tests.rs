@@ -17,6 +17,7 @@ const SIZES: Forces = Forces {
     shift_base: 12,
     threshold: 1 << 20,
     score_limit: Some(-1000),
+    balance: Some(Balance { push: 5, taxels: 24 }),
     taxels: 24,
 };
 
@@ -42,6 +43,7 @@ struct Beats {
     words: [i64; 3],
     saturations: u64,
     contact: bool,
+    balance: i64,
     counting: bool,
     cycles: u64,
     valid: bool,
@@ -64,7 +66,9 @@ impl Beats {
                 let no_contact = i64::from(!self.contact) * i64::from(NO_CONTACT.mask());
                 let [x, y] = [4, 5].map(|k| inputs[k].signed(0, position_bits()));
                 let low = inputs[7].number() == 1 && Some(inputs[6].signed(0, SIZES.score)) > SIZES.score_limit;
-                [x, y, flags.iter().sum::<i64>() + no_contact + i64::from(low) * i64::from(SCORE_LOW.mask())]
+                let marks = i64::from(low) * i64::from(SCORE_LOW.mask())
+                    + i64::from(self.balance < 0) * i64::from(NEGATIVE_PRESSURE.mask());
+                [x, y, flags.iter().sum::<i64>() + no_contact + marks]
             }
             1 => [number(7) * inputs[6].signed(0, SIZES.score), number(11), number(10)],
             _ => [number(12), self.saturations as i64, self.cycles as i64],
@@ -120,6 +124,9 @@ impl Beats {
                 if self.is_last() {
                     self.step = Step::Idle;
                 }
+                let push = SIZES.balance.map_or(0, |balance| i64::from(balance.push));
+                let weight = if self.words[2] < 0 { push } else { 1 };
+                self.balance += if forces { weight * self.words[2] } else { 0 };
                 let forces_end = forces && self.beat == SIZES.taxels - 1;
                 (self.phase, self.valid) = (AGAIN_PHASE, false);
                 self.beat = if forces_end { 0 } else { self.beat + 1 };
@@ -163,6 +170,7 @@ impl Reference for Beats {
                     beat: 0,
                     saturations: 0,
                     contact: false,
+                    balance: 0,
                     ..self.clone()
                 };
             }

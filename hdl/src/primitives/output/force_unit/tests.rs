@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 
+use dermis_golden::fixed::plan::contents::Plan;
 use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::result::flags::{StatusField, ZERO_LIMIT};
 
 use super::*;
 use crate::language::kernel_of;
-use crate::language::testbench::{check, random_word, Reference};
+use crate::language::testbench::{check, difference, random_word, Reference};
 use crate::scenes::{learned, model};
 use crate::wire::Word;
 
@@ -43,6 +44,7 @@ struct Frame {
     cycles: u32,
     saturations: u32,
     contact: bool,
+    balance: i64,
     counting: bool,
 }
 
@@ -118,6 +120,13 @@ impl Requests {
                 let result = force(f, entry.value, mu, shift, threshold);
                 frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
                 frame.contact |= result.words[2] != 0;
+                if let Some(balance) = Balance::of_model(&self.model) {
+                    let z = i64::from(result.words[2]);
+                    // More requests than a frame has taxels go around.
+                    let unused = 64 - balance.ty().bits;
+                    frame.balance += if z < 0 { z * i64::from(balance.push) } else { z };
+                    frame.balance = frame.balance << unused >> unused;
+                }
                 result.words
             }
             1 => {
@@ -130,6 +139,7 @@ impl Requests {
                     | flag(inputs[16].number() == 1, FRAMING)
                     | flag(part.damaged, COEFFICIENTS)
                     | flag(part.score_low, SCORE_LOW)
+                    | flag(frame.balance < 0, NEGATIVE_PRESSURE)
                     | flag(self.model.has_writable_tables() && inputs[26].number() == 1, TABLES)
                     | flag(f.by_contact() && inputs[23].number() == 1, MORE_CONTACTS)
                     | flag(self.model.prepare.check.is_some() && inputs[27].field(0, 1) == 1, CLIPPED)
@@ -268,6 +278,15 @@ fn beats_are_those_of_the_model() {
         let searched = model(4, 4, &format!("[search]\nmu_max = 0.05\n{more}"));
         check_forces(searched.with_changed_plan(|plan| plan.score_limit = Some(limit)).unwrap());
     }
+    let weighed = |push: u32| {
+        let change = |plan: &mut Plan| (plan.push_limit, plan.threshold) = (Some(push), 1 << 20);
+        model(4, 4, "[search]\nmu_max = 0.05\n").with_changed_plan(change).unwrap()
+    };
+    [1, 5, 14].into_iter().for_each(|push| check_forces(weighed(push)));
+    // A wrong weight is found.
+    let (block, wrong) = (ForceUnit::new(&weighed(5)), weighed(4));
+    let found = difference(&kernel_of(&block), &stimulus(&wrong, &block, 6000), &mut Requests::new(wrong));
+    assert!(found.is_some());
     let sliding = "[input]\naverage = 3\nmean = \"sliding\"\n";
     is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let running = "zero = \"running\"\nfull_scale_MPa = 1.0\n";
