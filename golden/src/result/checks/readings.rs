@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(of(&scene, &[changed(&|b| if b.abs() > 0.01 * peak { b } else { 0.0 })]), (true, true));
         assert_eq!(of(&scene, &[noisy(1)]), (false, false));
         let shifted = changed(&|b| ((b / peak + 0.002) * 128.0).round());
-        assert_eq!(of(&scene, &[codes(8), shifted]).1, false);
+        assert!(!of(&scene, &[codes(8), shifted]).1);
         scene.search.mu_max = 0.0;
         assert_eq!(of(&scene, &[codes(8)]), (true, false));
     }
