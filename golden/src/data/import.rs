@@ -87,6 +87,8 @@ pub struct Settings {
     pub missing_as_zero: bool,
     /// Thickness of an elastic cover over the array in mm.
     pub thickness_mm: Option<f64>,
+    /// Whether a file whose end is missing is taken; else it is an error.
+    pub partial: bool,
     /// Layout of the lines of a plain text.
     pub layout: Stated,
     /// Zero, sign and orientation of the readings, which the file has otherwise.
@@ -146,6 +148,9 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     let source = Source { file };
     settings.check(&source)?;
     let mut recording = parse(file, bytes, settings, &source)?;
+    if let Some(words) = recording.cut.as_ref().filter(|_| !settings.partial || recording.frames.is_empty()) {
+        return Err(source.cut(words, recording.frames.len()));
+    }
     let frames_in_file = recording.frames.len();
     settings.correction.apply(&mut recording, &source)?;
     select(&mut recording, settings.frames, &source)?;
@@ -190,6 +195,7 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         left_out,
         layout: recording.layout.clone(),
         lines_left_out: recording.left_out.clone(),
+        cut: recording.cut.clone(),
         missing_as_zero: settings.missing_as_zero,
         correction: settings.correction,
         unit,

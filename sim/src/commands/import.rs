@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Format, if it is not recognised: tekscan, lst, npy, xsensor or csv.
     #[arg(long, value_name = "NAME", value_parser = format)]
     format: Option<Format>,
-    /// Unit of the readings: Pa, kPa, MPa, N/cm2, psi, mmHg, kg/cm2, g/cm2 or raw; default: the file's.
+    /// Unit of the readings: Pa, kPa, MPa, bar, mbar, N/cm2, psi, mmHg, kg/cm2, g/cm2 or raw; default: the file's.
     #[arg(long, value_name = "UNIT", value_parser = unit)]
     units: Option<Unit>,
     /// Stress of the largest reading in MPa; raw counts need it.
@@ -51,6 +51,9 @@ pub struct Arguments {
     /// line: a line per frame; default: found. May be given twice.
     #[arg(long, value_name = "A..B|grid|line")]
     frames: Vec<String>,
+    /// Take a file whose end is missing: the frames before that. Else it is an error.
+    #[arg(long)]
+    partial: bool,
     #[command(flatten)]
     layout: LayoutArguments,
     /// auto, contact, or rows and columns counted from 0: A..B,C..D, ends included.
@@ -173,6 +176,7 @@ impl Arguments {
             crop: crop(&self.crop)?,
             missing_as_zero: self.missing == Missing::Zero,
             thickness_mm: self.thickness,
+            partial: self.partial,
             layout,
             correction: self.correction.correction(),
         })
@@ -204,6 +208,9 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     }
     if let Some(first) = summary.lines_left_out.first() {
         writeln!(text, "left out        {} lines without a frame; {first}", summary.lines_left_out.len())?;
+    }
+    if let Some(words) = &summary.cut {
+        writeln!(text, "ends early      {words}")?;
     }
     if summary.correction != Correction::default() {
         writeln!(text, "corrected       {}", summary.correction)?;

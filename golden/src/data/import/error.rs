@@ -78,6 +78,19 @@ pub enum ImportError {
         /// The allowed values, in words.
         allowed: String,
     },
+    /// The end of the file is missing.
+    #[error("{file}: ends early: {words}; {}", match whole {
+        0 => "no frame before that is whole".to_owned(),
+        whole => format!("--partial takes the {whole} frames before that"),
+    })]
+    Cut {
+        /// Path as given.
+        file: String,
+        /// What is missing.
+        words: String,
+        /// Number of frames that are whole.
+        whole: usize,
+    },
     /// Something that a scene needs is neither in the file nor in the options.
     #[error("{file}: {field} is missing; {remedy}")]
     Missing {
@@ -135,6 +148,10 @@ impl Source<'_> {
     pub(super) fn field(&self, field: &str, value: impl ToString, allowed: impl Into<String>) -> ImportError {
         let (file, field) = (self.file.to_string(), field.to_string());
         ImportError::Field { file, field, value: shortened(&value.to_string()), allowed: allowed.into() }
+    }
+
+    pub(super) fn cut(&self, words: &str, whole: usize) -> ImportError {
+        ImportError::Cut { file: self.file.to_string(), words: words.to_string(), whole }
     }
 
     pub(super) fn missing(&self, field: &str, remedy: impl Into<String>) -> ImportError {

@@ -11,7 +11,7 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{reading, side, DeviceFigure, RawFrame, Recording};
+use super::recording::{reading, side, unfinished, DeviceFigure, RawFrame, Recording};
 use super::units::Unit;
 
 /// Largest share of readings to fill in, where pages print different parts, over those printed.
@@ -43,6 +43,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     let mut pages: Vec<Page> = Vec::new();
     // Whether the lines that follow belong to a table.
     let mut open = false;
+    let unfinished = unfinished(text);
     for (line, text) in
         text.split('\n').enumerate().map(|(index, line)| (index + 1, line.trim_end_matches(['\r', '\x0c'])))
     {
@@ -58,14 +59,17 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         } else if text.trim().is_empty() || !open {
             head_line(text, &mut header, source)?;
         } else if let Some(page) = pages.last_mut() {
-            open = table_line(page, text, line, source)?;
+            // What is left of a number can be another one.
+            open = Some(line) == unfinished || table_line(page, text, line, source)?;
         }
     }
+    // A table ends with its line of forces.
+    let cut = pages.pop_if(|_| open).map(|page| format!("the table of picture {} is not complete", page.number));
     if let Some(page) = pages.iter().find(|page| page.rows.is_empty()) {
         let field = format!("the table of picture {}", page.number);
         return Err(source.missing(&field, "a line of column numbers and lines of readings follow Pict-No."));
     }
-    assemble(header, pages, source)
+    Ok(Recording { cut, ..assemble(header, pages, source)? })
 }
 
 /// Takes pitch, period and matrix from a line above a table.
@@ -169,6 +173,7 @@ fn assemble(header: Header, pages: Vec<Page>, source: &Source) -> Result<Recordi
         missing: Vec::new(),
         layout: None,
         left_out: Vec::new(),
+        cut: None,
         frames,
     })
 }

@@ -28,8 +28,13 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
     let header = header(&text, source)?;
     let [count, rows, cols] = dimensions(&header.shape, size, source)?;
     let taxels = rows * cols;
-    let wanted = count.checked_mul(taxels).and_then(|values| values.checked_mul(header.number.width));
-    if wanted != Some(data.len()) {
+    let frame_bytes = taxels.checked_mul(header.number.width);
+    let wanted = frame_bytes.and_then(|bytes| bytes.checked_mul(count));
+    // Frames stand one after the other but in the order of Fortran.
+    let whole = frame_bytes.filter(|_| !header.fortran).map_or(0, |bytes| data.len() / bytes);
+    let cut = wanted.is_some_and(|wanted| data.len() < wanted).then(|| format!("the header states {count} frames"));
+    let count = if cut.is_some() { whole } else { count };
+    if cut.is_none() && wanted != Some(data.len()) {
         let allowed = format!("the number of bytes of shape {:?}", header.shape);
         return Err(source.field("bytes behind the NumPy header", data.len(), allowed));
     }
@@ -56,7 +61,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         }
         frames.push(RawFrame { number: frame + 1, time_s: None, values, stated: None, device: None });
     }
-    Ok(Recording::bare(Format::Npy, [rows, cols], frames))
+    Ok(Recording { cut, ..Recording::bare(Format::Npy, [rows, cols], frames) })
 }
 
 /// Text of the header, and the bytes behind it.

@@ -56,6 +56,8 @@ pub(super) struct Recording {
     pub layout: Option<String>,
     /// Lines of a plain text that hold no frame, with the reason.
     pub left_out: Vec<String>,
+    /// Where the file ends too early, in words; the frames are those that are whole.
+    pub cut: Option<String>,
     pub frames: Vec<RawFrame>,
 }
 
@@ -74,6 +76,7 @@ impl Recording {
             missing: Vec::new(),
             layout: None,
             left_out: Vec::new(),
+            cut: None,
             frames,
         }
     }
@@ -96,6 +99,11 @@ pub(super) fn sensel(source: &Source, line: usize, column: usize, cell: &str) ->
 /// Whether a number is finite and small enough.
 pub(super) fn is_reading(value: f64) -> bool {
     value.abs() <= LARGEST_READING
+}
+
+/// The number of a last line that has no end, if there is one: the text may be cut within it.
+pub(super) fn unfinished(text: &str) -> Option<usize> {
+    (!text.is_empty() && !text.ends_with('\n')).then(|| text.lines().count())
 }
 
 /// Checks rows or columns against [`LARGEST_SIDE`].

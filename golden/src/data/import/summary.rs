@@ -68,6 +68,9 @@ pub struct Summary {
     /// Lines of a plain text that hold no frame, with the reason.
     #[serde(default)]
     pub lines_left_out: Vec<String>,
+    /// Where the file ends too early, in words; the frames are those that are whole.
+    #[serde(default)]
+    pub cut: Option<String>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
     /// Zero, sign and orientation that were corrected.

@@ -11,15 +11,22 @@
 //! | `SENSOR_TYPE` | name of the device |
 //!
 //! A frame starts with `Frame N`, in the CSV with time and `Raw Sum=` behind it, and has `ROWS` lines; `@@` ends the
-//! file. MIRROR_ROW and MIRROR_COL are not applied: the rows stay as the file has them.
+//! file: without it the file is cut. A spreadsheet that has saved the file again has filled its lines with empty cells, or separates by
+//! semicolons and writes decimal commas.
+//!
+//! `COMMENTS:` begins lines of text. Keys that stand before it count; of another one that stands behind it, the last one with a
+//! value that is allowed, because more keys follow the text. MIRROR_ROW and MIRROR_COL are not applied: the rows stay as the file has them.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, side, unfinished, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
+use crate::data::text::{point, Separator};
 
 /// Width of Tekscan's counts.
 const BITS: u32 = 8;
+/// What fills lines that a spreadsheet has saved.
+const FILL: [char; 2] = [',', ';'];
 
 /// Keys of the header that are used.
 #[derive(Default)]
@@ -41,34 +48,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         count.ok_or_else(|| source.missing(key, "the header of a Tekscan file states it before ASCII_DATA"))
     };
     let (rows, cols) = (size(header.rows, "ROWS")?, size(header.cols, "COLS")?);
-    let mut frames: Vec<RawFrame> = Vec::new();
-    let mut left = 0;
-    let mut last = 0;
-    for (line, text) in lines.filter(|(_, text)| !text.is_empty()) {
-        last = line;
-        if text == "@@" {
-            break;
-        }
-        if left == 0 {
-            frames.push(frame_line(text, line, header.period_s, source)?);
-            left = rows;
-            continue;
-        }
-        let cells = text.split(',');
-        let got = cells.clone().count();
-        if got != cols {
-            return Err(source.line(line, text, format!("{cols} values separated by commas (COLS), not {got}")));
-        }
-        let values = &mut frames.last_mut().ok_or_else(|| source.line(line, text, "Frame 1"))?.values;
-        for (column, cell) in cells.enumerate() {
-            values.push(sensel(source, line, column + 1, cell)?);
-        }
-        left -= 1;
-    }
-    if left > 0 {
-        let number = frames.last().map_or(0, |frame| frame.number);
-        return Err(source.line(last, "end of file", format!("{left} more rows of frame {number}, which has {rows}")));
-    }
+    let (frames, cut) = frames(lines, [rows, cols], header.period_s, unfinished(text), source)?;
     let [x, y] = header.pitch_mm;
     Ok(Recording {
         format: Format::Tekscan,
@@ -82,45 +62,131 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         missing: Vec::new(),
         layout: None,
         left_out: Vec::new(),
+        cut,
         frames,
     })
+}
+
+/// The frames that are whole, and why the file ends too early, if it does; `unfinished` is the number of a last line without end.
+fn frames<'a>(
+    lines: impl Iterator<Item = (usize, &'a str)>,
+    [rows, cols]: [usize; 2],
+    period_s: Option<f64>,
+    unfinished: Option<usize>,
+    source: &Source,
+) -> Result<(Vec<RawFrame>, Option<String>), ImportError> {
+    let (mut frames, mut left): (Vec<RawFrame>, usize) = (Vec::new(), 0);
+    for (line, text) in lines.filter(|(_, text)| !text.is_empty()) {
+        let bare = text.trim_end_matches(FILL);
+        if bare == "@@" && left == 0 {
+            return Ok((frames, None));
+        }
+        if Some(line) == unfinished {
+            // What is left of a number can be another one.
+            left += usize::from(left == 0);
+            break;
+        }
+        match frames.last_mut().filter(|_| left > 0) {
+            Some(frame) => {
+                row(text, line, cols, &mut frame.values, source)?;
+                left -= 1;
+            }
+            None if bare.is_empty() => (),
+            None => {
+                frames.push(frame_line(text, line, period_s, source)?);
+                left = rows;
+            }
+        }
+    }
+    let cut = match left {
+        0 => "the end mark @@ is missing".to_owned(),
+        _ => frames.pop().map_or("no frame".to_owned(), |frame| format!("frame {} is not complete", frame.number)),
+    };
+    Ok((frames, Some(cut)))
+}
+
+/// Takes a row of `cols` readings; empty cells behind them fill the line.
+fn row(text: &str, line: usize, cols: usize, values: &mut Vec<f64>, source: &Source) -> Result<(), ImportError> {
+    let separator = separator(text);
+    let mut cells = separator.cells(text);
+    while cells.len() > cols && cells.last().is_some_and(|cell| cell.is_empty()) {
+        cells.pop();
+    }
+    if cells.len() != cols {
+        let wanted = format!("{cols} values separated by {separator} (COLS), not {}", cells.len());
+        return Err(source.line(line, text, wanted));
+    }
+    for (column, cell) in cells.iter().enumerate() {
+        values.push(sensel(source, line, column + 1, &point(cell))?);
+    }
+    Ok(())
+}
+
+/// What separates the cells of a line.
+fn separator(text: &str) -> Separator {
+    if text.contains(';') {
+        Separator::Semicolon
+    } else {
+        Separator::Comma
+    }
 }
 
 /// Reads the header up to `ASCII_DATA`.
 fn header<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, source: &Source) -> Result<Header, ImportError> {
     let mut header = Header::default();
-    let length = |key: &str, text: &str| millimetres(text).ok_or_else(|| source.field(key, text, LENGTHS));
+    // Keys before the comments, and whether these have begun.
+    let (mut stated, mut comments) = (Vec::new(), false);
     for (_, line) in lines {
+        let line = line.trim_end_matches(FILL);
         let (key, value) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let value = value.trim();
         match key {
-            "ASCII_DATA" => return Ok(header),
-            "ROWS" => header.rows = Some(side(source, key, value)?),
-            "COLS" => header.cols = Some(side(source, key, value)?),
-            // Columns are apart along x.
-            "COL_SPACING" => header.pitch_mm[0] = Some(length(key, value)?),
-            "ROW_SPACING" => header.pitch_mm[1] = Some(length(key, value)?),
-            "UNITS" => {
-                let unit = Unit::named(value);
-                header.unit = Some(unit.ok_or_else(|| source.field(key, value, format!("one of {}", Unit::names())))?);
+            "ASCII_DATA" if !comments || ["", "@@"].contains(&value) => return Ok(header),
+            "COMMENTS" | "COMMENTS:" => comments = true,
+            _ if !comments => {
+                header.key(key, value, source)?;
+                stated.push(key);
             }
-            "SECONDS_PER_FRAME" => {
-                let seconds = value.parse().ok().filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite());
-                header.period_s = Some(seconds.ok_or_else(|| source.field(key, value, "a number above 0"))?);
-            }
-            "SATURATION_PRESSURE" => header.saturation = Some(value.to_string()),
-            "SENSOR_TYPE" => header.device = Some(format!("Tekscan {value}")),
-            _ => {}
+            // A line of a comment may begin with a word that is a key; its value is hardly one.
+            _ if !stated.contains(&key) => header.key(key, value, source).unwrap_or(()),
+            _ => (),
         }
     }
     Err(source.missing("ASCII_DATA", "a Tekscan file has it between header and frames"))
+}
+
+impl Header {
+    /// Takes a key and its value; one that is not used is none.
+    fn key(&mut self, key: &str, value: &str, source: &Source) -> Result<(), ImportError> {
+        let length = || millimetres(value).ok_or_else(|| source.field(key, value, LENGTHS));
+        match key {
+            "ROWS" => self.rows = Some(side(source, key, value)?),
+            "COLS" => self.cols = Some(side(source, key, value)?),
+            // Columns are apart along x.
+            "COL_SPACING" => self.pitch_mm[0] = Some(length()?),
+            "ROW_SPACING" => self.pitch_mm[1] = Some(length()?),
+            "UNITS" => {
+                let unit = Unit::named(value);
+                self.unit = Some(unit.ok_or_else(|| source.field(key, value, format!("one of {}", Unit::names())))?);
+            }
+            "SECONDS_PER_FRAME" => {
+                let seconds = point(value).parse().ok().filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite());
+                self.period_s = Some(seconds.ok_or_else(|| source.field(key, value, "a number above 0"))?);
+            }
+            "SATURATION_PRESSURE" => self.saturation = Some(value.to_string()),
+            "SENSOR_TYPE" => self.device = Some(format!("Tekscan {value}")),
+            _ => {}
+        }
+        Ok(())
+    }
 }
 
 /// `Frame N`, or `Frame N, seconds,, …, Raw Sum=,, sum`.
 fn frame_line(text: &str, line: usize, period_s: Option<f64>, source: &Source) -> Result<RawFrame, ImportError> {
     let wrong = || source.line(line, text, "a line that starts with \"Frame\" and a number, or @@");
     let rest = text.strip_prefix("Frame").ok_or_else(wrong)?;
-    let mut cells = rest.split(',').map(str::trim);
+    let cells = separator(rest).cells(rest);
+    let mut cells = cells.iter().map(|cell| point(cell));
     let number: usize = cells.next().and_then(|number| number.parse().ok()).ok_or_else(wrong)?;
     let own_time = cells.next().and_then(|seconds| seconds.parse().ok());
     let sum = cells.skip_while(|cell| *cell != "Raw Sum=").skip(1).find(|cell| !cell.is_empty());
@@ -139,5 +205,5 @@ fn frame_line(text: &str, line: usize, period_s: Option<f64>, source: &Source) -
 fn saturation(text: &str, unit: Option<Unit>) -> Option<f64> {
     let (number, own) = text.split_once(char::is_whitespace)?;
     let same = unit.is_some() && Unit::named(own) == unit && unit != Some(Unit::Raw);
-    number.parse().ok().filter(|number: &f64| same && *number > 0.0 && number.is_finite())
+    point(number).parse().ok().filter(|number: &f64| same && *number > 0.0 && number.is_finite())
 }

@@ -69,8 +69,8 @@ impl Header {
 pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportError> {
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line));
     let (mut header, mut frames, mut shape) = (Header::default(), Vec::new(), None);
-    let mut last = 0;
-    while let Some((line, text)) = lines.next() {
+    let (mut last, mut cut) = (0, None);
+    'frames: while let Some((line, text)) = lines.next() {
         last = line;
         if cell(text.split(',').next().unwrap_or("")) != "SENSELS" {
             header.read(text, source)?;
@@ -83,10 +83,14 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         // Grown with the file: a header may state more than there is.
         let mut values = Vec::new();
         for row in 0..rows {
-            let Some((line, text)) = lines.next().filter(|(_, text)| !text.trim().is_empty()) else {
-                let allowed = format!("{rows} rows below SENSELS, not {row}");
-                return Err(source.line(line + row, "end of the frame", allowed));
+            let Some((line, text)) = lines.next() else {
+                cut = Some(format!("the last frame has {row} of {rows} rows"));
+                break 'frames;
             };
+            if text.trim().is_empty() {
+                let allowed = format!("{rows} rows below SENSELS, not {row}");
+                return Err(source.line(line, "end of the frame", allowed));
+            }
             let cells: Vec<&str> = text.split(',').collect();
             if cells.len() < cols || cells[cols..].iter().any(|cell| !cell.trim().is_empty()) {
                 return Err(source.line(line, text, format!("{cols} values separated by commas (Columns)")));
@@ -105,6 +109,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         device: Some("XSENSOR".into()),
         pitch_mm: x.zip(y).map(|(x, y)| [x, y]),
         unit: header.unit,
+        cut,
         ..Recording::bare(Format::Xsensor, shape, frames)
     })
 }

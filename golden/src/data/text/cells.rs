@@ -25,7 +25,7 @@ impl Separator {
     pub const ALL: [Separator; 4] = [Separator::Semicolon, Separator::Tab, Separator::Comma, Separator::Blank];
 
     /// The cells of a line, without blanks around them and without quotes.
-    pub(super) fn cells(self, line: &str) -> Vec<Cow<'_, str>> {
+    pub(crate) fn cells(self, line: &str) -> Vec<Cow<'_, str>> {
         let byte = match self {
             Separator::Semicolon => b';',
             Separator::Tab => b'\t',
@@ -170,7 +170,7 @@ impl Digits {
 }
 
 /// A cell with a decimal point.
-pub(super) fn point(cell: &str) -> Cow<'_, str> {
+pub(crate) fn point(cell: &str) -> Cow<'_, str> {
     match cell.contains(',') && !cell.contains('.') {
         true => Cow::Owned(cell.trim().replacen(',', ".", 1)),
         false => Cow::Borrowed(cell.trim()),

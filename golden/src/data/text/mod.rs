@@ -34,6 +34,7 @@ mod reader;
 mod tests;
 mod time;
 
+pub(crate) use cells::point;
 pub use cells::{reading, Separator};
 pub use layout::{Form, Layout, Stated};
 pub(crate) use reader::without_nan;
