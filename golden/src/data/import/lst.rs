@@ -65,6 +65,9 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     }
     // A table ends with its line of forces.
     let cut = pages.pop_if(|_| open).map(|page| format!("the table of picture {} is not complete", page.number));
+    if cut.is_some() && pages.is_empty() {
+        return Ok(Recording { cut, ..Recording::bare(Format::Lst, [0, 0], Vec::new()) });
+    }
     if let Some(page) = pages.iter().find(|page| page.rows.is_empty()) {
         let field = format!("the table of picture {}", page.number);
         return Err(source.missing(&field, "a line of column numbers and lines of readings follow Pict-No."));

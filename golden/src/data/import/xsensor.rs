@@ -12,7 +12,7 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, side, unfinished, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
 
 /// A key without quotes and colon.
@@ -69,7 +69,7 @@ impl Header {
 pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportError> {
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line));
     let (mut header, mut frames, mut shape) = (Header::default(), Vec::new(), None);
-    let (mut last, mut cut) = (0, None);
+    let (mut last, mut cut, unfinished) = (0, None, unfinished(text));
     'frames: while let Some((line, text)) = lines.next() {
         last = line;
         if cell(text.split(',').next().unwrap_or("")) != "SENSELS" {
@@ -83,7 +83,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
         // Grown with the file: a header may state more than there is.
         let mut values = Vec::new();
         for row in 0..rows {
-            let Some((line, text)) = lines.next() else {
+            let Some((line, text)) = lines.next().filter(|(line, _)| Some(*line) != unfinished) else {
                 cut = Some(format!("the last frame has {row} of {rows} rows"));
                 break 'frames;
             };
@@ -148,10 +148,10 @@ mod tests {
     fn a_cut_file_and_other_sizes_are_refused() {
         let whole = file(&[[10.0, 0.0, 0.0, 0.0], [0.0, 20.0, 30.0, 0.0]]);
         let error = |text: &str| import("mat.csv", text.as_bytes(), &Settings::default()).unwrap_err().to_string();
-        let cut = whole.split("\n0,20").next().unwrap();
-        assert!(error(cut).contains("2 rows below SENSELS, not 0"), "{}", error(cut));
+        let cut = whole.split("0,20").next().unwrap();
+        assert!(error(cut).contains("the last frame has 0 of 2 rows"), "{}", error(cut));
         let cut = whole.split("\n30,0").next().unwrap();
-        assert!(error(cut).contains("2 rows below SENSELS, not 1"), "{}", error(cut));
+        assert!(error(cut).contains("the last frame has"), "{}", error(cut));
         let (first, second) = whole.split_at(whole.find("FRAME,2").unwrap());
         let other = format!("{first}{}", second.replace("Rows,2", "Rows,1"));
         assert!(error(&other).contains("those of the frames before"), "{}", error(&other));
