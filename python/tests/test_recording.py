@@ -86,14 +86,14 @@ def contacts(result: dict[str, Any]) -> list[tuple[list[float], list[float]]]:
     return [] if "no-contact" in result["flags"] else [(whole["compression_centroid_mm"], result["resultant_N"])]
 
 
-def check_header(header: Any, received_s: float) -> None:
+def check_header(header: Any, time_ns: int) -> None:
     assert header.frame_id == "dermis"
     assert 0 <= header.stamp.nanosec < 10**9
-    assert header.stamp.sec * 10**9 + header.stamp.nanosec == round(received_s * 1e9)
+    assert header.stamp.sec * 10**9 + header.stamp.nanosec == time_ns
 
 
 def check_image(image: Any, result: dict[str, Any], frame: np.ndarray, topic: str) -> None:
-    check_header(image.header, result["received_s"])
+    check_header(image.header, result["time_ns"])
     kind = {"/dermis/stress": np.dtype("<f4"), "/dermis/stress_exact": np.dtype("<f8")}[topic]
     assert (image.height, image.width, image.step) == (ROWS, COLS, kind.itemsize * COLS)
     assert (image.encoding, image.is_bigendian) == (f"{8 * kind.itemsize}FC1", 0)
@@ -101,7 +101,7 @@ def check_image(image: Any, result: dict[str, Any], frame: np.ndarray, topic: st
 
 
 def check_cloud(cloud: Any, result: dict[str, Any]) -> None:
-    check_header(cloud.header, result["received_s"])
+    check_header(cloud.header, result["time_ns"])
     assert (cloud.height, cloud.width, cloud.is_bigendian) == (ROWS, COLS, False)
     wanted = {"x": 7, "y": 7, "z": 7, "fx": 8, "fy": 8, "fz": 8}
     ratios: dict[str, np.ndarray] = {}
@@ -139,7 +139,7 @@ def check_cloud(cloud: Any, result: dict[str, Any]) -> None:
 
 
 def check_wrench(stamped: Any, result: dict[str, Any], number: int) -> None:
-    check_header(stamped.header, result["received_s"])
+    check_header(stamped.header, result["time_ns"])
     (x, y), (fx, fy, fz) = contacts(result)[number - 1]
     force, torque = stamped.wrench.force, stamped.wrench.torque
     assert [force.x, force.y, force.z] == [fx, fy, fz]
@@ -169,7 +169,7 @@ def check_arrows(array: Any, result: dict[str, Any]) -> None:
         assert own.type == 5 and np.allclose([vector(point) for point in own.points], wanted, rtol=1e-12, atol=1e-15)
     assert [own.id for own in arrows] == list(range(1, len(found) + 1))
     for own, (centre_mm, force_N) in zip(arrows, found, strict=True):
-        check_header(own.header, result["received_s"])
+        check_header(own.header, result["time_ns"])
         start, end = (np.array(vector(point)) for point in own.points)
         assert own.type == 0 and np.allclose(start, [*(np.array(centre_mm) * 1e-3), 0.0], rtol=1e-12)
         assert np.allclose(end - start, np.array(force_N) * metres_per_N, rtol=1e-9, atol=1e-15)
