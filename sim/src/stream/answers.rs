@@ -525,7 +525,7 @@ mod tests {
         assert!(counts.to_string().ends_with(words), "{counts}");
     }
 
-    /// An engine whose results take a millisecond, and any time by a clock of its own.
+    /// An engine whose results take three milliseconds, and any time by a clock of its own.
     struct Slow {
         engine: Box<dyn Engine>,
         now_ms: Arc<AtomicU64>,
@@ -546,7 +546,8 @@ mod tests {
         }
 
         fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-            std::thread::sleep(Duration::from_millis(1));
+            // Long enough for the reader to fill the queue on a busy machine.
+            std::thread::sleep(Duration::from_millis(3));
             self.now_ms.fetch_add(self.cost_ms, Ordering::Relaxed);
             self.engine.reconstruct_after(state, frames)
         }
