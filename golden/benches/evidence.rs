@@ -17,7 +17,7 @@
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Draws};
-use dermis_golden::data::generator::presses::{press, Motion};
+use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::engine::{Engine, State};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::result::errors::Errors;
@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let [cold_ms, cold_worst] = spread(&mut times);
             let mut times = Vec::new();
             for (number, motion) in (0..).zip(MOTIONS) {
-                let frames = press(&scene, number, motion, count / MOTIONS.len(), noise)?;
+                let frames = Press::new(motion).of_frames(count / MOTIONS.len(), noise).frames(&scene, number)?;
                 times.extend(results(&evidence, &frames, true)?.1);
             }
             let [warm_ms, warm_worst] = spread(&mut times);

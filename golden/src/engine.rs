@@ -13,16 +13,15 @@ mod cross_check;
 mod stream_checks;
 #[cfg(test)]
 mod tests;
+mod tracks;
 
 pub use checked_engine::CheckedEngine;
 pub use cross_check::{CrossCheck, Finding};
 pub use stream_checks::{CheckPace, StreamChecks};
 
 use crate::data::frame::Frame;
-use crate::data::input::drift::Drift;
 use crate::data::input::Input;
-use crate::estimate::evidence::LastFit;
-use crate::estimate::float::{Golden, GoldenError};
+use crate::estimate::float::{Golden, GoldenError, Past};
 use crate::fixed::stages::prepare::Prepared;
 use crate::fixed::{FixedError, Model};
 use crate::result::reconstruct::Reconstruction;
@@ -47,12 +46,10 @@ pub enum EngineError {
 /// What an engine has of the frames of a stream so far; the default is that after a reset.
 #[derive(Clone, Debug, Default)]
 pub struct State {
-    /// How far zeros have moved.
-    drift: Drift,
+    /// What they leave to the floating-point model.
+    past: Past,
     /// The state of the hardware, for its bit-true model.
     prepared: Option<Prepared>,
-    /// The fit of the last frame, for the estimator `evidence`.
-    last: Option<LastFit>,
     /// Whether there were frames.
     begun: bool,
 }
@@ -75,7 +72,7 @@ pub trait Engine {
     /// The estimator that the engine computes.
     fn estimator(&self) -> EstimatorKind;
 
-    /// The forces of the mean of 2^k frames, k the scene's `input.average`; with a sliding mean of all frames so far. Where
+    /// The forces of the mean of 2^k frames, k the scene's `input.average`; with a mean that slides of all frames so far. Where
     /// zeros run, the frames are all since a reset, and the mean is of the last 2^k.
     ///
     /// # Errors
@@ -84,8 +81,7 @@ pub trait Engine {
         self.reconstruct_after(&mut State::default(), frames)
     }
 
-    /// The same where frames came before, of which `state` is; it is then that after these frames. Of a sliding mean all frames
-    /// are given, with the state after a reset.
+    /// The same where frames came before, of which `state` is; it is then that after these frames.
     ///
     /// # Errors
     /// As [`Engine::reconstruct`]; a device that begins with a reset.
@@ -115,7 +111,7 @@ impl Engine for Golden {
     }
 
     fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        Ok(self.run_after(&mut state.drift, &mut state.last, frames)?)
+        Ok(self.run_after(&mut state.past, frames)?)
     }
 }
 
@@ -134,6 +130,6 @@ impl Engine for Model {
 
     fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
         let prepared = state.prepared.get_or_insert_with(|| self.prepare.empty());
-        Ok(Model::reconstruct_after(self, &mut state.drift, prepared, frames)?)
+        Ok(Model::reconstruct_after(self, &mut state.past.memory, prepared, frames)?)
     }
 }

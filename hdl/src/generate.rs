@@ -300,7 +300,7 @@ fn manifest(
                 "layout": model.table_layout(),
             })),
             "average": model.prepare.average,
-            "mean": model.prepare.mean,
+            "mean": model.prepare.mean.name(),
             "full_scale_readings": full_scale.map(|full_scale| full_scale * model.prepare.reading_per_MPa),
             "full_scale_MPa": full_scale,
             "noise_floor_codes": model.noise_floor,

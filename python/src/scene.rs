@@ -10,7 +10,6 @@ use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::spec::scene::Scene as Spec;
 use dermis_sim::batch::Batch;
 use dermis_sim::engine::{self, EngineName, Engines};
-use dermis_sim::stream::require_blocks;
 use numpy::{PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -155,7 +154,7 @@ impl Scene {
         self.spec.hardware_estimator().name()
     }
 
-    /// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean.
+    /// Number of frames that one result takes: 2^average of a block, 1 of a mean that slides.
     #[getter]
     fn frames_per_result(&self) -> usize {
         self.spec.input.frames_per_result()
@@ -202,7 +201,7 @@ impl Scene {
     ///     Of one frame; equal to what `dermis reconstruct` prints, to the last bit.
     /// Reconstructions
     ///     Of frames with an axis of time, a sequence: one result per frame; with input.average = k one per 2^k frames;
-    ///     with input.mean = "sliding" one per frame, of the mean of all frames up to it. With input.zero = "running"
+    ///     with input.mean = "sliding" or "adaptive" one per frame, of all frames up to it. With input.zero = "running"
     ///     the zero follows the readings from the first of them on.
     ///
     /// Raises
@@ -305,11 +304,10 @@ impl Scene {
     /// Raises
     /// ------
     /// InputError
-    ///     A scene that the model refuses, or with a sliding mean.
+    ///     A scene that the model refuses.
     #[pyo3(signature = (engine = "golden", *, cross_check = 1))]
     fn tracker(&self, py: Python<'_>, engine: &str, cross_check: u64) -> PyResult<Tracker> {
         let name = EngineName::software(engine).map_err(model)?;
-        require_blocks(&self.spec).map_err(model)?;
         let begin = || {
             let engine = self.engines.of_stream(name, &self.spec)?;
             anyhow::Ok(Tracker::new(&self.spec, engine, CheckPace::Every(cross_check)))

@@ -156,6 +156,18 @@ def test_blocks_and_sliding_means_have_their_frames() -> None:
         scene.reconstruct(stress[0])
     sliding = dermis.Scene.from_toml(text + 'mean = "sliding"\n').reconstruct(stress)
     assert [result.to_dict()["mean_frames"] for result in sliding] == [1, 2, 3, 3]
+    with dermis.Scene.from_toml(text + 'mean = "sliding"\n').tracker() as tracker:
+        assert [tracker.push(frame).to_dict() for frame in stress] == [result.to_dict() for result in sliding]
+
+
+def test_an_adaptive_mean_follows_a_press() -> None:
+    text = SMALL + '[input]\nmean = "adaptive"\n'
+    stress = np.repeat(dermis.Scene.from_name("eight-by-eight").frames[1].stress_MPa[None], 12, axis=0)
+    results = [result.to_dict() for result in dermis.Scene.from_toml(text).reconstruct(stress)]
+    assert [result["mean_frames"] for result in results][:3] == [1, 2, 3]
+    assert results[11]["template"] == {"held": True, "residual": pytest.approx(0.46, abs=0.5)}
+    [track] = results[11]["tracks"]
+    assert (track["number"], track["age"], track["moving"]) == (1, 12, False)
 
 
 def test_the_interpreter_is_free_while_a_model_computes() -> None:
@@ -215,10 +227,10 @@ def test_a_batch_of_another_shape_or_of_frames_that_depend_on_each_other_is_refu
     stress[2, 0, 0] = np.inf
     with pytest.raises(dermis.InputError, match="frame 2"):
         scene.reconstruct_many(stress)
-    sliding = dermis.Scene.from_toml(SMALL + '[input]\naverage = 1\nmean = "sliding"\n')
-    for refused in (lambda: sliding.reconstruct_many(stress), lambda: sliding.tracker()):
-        with pytest.raises(dermis.InputError, match=r'input.mean = "sliding"'):
-            refused()
+    for mean in ('average = 1\nmean = "sliding"', 'mean = "adaptive"'):
+        slides = dermis.Scene.from_toml(SMALL + f"[input]\n{mean}\n")
+        with pytest.raises(dermis.InputError, match=r"input.mean = "):
+            slides.reconstruct_many(stress)
 
 
 def test_a_batch_reads_the_array_where_it_stands() -> None:

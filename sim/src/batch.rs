@@ -45,9 +45,8 @@ impl<'a> Batch<'a> {
         cross_check: bool,
     ) -> Result<Batch<'a>> {
         let input = &scene.input;
-        for (field, depends) in
-            [("mean = \"sliding\"", input.slides()), ("zero = \"running\"", input.running_zero().is_some())]
-        {
+        let mean = format!("mean = \"{}\"", input.mean.name());
+        for (field, depends) in [(&*mean, input.slides()), ("zero = \"running\"", input.running_zero().is_some())] {
             if depends {
                 bail!("scene {}: input.{field} needs the frames before: not available in a batch", scene.name);
             }

@@ -36,6 +36,7 @@ pages! {
     "c.md" c,
     "accuracy.md" accuracy,
     "limits.md" limits,
+    "over-time.md" over_time,
     "partitions.md" partitions,
     "stability.md" stability,
     "robustness.md" robustness,

@@ -8,7 +8,8 @@
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
-//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::spec::sliding) |
+//! | `mean = "adaptive"` | the same, of a length that follows how fast readings change, [`adaptive`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
@@ -21,9 +22,13 @@
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
+pub mod adaptive;
 pub mod calibration;
+pub mod change_noise;
 pub mod drift;
 pub mod known_loads;
+pub mod means;
+pub mod memory;
 pub mod missing;
 pub mod running_zero;
 pub mod tare;
@@ -32,11 +37,11 @@ mod tests;
 pub mod unloaded;
 
 use crate::data::frame::{Frame, FrameError};
-use crate::spec::scene::{InputSpec, Scene};
-use crate::spec::sliding;
+use crate::spec::scene::{InputSpec, MeanKind, Scene};
 use calibration::{Calibration, CalibrationError};
-use drift::Drift;
-use missing::{mean_reading, readings};
+use means::Means;
+use memory::{Averaged, Memory};
+use missing::mean_reading;
 use std::borrow::Cow;
 use tare::Tare;
 use thiserror::Error;
@@ -50,6 +55,8 @@ pub struct Input {
     stated_noise_MPa: f64,
     /// The same of each taxel, from tare frames, and the number of those; `None` where the scene states it.
     taxel_noise_MPa: Option<(Vec<f64>, usize)>,
+    /// Columns of the array.
+    cols: usize,
     /// The largest |gain|, of which a code and the limit of a running zero are.
     largest_gain: f64,
     spec: InputSpec,
@@ -89,7 +96,8 @@ impl Input {
         let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
         let stated_noise_MPa = scene.search.noise_floor_MPa();
         let largest_gain = scene.hardware.largest_gain(table.as_ref().map(|table| table.gain.as_slice()));
-        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, largest_gain, spec: spec.clone() };
+        let (cols, spec) = (scene.sensor.cols, spec.clone());
+        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, cols, largest_gain, spec };
         if table.is_none() && tare.is_none() {
             return Ok(input);
         }
@@ -105,16 +113,15 @@ impl Input {
     /// Standard deviation in MPa of a taxel of a calibrated mean, of a sliding one of many frames: as the scene states it,
     /// else as the tare frames show it, the root mean square over the taxels; 0 if neither does.
     pub fn noise_MPa(&self) -> f64 {
-        self.noise_of_mean_MPa(usize::MAX)
+        self.noise_of_mean_MPa(self.spec.settled_variance())
     }
 
-    /// The same for the mean of the `frames` frames so far, at least one; a block always has its 2^k.
-    pub fn noise_of_mean_MPa(&self, frames: usize) -> f64 {
-        let share = self.spec.variance_share(frames);
+    /// The same for a mean of this `variance`, over that of a frame.
+    pub fn noise_of_mean_MPa(&self, variance: f64) -> f64 {
         match &self.taxel_noise_MPa {
             // The zero has noise of its own, that of a mean of the tare frames.
-            Some((noise, taken)) => root_mean_square(noise) * (share + 1.0 / *taken as f64).sqrt(),
-            None => self.stated_noise_MPa * share.sqrt(),
+            Some((noise, taken)) => root_mean_square(noise) * (variance + 1.0 / *taken as f64).sqrt(),
+            None => self.stated_noise_MPa * variance.sqrt(),
         }
     }
 
@@ -127,22 +134,22 @@ impl Input {
     }
 
     /// The mean of frames, each checked against the scene. Of a block of 2^k frames, id and known forces are those of the
-    /// first; of a sliding mean, of all frames since the start, those of the last. Where zeros run, the frames are all since a
+    /// first; else, of all frames since the start, those of the last. Where zeros run, the frames are all since a
     /// reset. A taxel counts in the frames that have its reading; it is missing in the mean if none has it, where its value is
     /// that of [`Input::complete`].
     ///
     /// # Errors
-    /// [`InputError::Count`] unless there are 2^k frames, where zeros run a multiple of them, of a sliding mean at least one;
+    /// [`InputError::Count`] unless there are 2^k frames, where zeros run a multiple of them, of a mean that slides at least one;
     /// [`InputError::Frame`] if one is not of the scene's sensor.
     pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
-        self.average_after(&mut Drift::default(), scene, frames)
+        Ok(self.average_after(&mut Memory::default(), scene, frames)?.mean)
     }
 
-    /// The same where zeros have a `drift` before the frames, which is then that after them.
+    /// The same where `memory` is of the frames before, which is then that after these.
     ///
     /// # Errors
     /// As [`Input::average`].
-    pub fn average_after(&self, drift: &mut Drift, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
+    pub fn average_after(&self, memory: &mut Memory, scene: &Scene, frames: &[Frame]) -> Result<Averaged, InputError> {
         let (average, wanted, got) = (self.spec.average, self.spec.frames_per_result(), frames.len());
         let count = || InputError::Count { scene: scene.name.clone(), average, wanted, got };
         let fits = match self.spec.has_memory() {
@@ -150,29 +157,81 @@ impl Input {
             false => got == wanted,
         };
         frames.iter().try_for_each(|frame| frame.check(scene))?;
-        let all = self.without_drift(drift, if fits { frames } else { &[] });
-        let newest = self.spec.newest(&all);
-        let ([first, ..], [.., last]) = (newest, newest) else { return Err(count()) };
-        let missing = missing_in_all(newest);
-        let complete = self.complete(newest);
-        if self.spec.slides() {
-            let mut mean = vec![0.0; first.stress_MPa.len()];
-            for (number, frame) in (1..).zip(&*complete) {
-                sliding::add(&mut mean, &frame.stress_MPa, number, average);
+        if self.spec.mean == MeanKind::Block {
+            let all = self.without_drift(&mut memory.drift, if fits { frames } else { &[] });
+            let newest = self.spec.newest(&all);
+            let first = newest.first().ok_or_else(count)?;
+            let mut mean = Frame { missing: missing_in_all(newest), ..first.clone() };
+            let complete = self.complete(newest);
+            for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
+                // Divided before adding, so that the sum does not overflow.
+                *b = complete.iter().map(|frame| frame.stress_MPa[index] / wanted as f64).sum();
             }
-            return Ok(Frame { stress_MPa: mean, missing, ..last.clone() });
+            let variance = self.spec.settled_variance();
+            return Ok(Averaged { mean, variance, frames_held: None, lag_frames: None });
         }
-        let mut mean = Frame { missing, ..first.clone() };
-        for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
-            // Divided before adding, so that the sum does not overflow.
-            *b = complete.iter().map(|frame| frame.stress_MPa[index] / wanted as f64).sum();
+        let mut averaged = Err(count());
+        for frame in frames {
+            averaged = Ok(self.slide(memory, frame));
         }
-        Ok(mean)
+        averaged
     }
 
-    /// The frames of one reconstruction, of the scene's sensor, with a value for each missing reading: of a block, the mean of the
-    /// frames that have it; of a sliding mean, the mean before it, or the first reading. Where no frame has it, it is what the
-    /// other taxels predict, see [`missing`].
+    /// The mean that slides, with one more frame.
+    fn slide(&self, memory: &mut Memory, frame: &Frame) -> Averaged {
+        let own = self.without_drift(&mut memory.drift, std::slice::from_ref(frame))[0].clone();
+        let complete = self.continued(memory, &own);
+        let taxels = frame.stress_MPa.len();
+        let means = memory.means.get_or_insert_with(|| Means::new(self.spec.averages(), taxels));
+        means.add(&complete.stress_MPa, |taxel| own.lacks(taxel));
+        let adapts = self.spec.mean == MeanKind::Adaptive;
+        let window = match adapts {
+            true => {
+                let stress_MPa = self.calibrate(&complete).stress_MPa;
+                memory.noise.add(&stress_MPa, taxels - self.spec.dead.len());
+                self.window(means, memory.noise.sigma_MPa(), &own)
+            }
+            false => means.longest(),
+        };
+        let mean = Frame { stress_MPa: means.mean(&window), missing: means.never_read(), ..own };
+        let frames_held = if adapts { Some(window.frames_held()) } else { self.spec.frames_held(means.frames()) };
+        let lag_frames = adapts.then_some(window.age);
+        Averaged { mean, variance: window.variance, frames_held, lag_frames }
+    }
+
+    /// A frame with a value for each missing reading: the mean so far, else what the other taxels predict.
+    fn continued(&self, memory: &Memory, frame: &Frame) -> Frame {
+        let mut own = frame.clone();
+        let before = |taxel: usize| memory.means.as_ref().and_then(|means| means.reading(taxel));
+        own.missing.retain(|&taxel| before(taxel).map(|mean| own.stress_MPa[taxel] = mean).is_none());
+        let complete = self.complete(std::slice::from_ref(&own)).into_owned().pop();
+        Frame { missing: frame.missing.clone(), ..complete.unwrap_or(own) }
+    }
+
+    /// The frames of a result as a device takes them: with a value for each missing reading, after those of which `memory` is.
+    pub fn complete_after(&self, memory: &Memory, frames: &[Frame]) -> Vec<Frame> {
+        if self.spec.mean == MeanKind::Block {
+            let results = frames.chunks(self.spec.frames_per_result());
+            return results.flat_map(|frames| self.complete(frames).into_owned()).collect();
+        }
+        let mut memory = memory.clone();
+        let next = |frame: &Frame| {
+            let moved = memory.drift.moved.clone();
+            let own = self.without_drift(&mut memory.drift.clone(), std::slice::from_ref(frame))[0].clone();
+            let mut complete = self.continued(&memory, &own);
+            for &taxel in &frame.missing {
+                complete.stress_MPa[taxel] += moved.get(taxel).unwrap_or(&0.0);
+            }
+            self.slide(&mut memory, frame);
+            let read =
+                |taxel: usize| if frame.lacks(taxel) { complete.stress_MPa[taxel] } else { frame.stress_MPa[taxel] };
+            Frame { stress_MPa: (0..frame.stress_MPa.len()).map(read).collect(), ..frame.clone() }
+        };
+        frames.iter().map(next).collect()
+    }
+
+    /// The frames of a block, of the scene's sensor, with a value for each missing reading: the mean of the frames that have it;
+    /// where none has it, it is what the other taxels predict, see [`missing`].
     pub fn complete<'a>(&self, frames: &'a [Frame]) -> Cow<'a, [Frame]> {
         if frames.iter().all(|frame| frame.missing.is_empty()) {
             return Cow::Borrowed(frames);
@@ -180,7 +239,8 @@ impl Input {
         let mut all = frames.to_vec();
         let missing: Vec<usize> = (0..all[0].stress_MPa.len()).filter(|k| frames.iter().any(|f| f.lacks(*k))).collect();
         for &taxel in &missing {
-            self.continue_taxel(frames, taxel, &mut all);
+            let Some(mean) = mean_reading(frames, taxel) else { continue };
+            all.iter_mut().filter(|frame| frame.lacks(taxel)).for_each(|frame| frame.stress_MPa[taxel] = mean);
         }
         // The prediction needs every other value of its frame, which the means have given.
         let nowhere = missing_in_all(frames);
@@ -190,22 +250,6 @@ impl Input {
             nowhere.iter().for_each(|&taxel| frame.stress_MPa[taxel] = self.reading(taxel, stress[taxel]));
         }
         Cow::Owned(all)
-    }
-
-    /// Writes into `all` what the `frames` that have a reading of `taxel` give the others; nothing where none has one.
-    fn continue_taxel(&self, frames: &[Frame], taxel: usize, all: &mut [Frame]) {
-        let slides = self.spec.slides();
-        let first = if slides { readings(frames, taxel).next() } else { mean_reading(frames, taxel) };
-        let Some(first) = first else { return };
-        let mut mean = [first];
-        for (number, frame) in (1..).zip(all) {
-            if frame.lacks(taxel) {
-                frame.stress_MPa[taxel] = mean[0];
-            }
-            if slides {
-                sliding::add(&mut mean, &[frame.stress_MPa[taxel]], number, self.spec.average);
-            }
-        }
     }
 
     /// The reading of a taxel whose calibrated stress is `stress_MPa`.

@@ -18,9 +18,7 @@
 
 use super::Engine;
 use crate::data::frame::Frame;
-use crate::data::input::drift::Drift;
-use crate::estimate::evidence::LastFit;
-use crate::estimate::float::Golden;
+use crate::estimate::float::{Golden, Past};
 use crate::result::checks::Checks;
 use crate::result::flags::Flag;
 use crate::result::reconstruct::{Diagnostics, Reconstruction, SuspectTaxel};
@@ -83,17 +81,10 @@ impl CrossCheck {
         Some(CrossCheck { golden, scene: scene.clone(), trusts_readings: sparse && input.noise_MPa() == 0.0 })
     }
 
-    /// What it says of the result with this resultant in N, [x, y, normal], of `frames`, the readings of one result, where
-    /// zeros have a `drift` before them and the fit of an earlier frame is `last`, then that of these; `None` for frames that
-    /// `evidence` refuses.
-    pub fn finding(
-        &self,
-        frames: &[Frame],
-        mut drift: Drift,
-        last: &mut Option<LastFit>,
-        resultant_N: [f64; 3],
-    ) -> Option<Finding> {
-        let reference = self.golden.run_after(&mut drift, last, frames).ok()?;
+    /// What it says of the result with this resultant in N, [x, y, normal], of `frames`, the readings of one result, after those of
+    /// which `past` is; `None` for frames that `evidence` refuses.
+    pub fn finding(&self, frames: &[Frame], past: &mut Past, resultant_N: [f64; 3]) -> Option<Finding> {
+        let reference = self.golden.run_after(past, frames).ok()?;
         let checks = reference.checks;
         let mut flags: Vec<Flag> = reference.flags.iter().copied().filter(|flag| OF_READINGS.contains(flag)).collect();
         let disturbed = !flags.is_empty() || checks.leaves_structure();
@@ -110,7 +101,7 @@ impl CrossCheck {
 
     /// Adds figures and flags to the result with this resultant in N of `frames`, as [`CrossCheck::finding`] finds them.
     pub fn check(&self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
-        if let Some(finding) = self.finding(frames, Drift::default(), &mut None, resultant_N) {
+        if let Some(finding) = self.finding(frames, &mut Past::default(), resultant_N) {
             self.add(&finding, 0, result);
         }
     }

@@ -9,10 +9,11 @@
 //! The age of a finding in results is `cross_check_age`.
 
 use super::cross_check::{CrossCheck, Finding};
+use super::tracks::Tracks;
 use super::{Engine, EngineError, State};
 use crate::data::frame::Frame;
-use crate::data::input::drift::Drift;
-use crate::estimate::evidence::LastFit;
+use crate::data::input::memory::Memory;
+use crate::estimate::float::Past;
 use crate::result::checks::history::History;
 use crate::result::reconstruct::{Diagnostics, Reconstruction};
 use crate::spec::scene::Scene;
@@ -33,7 +34,8 @@ pub enum CheckPace {
 struct Job {
     number: u64,
     frames: Vec<Frame>,
-    drift: Drift,
+    /// Of the frames before.
+    memory: Memory,
     resultant_N: [f64; 3],
 }
 
@@ -59,7 +61,7 @@ impl Worker {
 
     /// Answers jobs until the stream ends.
     fn work(&self, check: &CrossCheck) {
-        let mut last = None;
+        let mut past = Past::default();
         loop {
             let mut exchange = self.exchange();
             let job = loop {
@@ -70,7 +72,8 @@ impl Worker {
                 }
             };
             drop(exchange);
-            if let Some(finding) = check.finding(&job.frames, job.drift, &mut last, job.resultant_N) {
+            past = past.with_memory(job.memory);
+            if let Some(finding) = check.finding(&job.frames, &mut past, job.resultant_N) {
                 self.exchange().found = Some((job.number, finding));
             }
         }
@@ -83,10 +86,11 @@ pub struct StreamChecks {
     /// That after the frames of the last result of [`StreamChecks::next`].
     state: State,
     history: History,
+    tracks: Tracks,
     /// Frames of a block that is not complete.
     waiting: Vec<Frame>,
-    /// The last fit of the cross-check, where it has no thread of its own.
-    checked: Option<LastFit>,
+    /// What the last frames of the cross-check leave, where it has no thread of its own.
+    checked: Past,
     check: Option<Arc<CrossCheck>>,
     pace: CheckPace,
     worker: Option<Arc<Worker>>,
@@ -102,8 +106,9 @@ impl StreamChecks {
             scene: engine.scene().clone(),
             state: State::default(),
             history: History::new(engine.scene()),
+            tracks: Tracks::default(),
             waiting: Vec::new(),
-            checked: None,
+            checked: Past::default(),
             check: None,
             pace,
             worker: None,
@@ -130,7 +135,8 @@ impl StreamChecks {
             worker
         });
         self.scene = engine.scene().clone();
-        (self.state.last, self.checked, self.found) = (None, None, None);
+        self.state.past = std::mem::take(&mut self.state.past).without_fits();
+        (self.checked, self.found) = (Past::default(), None);
     }
 
     /// Ends the thread of the cross-check.
@@ -146,18 +152,16 @@ impl StreamChecks {
     /// # Errors
     /// As [`Engine::reconstruct_after`].
     pub fn next(&mut self, engine: &(impl Engine + ?Sized), frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        if self.scene.input.slides() {
-            self.state = State { last: self.state.last.take(), ..State::default() };
-        }
-        let drift = self.state.drift.clone();
+        let memory = self.state.past.memory.clone();
         let mut result = engine.reconstruct_after(&mut self.state, frames)?;
         self.state.begun = true;
-        self.add_after(drift, frames, result.resultant_N, &mut result.diagnostics());
+        self.tracks.follow(&self.scene.sensor, &mut result);
+        self.add_after(memory, frames, result.resultant_N, &mut result.diagnostics());
         Ok(result)
     }
 
-    /// The result of `engine` whose block `frame` completes, with the frames of the block; `None` before. The scene has no sliding
-    /// mean, which takes all frames so far.
+    /// The result of `engine` whose block `frame` completes, with the frames of the block; `None` before. Where the mean slides, every
+    /// frame has a result.
     ///
     /// # Errors
     /// As [`Engine::reconstruct_after`]; the frames of the block are dropped.
@@ -175,30 +179,28 @@ impl StreamChecks {
         Ok(Some((frames, result)))
     }
 
-    /// Adds figures and flags to the next result, with this resultant in N, of `frames`: of a block its own, of a sliding mean
-    /// all so far. Zeros are fixed.
+    /// Adds figures and flags to the next result, with this resultant in N, of `frames`, its own. Zeros are fixed, and nothing slides.
     pub fn add(&mut self, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
-        self.add_after(Drift::default(), frames, resultant_N, result);
+        self.add_after(Memory::default(), frames, resultant_N, result);
     }
 
-    /// The same where zeros have a `drift` before the frames.
-    fn add_after(&mut self, drift: Drift, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
+    /// The same after the frames of which `memory` is.
+    fn add_after(&mut self, memory: Memory, frames: &[Frame], resultant_N: [f64; 3], result: &mut Diagnostics) {
         let number = self.next;
         self.next += 1;
-        let new = if self.scene.input.slides() { 1 } else { frames.len() };
-        let checks = self.history.add(&frames[frames.len().saturating_sub(new)..], *result.checks);
+        let checks = self.history.add(frames, *result.checks);
         result.add_checks(&self.scene, checks);
         let Some(check) = &self.check else { return };
         match (&self.worker, self.pace) {
             (Some(worker), _) => {
                 let mut exchange = worker.exchange();
-                exchange.job = Some(Job { number, frames: frames.to_vec(), drift, resultant_N });
+                exchange.job = Some(Job { number, frames: frames.to_vec(), memory, resultant_N });
                 self.found = exchange.found.take().or(self.found.take());
                 worker.changed.notify_one();
             }
             (None, CheckPace::Every(period)) if number.is_multiple_of(period) => {
-                self.found =
-                    check.finding(frames, drift, &mut self.checked, resultant_N).map(|finding| (number, finding));
+                self.checked = std::mem::take(&mut self.checked).with_memory(memory);
+                self.found = check.finding(frames, &mut self.checked, resultant_N).map(|finding| (number, finding));
             }
             _ => (),
         }

@@ -14,7 +14,7 @@ use super::stages::prepare::Prepared;
 use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
-use crate::data::input::drift::Drift;
+use crate::data::input::memory::Memory;
 use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::estimate::float::objective::Estimate;
 use crate::result::checks::Checks;
@@ -24,6 +24,16 @@ use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
 use crate::spec::partition::Subarray;
+
+/// The mean of the frames of a result.
+struct Mean<'a> {
+    /// Calibrated.
+    stress: &'a Frame,
+    /// Variance over that of a frame.
+    variance: f64,
+    /// As in [`Checks`].
+    zero_share: Option<f64>,
+}
 
 /// μ as a status has it.
 struct StatusMu {
@@ -48,24 +58,26 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
-        self.reconstruct_after(&mut Drift::default(), &mut self.prepare.empty(), frames)
+        self.reconstruct_after(&mut Memory::default(), &mut self.prepare.empty(), frames)
     }
 
-    /// The same where frames came before: zeros have a `drift`, and `prepared` is what the hardware has of them. Both are then
+    /// The same where frames came before, of which `memory` is, and `prepared` what the hardware has of them. Both are then
     /// those after these frames.
     ///
     /// # Errors
     /// As [`Model::stress`].
     pub fn reconstruct_after(
         &self,
-        drift: &mut Drift,
+        memory: &mut Memory,
         prepared: &mut Prepared,
         frames: &[Frame],
     ) -> Result<Reconstruction, FixedError> {
-        let stress = self.stress_after(drift, frames)?;
-        self.add(prepared, &self.readings_at(full_scale(&self.scene, &stress), frames));
+        let before = memory.clone();
+        let (stress, variance) = self.stress_after(memory, frames)?;
+        self.add(prepared, &self.readings_after(&before, full_scale(&self.scene, &stress), frames));
         let trace = self.run_prepared(prepared);
-        self.decode_stress(frames, (&stress, drift.share()), "fixed", &trace.beats, &trace.status)
+        let mean = Mean { stress: &stress, variance, zero_share: memory.drift().share() };
+        self.decode_mean(frames, mean, "fixed", &trace.beats, &trace.status)
     }
 
     /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
@@ -80,16 +92,17 @@ impl Model {
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
-        let mut drift = Drift::default();
-        let stress = self.stress_after(&mut drift, readings)?;
-        self.decode_stress(readings, (&stress, drift.share()), engine, beats, status)
+        let mut memory = Memory::default();
+        let (stress, variance) = self.stress_after(&mut memory, readings)?;
+        let mean = Mean { stress: &stress, variance, zero_share: memory.drift().share() };
+        self.decode_mean(readings, mean, engine, beats, status)
     }
 
-    /// The same for `frame`, the [`Model::stress`] of the readings; `zero_share` as in [`Checks`].
-    fn decode_stress(
+    /// The same where the mean of the readings is known.
+    fn decode_mean(
         &self,
         readings: &[Frame],
-        (frame, zero_share): (&Frame, Option<f64>),
+        Mean { stress: frame, variance, zero_share }: Mean,
         engine: &str,
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
@@ -119,7 +132,7 @@ impl Model {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let sensor = &self.scene.sensor;
-        let noise_MPa = self.input.noise_of_mean_MPa(readings.len());
+        let noise_MPa = self.input.noise_of_mean_MPa(variance);
         let mut flags = frame_flags(&self.scene, self.estimator(), frame, &codes, noise_MPa);
         let mut subarrays = Vec::with_capacity(case.parts.len());
         let mut shear_spread = None;

@@ -8,7 +8,7 @@ use super::plan::contents::Plan;
 use super::plan::fit_suggestions::fitting;
 use super::stages::prepare::Scale;
 use crate::data::frame::Frame;
-use crate::data::input::drift::Drift;
+use crate::data::input::memory::{Averaged, Memory};
 use crate::data::input::Input;
 use crate::data::quantise::{quantise, Codes};
 use crate::data::reception::full_scale;
@@ -161,12 +161,13 @@ impl Model {
     /// [`InputError`](crate::data::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
     /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
-        self.stress_after(&mut Drift::default(), frames)
+        Ok(self.stress_after(&mut Memory::default(), frames)?.0)
     }
 
-    /// The same where zeros have a `drift` before the frames, which is then that after them.
-    pub(super) fn stress_after(&self, drift: &mut Drift, frames: &[Frame]) -> Result<Frame, FixedError> {
-        Ok(self.input.calibrate(&self.input.average_after(drift, &self.scene, frames)?))
+    /// The same after frames of which `memory` is, which is then that after these; and its variance over that of a frame.
+    pub(super) fn stress_after(&self, memory: &mut Memory, frames: &[Frame]) -> Result<(Frame, f64), FixedError> {
+        let Averaged { mean, variance, .. } = self.input.average_after(memory, &self.scene, frames)?;
+        Ok((self.input.calibrate(&mean), variance))
     }
 
     /// The converter's codes for the frames of one reconstruction, frame after frame, row-major.
@@ -174,17 +175,15 @@ impl Model {
     /// # Errors
     /// As [`Model::stress`].
     pub fn readings(&self, frames: &[Frame]) -> Result<Vec<i32>, FixedError> {
-        Ok(self.readings_at(full_scale(&self.scene, &self.stress(frames)?), frames))
+        let full_scale_MPa = full_scale(&self.scene, &self.stress(frames)?);
+        Ok(self.readings_after(&Memory::default(), full_scale_MPa, frames))
     }
 
-    /// The same where the stress in MPa of the largest code is known.
-    pub(super) fn readings_at(&self, full_scale_MPa: f64, frames: &[Frame]) -> Vec<i32> {
+    /// The same after frames of which `memory` is, where the stress in MPa of the largest code is known.
+    pub(super) fn readings_after(&self, memory: &Memory, full_scale_MPa: f64, frames: &[Frame]) -> Vec<i32> {
         let full_scale = full_scale_MPa * self.prepare.reading_per_MPa;
-        let codes = |frame: &Frame| quantise(&frame.stress_MPa, self.formats().code_bits, full_scale).codes;
-        // Of the frames since a reset, those of each result.
-        let results = if self.scene.input.slides() { frames.len() } else { self.scene.input.frames_per_result() };
-        let complete = frames.chunks(results.max(1)).flat_map(|frames| self.input.complete(frames).into_owned());
-        complete.flat_map(|frame| codes(&frame)).collect()
+        let codes = |frame: Frame| quantise(&frame.stress_MPa, self.formats().code_bits, full_scale).codes;
+        self.input.complete_after(memory, frames).into_iter().flat_map(codes).collect()
     }
 
     /// The readings that have these codes, as a frame named `id`: the other way round than [`Model::readings`], for codes that the

@@ -11,22 +11,28 @@
 //! | out: wrench | 3, 3 | N, N mm |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod change;
 mod contact_estimate;
+mod contact_track;
 mod contacts;
 mod diagnostics;
 mod extra;
 mod figures;
 mod missing_taxel;
 mod output;
+mod pressure_template;
 mod suspect_taxel;
 
+pub(crate) use change::ForceChange;
 pub use contact_estimate::ContactEstimate;
+pub use contact_track::ContactTrack;
 pub use contacts::FoundContact;
 pub use diagnostics::Diagnostics;
 pub(crate) use extra::shear_spread_of;
 pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use missing_taxel::MissingTaxel;
 pub use output::{shear_sigma_N, Resultant, Wrench};
+pub use pressure_template::PressureTemplate;
 pub use suspect_taxel::SuspectTaxel;
 
 use crate::data::frame::{Forces, Frame};

@@ -380,15 +380,32 @@ impl HardwareSpec {
     }
 }
 
+/// k of the shortest mean of an adaptive one: with fewer frames the shear is mostly noise.
+pub(crate) const SHORTEST_AVERAGE: u32 = 2;
+/// k of its longest one, unless a scene states it: 127 frames, an eighth of a second at 1 kHz.
+const LONGEST_AVERAGE: u32 = 6;
+
 /// How frames are averaged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MeanKind {
     /// 2^average frames give one result.
     #[default]
     Block,
     /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::spec::sliding`].
     Sliding,
+    /// The same, of fewer frames the faster readings change: [`crate::data::input::adaptive`].
+    Adaptive,
+}
+
+impl MeanKind {
+    /// Every kind with its name in scene files.
+    pub const NAMES: [(&'static str, MeanKind); 3] =
+        [("block", MeanKind::Block), ("sliding", MeanKind::Sliding), ("adaptive", MeanKind::Adaptive)];
+
+    /// The name in scene files.
+    pub fn name(self) -> &'static str {
+        MeanKind::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| *name)
+    }
 }
 
 table! {
@@ -397,11 +414,13 @@ table! {
     pub struct InputSpec in "input" with defaults {
         /// Stress in MPa of the largest code; hardware needs it beside a calibration, tare, threshold or noise floor.
         full_scale_MPa: Option<f64> = Number::Positive.optional("each frame's peak");
-        /// 2^average frames are averaged; give `--frame` as often.
+        /// 2^average frames are averaged; give `--frame` as often. With an adaptive mean, 0 is 6.
         average: u32 = whole::<u32>(0, 12).or(0);
-        /// One result of 2^average frames, or one with every frame, of 1/√(2^(average+1) − 1) of the noise; give all frames since the
-        /// start.
-        mean: MeanKind = choice(&[("block", MeanKind::Block), ("sliding", MeanKind::Sliding)]).or(MeanKind::Block);
+        /// One result of 2^average frames, or one with every frame, of 1/√(2^(average+1) − 1) of the noise; of fewer frames the faster
+        /// readings change, where it is adaptive. Give all frames since the start.
+        mean: MeanKind = choice(&MeanKind::NAMES)
+            .or(MeanKind::Block)
+            .hardware("`\"block\"`, `\"sliding\"`");
         /// Table of the taxels' offsets and gains: a file, relative to the scene.
         calibration: Option<PathBuf> = File.optional("none").page("files");
         /// Frames without contact, a file or folder, relative to the scene: their mean is the zero, the spread of 8 or more the noise
@@ -457,14 +476,32 @@ impl InputSpec {
     /// Noise of a mean relative to that of a single frame: 2^(−average/2) of a block, 1/√(2^(average+1) − 1) of a sliding
     /// mean of many frames.
     pub fn noise_share(&self) -> f64 {
-        self.variance_share(usize::MAX).sqrt()
+        self.settled_variance().sqrt()
     }
 
-    /// Variance of a mean relative to that of a single frame: of a block, or of a sliding mean of `frames` frames.
-    pub(crate) fn variance_share(&self, frames: usize) -> f64 {
+    /// Variance of a mean relative to that of a single frame: of a block, or of the longest mean that slides, of many frames.
+    pub(crate) fn settled_variance(&self) -> f64 {
         match self.mean {
             MeanKind::Block => 0.5f64.powi(self.average as i32),
-            MeanKind::Sliding => sliding::variance(frames, self.average),
+            MeanKind::Sliding | MeanKind::Adaptive => 1.0 / sliding::most_frames(self.longest_average()) as f64,
+        }
+    }
+
+    /// k of each mean that slides, ascending; none of a block.
+    pub(crate) fn averages(&self) -> Vec<u32> {
+        match self.mean {
+            MeanKind::Block => Vec::new(),
+            MeanKind::Sliding => vec![self.average],
+            MeanKind::Adaptive => (SHORTEST_AVERAGE..=self.longest_average()).collect(),
+        }
+    }
+
+    /// k of the longest mean that slides.
+    fn longest_average(&self) -> u32 {
+        if self.mean == MeanKind::Adaptive && self.average == 0 {
+            LONGEST_AVERAGE
+        } else {
+            self.average
         }
     }
 
@@ -472,13 +509,13 @@ impl InputSpec {
     pub fn frames_per_result(&self) -> usize {
         match self.mean {
             MeanKind::Block => 1 << self.average,
-            MeanKind::Sliding => 1,
+            MeanKind::Sliding | MeanKind::Adaptive => 1,
         }
     }
 
-    /// Whether the mean slides.
+    /// Whether every frame gives a result, with those before it.
     pub fn slides(&self) -> bool {
-        self.mean == MeanKind::Sliding
+        self.mean != MeanKind::Block
     }
 
     /// How the zero follows the readings; `None` where it is fixed.
@@ -494,12 +531,9 @@ impl InputSpec {
         self.slides() || self.running_zero().is_some()
     }
 
-    /// Of frames since a reset, those that the mean of the last result is of.
+    /// Of frames since a reset, those that arrived for the last result.
     pub fn newest<'a, T>(&self, frames: &'a [T]) -> &'a [T] {
-        match self.mean {
-            MeanKind::Block => &frames[frames.len().saturating_sub(self.frames_per_result())..],
-            MeanKind::Sliding => frames,
-        }
+        &frames[frames.len().saturating_sub(self.frames_per_result())..]
     }
 
     /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.

@@ -12,7 +12,7 @@
 //!
 //! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
 //! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
-//! [`slip_study`] measures the bias of the shear in partial slip. [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
+//! [`slip_study`] measures the bias of the shear in partial slip, [`press_study`] errors and lag over whole presses. [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
 //! [`measure_deviations`] the standard deviations of a search.
 //!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
@@ -25,6 +25,7 @@ mod deviations;
 pub mod expected;
 pub mod matching;
 pub mod outcome;
+mod presses;
 mod sensitivity;
 mod shapes;
 mod slip;
@@ -36,6 +37,7 @@ mod tests;
 mod unlike;
 
 pub use deviations::{deviations_coverage, measure_deviations};
+pub use presses::{press_study, Averaged, PressEngine, PressRow, PressStudy};
 pub use sensitivity::{other_medium, sensitivities, SensitivityRow};
 pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use slip::{slip_study, SlipRow};

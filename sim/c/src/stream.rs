@@ -4,7 +4,7 @@
 //! frame ── dermis_stream_push ─┬─ no result yet, of a block that is not complete
 //!                              └─ dermis_result ── of this block, with what the frames before show of the sensor
 //! ```
-//! Results are those of `dermis reconstruct --stream`: means of blocks, running zeros, the checks of the history and the
+//! Results are those of `dermis reconstruct --stream`: means of blocks or that slide, running zeros, the checks of the history and the
 //! cross-check.
 
 use std::ffi::c_char;
@@ -12,7 +12,6 @@ use std::path::Path;
 
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_sim::engine::{typed, EngineName};
-use dermis_sim::stream::require_blocks;
 
 use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text, Error};
 use crate::result::dermis_result;
@@ -36,7 +35,7 @@ pub(crate) fn pace(cross_check: u64) -> CheckPace {
 }
 
 /// Begin a stream of frames of a scene. It belongs to the caller: dermis_stream_free; the scene may be freed before it. After
-/// an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses, or with a sliding mean.
+/// an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses.
 ///
 /// engine is "golden" or "fixed", as for dermis_reconstruct. cross_check says which results the estimator evidence reads too,
 /// where the engine has another one: every so many, from the first one on, before they are given; 0: none;
@@ -54,7 +53,6 @@ pub unsafe extern "C" fn dermis_stream_new(
         stream.write(std::ptr::null_mut());
         let spec = &unsafe { reference("scene", scene) }?.spec;
         let name = EngineName::software(unsafe { text("engine", engine) }?)?;
-        require_blocks(spec)?;
         let engine = name.engine(spec, None, Path::new(""))?;
         let checks = StreamChecks::new(&*engine, pace(cross_check));
         stream.write(Box::into_raw(Box::new(dermis_stream { engine, checks })));

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{anyhow, Result};
-use dermis_golden::data::generator::presses::{press, Motion};
+use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
@@ -29,7 +29,7 @@ pub(super) fn rates(scene: &Scene) -> Result<Vec<RateRow>> {
     // The drawn frames are stress already, one for each result.
     let mut plain = scene.clone();
     (plain.input.calibration, plain.input.tare, plain.input.average) = (None, None, 0);
-    let frames = press(&plain, 1, Motion::Slide, MOMENTS, NOISE)?;
+    let frames = Press::new(Motion::Slide).of_frames(MOMENTS, NOISE).frames(&plain, 1)?;
     let own = Golden::new(&plain)?;
     let mut rows = vec![row(&own, &frames)?];
     for faster in Faster::of_scene(&plain) {

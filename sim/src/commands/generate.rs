@@ -1,10 +1,11 @@
-//! `dermis generate`: a frame with known forces, from contacts described on the command line.
+//! `dermis generate`: a frame, or a recording of a press, with known forces, from contacts described on the command line.
 //!
 //! | option | contacts |
 //! |---|---|
 //! | `--contact shape:key=value:…` | keys `at`, `size`, `normal`, `shear`, `slip`, `friction` |
 //! | `--like FILE` | those described in a frame file |
 //! | `--random N` | N random ones, drawn from the seed |
+//! | `--press MOTION` | one random one that holds or moves: a recording in place of a frame, [`generate_press`](super::generate_press) |
 
 use std::path::PathBuf;
 
@@ -12,10 +13,13 @@ use anyhow::{anyhow, bail, Result};
 use clap::Args;
 use dermis_golden::data::frame::{Contact, Frame};
 use dermis_golden::data::generator::converter::Converter;
+use dermis_golden::data::generator::draws::DrawOptions;
+use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw};
 use dermis_golden::spec::scene::Scene;
 
+use super::generate_press::{self, PressArguments};
 use crate::drawn_frames::Shapes;
 use dermis_golden::write::write;
 
@@ -59,9 +63,11 @@ pub struct Arguments {
     /// Frames without contact whose noisy mean is subtracted; 0: none.
     #[arg(long, value_name = "N", default_value_t = 0)]
     tare_frames: usize,
-    /// Frames that are averaged, each with its own noise.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Frames that are averaged, each with its own noise; not of a press.
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "press")]
     frames: usize,
+    #[command(flatten)]
+    press: PressArguments,
     /// Unipolar sensor: tension reads as zero.
     #[arg(long)]
     unipolar: bool,
@@ -78,9 +84,9 @@ pub struct Arguments {
     #[arg(long, value_name = "ROW,COL=MPA")]
     stuck: Vec<String>,
     /// Id of the frame.
-    #[arg(long, default_value = "generated")]
+    #[arg(long, default_value = "generated", conflicts_with = "press")]
     id: String,
-    /// File to write; default: standard output.
+    /// File to write; default: standard output. Of a press a recording, if its name ends in .mcap, else a line of JSON per frame.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -94,6 +100,7 @@ const EXAMPLES: &str = "Examples:
                            --drift 0.002 --frames 64 --tare-frames 256
   dermis generate sensor-4 --contact plantar-left:at=-70,0:normal=350:shear=10,50
   dermis generate sensor-3 --random 4 --slip mixed --seed 12 --dead 3,4 --stuck 0,7=0.2
+  dermis generate sensor-1 --press slide --noise 0.01 --gain-spread 0.01 --bits 10 --duration 0.2 --out slide.jsonl
 Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; tilted a,b,angle,u,v; lobed a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
   rectangle width,height,angle; plantar-left, plantar-right none or width,length,angle.";
 
@@ -103,6 +110,9 @@ Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; tilted a,b,angle,u,v;
 /// Contacts that cannot be parsed or are inconsistent, options out of range, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
+    if let Some(motion) = arguments.press.motion() {
+        return press(arguments, &scene, motion);
+    }
     let mut contacts = arguments.contacts.iter().map(|text| contact(text)).collect::<Result<Vec<_>>>()?;
     if let Some(path) = &arguments.like {
         contacts.extend(Frame::load(path, Some(&scene))?.contacts);
@@ -114,7 +124,30 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if contacts.is_empty() {
         bail!("no contact: give --contact, --like or --random");
     }
-    let converter = Converter {
+    let frame = generate(&arguments.id, &scene.sensor, scene.medium, &contacts)?;
+    let text = converter(arguments)?.convert(&frame)?.to_json() + "\n";
+    match &arguments.out {
+        None => Ok(text),
+        Some(path) => {
+            write(path, text.as_bytes())?;
+            Ok(format!("{} ({} bytes)\n", path.display(), text.len()))
+        }
+    }
+}
+
+/// The press of a motion.
+fn press(arguments: &Arguments, scene: &Scene, motion: Motion) -> Result<String> {
+    if !arguments.contacts.is_empty() || arguments.like.is_some() || arguments.random > 0 {
+        bail!("--press draws its contact from --seed: leave out --contact, --like and --random");
+    }
+    let press = arguments.press.press(motion, DrawOptions { slip: arguments.slip, ..DrawOptions::default() })?;
+    let draw = DrawOptions { converter: converter(arguments)?, ..press.draw.clone() };
+    generate_press::run(scene, &Press { draw, ..press }, arguments.seed, arguments.out.as_deref())
+}
+
+/// The sensor that reads the stress.
+fn converter(arguments: &Arguments) -> Result<Converter> {
+    Ok(Converter {
         noise: arguments.noise,
         gain_spread: arguments.gain_spread,
         drift: arguments.drift,
@@ -126,16 +159,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         dead: arguments.dead.iter().map(|text| taxel("--dead", text)).collect::<Result<_>>()?,
         stuck: arguments.stuck.iter().map(|text| stuck(text)).collect::<Result<_>>()?,
         seed: arguments.seed,
-    };
-    let frame = generate(&arguments.id, &scene.sensor, scene.medium, &contacts)?;
-    let text = converter.convert(&frame)?.to_json() + "\n";
-    match &arguments.out {
-        None => Ok(text),
-        Some(path) => {
-            write(path, text.as_bytes())?;
-            Ok(format!("{} ({} bytes)\n", path.display(), text.len()))
-        }
-    }
+    })
 }
 
 /// Parses `shape:key=value:…`.

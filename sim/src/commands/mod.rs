@@ -51,6 +51,7 @@ pub mod cosim;
 pub mod deviations;
 pub mod faults;
 pub mod generate;
+mod generate_press;
 pub mod guide_pages;
 pub mod host;
 pub mod import;

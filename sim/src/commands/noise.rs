@@ -6,17 +6,20 @@
 //! | `--shapes` | estimators on drawn contacts of any shape, beside two baselines and the bound of a known support |
 //! | `--shapes --slips` | errors and bias of the shear in full slip, at shares of the friction limit, and spread evenly |
 //! | `--shapes --sensitivity` | errors if the scene states something wrongly, or the gains differ |
+//! | `--time` | errors and lag over whole presses, with each kind of mean |
 //! | `--unlike` | how many frames like and unlike a network's training are flagged |
 
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Shape};
+use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
-use dermis_golden::study::noise::{sensitivities, shape_study, slip_study, study, unlike_study};
-use dermis_golden::study::noise::{Candidate, ShapeStudy, Study};
+use dermis_golden::study::noise::{press_study, sensitivities, shape_study, slip_study, study, unlike_study};
+use dermis_golden::study::noise::{Candidate, PressEngine, PressStudy, ShapeStudy, Study};
 
+use super::generate_press::motion;
 use crate::progress::Progress;
 use crate::report::{self, Format};
 
@@ -38,7 +41,8 @@ const SENSITIVITY_LEVEL: f64 = 1e-3;
   dermis noise sensor-1 --shapes table --slip mixed --level 0.002
   dermis noise sensor-1 --shapes table --slips --estimator evidence --level 0.0005
   dermis noise sensor-1 --shapes table --sensitivity
-  dermis noise sensor-1-noisy --unlike --estimator network --hardware --draws 10")]
+  dermis noise sensor-1-noisy --unlike --estimator network --hardware --draws 10
+  dermis noise sensor-1-noisy --time --estimator network --motion hold --presses 1 --seconds 0.3 --level 0.01")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,
@@ -72,6 +76,34 @@ pub struct Arguments {
     unlike: bool,
     #[command(flatten)]
     shapes: ShapeArguments,
+    #[command(flatten)]
+    time: TimeArguments,
+}
+
+/// Options of the study over presses.
+#[derive(Args, Debug)]
+struct TimeArguments {
+    /// Reconstruct presses frame by frame: each alone, with a sliding and with an adaptive mean. The noise is not stated.
+    #[arg(long, group = "drawn", conflicts_with_all = ["medians", "frames", "draws", "objectives", "unlike", "shapes"])]
+    time: bool,
+    /// What the contact does, repeatable; default: hold, ramp, slide, roll, turn, step, oscillation.
+    #[arg(long = "motion", value_name = "MOTION", value_parser = motion, requires = "time")]
+    motions: Vec<Motion>,
+    /// Presses of each motion.
+    #[arg(long, value_name = "N", default_value_t = 3, requires = "time", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    presses: u64,
+    /// Frames per second.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, requires = "time")]
+    rate: f64,
+    /// Seconds of a press; those after the first tenth of a second count.
+    #[arg(long, value_name = "S", default_value_t = 0.8, requires = "time")]
+    seconds: f64,
+    /// Standard deviation of the taxels' gains.
+    #[arg(long = "gains", value_name = "SHARE", default_value_t = 0.01, requires = "time")]
+    gain_spread: f64,
+    /// Width of the codes in bits.
+    #[arg(long, value_name = "BITS", default_value_t = 10, requires = "time")]
+    bits: u32,
 }
 
 /// Options of the study over shapes.
@@ -130,6 +162,9 @@ struct Shapes(Vec<Shape>);
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
     let format = if arguments.json { Format::Json } else { arguments.format };
+    if arguments.time.time {
+        return over_time(arguments, &scene, format);
+    }
     if let Some(Shapes(shapes)) = &arguments.shapes.shapes {
         return over_shapes(arguments, &scene, shapes, format);
     }
@@ -172,6 +207,32 @@ fn candidates(arguments: &Arguments) -> Vec<Candidate> {
         candidates.push(Candidate::Hardware);
     }
     candidates
+}
+
+/// The study over presses.
+fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<String> {
+    let own = &arguments.time;
+    let estimators = match arguments.shapes.estimators.as_slice() {
+        [] => &[scene.model_estimator()],
+        stated => stated,
+    };
+    let mut engines: Vec<PressEngine> = estimators.iter().copied().map(PressEngine::Golden).collect();
+    engines.extend(arguments.shapes.hardware.then_some(PressEngine::Fixed));
+    let all = PressStudy::default();
+    let converter = Converter { gain_spread: own.gain_spread, bits: Some(own.bits), ..Converter::default() };
+    let draw = DrawOptions { converter, seed: arguments.seed, ..all.press.draw };
+    let frames = (own.rate * own.seconds).round() as usize + 1;
+    let press = Press { rate_Hz: own.rate, frames, draw, ..all.press };
+    let mut wanted = PressStudy { engines, presses: own.presses, press, ..all };
+    if !own.motions.is_empty() {
+        wanted.motions = own.motions.clone();
+    }
+    if !arguments.levels.is_empty() {
+        wanted.levels = arguments.levels.clone();
+    }
+    let bar = Progress::steps(&format!("{}: presses", scene.name), 0);
+    let rows = press_study(scene, &wanted, &|done, total| bar.set_of(done as u64, total as u64))?;
+    report::presses(&rows, format)
 }
 
 fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: Format) -> Result<String> {

@@ -15,9 +15,7 @@ use super::layout::LayoutArguments;
 use crate::engine::EngineName;
 use crate::jobs::{Interrupt, Interrupted};
 use crate::recording::Recorder;
-use crate::stream::{
-    as_lines, require_blocks, run_until, Clock, Estimators, Faster, Outcome, Policy, Source, Stop, StreamOptions,
-};
+use crate::stream::{as_lines, run_until, Clock, Estimators, Faster, Outcome, Policy, Source, Stop, StreamOptions};
 
 /// Lines that wait with `--all` while the source waits too: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;
@@ -140,12 +138,11 @@ impl StreamArguments {
 /// The software engine of a stream.
 ///
 /// # Errors
-/// Another engine, a sliding mean, a scene that the engine refuses.
+/// Another engine, a scene that the engine refuses.
 pub(super) fn stream_engine(scene: &Scene, name: EngineName) -> Result<Box<dyn Engine>> {
     if !EngineName::SOFTWARE.contains(&name) {
         bail!("--engine rtl: a stream takes golden or fixed");
     }
-    require_blocks(scene)?;
     if name != EngineName::Golden {
         note_hardware(scene)?;
     }

@@ -5,7 +5,6 @@ use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 use super::newest::Newest;
-use crate::recording::contacts;
 use crate::stream::{Answer, Outcome};
 
 /// The newest result with its frame.
@@ -97,7 +96,7 @@ impl<'a> Show<'a> {
                     refused: self.refused,
                     refusal: self.refusal.as_deref(),
                     stress_MPa: frame.readings(),
-                    contacts: contacts(result),
+                    contacts: result.all_contacts(),
                     result,
                     truth: Truth::of(frame),
                 };

@@ -6,17 +6,15 @@
 //! | module | does |
 //! |---|---|
 //! | `arrows` | the forces of a result as arrows that viewers draw |
-//! | [`mod@contacts`] | the contacts of a result |
 //! | [`lines`] | recorded frames as lines of a stream, at a pace |
 //! | [`mod@write`] | outcomes of a stream into a file |
 
 mod arrows;
-pub mod contacts;
 pub mod lines;
 pub mod write;
 
-pub use contacts::contacts;
 pub use lines::{Lines, Pace};
+pub(crate) use write::header;
 pub use write::Recorder;
 
 /// Metres of a millimetre.

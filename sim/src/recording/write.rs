@@ -16,7 +16,6 @@ use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
 
 use super::arrows::Arrows;
-use super::contacts::contacts;
 use super::{contact_channel, ARROWS, FORCES, METRES, RESULT};
 use crate::stream::{seconds, Answer, Outcome};
 
@@ -138,7 +137,7 @@ impl Recorder {
             let points = Points::new(&self.sensor, answer.result);
             entry.add(FORCES, &points.cloud(&self.sensor, header.clone()))?;
         }
-        let contacts = contacts(answer.result);
+        let contacts = answer.result.all_contacts();
         for (index, contact) in contacts.iter().enumerate() {
             // Without compressive force there is no place at which the force acts.
             let Some(centre_mm) = contact.centre_mm else { continue };
@@ -199,7 +198,8 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-fn header(time_ns: i64) -> Header {
+/// Header of a message of this time in ns since 1970.
+pub(crate) fn header(time_ns: i64) -> Header {
     Header { stamp: Time::from(u64::try_from(time_ns).unwrap_or(0)), frame_id: FRAME_ID.into() }
 }
 

@@ -35,7 +35,12 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
     writeln!(text, "full scale      {} MPa", significant_digits(full_scale_MPa, full_scale_MPa))?;
     if let Some(frames) = result.extra.mean_frames {
-        writeln!(text, "sliding mean    {frames} frames")?;
+        let lag = result.extra.lag_frames.map_or(String::new(), |lag| format!(", forces behind by {lag:.0}"));
+        writeln!(text, "sliding mean    {frames} frames{lag}")?;
+    }
+    if let Some(template) = result.extra.template {
+        let holds = if template.held { "holds" } else { "does not hold" };
+        writeln!(text, "pressure        remembered {holds}, residual {:.2}", template.residual)?;
     }
     writeln!(text, "resultant, N    {}", axes(result.resultant_N, largest))?;
     if let Some(wrench) = result.extra.wrench {

@@ -9,7 +9,6 @@ use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
 use dermis_golden::result::reconstruct::Reconstruction;
-use dermis_golden::spec::scene::Scene;
 use serde::{Serialize, Serializer};
 
 use super::acquisition::Acquisition;
@@ -165,17 +164,6 @@ pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> 
         output.write_all(text.as_bytes())?;
         output.flush()
     }
-}
-
-/// Refuses a scene that a stream cannot have.
-///
-/// # Errors
-/// A sliding mean.
-pub fn require_blocks(scene: &Scene) -> Result<()> {
-    if scene.input.slides() {
-        bail!("scene {}: input.mean = \"sliding\" is not available in a stream: block", scene.name);
-    }
-    Ok(())
 }
 
 /// Answers every line of `input`, called `name` in errors, until it ends or `output` is closed.
@@ -353,7 +341,7 @@ mod tests {
     use dermis_golden::data::input::Input;
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
-    use dermis_golden::spec::scene::EstimatorKind;
+    use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
     use serde_json::Value;
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
@@ -448,13 +436,37 @@ mod tests {
         }
     }
 
+    /// A result with every line, as that of all frames up to it.
     #[test]
-    fn a_sliding_mean_is_refused_by_its_field() {
-        let mut scene = scene();
-        scene.input.mean = dermis_golden::spec::scene::MeanKind::Sliding;
-        scene.input.average = 2;
-        let error = require_blocks(&scene).unwrap_err().to_string();
-        assert!(error.contains("input.mean = \"sliding\""), "{error}");
+    fn a_mean_that_slides_answers_every_line() {
+        for (mean, name) in [
+            (MeanKind::Sliding, EngineName::Golden),
+            (MeanKind::Sliding, EngineName::Fixed),
+            (MeanKind::Adaptive, EngineName::Golden),
+        ] {
+            let mut scene = scene();
+            (scene.input.mean, scene.input.average, scene.input.full_scale_MPa) = (mean, 3, Some(1.0));
+            let frames = &Frame::shipped(&scene)[..4];
+            let input: String = frames.iter().map(csv).collect();
+            let (_, answers) = answers(&scene, name, input, ALL, true);
+            let engine = name.engine(&scene, None, Path::new("")).unwrap();
+            for (number, answer) in answers.iter().enumerate() {
+                let all = engine.reconstruct(&frames[..=number]).unwrap();
+                assert_eq!(answer["mean_frames"], Value::from(all.extra.mean_frames), "{mean:?}");
+                assert_eq!(answer["resultant_N"], serde_json::to_value(all.resultant_N).unwrap(), "{mean:?} {number}");
+            }
+            assert_eq!(answers.len(), 4);
+        }
+    }
+
+    /// A line of JSON that states the force is answered with the errors.
+    #[test]
+    fn known_forces_of_a_line_give_errors() {
+        let (scene, frame) = (scene(), Frame::shipped(&scene()).remove(1));
+        let line = |force: &str| format!("{{\"stress_MPa\": {:?}{force}}}\n", frame.stress_MPa);
+        let input = line("") + &line(&format!(", \"resultant_N\": {:?}", frame.resultant_N.unwrap()));
+        let (_, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
+        assert!(answers[0]["error"].is_null() && answers[1]["error"]["tangential"].as_f64() < Some(0.1), "{answers:?}");
     }
 
     #[test]

@@ -91,14 +91,14 @@ impl Frames {
             Some(Read::LeftOut(LeftOut { id, reason })) => {
                 Err(NoFrame { id, reason: NoReadings { line: None, ..reason }.to_string() })
             }
-            Some(Read::Frame(TextFrame { id, readings, time_ns, .. })) => {
+            Some(Read::Frame(TextFrame { id, readings, time_ns, resultant_N, .. })) => {
                 let name = match &id {
                     Value::Null => format!("line {number}"),
                     Value::String(name) => name.clone(),
                     other => other.to_string(),
                 };
                 match Frame::from_stress(&name, &self.sensor, readings) {
-                    Ok(frame) => Ok(Some(LineFrame { id, frame, time_ns })),
+                    Ok(frame) => Ok(Some(LineFrame { id, frame: Frame { resultant_N, ..frame }, time_ns })),
                     Err(error) => Err(NoFrame { id, reason: error.to_string() }),
                 }
             }

@@ -38,9 +38,7 @@ pub mod source;
 pub mod stop;
 
 pub(crate) use answers::nanoseconds;
-pub use answers::{
-    as_lines, require_blocks, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions,
-};
+pub use answers::{as_lines, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions};
 pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;

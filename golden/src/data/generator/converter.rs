@@ -90,6 +90,62 @@ impl Converter {
             mean.iter_mut().zip(one).for_each(|(mean, b)| *mean += b / self.frames as f64);
         }
         frame.stress_MPa = mean;
+        self.fail_taxels(&mut frame)?;
+        Ok(frame)
+    }
+
+    /// The frames of a press as the sensor reads them, in their order: gains and drift are those of the press, drift grows evenly from
+    /// none in the first frame, the noise is that of each frame. Shares are of the largest |b| of all; the full scale is `full_scale`
+    /// times that unless it is stated. Nothing is averaged.
+    ///
+    /// # Errors
+    /// As [`Converter::convert`].
+    pub(super) fn convert_in_order(
+        &self,
+        frames: &mut [Frame],
+        full_scale: f64,
+        random: &mut Random,
+    ) -> Result<(), GeneratorError> {
+        self.check()?;
+        let peak = frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
+        let taxels = frames.first().map_or(0, |frame| frame.stress_MPa.len());
+        let mut drawn = |deviation: f64| -> Vec<f64> { (0..taxels).map(|_| deviation * random.normal()).collect() };
+        let (gains, drift, tare) = (drawn(self.gain_spread), drawn(self.drift * peak), drawn(self.tare_noise() * peak));
+        let full_scale_MPa = self.full_scale_MPa.or((peak > 0.0).then_some(full_scale * peak));
+        let each = Converter { full_scale_MPa, ..self.clone() };
+        let last = frames.len().saturating_sub(1).max(1) as f64;
+        for (number, frame) in frames.iter_mut().enumerate() {
+            let stress = frame.stress_MPa.iter().enumerate();
+            let grown = number as f64 / last;
+            let off: Vec<f64> = stress.map(|(k, b)| b * (1.0 + gains[k]) + grown * drift[k] + tare[k]).collect();
+            frame.stress_MPa = each.one(&off, peak, random);
+            self.fail_taxels(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Applies what is the same in all averaged frames: gains, drift and the noise of the tare.
+    fn offset(&self, stress_MPa: &mut [f64], peak: f64, random: &mut Random) {
+        let tare = self.tare_noise();
+        // A deviation of zero draws no number.
+        for (deviation, share) in [(self.gain_spread, true), (self.drift, false), (tare, false)] {
+            for b in stress_MPa.iter_mut().filter(|_| deviation > 0.0) {
+                *b += deviation * random.normal() * if share { *b } else { peak };
+            }
+        }
+    }
+
+    /// Standard deviation of the zeros, from the noise of the tare, as a share of the largest |b|.
+    fn tare_noise(&self) -> f64 {
+        if self.tare_frames > 0 {
+            self.noise / (self.tare_frames as f64).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    /// Dead and stuck taxels.
+    fn fail_taxels(&self, frame: &mut Frame) -> Result<(), GeneratorError> {
         for taxel in &self.dead {
             let index = index("dead", &frame.sensor, *taxel)?;
             frame.stress_MPa[index] = 0.0;
@@ -98,18 +154,7 @@ impl Converter {
             let index = index("stuck", &frame.sensor, *taxel)?;
             frame.stress_MPa[index] = *reads;
         }
-        Ok(frame)
-    }
-
-    /// Applies what is the same in all averaged frames: gains, drift and the noise of the tare.
-    fn offset(&self, stress_MPa: &mut [f64], peak: f64, random: &mut Random) {
-        let tare = if self.tare_frames > 0 { self.noise / (self.tare_frames as f64).sqrt() } else { 0.0 };
-        // A deviation of zero draws no number.
-        for (deviation, share) in [(self.gain_spread, true), (self.drift, false), (tare, false)] {
-            for b in stress_MPa.iter_mut().filter(|_| deviation > 0.0) {
-                *b += deviation * random.normal() * if share { *b } else { peak };
-            }
-        }
+        Ok(())
     }
 
     /// One frame: noise, clipping, codes.

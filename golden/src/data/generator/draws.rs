@@ -40,7 +40,7 @@ const MOST_CONTACTS: usize = 64;
 /// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
 const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
-const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
+pub(super) const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Shape of a drawn contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

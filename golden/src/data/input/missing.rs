@@ -4,7 +4,7 @@
 //! |---|---|
 //! | estimators with evidence | nothing: the taxel is left out of the fit of that frame |
 //! | other estimators, and the codes of the bit-true model, of simulated hardware and of a board | b̂ |
-//! | mean of several frames | the mean of the frames that have the reading, where there is one |
+//! | mean of several frames | the mean of the frames that have the reading, where there is one; of a mean that slides, those before |
 //! | checks of readings and of a stream | nothing |
 //!
 //! A cover smooths the stress. With readings of that covariance k, b̂ is the mean under those of the `NEAREST` nearest taxels that

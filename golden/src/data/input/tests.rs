@@ -7,6 +7,7 @@ use crate::fixed::Model;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{ForceOutput, MeanKind, Scene};
 use crate::spec::sensor::Sensor;
+use crate::spec::sliding;
 use std::cell::Cell;
 
 thread_local! {
@@ -170,7 +171,10 @@ fn a_sliding_mean_has_the_noise_of_its_frames() {
         let deviation = (squares / 100.0).sqrt() / frame.peak_MPa();
         // 100 draws estimate a deviation to 1/√200 = 7 %; four times that.
         assert!((deviation / (0.01 * f64::sqrt(variance)) - 1.0).abs() < 0.28, "{count}: {deviation}");
-        assert!((input.noise_of_mean_MPa(count) / (1e-3 * f64::sqrt(variance)) - 1.0).abs() < 0.01, "{count}");
+        assert!(
+            (input.noise_of_mean_MPa(sliding::variance(count, 3)) / (1e-3 * f64::sqrt(variance)) - 1.0).abs() < 0.01,
+            "{count}"
+        );
     }
     let mut newest = frames.clone();
     newest[39].id = "newest".to_string();

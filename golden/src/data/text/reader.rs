@@ -23,6 +23,8 @@ pub struct TextFrame {
     pub time_ns: Option<i64>,
     /// Readings, row-major; NaN where one is missing.
     pub readings: Vec<f64>,
+    /// The true force in N, [x, y, normal], of a line of JSON that states it.
+    pub resultant_N: Option<[f64; 3]>,
 }
 
 /// What a line brought.
@@ -68,6 +70,8 @@ struct Request {
     timestamp: Value,
     #[serde(default)]
     time_ns: Option<i64>,
+    #[serde(default)]
+    resultant_N: Option<[f64; 3]>,
 }
 
 /// Turns lines into frames of one array.
@@ -225,6 +229,7 @@ impl Reader {
                     id: Value::Null,
                     time_ns,
                     readings,
+                    resultant_N: None,
                 })
             }
             Err(reason) => self.of_another_layout(layout, line, reason),
@@ -280,6 +285,7 @@ impl Reader {
                     id: Value::Null,
                     time_ns: self.time_ns.take(),
                     readings: rows.concat(),
+                    resultant_N: None,
                 }),
                 Err(reason) => Read::LeftOut(LeftOut { id: Value::Null, reason }),
             });
@@ -338,6 +344,7 @@ fn json_frame(line: &Line, taxels: usize) -> Read {
         id: request.id,
         time_ns: request.time_ns.or_else(of_cell),
         readings,
+        resultant_N: request.resultant_N,
     })
 }
 

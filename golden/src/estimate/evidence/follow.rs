@@ -103,7 +103,7 @@ pub(super) fn follow(scene: &Evidence, frame: Scaled, last: &LastFit) -> Option<
 mod tests {
     use super::*;
     use crate::data::frame::Frame;
-    use crate::data::generator::presses::{press, Motion};
+    use crate::data::generator::presses::{Motion, Press};
     use crate::estimate::evidence::{suspect, Estimate};
     use crate::spec::scene::Scene;
 
@@ -114,7 +114,8 @@ mod tests {
     const CHANGED: usize = 6;
 
     fn frames(scene: &Scene, motion: Motion, noise: f64) -> Vec<Frame> {
-        press(scene, 3, motion, MOMENTS, noise).unwrap()
+        let press = Press { rate_Hz: 100.0, speed_mm_s: 5.0, ..Press::new(motion) };
+        press.of_frames(MOMENTS, noise).frames(scene, 3).unwrap()
     }
 
     fn sigma(estimate: &Estimate, axis: usize) -> f64 {
@@ -128,7 +129,7 @@ mod tests {
         let scene = Scene::builtin("sensor-1").unwrap();
         let evidence = Evidence::new(&scene);
         let (mut far, mut all, mut errors) = (0, 0, [0.0, 0.0]);
-        for (motion, noise) in Motion::ALL.into_iter().flat_map(|motion| [(motion, 5e-4), (motion, 2e-3)]) {
+        for (motion, noise) in Motion::NAMES.into_iter().flat_map(|(_, motion)| [(motion, 5e-4), (motion, 2e-3)]) {
             let (mut last, mut followed) = (None, 0);
             for (k, frame) in frames(&scene, motion, noise).iter().enumerate() {
                 let after = evidence.solve_after(&mut last, &frame.stress_MPa, &[], None);

@@ -9,6 +9,7 @@
 use super::array::{Array, EngineInput};
 use super::error::GoldenError;
 use super::estimator::Estimator;
+use super::template::Influences;
 use super::{adaptive, by_contacts, by_evidence, by_network, by_subarray};
 use crate::data::frame::Frame;
 use crate::data::input::Input;
@@ -22,7 +23,7 @@ use crate::physics::matrices::Matrices;
 use crate::result::flags::frame_flags;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::Case;
-use crate::spec::scene::{EstimatorKind, Scene};
+use crate::spec::scene::{EstimatorKind, MeanKind, Scene};
 
 /// The golden engine of one scene.
 pub struct Golden {
@@ -38,6 +39,8 @@ pub struct Golden {
     pub(super) misfit: Option<Misfit>,
     /// Standard deviations of a search, where there is a table.
     pub(super) deviations: Option<Deviations>,
+    /// What a remembered pressure takes, where the mean is adaptive.
+    pub(super) influences: Option<Influences>,
 }
 
 /// The estimator `kind` for a scene with these input options: the table of names.
@@ -99,7 +102,9 @@ impl Golden {
         scene.require_golden()?;
         let estimator = estimator(kind, scene, &input)?;
         let (misfit, deviations) = (Misfit::of_scene(scene, kind)?, Deviations::of_scene(scene, kind)?);
-        Ok(Golden { scene: scene.clone(), input, kind, estimator, misfit, deviations })
+        let adapts = scene.input.mean == MeanKind::Adaptive;
+        let influences = adapts.then(|| Influences::new(&scene.sensor, scene.medium));
+        Ok(Golden { scene: scene.clone(), input, kind, estimator, misfit, deviations, influences })
     }
 
     /// The estimator.

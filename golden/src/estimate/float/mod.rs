@@ -16,7 +16,8 @@
 //! folding is an exact change of basis.
 //!
 //! The driver: [`Golden`] runs an estimator (`golden`) between the input and the output options (`run`, with `unipolar`
-//! for readings that a sensor clips). The estimators (`estimator`) compute with the matrices of
+//! for readings that a sensor clips); over time, with an adaptive mean, `over_time` and its `template` remember the pressure. The
+//! estimators (`estimator`) compute with the matrices of
 //! `array`: `by_subarray`, `adaptive` and `by_contacts` search, `by_evidence` and `by_network` take the place of a search.
 
 pub mod contacts;
@@ -39,8 +40,11 @@ mod estimator;
 mod golden;
 #[cfg(test)]
 mod golden_tests;
+mod over_time;
 mod run;
+mod template;
 mod unipolar;
 
 pub use error::GoldenError;
 pub use golden::Golden;
+pub use over_time::Past;

@@ -13,10 +13,11 @@ use super::error::GoldenError;
 use super::estimator::Clipped;
 use super::forces::force;
 use super::golden::Golden;
+use super::over_time::Past;
 use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};
 use crate::data::frame::Frame;
-use crate::data::input::drift::Drift;
+use crate::data::input::memory::{Averaged, Memory};
 use crate::estimate::evidence::LastFit;
 use crate::physics::matrices::Matrices;
 use crate::result::checks::Checks;
@@ -57,7 +58,30 @@ impl Golden {
     pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         frame.check(self.scene())?;
         let complete = self.input.complete(std::slice::from_ref(frame));
-        self.run_readings(&mut None, std::slice::from_ref(frame), &complete[0], noise_MPa, None)
+        let result = self.run_readings(&mut None, std::slice::from_ref(frame), &complete[0], noise_MPa, None)?;
+        Ok(self.with_output(result))
+    }
+
+    /// The result of the mean of the frames `newest`, or of theirs and of those of which `memory` is.
+    pub(super) fn of_mean(
+        &self,
+        last: &mut Option<LastFit>,
+        memory: &Memory,
+        newest: &[Frame],
+        averaged: &Averaged,
+    ) -> Result<Reconstruction, GoldenError> {
+        let noise_MPa = self.input.noise_of_mean_MPa(averaged.variance);
+        let mut result = self.run_readings(last, newest, &averaged.mean, noise_MPa, memory.drift().share())?;
+        (result.extra.mean_frames, result.extra.lag_frames) = (averaged.frames_held, averaged.lag_frames);
+        Ok(result)
+    }
+
+    /// The result with the forces that the scene asks for.
+    pub(super) fn with_output(&self, result: Reconstruction) -> Reconstruction {
+        match self.scene().output.forces {
+            ForceOutput::Taxels => result,
+            ForceOutput::Resultants => result.with_resultants(&self.scene().sensor),
+        }
     }
 
     /// Reconstructs `mean`, the average of the frames `readings`, which have been checked; `zero_share` as in [`Checks`].
@@ -90,10 +114,7 @@ impl Golden {
         if let Some(deviations) = &self.deviations {
             deviations.add(&mut result, scene, &frame, noise_MPa);
         }
-        Ok(match scene.output.forces {
-            ForceOutput::Taxels => result,
-            ForceOutput::Resultants => result.with_resultants(&scene.sensor),
-        })
+        Ok(result)
     }
 
     /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless the latter presses, and of an estimator
@@ -128,7 +149,7 @@ impl Golden {
     }
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
-    /// first. With a sliding mean the frames are all those since the start, and known forces those of the last; where zeros
+    /// first. With a mean that slides the frames are all those since the start, and known forces those of the last; where zeros
     /// run, they are all those since the start too, and the last 2^k are averaged.
     ///
     /// ```
@@ -149,25 +170,7 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
-        self.run_after(&mut Drift::default(), &mut None, frames)
-    }
-
-    /// The same where zeros have a `drift` before the frames and the frame before left `last`; these are then what the frames
-    /// leave.
-    ///
-    /// # Errors
-    /// As [`Golden::run_averaged`].
-    pub fn run_after(
-        &self,
-        drift: &mut Drift,
-        last: &mut Option<LastFit>,
-        frames: &[Frame],
-    ) -> Result<Reconstruction, GoldenError> {
-        let mean = self.input.average_after(drift, self.scene(), frames)?;
-        let noise_MPa = self.input.noise_of_mean_MPa(frames.len());
-        let mut result = self.run_readings(last, self.scene().input.newest(frames), &mean, noise_MPa, drift.share())?;
-        result.extra.mean_frames = self.scene().input.frames_held(frames.len());
-        Ok(result)
+        self.run_after(&mut Past::default(), frames)
     }
 
     /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.

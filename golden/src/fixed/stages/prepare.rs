@@ -192,10 +192,8 @@ impl Prepare {
             }
             let raised = self.check.as_ref().map_or(FlagSet::default(), |check| check.flags(frame));
             let samples = self.calibrate(&mut prepared.drift, frame, false);
-            let shift = match self.mean {
-                MeanKind::Block => None,
-                MeanKind::Sliding => Some(gain_shift(prepared.frames + 1, self.average)),
-            };
+            let slides = self.mean != MeanKind::Block;
+            let shift = slides.then(|| gain_shift(prepared.frames + 1, self.average));
             prepared.raised = if shift.is_some() { raised } else { prepared.raised | raised };
             let half_down = (prepared.frames % 2) as i64;
             for (word, sample) in prepared.words.iter_mut().zip(samples) {
@@ -241,7 +239,8 @@ impl Prepare {
         let average = match self.mean {
             MeanKind::Block if self.average == 0 => 0,
             MeanKind::Block => 2,
-            MeanKind::Sliding => 3,
+            // No hardware has an adaptive one.
+            MeanKind::Sliding | MeanKind::Adaptive => 3,
         };
         calibrate + running + average
     }

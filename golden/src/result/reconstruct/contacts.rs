@@ -6,7 +6,8 @@
 //! | out: force, μ, centre, standard deviations, number of taxels | per contact | N, –, mm, – |
 
 use super::contact_estimate::ContactEstimate;
-use super::{Reconstruction, Region};
+use super::{Reconstruction, Region, Resultant, SubarrayResult};
+use crate::result::flags::Flag;
 use serde::Serialize;
 
 /// A contact of a result. What the estimator does not give is `None`.
@@ -35,6 +36,12 @@ impl FoundContact {
     pub fn sigma_N(&self) -> Option<[f64; 3]> {
         let ([x, y], normal) = (self.shear_sigma_N?, self.normal_sigma_N?);
         Some([x, y, normal])
+    }
+
+    /// With the μ of its subarray and the standard deviations.
+    fn deviating(self, own: &SubarrayResult) -> FoundContact {
+        let SubarrayResult { mu, mu_sigma, shear_sigma_N, normal_sigma_N, .. } = *own;
+        FoundContact { mu, mu_sigma, shear_sigma_N, normal_sigma_N, ..self }
     }
 }
 
@@ -76,10 +83,52 @@ impl Reconstruction {
         estimated.or_else(|| self.extra.regions.as_ref().map(|all| all.iter().map(FoundContact::from).collect()))
     }
 
+    /// The same; else the resultants of subarrays; else the whole array as one contact, where it is one subarray with a contact.
+    pub fn all_contacts(&self) -> Vec<FoundContact> {
+        let plain = |centre_mm, force_N| FoundContact { centre_mm, force_N, ..FoundContact::default() };
+        if let Some(found) = self.contacts() {
+            return found;
+        }
+        if let Some(resultants) = &self.extra.resultants {
+            let own = |(own, part): (&Resultant, &SubarrayResult)| plain(own.centre_mm, own.force_N).deviating(part);
+            return resultants.iter().zip(&self.subarrays).map(own).collect();
+        }
+        match self.subarrays.as_slice() {
+            [whole] if !self.flags.contains(&Flag::NoContact) => {
+                vec![plain(whole.compression_centroid_mm, self.resultant_N).deviating(whole)]
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// Standard deviation of the resultant in N, [x, y, normal], the contacts being independent; `None` unless each has one.
     pub fn sigma_N(&self) -> Option<[f64; 3]> {
         let all: Option<Vec<[f64; 3]>> = self.contacts()?.iter().map(FoundContact::sigma_N).collect();
         let all = all.filter(|all| !all.is_empty())?;
         Some([0, 1, 2].map(|axis| all.iter().map(|own| own[axis].powi(2)).sum::<f64>().sqrt()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::frame::Frame;
+    use crate::estimate::float::Golden;
+    use crate::spec::scene::Scene;
+
+    #[test]
+    fn estimated_contacts_come_first_and_one_subarray_is_one_contact() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let frame = Frame::shipped(&scene).remove(0);
+        let estimated = Golden::new(&scene).unwrap().run(&frame).unwrap();
+        let found = estimated.all_contacts();
+        assert_eq!(found[0].sigma_N(), Some(estimated.extra.contacts.as_ref().unwrap()[0].sigma_N));
+        let golden = Golden::reference(&scene).unwrap();
+        let searched = golden.run(&frame).unwrap();
+        let (force_N, own) = (searched.resultant_N, &searched.subarrays[0]);
+        let whole = FoundContact { centre_mm: own.compression_centroid_mm, force_N, mu: own.mu, ..Default::default() };
+        assert_eq!(searched.all_contacts(), [whole]);
+        let still = Frame::from_stress("still", &scene.sensor, vec![0.0; 64]).unwrap();
+        assert_eq!(golden.run(&still).unwrap().all_contacts(), []);
     }
 }

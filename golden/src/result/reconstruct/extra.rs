@@ -8,16 +8,20 @@
 //! | `unipolar` | `input.unipolar = true` | clipped and filled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `wrench` | a force per taxel, or a record for each contact | force and moment of the whole array |
+//! | `tracks` | a stream | number, age, place, velocity and load ratio of each contact |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
 //! | `suspects` | `search.estimator = "evidence"`, flag `taxel-suspect` | row, column, reading and expected stress of taxels taken as missing |
 //! | `missing` | flag `taxel-missing` | row, column, frames and stress of taxels without a reading |
-//! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
+//! | `mean_frames` | `input.mean = "sliding"`, `"adaptive"` | number of frames that the mean holds |
+//! | `lag_frames`, `template` | `input.mean = "adaptive"` | age of what the forces follow; whether the remembered pressure holds |
 //! | `tables_version` | `hardware.tables = "writable"` | version of the tables of the hardware, 0 for those of the bitstream |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::contact_estimate::ContactEstimate;
+use super::contact_track::ContactTrack;
 use super::missing_taxel::MissingTaxel;
 use super::output::{shear_sigma_N, Resultant, Wrench};
+use super::pressure_template::PressureTemplate;
 use super::suspect_taxel::SuspectTaxel;
 use crate::data::frame::Forces;
 use crate::result::checks::{largest_spread, relative_spread};
@@ -38,6 +42,9 @@ pub struct Extra {
     /// The contacts of the estimator `evidence`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contacts: Option<Vec<ContactEstimate>>,
+    /// The contacts over the results of a stream.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tracks: Vec<ContactTrack>,
     /// Number of sweeps over all regions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<usize>,
@@ -53,6 +60,12 @@ pub struct Extra {
     /// Number of frames that a sliding mean holds: as many of equal weight have its noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_frames: Option<usize>,
+    /// Mean age in frames of the readings that the forces follow, with an adaptive mean: their lag where they change evenly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_frames: Option<f64>,
+    /// The remembered pressure of an adaptive mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub template: Option<PressureTemplate>,
     /// Version of the tables of the hardware; 0 is that of the bitstream's, and of tables that are not whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tables_version: Option<u16>,

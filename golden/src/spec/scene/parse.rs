@@ -5,7 +5,7 @@ use super::field::{choice, table, whole, Field, Kind, Member, Number, Optional, 
 use super::reader::Reader;
 use super::{
     Condition, FixedSpec, HardwareSpec, InputSpec, InverseKind, InverseSpec, MeanKind, Medium, OutputSpec,
-    PartitionSpec, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, MAX_CONTACTS,
+    PartitionSpec, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, MAX_CONTACTS, SHORTEST_AVERAGE,
 };
 use crate::spec::partition::{subarrays, Case, Grid};
 use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
@@ -329,7 +329,7 @@ fn check_table_range(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Dead taxels are of the array, and fewer than all; a sliding mean of one frame is no mean.
+/// Dead taxels are of the array, and fewer than all; a mean that slides has several frames.
 fn check_input(reader: &Reader, input: &InputSpec, sensor: &Sensor) -> Result<(), SceneError> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     if input.dead.iter().any(|&[row, col]| row >= rows || col >= cols) || input.dead.len() == sensor.taxels() {
@@ -338,6 +338,10 @@ fn check_input(reader: &Reader, input: &InputSpec, sensor: &Sensor) -> Result<()
     }
     if input.mean == MeanKind::Sliding && input.average == 0 {
         return Err(reader.wrong_field("input.mean", "\"block\", or input.average from 1 to 12"));
+    }
+    if input.mean == MeanKind::Adaptive && (1..=SHORTEST_AVERAGE).contains(&input.average) {
+        let allowed = format!("0, or a whole number from {} to 12, with an adaptive mean", SHORTEST_AVERAGE + 1);
+        return Err(reader.wrong_field("input.average", allowed));
     }
     Ok(())
 }

@@ -151,8 +151,11 @@ impl Block for Average {
         let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
         let Average { taxels, bits, power, mean, marks: FrameMarks { limited, .. } } = *self;
         match mean {
-            MeanKind::Sliding => SlidingMean { taxels, bits, power, limited }.build(k, io.rst, from, to, io.frames),
             MeanKind::Block => self.sums(k, io),
+            // No hardware has an adaptive one.
+            MeanKind::Sliding | MeanKind::Adaptive => {
+                SlidingMean { taxels, bits, power, limited }.build(k, io.rst, from, to, io.frames);
+            }
         }
     }
 }

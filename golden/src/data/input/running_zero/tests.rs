@@ -108,9 +108,6 @@ fn all_frames_since_the_reset_give_the_same() {
         for engine in engines(&scene) {
             let mut state = State::default();
             for frames in &all {
-                if scene.input.slides() {
-                    state = State::default();
-                }
                 let newest = scene.input.newest(frames);
                 let result = engine.reconstruct_after(&mut state, newest).unwrap();
                 assert_eq!(result, engine.reconstruct(frames).unwrap(), "{more}");

@@ -1,0 +1,80 @@
+//! Change noise: the noise of a reading, from how readings change from frame to frame.
+//!
+//! ```text
+//! σ² = median over the last frames of  mean over taxels of (b_t − 2 b_{t−1} + b_{t−2})² / 6
+//! ```
+//! A reading that changes evenly has no second difference, and the median leaves out the frames in which a contact comes, goes or
+//! jumps.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: calibrated frames in their order | taxels | MPa |
+//! | out: standard deviation of a reading | scalar | MPa |
+
+/// Number of frames of which the median is.
+const FRAMES: usize = 31;
+/// The variance of a second difference over that of a reading: 1 + 4 + 1.
+const SECOND_DIFFERENCE: f64 = 6.0;
+
+/// The noise of the frames so far; the default is that before any.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChangeNoise {
+    /// The frame before, and that before it.
+    last: [Vec<f64>; 2],
+    /// The variance in each of the last frames.
+    variances: Vec<f64>,
+    frames: usize,
+}
+
+impl ChangeNoise {
+    /// Adds a frame in MPa; dead taxels, which are always 0, do not count: `live` taxels do.
+    pub fn add(&mut self, frame_MPa: &[f64], live: usize) {
+        let [before, earlier] = &self.last;
+        if !earlier.is_empty() && live > 0 {
+            let second = |k: usize| (frame_MPa[k] - 2.0 * before[k] + earlier[k]).powi(2);
+            let variance = (0..frame_MPa.len()).map(second).sum::<f64>() / (SECOND_DIFFERENCE * live as f64);
+            match self.variances.len() < FRAMES {
+                true => self.variances.push(variance),
+                false => self.variances[self.frames % FRAMES] = variance,
+            }
+        }
+        self.frames += 1;
+        self.last = [frame_MPa.to_vec(), std::mem::take(&mut self.last[0])];
+    }
+
+    /// Standard deviation of a reading in MPa; `None` before the third frame.
+    pub fn sigma_MPa(&self) -> Option<f64> {
+        let mut sorted = self.variances.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).map(|variance| variance.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::frame::Frame;
+    use crate::data::generator::presses::{Motion, Press};
+    use crate::spec::scene::Scene;
+
+    /// Presses that move, change at once or come and go have the noise of those that hold.
+    #[test]
+    fn the_noise_of_a_press_is_found_whatever_it_does() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        for (noise, (name, motion)) in [1e-3, 1e-2].into_iter().flat_map(|noise| Motion::NAMES.map(|own| (noise, own)))
+        {
+            let press = Press { rate_Hz: 250.0, ..Press::new(motion) };
+            let frames = press.of_frames(100, noise).frames(&scene, 5).unwrap();
+            let exact = Press { rate_Hz: 250.0, ..Press::new(motion) }.of_frames(100, 0.0).frames(&scene, 5).unwrap();
+            let peak = exact.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
+            let mut found = ChangeNoise::default();
+            for (number, frame) in frames.iter().enumerate() {
+                found.add(&frame.stress_MPa, 64);
+                assert_eq!(found.sigma_MPa().is_some(), number >= 2);
+                let share = found.sigma_MPa().unwrap_or(noise * peak) / (noise * peak);
+                // 64 taxels of a few frames; at 250 Hz a contact moves by 0.08 mm a frame.
+                assert!(number < 10 || (0.85..1.25).contains(&share), "{name} {noise} {number}: {share}");
+            }
+        }
+    }
+}

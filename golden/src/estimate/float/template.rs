@@ -1,0 +1,221 @@
+//! Template: what changed forces of contacts that stay in place would change of the readings.
+//!
+//! While a contact holds, its pressure keeps its shape q, Σ q = 1 over its cells, and only three numbers change: normal force and
+//! shear. With q from an estimate on many frames, they follow from a difference d of two means by least squares:
+//!
+//! ```text
+//! d = Σ over contacts of  ΔN Cz q + ΔFx Cx q + ΔFy Cy q  + noise
+//! ```
+//! What the fit leaves shows a contact that moves: over 1 mm on sensor-1 the change of the readings is that of a shear up to a fifth
+//! of its size.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: forces of an estimate, its contacts | 3 × taxels, – | N, mm |
+//! | in: d, taxels that count | taxels each | MPa, – |
+//! | out: change of the force of each contact, its variance over that of d | 3 each | N, N²/MPa² |
+//! | out: Σ of squares that the fit explains and leaves | scalars | MPa² |
+
+use crate::physics::influence::CellInfluence;
+use crate::result::reconstruct::Reconstruction;
+use crate::spec::scene::Medium;
+use crate::spec::sensor::Sensor;
+use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
+use faer::{Col, Mat, Side};
+
+/// Parts of a cell along each side: a pressure that is even on a cell would leave a tenth of a changed shear.
+const PARTS: usize = 3;
+
+/// The influence of parts of an array's cells on its taxels, by their distance.
+pub(super) struct Influences {
+    sensor: Sensor,
+    /// MPa per N along x, y and z, for each distance in rows and columns of parts.
+    table: Vec<[f64; 3]>,
+}
+
+/// The readings of changed forces of the contacts of a result.
+pub(super) struct Template {
+    /// Share of each taxel in the normal force of each contact.
+    pub shares: Vec<Vec<f64>>,
+    /// Stress in MPa per N along x, y and z of each contact, as columns; 0 on taxels that do not count.
+    columns: Vec<Vec<f64>>,
+    factor: Llt<f64>,
+    /// Variance of each number of the fit over that of a reading.
+    variances: Vec<f64>,
+}
+
+/// A fit of changed forces.
+pub(super) struct Fit {
+    /// ΔFx, ΔFy, ΔN of each contact in N.
+    pub changes_N: Vec<[f64; 3]>,
+    /// Σ of the squares of what it explains, and of what it leaves, in MPa².
+    pub explained: f64,
+    pub left: f64,
+}
+
+impl Influences {
+    /// Those of an array on a medium.
+    pub(super) fn new(sensor: &Sensor, medium: Medium) -> Influences {
+        let Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm } = *sensor;
+        let sides = [pitch_x_mm, pitch_y_mm].map(|pitch| pitch / PARTS as f64);
+        let cell = CellInfluence::new(sides, thickness_mm, medium);
+        let at =
+            |k: usize| cell.in_table([(k % (PARTS * cols)) as f64 * sides[0], (k / (PARTS * cols)) as f64 * sides[1]]);
+        Influences { sensor: sensor.clone(), table: (0..PARTS * rows * PARTS * cols).map(at).collect() }
+    }
+
+    /// The stress in MPa of forces of 1 N along x, y and z, spread over the array by `shares`, linearly between the cells.
+    fn columns(&self, shares: &[f64], counts: &[bool]) -> [Vec<f64>; 3] {
+        let (rows, cols) = (self.sensor.rows, self.sensor.cols);
+        let parts = self.parts(shares);
+        let total: f64 = parts.iter().map(|(_, share)| share).sum();
+        let mut columns = [(); 3].map(|()| vec![0.0; shares.len()]);
+        for ([s, d], share) in parts {
+            let share = share / total;
+            for taxel in (0..rows * cols).filter(|taxel| counts[*taxel]) {
+                // The middle part of the taxel's own cell.
+                let (r, c) = (taxel / cols * PARTS + PARTS / 2, taxel % cols * PARTS + PARTS / 2);
+                let [x, y, z] = self.table[r.abs_diff(s) * PARTS * cols + c.abs_diff(d)];
+                // Odd along its own axis.
+                columns[0][taxel] += share * if c < d { -x } else { x };
+                columns[1][taxel] += share * if r < s { -y } else { y };
+                columns[2][taxel] += share * z;
+            }
+        }
+        columns
+    }
+
+    /// Row and column of each part with a share, and that share, not normalised.
+    fn parts(&self, shares: &[f64]) -> Vec<([usize; 2], f64)> {
+        let (rows, cols) = (self.sensor.rows, self.sensor.cols);
+        // Cells between which a part lies, and its place between them.
+        let between = |part: usize, count: usize| {
+            let away = (part % PARTS) as f64 / PARTS as f64 - (PARTS / 2) as f64 / PARTS as f64;
+            let (own, beside) = (part / PARTS, if away < 0.0 { part / PARTS + count - 1 } else { part / PARTS + 1 });
+            // At the border nothing lies beside.
+            let beside = if away < 0.0 && own == 0 || away > 0.0 && own + 1 == count { own } else { beside % count };
+            ([own, beside], away.abs())
+        };
+        let share = |row: usize, col: usize| {
+            let ([r, s], down) = between(row, rows);
+            let ([c, d], right) = between(col, cols);
+            let along = |row: usize| (1.0 - right) * shares[row * cols + c] + right * shares[row * cols + d];
+            (1.0 - down) * along(r) + down * along(s)
+        };
+        let all = (0..PARTS * rows).flat_map(|row| (0..PARTS * cols).map(move |col| [row, col]));
+        all.map(|[row, col]| ([row, col], share(row, col))).filter(|(_, share)| *share != 0.0).collect()
+    }
+}
+
+impl Template {
+    /// That of the contacts of `result`, where one force vector per taxel is known; `counts` says which taxels do. `None` without a
+    /// contact that presses, and where the readings do not tell the forces apart.
+    pub(super) fn new(influences: &Influences, result: &Reconstruction, counts: &[bool]) -> Option<Template> {
+        let shares = shares(&influences.sensor, result)?;
+        let columns: Vec<Vec<f64>> = shares.iter().flat_map(|own| influences.columns(own, counts)).collect();
+        let n = columns.len();
+        let normal = Mat::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]));
+        let factor = normal.llt(Side::Lower).ok()?;
+        let inverse = factor.inverse();
+        let variances: Vec<f64> = (0..n).map(|k| inverse[(k, k)]).collect();
+        variances.iter().all(|variance| variance.is_finite()).then_some(Template { shares, columns, factor, variances })
+    }
+
+    /// Number of fitted numbers.
+    pub(super) fn unknowns(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Variance of the change of each contact's force, [x, y, normal], over that of `d`, in N²/MPa².
+    pub(super) fn variances(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        self.variances.chunks_exact(3).map(|own| [own[0], own[1], own[2]])
+    }
+
+    /// The changes that explain the difference `d`, which is 0 on taxels that do not count.
+    pub(super) fn fit(&self, d: &[f64]) -> Fit {
+        let projected = Col::from_fn(self.columns.len(), |k| dot(&self.columns[k], d));
+        let found = self.factor.solve(&projected);
+        // Of a least-squares fit xᵀ Gᵀ d.
+        let explained = found.transpose() * &projected;
+        let changes_N = (0..self.shares.len()).map(|k| [0, 1, 2].map(|axis| found[3 * k + axis])).collect();
+        Fit { changes_N, explained, left: (dot(d, d) - explained).max(0.0) }
+    }
+}
+
+/// Share of each taxel in the normal force of each contact; `None` where none presses. Taxels belong to the nearest contact.
+fn shares(sensor: &Sensor, result: &Reconstruction) -> Option<Vec<Vec<f64>>> {
+    let pressed: Vec<f64> = result.forces_N.fz.iter().map(|fz| fz.max(0.0)).collect();
+    let contacts = result.contacts().unwrap_or_default();
+    let centres: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.centre_mm).collect();
+    let centres = centres.filter(|centres| !centres.is_empty()).unwrap_or_else(|| vec![[0.0; 2]]);
+    let mut shares = vec![vec![0.0; pressed.len()]; centres.len()];
+    for (taxel, force_N) in pressed.into_iter().enumerate() {
+        let [x, y] = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
+        let away = |[u, v]: [f64; 2]| (x - u).hypot(y - v);
+        let nearest = (0..centres.len()).min_by(|a, b| away(centres[*a]).total_cmp(&away(centres[*b])))?;
+        shares[nearest][taxel] = force_N;
+    }
+    for own in &mut shares {
+        let total: f64 = own.iter().sum();
+        if total <= 0.0 {
+            return None;
+        }
+        own.iter_mut().for_each(|share| *share /= total);
+    }
+    (!shares[0].is_empty()).then_some(shares)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    std::iter::zip(a, b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::frame::Contact;
+    use crate::data::generator::generate;
+    use crate::estimate::float::Golden;
+    use crate::spec::scene::{EstimatorKind, Scene};
+
+    /// The change of a contact's forces is found from that of its stress, and what is left of it is small.
+    #[test]
+    fn changed_forces_of_a_contact_that_stays_are_found() {
+        for name in ["sensor-1", "eight-by-eight", "eight-by-eight-bonded"] {
+            let scene = Scene::builtin(name).unwrap();
+            let stress = |shear: [f64; 2], normal: f64| {
+                let contact = Contact {
+                    shape: Some("hertz-circle".to_string()),
+                    centre_mm: Some([1.3, -0.7]),
+                    size_mm: vec![4.5],
+                    normal_N: Some(normal),
+                    tangential_N: Some(shear),
+                    ..Contact::default()
+                };
+                generate("press", &scene.sensor, scene.medium, &[contact]).unwrap()
+            };
+            let (before, after) = (stress([1.0, 0.4], 5.0), stress([-0.6, 1.1], 5.3));
+            let result = Golden::with(&scene, EstimatorKind::Evidence).unwrap().run(&before).unwrap();
+            let influences = Influences::new(&scene.sensor, scene.medium);
+            let template = Template::new(&influences, &result, &vec![true; scene.sensor.taxels()]).unwrap();
+            let d: Vec<f64> = std::iter::zip(&after.stress_MPa, &before.stress_MPa).map(|(b, a)| b - a).collect();
+            let fit = template.fit(&d);
+            let [x, y, normal] = fit.changes_N[0];
+            let off = (x + 1.6).hypot(y - 0.7).hypot(normal - 0.3);
+            assert!(off < 0.06 * 1.6f64.hypot(0.7), "{name}: {:?}", fit.changes_N);
+            assert!(fit.left < 0.06f64.powi(2) * fit.explained, "{name}: {} {}", fit.left, fit.explained);
+        }
+    }
+
+    #[test]
+    fn parts_keep_what_is_even_and_lie_between_the_cells() {
+        let sensor = Sensor { rows: 1, cols: 3, pitch_x_mm: 3.0, pitch_y_mm: 3.0, thickness_mm: 3.0 };
+        let influences = Influences::new(&sensor, Medium::HalfSpace);
+        let shares = |shares: [f64; 3]| influences.parts(&shares).iter().map(|(_, share)| *share).collect::<Vec<f64>>();
+        assert!(shares([1.0; 3]).iter().all(|share| (share - 1.0).abs() < 1e-12));
+        let row = &shares([0.0, 3.0, 6.0])[..];
+        let wanted = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0];
+        // Of each of the three rows of parts the same.
+        assert_eq!(row.len(), 21);
+        assert!((0..21).all(|k| (row[k] - wanted[k % 7]).abs() < 1e-12), "{row:?}");
+    }
+}
