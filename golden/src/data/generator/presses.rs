@@ -33,6 +33,7 @@ use crate::random::Random;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// First load of a ramp, last load of a release, over the largest.
 const LOADS: [f64; 2] = [1.0 / 6.0, 0.01];
@@ -252,12 +253,20 @@ impl Press {
     /// As [`Draws::contacts`] for two contacts, and as [`generate`]; [`GeneratorError::Option`] for a number of
     /// frames below two, a rate or speed that is not positive.
     pub fn exact(&self, scene: &Scene, number: u64) -> Result<Vec<Frame>, GeneratorError> {
+        self.exact_part(scene, number, 0..self.frames)
+    }
+
+    /// Of the exact frames those in `part`.
+    ///
+    /// # Errors
+    /// As [`Press::exact`].
+    pub fn exact_part(&self, scene: &Scene, number: u64, part: Range<usize>) -> Result<Vec<Frame>, GeneratorError> {
         self.check()?;
         // Two for every motion, so that the first is the same in all.
         let all = Draws::new(scene, DrawOptions { contacts: 2, ..self.draw.clone() })?.contacts(number)?;
         let duration_s = (self.frames - 1) as f64 / self.rate_Hz;
-        let mut frames: Vec<Frame> = Vec::with_capacity(self.frames);
-        for frame in 0..self.frames {
+        let mut frames: Vec<Frame> = Vec::with_capacity(part.len());
+        for frame in part {
             let time_s = frame as f64 / self.rate_Hz;
             let moment = Moment { sensor: &scene.sensor, time_s, duration_s, speed_mm_s: self.speed_mm_s };
             let (id, contacts) = (format!("press-{number}-{frame}"), self.motion.contacts(&all, &moment));

@@ -16,20 +16,17 @@
 //! | out: change of the force of each contact, its variance over that of d | 3 each | N, N²/MPa² |
 //! | out: Σ of squares that the fit explains and leaves | scalars | MPa² |
 
-use crate::physics::influence::CellInfluence;
+use crate::physics::influence::table;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::Medium;
 use crate::spec::sensor::Sensor;
 use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 use faer::{Col, Mat, Side};
 
-/// Parts of a cell along each side: a pressure that is even on a cell would leave a tenth of a changed shear.
-const PARTS: usize = 3;
-
-/// The influence of parts of an array's cells on its taxels, by their distance.
+/// The influence of an array's cells on its taxels, by their distance.
 pub(super) struct Influences {
     sensor: Sensor,
-    /// MPa per N along x, y and z, for each distance in rows and columns of parts.
+    /// MPa per N along x, y and z, for each distance in rows and columns.
     table: Vec<[f64; 3]>,
 }
 
@@ -56,26 +53,18 @@ pub(super) struct Fit {
 impl Influences {
     /// Those of an array on a medium.
     pub(super) fn new(sensor: &Sensor, medium: Medium) -> Influences {
-        let Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm } = *sensor;
-        let sides = [pitch_x_mm, pitch_y_mm].map(|pitch| pitch / PARTS as f64);
-        let cell = CellInfluence::new(sides, thickness_mm, medium);
-        let at =
-            |k: usize| cell.in_table([(k % (PARTS * cols)) as f64 * sides[0], (k / (PARTS * cols)) as f64 * sides[1]]);
-        Influences { sensor: sensor.clone(), table: (0..PARTS * rows * PARTS * cols).map(at).collect() }
+        Influences { sensor: sensor.clone(), table: table(sensor, medium) }
     }
 
-    /// The stress in MPa of forces of 1 N along x, y and z, spread over the array by `shares`, linearly between the cells.
+    /// The stress in MPa of forces of 1 N along x, y and z, spread over the cells by `shares`.
     fn columns(&self, shares: &[f64], counts: &[bool]) -> [Vec<f64>; 3] {
-        let (rows, cols) = (self.sensor.rows, self.sensor.cols);
-        let parts = self.parts(shares);
-        let total: f64 = parts.iter().map(|(_, share)| share).sum();
+        let cols = self.sensor.cols;
         let mut columns = [(); 3].map(|()| vec![0.0; shares.len()]);
-        for ([s, d], share) in parts {
-            let share = share / total;
-            for taxel in (0..rows * cols).filter(|taxel| counts[*taxel]) {
-                // The middle part of the taxel's own cell.
-                let (r, c) = (taxel / cols * PARTS + PARTS / 2, taxel % cols * PARTS + PARTS / 2);
-                let [x, y, z] = self.table[r.abs_diff(s) * PARTS * cols + c.abs_diff(d)];
+        for (cell, share) in shares.iter().enumerate().filter(|(_, share)| **share != 0.0) {
+            let (s, d) = (cell / cols, cell % cols);
+            for taxel in (0..shares.len()).filter(|taxel| counts[*taxel]) {
+                let (r, c) = (taxel / cols, taxel % cols);
+                let [x, y, z] = self.table[r.abs_diff(s) * cols + c.abs_diff(d)];
                 // Odd along its own axis.
                 columns[0][taxel] += share * if c < d { -x } else { x };
                 columns[1][taxel] += share * if r < s { -y } else { y };
@@ -83,27 +72,6 @@ impl Influences {
             }
         }
         columns
-    }
-
-    /// Row and column of each part with a share, and that share, not normalised.
-    fn parts(&self, shares: &[f64]) -> Vec<([usize; 2], f64)> {
-        let (rows, cols) = (self.sensor.rows, self.sensor.cols);
-        // Cells between which a part lies, and its place between them.
-        let between = |part: usize, count: usize| {
-            let away = (part % PARTS) as f64 / PARTS as f64 - (PARTS / 2) as f64 / PARTS as f64;
-            let (own, beside) = (part / PARTS, if away < 0.0 { part / PARTS + count - 1 } else { part / PARTS + 1 });
-            // At the border nothing lies beside.
-            let beside = if away < 0.0 && own == 0 || away > 0.0 && own + 1 == count { own } else { beside % count };
-            ([own, beside], away.abs())
-        };
-        let share = |row: usize, col: usize| {
-            let ([r, s], down) = between(row, rows);
-            let ([c, d], right) = between(col, cols);
-            let along = |row: usize| (1.0 - right) * shares[row * cols + c] + right * shares[row * cols + d];
-            (1.0 - down) * along(r) + down * along(s)
-        };
-        let all = (0..PARTS * rows).flat_map(|row| (0..PARTS * cols).map(move |col| [row, col]));
-        all.map(|[row, col]| ([row, col], share(row, col))).filter(|(_, share)| *share != 0.0).collect()
     }
 }
 
@@ -167,55 +135,4 @@ fn shares(sensor: &Sensor, result: &Reconstruction) -> Option<Vec<Vec<f64>>> {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     std::iter::zip(a, b).map(|(a, b)| a * b).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::data::frame::Contact;
-    use crate::data::generator::generate;
-    use crate::estimate::float::Golden;
-    use crate::spec::scene::{EstimatorKind, Scene};
-
-    /// The change of a contact's forces is found from that of its stress, and what is left of it is small.
-    #[test]
-    fn changed_forces_of_a_contact_that_stays_are_found() {
-        for name in ["sensor-1", "eight-by-eight", "eight-by-eight-bonded"] {
-            let scene = Scene::builtin(name).unwrap();
-            let stress = |shear: [f64; 2], normal: f64| {
-                let contact = Contact {
-                    shape: Some("hertz-circle".to_string()),
-                    centre_mm: Some([1.3, -0.7]),
-                    size_mm: vec![4.5],
-                    normal_N: Some(normal),
-                    tangential_N: Some(shear),
-                    ..Contact::default()
-                };
-                generate("press", &scene.sensor, scene.medium, &[contact]).unwrap()
-            };
-            let (before, after) = (stress([1.0, 0.4], 5.0), stress([-0.6, 1.1], 5.3));
-            let result = Golden::with(&scene, EstimatorKind::Evidence).unwrap().run(&before).unwrap();
-            let influences = Influences::new(&scene.sensor, scene.medium);
-            let template = Template::new(&influences, &result, &vec![true; scene.sensor.taxels()]).unwrap();
-            let d: Vec<f64> = std::iter::zip(&after.stress_MPa, &before.stress_MPa).map(|(b, a)| b - a).collect();
-            let fit = template.fit(&d);
-            let [x, y, normal] = fit.changes_N[0];
-            let off = (x + 1.6).hypot(y - 0.7).hypot(normal - 0.3);
-            assert!(off < 0.06 * 1.6f64.hypot(0.7), "{name}: {:?}", fit.changes_N);
-            assert!(fit.left < 0.06f64.powi(2) * fit.explained, "{name}: {} {}", fit.left, fit.explained);
-        }
-    }
-
-    #[test]
-    fn parts_keep_what_is_even_and_lie_between_the_cells() {
-        let sensor = Sensor { rows: 1, cols: 3, pitch_x_mm: 3.0, pitch_y_mm: 3.0, thickness_mm: 3.0 };
-        let influences = Influences::new(&sensor, Medium::HalfSpace);
-        let shares = |shares: [f64; 3]| influences.parts(&shares).iter().map(|(_, share)| *share).collect::<Vec<f64>>();
-        assert!(shares([1.0; 3]).iter().all(|share| (share - 1.0).abs() < 1e-12));
-        let row = &shares([0.0, 3.0, 6.0])[..];
-        let wanted = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0];
-        // Of each of the three rows of parts the same.
-        assert_eq!(row.len(), 21);
-        assert!((0..21).all(|k| (row[k] - wanted[k % 7]).abs() < 1e-12), "{row:?}");
-    }
 }

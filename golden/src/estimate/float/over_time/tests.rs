@@ -118,11 +118,12 @@ fn other_covers_contacts_and_faulty_taxels_have_templates_too() {
     let mut unipolar = plain.clone();
     unipolar.input.unipolar = true;
     let converter = |scene: &Scene| Converter { noise: 2e-3, unipolar: scene.input.unipolar, ..Converter::default() };
+    // With little noise the error of the remembered pressure ends the template of a shear that changes fast.
     for (name, scene, motion) in [
-        ("plain", plain.clone(), Motion::Turn),
-        ("dead", dead, Motion::Turn),
-        ("unipolar", unipolar, Motion::Turn),
-        ("bonded", adaptive("eight-by-eight-bonded"), Motion::Turn),
+        ("plain", plain.clone(), Motion::Hold),
+        ("dead", dead, Motion::Hold),
+        ("unipolar", unipolar, Motion::Hold),
+        ("bonded", adaptive("eight-by-eight-bonded"), Motion::Hold),
         ("second", plain, Motion::Second),
     ] {
         let golden = Golden::with(&scene, EstimatorKind::Evidence).unwrap();
@@ -134,7 +135,7 @@ fn other_covers_contacts_and_faulty_taxels_have_templates_too() {
         // From a frame on at which the template can hold again.
         let found = results(&golden, &frames);
         let [error, held] = figures(&frames, &found, FRAMES - 80);
-        assert!(error < 0.15 && held > 0.3, "{name}: e_t {error}, held {held}");
+        assert!(error < 0.15 && held > 0.9, "{name}: e_t {error}, held {held}");
         let contacts = found[FRAMES - 1].contacts().unwrap();
         assert_eq!(contacts.len(), if motion == Motion::Second { 2 } else { 1 }, "{name}");
         // The forces of contacts and of taxels have the same sum.
