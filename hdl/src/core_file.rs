@@ -74,13 +74,14 @@ mod tests {
     #[test]
     fn every_file_stands_where_its_kind_belongs() {
         let owned = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
-        let files = owned(&["dermis_a.v", "dermis_a.vlt", "manifest.json", "coefficients.hex"]);
+        let files = owned(&["dermis_a.v", "dermis_a.vlt", "manifest.json", "dermis_a__coefficients.hex"]);
         let text =
             core_file("dermis_a", "a", Family::Ice40, &files, &owned(&["dermis_a_tb.sv", "dermis_a_tb_codes.hex"]));
         let after = |start: &str| text.split_once(start).map(|(_, rest)| rest.lines().nth(1).unwrap_or_default());
         assert_eq!(after("  rtl:\n"), Some("      - dermis_a.v: {file_type: verilogSource}"));
         assert_eq!(after("  waivers:\n"), Some("      - dermis_a.vlt: {file_type: vlt}"));
-        assert!(text.contains("      - coefficients.hex: {file_type: user, copyto: coefficients.hex}\n"));
+        assert!(text
+            .contains("      - dermis_a__coefficients.hex: {file_type: user, copyto: dermis_a__coefficients.hex}\n"));
         assert_eq!(after("  testbench:\n"), Some("      - dermis_a_tb.sv: {file_type: systemVerilogSource}"));
         assert!(text.contains("      arch: ice40\n") && !text.contains("manifest.json"));
     }

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::engine::stages;
 use crate::error::HdlError;
-use crate::language::{Attributes, Hierarchy, Kernel, Slot, SEPARATOR};
+use crate::language::{Hierarchy, Kernel, Slot, SEPARATOR};
 use crate::simulate::{design, Running};
 use crate::wire::Word;
 
@@ -130,7 +130,7 @@ pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
 /// As [`fn@block`].
 pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError> {
     let block = block(model, name)?;
-    let text = engine(model)?.module(block.instance, ENGINE, &Attributes::new()).unwrap_or_default();
+    let text = engine(model)?.module(block.instance, ENGINE, None).unwrap_or_default();
     Ok(format!("// {}\n{text}", block.purpose))
 }
 

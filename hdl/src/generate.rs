@@ -7,7 +7,7 @@ use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::stages::send::{status_fields, STATUS_BEATS};
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
-use dermis_golden::result::flags::StatusField;
+use dermis_golden::result::flags::{Flag, StatusField};
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::identifier;
 use dermis_golden::wire::link::c_header;
@@ -17,7 +17,7 @@ use serde_json::json;
 use crate::device::Tap;
 use crate::engine::stages;
 use crate::error::HdlError;
-use crate::language::{self, Attributes, Change, Hierarchy};
+use crate::language::{self, memory_file, Change, Hierarchy, RamStyles};
 use crate::manifest::{seal, GeneratedFile, MANIFEST, MANIFEST_VERSION};
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
@@ -103,7 +103,8 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let file = |name: String, text: String| GeneratedFile { name, text };
     let hierarchy = design(model)?.changed(changes)?;
     let memories = placed(&hierarchy, model)?;
-    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories));
+    let styles = names_family(model).then(|| ram_styles(&memories));
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, styles.as_ref());
     let usage = by_stage(model, &hierarchy, &memories, None);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);
@@ -115,8 +116,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
         file("dermis_link.h".to_string(), c_header()),
     ];
-    let contents = hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files());
-    files.extend(contents.map(|(name, text)| file(name, text)));
+    files.extend(hierarchy.memory_files(&top).into_iter().map(|(name, text)| file(name, text)));
     let mut generated = Generated { top, files, memories, taps, state, manifest, usage, dropped };
     generated.seal();
     Ok(generated)
@@ -135,24 +135,26 @@ pub(crate) struct Around {
     pub header: String,
     /// Row of its own blocks in the table of resources.
     pub row: &'static str,
+    /// It has the pins of a board.
+    pub is_board: bool,
 }
 
 impl Around {
-    /// The files of `engine` with this module's Verilog in the place of the engine's, without taps; not sealed.
+    /// The files of `engine`, those of its top module under this module's name and with its Verilog, without taps; not sealed.
     ///
     /// # Errors
     /// [`HdlError::Check`] if a planned memory is missing.
     pub(crate) fn generated(self, model: &Model, mut engine: Generated) -> Result<Generated, HdlError> {
-        let Around { top, hierarchy, header, row } = self;
+        let Around { top, hierarchy, header, row, is_board } = self;
         let memories = placed(&hierarchy, model)?;
-        let text = header + &hierarchy.verilog(&top, &attributes(&memories));
-        let (engine_file, waivers) = (format!("{}.v", engine.top), format!("{}.vlt", engine.top));
+        let styles = (is_board || names_family(model)).then(|| ram_styles(&memories));
+        let text = header + &hierarchy.verilog(&top, styles.as_ref());
         for file in &mut engine.files {
-            if file.name == waivers {
-                file.name = format!("{top}.vlt");
-            } else if file.name == engine_file {
-                file.name = format!("{top}.v");
-                file.text.clone_from(&text);
+            if let Some(rest) = file.name.strip_prefix(&engine.top) {
+                if rest == ".v" {
+                    file.text.clone_from(&text);
+                }
+                file.name = format!("{top}{rest}");
             }
         }
         let usage = by_stage(model, &hierarchy, &memories, Some(Surrounding { engine: ENGINE, row }));
@@ -181,17 +183,23 @@ fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, Hdl
     model.resources.memories.iter().map(place).collect()
 }
 
-/// The `ram_style` attribute of every memory.
-fn attributes(memories: &[PlacedMemory]) -> Attributes {
-    let attribute = |memory: &PlacedMemory| {
+/// Whether the Verilog is for a family that somebody has named. Another family may have no such RAMs, and synthesis then refuses an
+/// attribute; without one it takes what there is.
+fn names_family(model: &Model) -> bool {
+    model.scene.hardware.board.is_some()
+}
+
+/// The attribute `ram_style` of every memory that the model plans.
+fn ram_styles(memories: &[PlacedMemory]) -> RamStyles {
+    let style = |memory: &PlacedMemory| {
         let style = match (memory.planned.large_rams, memory.planned.block_rams) {
             (0, 0) => "distributed",
             (0, _) => "block",
             _ => "huge",
         };
-        ((memory.block.clone(), memory.array.clone()), format!("ram_style = \"{style}\""))
+        ((memory.block.clone(), memory.array.clone()), style.to_owned())
     };
-    memories.iter().map(attribute).collect()
+    memories.iter().map(style).collect()
 }
 
 /// `dermis_` and the scene's name as an identifier.
@@ -211,7 +219,7 @@ fn header(model: &Model, top: &str) -> String {
 //   s_axis_tdata     [{input_end}:0], a taxel's code, signed; row-major, tlast on the last code of a frame{tables}
 //   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {forces}, then {status} status beats
 //
-// {lanes} MAC lanes, degree {degree}; coefficients in {MEMORY_FILE}, one line per word of the lanes' memory.
+// {lanes} MAC lanes, degree {degree}; coefficients in {memory}, one line per word of the lanes' memory.
 ",
         sensor = scene.sensor,
         name = scene.name,
@@ -233,6 +241,7 @@ fn header(model: &Model, top: &str) -> String {
         },
         lanes = 4 * f.lanes_per_parity,
         degree = f.degree,
+        memory = memory_file(top, MEMORY_FILE),
     )
 }
 
@@ -272,6 +281,22 @@ fn status_masks(model: &Model) -> BTreeMap<String, Option<u32>> {
         Some((name, field.feature.is_in(&model.scene).then_some(value)))
     };
     status_fields().into_iter().filter_map(entry).collect()
+}
+
+/// Where the fields of a status are that this hardware has: word of the status, lowest bit, bits, and the flag that the bit raises.
+fn status_layout(model: &Model) -> Vec<serde_json::Value> {
+    let entry = |field: StatusField| {
+        let flag = Flag::ALL.into_iter().find(|flag| flag.status_bit() == Some(field));
+        json!({
+            "name": field.name,
+            "word": field.index(),
+            "low": field.low,
+            "bits": field.bits,
+            "flag": flag,
+            "meaning": field.meaning,
+        })
+    };
+    status_fields().into_iter().filter(|field| field.feature.is_in(&model.scene)).map(entry).collect()
 }
 
 fn manifest(
@@ -314,6 +339,7 @@ fn manifest(
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
             "threshold_lsb": model.threshold,
             "flags": status_masks(model),
+            "status": status_layout(model),
         },
         "sizes": {
             "quads": f.quads,
@@ -335,7 +361,7 @@ mod tests {
     use super::*;
     use crate::scenes::model;
     use dermis_golden::fixed::stages::send::{CASE, FRAMES, TABLES_VERSION};
-    use dermis_golden::result::flags::{Feature, Flag};
+    use dermis_golden::result::flags::Feature;
     use dermis_golden::spec::scene::Scene;
 
     /// The fields of a status in the manifest: of hardware with a feature those that the feature adds, of all others `null`.
@@ -371,6 +397,17 @@ mod tests {
                 let wanted = has.then_some(bit.mask());
                 assert_eq!(masks.get(bit.name), Some(&wanted), "{flag:?}, {feature:?}");
             }
+            // The layout has the same fields, and those that are always there.
+            let layout = status_layout(model);
+            for field in status_fields() {
+                let own: Vec<_> = layout.iter().filter(|entry| entry["name"] == field.name).collect();
+                assert_eq!(own.len(), usize::from(field.feature.is_in(&model.scene)), "{}, {feature:?}", field.name);
+                for entry in own {
+                    let at =
+                        [&entry["word"], &entry["low"], &entry["bits"]].map(|number| number.as_u64().unwrap() as u32);
+                    assert_eq!(at, [(3 * field.beat + field.word) as u32, field.low, field.bits]);
+                }
+            }
             for field in [CASE, FRAMES, TABLES_VERSION] {
                 let wanted = with.contains(&field.feature).then_some(field.low);
                 assert_eq!(masks.get(&format!("{}_shift", field.name)), Some(&wanted), "{feature:?}");
@@ -378,6 +415,49 @@ mod tests {
         }
         // And it is what the file says.
         let (_, plain) = &scenes[0];
-        assert_eq!(generate(plain).unwrap().manifest["output"]["flags"], json!(status_masks(plain)));
+        let manifest = generate(plain).unwrap().manifest;
+        assert_eq!(manifest["output"]["flags"], json!(status_masks(plain)));
+        let status = manifest["output"]["status"].as_array().unwrap();
+        let no_contact = status.iter().find(|field| field["flag"] == "no-contact").unwrap();
+        assert_eq!((&no_contact["word"], &no_contact["low"]), (&json!(2), &json!(2)));
+    }
+
+    /// Two designs have no file in common but those that are the same for all.
+    #[test]
+    fn the_files_of_two_scenes_stand_in_one_folder() {
+        let named = |name: &str| {
+            let mut scene = model(4, 4, "[input]\nfull_scale_MPa = 0.5\nzero = \"running\"\n[fixed]\nprune_bits = 8\n")
+                .scene
+                .clone();
+            scene.name = name.into();
+            generate(&Model::new(&scene).unwrap()).unwrap().files
+        };
+        let [one, other] = ["pad", "pad-low"].map(named);
+        let shared: Vec<&str> = one
+            .iter()
+            .filter(|file| other.iter().any(|own| own.name == file.name))
+            .map(|file| file.name.as_str())
+            .collect();
+        assert_eq!(shared, [MANIFEST, "dermis_link.h"]);
+        let memories = one.iter().filter(|file| file.name.ends_with(".hex")).count();
+        let verilog = &one[0].text;
+        assert!(memories > 0 && verilog.matches("$readmemh(\"dermis_pad__").count() == memories, "{memories}");
+        assert_eq!(verilog.matches("$readmemh").count(), memories);
+    }
+
+    /// The kinds of RAM are stated once, and only for a family that was named.
+    #[test]
+    fn kinds_of_ram_are_those_of_a_family_that_was_named() {
+        let mut scene = Scene::builtin("eight-by-eight-contacts").unwrap();
+        let styles = |scene: &Scene| {
+            let generated = generate(&Model::new(scene).unwrap()).unwrap();
+            let lines = generated.files[0].text.lines().map(|line| line.matches("ram_style").count());
+            (lines.clone().max().unwrap_or(0), lines.sum::<usize>(), generated.memories.len())
+        };
+        scene.hardware.board = None;
+        assert_eq!(styles(&scene).1, 0);
+        scene.hardware.board = Some("ulx3s-85f".into());
+        let (most, all, planned) = styles(&scene);
+        assert_eq!((most, all), (1, planned));
     }
 }

@@ -14,7 +14,7 @@ impl Generated {
     /// device of Xilinx.
     pub fn add_integration(&mut self, model: &Model) {
         let (top, scene) = (self.top.clone(), &model.scene.name);
-        self.add_core_file(model, testbench(model, &top));
+        self.add_core_file(model, testbench(model, &top, &self.files));
         if model.board.family == Family::Artix7 {
             let text = vivado::script(&top, scene, &model.board);
             self.files.push(GeneratedFile { name: format!("{top}_vivado.tcl"), text });

@@ -16,7 +16,7 @@ use serde_json::{json, Value};
 use thiserror::Error;
 
 /// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
-pub(crate) const MANIFEST_VERSION: u32 = 1;
+pub(crate) const MANIFEST_VERSION: u32 = 2;
 /// File name of the manifest.
 pub(crate) const MANIFEST: &str = "manifest.json";
 

@@ -262,7 +262,7 @@ mod tests {
         assert_eq!((&parallel[0].fields[..], &parallel[2].fields[..]), (&["taken_word"][..], &PARITIES[..]));
         assert_eq!(parallel[3].word[1].name, "pass__step");
         assert_eq!(parallel[7].fields, ["best_x", "best_y", "score", "taken"]);
-        let serial = model(|scene| scene.hardware.board = "icebreaker".into());
+        let serial = model(|scene| scene.hardware.board = Some("icebreaker".into()));
         assert_eq!(serial.board.engine, EngineKind::Serial);
         let serial = checked(&serial);
         assert_eq!(names(&serial), STAGES.into_iter().filter(|name| *name != "instruction").collect::<Vec<_>>());

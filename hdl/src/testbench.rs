@@ -3,10 +3,12 @@
 //! ```text
 //! <top>_tb_codes.hex ──> <top> ──> compared with <top>_tb_beats.hex, from the bit-true model
 //! ```
-//! One reconstruction at full speed; the status beats hold the cycle count, which is then equal too.
+//! One reconstruction at full speed; the status beats hold the cycle count, which is then equal too. Before it the sums of the core's
+//! own memory files are compared: a frame does not read all of them, and simulators go on without one that is missing.
 
 use dermis_golden::fixed::Model;
 
+use crate::language::memory_file;
 use crate::manifest::GeneratedFile;
 
 /// Cycles per cycle of the model after which the testbench gives up.
@@ -36,8 +38,8 @@ pub(crate) fn reconstruction(model: &Model) -> Reconstruction {
     Reconstruction { codes, beats, patience }
 }
 
-/// The testbench and its two memory files.
-pub(crate) fn testbench(model: &Model, top: &str) -> Vec<GeneratedFile> {
+/// The testbench and its two memory files; `files` are those of the hardware.
+pub(crate) fn testbench(model: &Model, top: &str, files: &[GeneratedFile]) -> Vec<GeneratedFile> {
     let Reconstruction { codes, beats, patience } = reconstruction(model);
     let bits = model.stream_bits();
     let mask = (1i64 << bits) - 1;
@@ -53,7 +55,7 @@ pub(crate) fn testbench(model: &Model, top: &str) -> Vec<GeneratedFile> {
         counts: [codes.len(), beats.len()],
         patience,
     };
-    let text = opening.text(model, top) + &text(top);
+    let text = opening.text(model, top, files) + &text(top);
     vec![file(".sv", text), file("_codes.hex", code_lines), file("_beats.hex", beat_lines)]
 }
 
@@ -93,8 +95,8 @@ pub(crate) struct Opening {
 }
 
 impl Opening {
-    /// The beginning of the testbench of `top`, up to its counters.
-    pub fn text(&self, model: &Model, top: &str) -> String {
+    /// The beginning of the testbench of `top`, whose files are `files`, up to its counters.
+    pub fn text(&self, model: &Model, top: &str, files: &[GeneratedFile]) -> String {
         let Opening { command, does, unit, widths: [code_bits, bits], counts: [codes, units], patience } = self;
         format!(
             "\
@@ -120,17 +122,66 @@ module {top}{SUFFIX};
     $readmemh(\"{top}{SUFFIX}_codes.hex\", codes);
     $readmemh(\"{top}{SUFFIX}_{unit}.hex\", expected);
   end
+{memories}
 
   integer cycle = 0;
   integer sent = 0;
   integer received = 0;
 ",
             taxels = model.scene.sensor.taxels(),
+            memories = memory_checks(top, files),
             upper = unit.to_uppercase(),
             code_end = code_bits - 1,
             end = bits - 1,
         )
     }
+}
+
+/// Prime of the hash FNV-1a of 32 bits.
+const FNV_PRIME: u32 = 16_777_619;
+/// Bits of the part of a word that is hashed at once, and its hexadecimal digits.
+const PART_BITS: usize = 32;
+const PART_DIGITS: usize = PART_BITS / 4;
+
+/// Parts of a word of so many hexadecimal digits.
+fn parts(digits: usize) -> usize {
+    digits.div_ceil(PART_DIGITS)
+}
+
+/// Hash of the words of a memory file: FNV-1a over their parts, the lowest of a word first, from 0.
+fn memory_sum(text: &str) -> u32 {
+    let part =
+        |digits: &[u8]| digits.iter().fold(0, |all, digit| all << 4 | (*digit as char).to_digit(16).unwrap_or(0));
+    let of_line = |line: &'_ str| line.as_bytes().rchunks(PART_DIGITS).map(part).collect::<Vec<u32>>();
+    text.lines().flat_map(of_line).fold(0, |sum: u32, part| (sum ^ part).wrapping_mul(FNV_PRIME))
+}
+
+/// Processes that compare the hash of each memory file of `top` with that of the file that was generated; a word that is missing is
+/// undefined or zero.
+fn memory_checks(top: &str, files: &[GeneratedFile]) -> String {
+    let memories = files.iter().filter(|file| file.name.starts_with(&memory_file(top, "")));
+    let check = |(index, GeneratedFile { name, text }): (usize, &GeneratedFile)| {
+        let words = text.lines().count();
+        let bits = PART_BITS * parts(text.lines().next().map_or(1, str::len));
+        format!(
+            "\
+  initial begin : memory_{index}
+    reg [{end}:0] words [0:{last}];
+    reg [31:0] sum;
+    integer word, low;
+    $readmemh(\"{name}\", words);
+    sum = 32'd0;
+    for (word = 0; word < {words}; word = word + 1)
+      for (low = 0; low < {bits}; low = low + {PART_BITS}) sum = (sum ^ words[word][low +: {PART_BITS}]) * 32'd{FNV_PRIME};
+    if (sum !== 32'h{sum:08x}) $fatal(1, \"{name}: missing, or not the file of this core\");
+  end
+",
+            end = bits - 1,
+            last = words - 1,
+            sum = memory_sum(text),
+        )
+    };
+    memories.enumerate().map(check).collect()
 }
 
 fn text(top: &str) -> String {
@@ -188,8 +239,16 @@ mod tests {
         assert_eq!((codes.len(), codes[..64] == codes[64..]), (128, true));
         let largest = 1 << (model.formats().code_bits - 2);
         assert!(codes.iter().all(|&code| (1..largest).contains(&code)), "{codes:?}");
-        let files = testbench(&model, "dermis_a");
+        let files = testbench(&model, "dermis_a", &[]);
         assert_eq!(files[1].text.lines().count(), 128);
         assert_eq!(files[2].text.lines().next().map(str::len), Some(24));
+    }
+
+    #[test]
+    fn the_sum_of_a_memory_file_is_that_of_its_words() {
+        // A word of 36 bits has two parts, the lower first.
+        let of = |parts: &[u32]| parts.iter().fold(0, |sum: u32, part| (sum ^ part).wrapping_mul(FNV_PRIME));
+        assert_eq!(memory_sum("f12345678\n000000001\n"), of(&[0x1234_5678, 0xf, 1, 0]));
+        assert_ne!(memory_sum("1\n2\n"), memory_sum("2\n1\n"));
     }
 }

@@ -1,5 +1,6 @@
 // Each code leaves once, in order, clipped to its width; a frame is complete with its last taxel, an early tlast begins it
-// anew; the label is that of its first beat, and says whether a beat of the frame was spoiled.
+// anew; the label is that of its first beat, and says whether a beat of the frame was spoiled; one with another identifier is told
+// once in a frame, and spoils it.
 module proof(
   input clk, input again, input [@WIDE@-1:0] code, input sign, input [3:0] keep, input [3:0] id, input valid, input last,
   input room, input ready
@@ -24,10 +25,11 @@ module proof(
   wire taken = valid && s_ready;
   reg [@COUNT@-1:0] count;
   reg [3:0] own;
-  reg spoiled, held, held_last;
+  reg spoiled, mixed, held, held_last;
   reg [@BITS@-1:0] held_code;
-  wire bad = fitting != value || keep != 4'd15;
   wire first = count == 0;
+  wire foreign = !first && id != own;
+  wire bad = fitting != value || keep != 4'd15 || foreign;
   always @(posedge clk) begin
     if (rst) {count, held} <= 0;
     else begin
@@ -35,12 +37,13 @@ module proof(
       if (held) assert (m_data == held_code && m_last == held_last);
       assert (complete == (taken && count == @LAST@));
       assert (clipped == (taken && fitting != value) && partial == (taken && keep != 4'd15));
-      assert (misframed == (taken && last != (count == @LAST@)));
+      assert (misframed == (taken && (last != (count == @LAST@) || (foreign && !mixed))));
       if (complete) assert (label == {bad || (spoiled && !first), first ? id : own});
       if (taken) begin
         {held, held_code, held_last} <= {1'b1, fitting[@BITS@-1:0], last};
         count <= last || complete ? 0 : count + 1;
         spoiled <= bad || (spoiled && !first);
+        mixed <= foreign || (mixed && !first);
         if (first) own <= id;
       end else if (ready) held <= 1'b0;
     end

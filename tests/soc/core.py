@@ -115,28 +115,33 @@ class Bench:
         await ClockCycles(dut.aclk, 20)
         dut.aresetn.value = 1
         await ClockCycles(dut.aclk, 2)
+        cocotb.start_soon(offered_beats_stay(dut))
         return bench
 
     async def send(self, codes=None, tid=0):
         codes = CODES if codes is None else codes
         await self.source.send(AxiStreamFrame(struct.pack(f"<{len(codes)}i", *codes), tid=tid))
 
-    async def receive(self):
-        """A frame: its bytes, its identifier, whether it is spoiled, and the index of the first word that is no force."""
-        frame = await with_timeout(self.sink.recv(compact=False), 10 * PATIENCE, "ns")
+    async def words(self, cycles=PATIENCE):
+        """A frame: its bytes, its identifier, and of each word whether it is spoiled, and whether it is no force."""
+        frame = await with_timeout(self.sink.recv(compact=False), 10 * cycles, "ns")
         kept = [index for index, keep in enumerate(frame.tkeep) if keep]
         # A frame has no gaps: only the end of its last beat is empty.
         assert kept == list(range(len(kept))) and len(frame.tkeep) - len(kept) < 4 * WORDS
         data = bytes(frame.tdata[index] for index in kept)
-        users = [frame.tuser[index] for index in kept]
+        users = [frame.tuser[index] for index in kept[::4]]
         ids = {frame.tid[index] for index in kept}
         assert len(ids) == 1
-        spoiled = {user >> WORDS for user in users}
-        assert len(spoiled) == 1
-        others = [users[4 * word] >> (word % WORDS) & 1 for word in range(len(kept) // 4)]
-        first = others.index(1)
+        others = [bool(user >> (word % WORDS) & 1) for word, user in enumerate(users)]
+        return data, ids.pop(), [bool(user >> WORDS) for user in users], others
+
+    async def receive(self):
+        """A frame: its bytes, its identifier, whether it is spoiled, and the index of the first word that is no force."""
+        data, tid, spoiled, others = await self.words()
+        assert len(set(spoiled)) == 1
+        first = others.index(True)
         assert all(others[first:])
-        return data, ids.pop(), bool(spoiled.pop()), first
+        return data, tid, spoiled[0], first
 
     async def expect(self, tid, spoiled=False, forces=True):
         data, own, own_spoiled, first = await self.receive()
@@ -144,6 +149,18 @@ class Bench:
         if forces:
             assert data[:FORCE_BYTES] == BEATS[:FORCE_BYTES]
         return data
+
+
+async def offered_beats_stay(dut):
+    """An offered beat stays as it is until it is accepted; only `aresetn` takes it back."""
+    pins = [dut.m_axis_tdata, dut.m_axis_tkeep, dut.m_axis_tuser, dut.m_axis_tid, dut.m_axis_tlast]
+    held = None
+    while True:
+        await RisingEdge(dut.aclk)
+        is_reset, valid = dut.aresetn.value != 1, dut.m_axis_tvalid.value == 1
+        now = [pin.value for pin in pins] if valid and not is_reset else None
+        assert held is None or is_reset or now == held, f"{held} on the output became {now}"
+        held = None if dut.m_axis_tready.value == 1 else now
 
 
 def pauses(seed, share):
@@ -263,3 +280,62 @@ async def a_reset_by_register_ends_a_frame_under_way(dut):
     before = await registers.read("cycles")
     await Timer(1, unit="us")
     assert await registers.read("cycles") - before >= 100
+
+
+@cocotb.test()
+async def a_frame_of_several_identifiers_is_spoiled_and_told_once(dut):
+    bench = await Bench.begin(dut)
+    data = struct.pack(f"<{len(CODES)}i", *CODES)
+    # Beats of another source in the middle, and at the end.
+    tids = [3] * len(CODES)
+    tids[5] = tids[6] = tids[-1] = 4
+    await bench.source.send(AxiStreamFrame(data, tid=[tid for tid in tids for _ in range(4)]))
+    await bench.send(tid=4)
+    await bench.expect(3, spoiled=True)
+    await bench.expect(4)
+    assert await bench.registers.read("frames_misframed") == 1
+    assert await bench.registers.errors() == {"framing"}
+
+
+async def accepted(dut, beats):
+    """Waits until so many beats of the output have been accepted."""
+    while beats:
+        await RisingEdge(dut.aclk)
+        beats -= dut.m_axis_tvalid.value == 1 and dut.m_axis_tready.value == 1
+
+
+@cocotb.test()
+async def a_reset_by_register_ends_the_frame_that_leaves_and_counters_stay_true(dut):
+    bench = await Bench.begin(dut)
+    registers = bench.registers
+    draws = random.Random(4)
+    rounds = 6
+    for tid in range(rounds):
+        await bench.send(tid=tid)
+        await accepted(dut, draws.randrange(1, 4))
+        # A receiver that waits gets the rest after the reset.
+        bench.sink.pause = tid % 2 == 1 or WORDS == 4
+        await registers.pulse("control", "reset")
+        await ClockCycles(dut.aclk, draws.randrange(1, 60))
+        bench.sink.pause = False
+        # It has begun.
+        data, own, spoiled, others = await bench.words(1000)
+        # Some whole triples as they are, and one of zeros that are no forces; the receiver has a frame of its own.
+        assert own == tid and len(data) < len(BEATS) and len(data) % 12 == 0
+        assert data == BEATS[: len(data) - 12] + bytes(12) and all(others[-3:])
+        assert spoiled[-1] and not spoiled[0]
+        await ClockCycles(dut.aclk, 24)
+        await bench.send(tid=tid + 8)
+        await bench.expect(tid + 8)
+    # One that is lost in the engine leaves no word.
+    await bench.send(tid=7)
+    while await registers.read("frames_in") != 2 * rounds + 1:
+        pass
+    await registers.pulse("control", "reset")
+    await ClockCycles(dut.aclk, 24)
+    await bench.send(tid=9)
+    await bench.expect(9)
+    counts = [await registers.read(name) for name in ["frames_in", "frames_out", "frames_lost"]]
+    assert counts == [2 * rounds + 2, rounds + 1, rounds + 1]
+    # A sender that goes on has no error from all this.
+    assert await registers.errors() == set()

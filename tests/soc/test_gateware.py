@@ -14,6 +14,7 @@ from test_cores import BUILD, HERE, NIGHTLY, generate
 
 PACKAGE = HERE.parent.parent / "python/litex"
 SCENE = HERE / "still.toml"
+MEMORY = "dermis_still_wishbone__coefficients.hex"
 CLOCKS = {
     "core": {"net": "pll_clkout", "wanted_MHz": 62.5},
     "Ethernet": {"net": "eth_clocks0_rx", "wanted_MHz": 125.0},
@@ -62,7 +63,7 @@ def elaborated(folder):
 def test_the_files_of_a_board(board, tmp_path):
     design, arguments = write(board, core(board), tmp_path)
     assert design["clocks"] == CLOCKS and design["array"] == "4×3" and design["scene"] == "still"
-    assert (tmp_path / "coefficients.hex").read_bytes() == (core(board) / "coefficients.hex").read_bytes()
+    assert (tmp_path / MEMORY).read_bytes() == (core(board) / MEMORY).read_bytes()
     pins = (tmp_path / "board.lpf").read_text(encoding="utf-8")
     assert 'FREQUENCY PORT "eth_clocks0_rx" 125.0 MHz' in pins
     # Clock, reset; of Ethernet clocks, controls and data in both directions.

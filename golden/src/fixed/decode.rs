@@ -200,7 +200,7 @@ impl Model {
             result.extra.mean_frames = all.first().map(|status| status.frames as usize);
         }
         if self.has_writable_tables() {
-            result.extra.tables_version = all.first().map(|status| status.tables as u16);
+            result.extra.tables_version = all.first().map(|status| status.tables_version as u16);
         }
         if self.chooses() {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();

@@ -113,7 +113,7 @@ impl Model {
                 score: told.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,
-                tables: self.tables_version.into(),
+                tables_version: self.tables_version.into(),
                 rescale_saturations: s.saturations,
                 force_saturations,
                 cycles: sending.counted as u32,

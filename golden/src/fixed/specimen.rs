@@ -248,7 +248,7 @@ impl Model {
     }
 }
 
-/// The first part of a specimen's scene that differs from the hardware's and is in no table that can be written.
+/// The first field of a specimen's scene that differs from the hardware's and is in no table that can be written.
 fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
     let mut other = specimen.clone();
     (other.input.calibration, other.input.tare) = (own.input.calibration.clone(), own.input.tare.clone());
@@ -268,18 +268,12 @@ fn differs(own: &Scene, specimen: &Scene) -> Option<&'static str> {
     }
     // The hardware's scale may have been taken from its frames.
     other.input.full_scale_MPa = other.input.full_scale_MPa.or(own.input.full_scale_MPa);
-    let same = [
-        ("sensor", own.sensor == other.sensor),
-        ("medium", own.medium == other.medium),
-        ("partition", own.partition == other.partition),
-        ("search", own.search == other.search),
-        ("inverse", own.inverse == other.inverse),
-        ("fixed", own.fixed == other.fixed),
-        ("hardware", own.hardware == other.hardware),
-        ("input", own.input == other.input),
-        ("output", own.output == other.output),
-    ];
-    same.into_iter().find_map(|(part, same)| (!same).then_some(part))
+    other.threshold = own.threshold;
+    if other.hardware.board_name() == own.hardware.board_name() {
+        // It is the same whether a scene names it or not.
+        other.hardware.board.clone_from(&own.hardware.board);
+    }
+    own.differing_field(&other)
 }
 
 #[cfg(test)]

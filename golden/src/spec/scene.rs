@@ -8,6 +8,7 @@
 
 mod adc_scan;
 mod declared;
+mod difference;
 mod error;
 mod estimator;
 mod estimator_choice;
@@ -310,8 +311,9 @@ table! {
     /// Table `[hardware]`.
     #[derive(Clone, Debug, PartialEq)]
     pub struct HardwareSpec in "hardware" with defaults {
-        /// Board: one of [`crate::spec::board::Board::names`], or a board's file, relative to the scene.
-        board: String = BoardName.or(DEFAULT_BOARD.to_owned()).page("boards");
+        /// Board: one of [`crate::spec::board::Board::names`], or a board's file, relative to the scene. Of an engine or a core
+        /// without one, the Verilog says nothing about the kinds of RAM that the device has.
+        board: Option<String> = BoardName.optional(DEFAULT_BOARD).page("boards");
         /// Link between the board and its host.
         link: LinkKind = choice(&LinkKind::NAMES).or(LinkKind::Uart).page("boards");
         /// Whether damaged coefficients are reported.
@@ -347,6 +349,11 @@ table! {
 const DEFAULT_BOARD: &str = "ulx3s-85f";
 
 impl HardwareSpec {
+    /// The board, that of a scene without one too.
+    pub fn board_name(&self) -> &str {
+        self.board.as_deref().unwrap_or(DEFAULT_BOARD)
+    }
+
     /// Whether tables are written.
     pub fn has_writable_tables(&self) -> bool {
         self.tables == TableStorage::Writable

@@ -31,7 +31,7 @@ block! {
         in s_axis_tdata: 8 * WORD_BYTES;
         /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
         in s_axis_tkeep: WORD_BYTES;
-        /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
+        /// Identifier of the frame, the same in all its beats; valid with `s_axis_tvalid`.
         in s_axis_tid: ID_BITS;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
@@ -164,6 +164,10 @@ impl Block for Core {
         k.comment("Registered, because the engine is large and its reset has a long route.");
         restart.d.set(rst | registers.restart);
         registers.rst.set(rst);
+        registers.restarting.set(restart.q);
+        k.comment("A reset by register does not take back what is offered to the receiver: it ends the frame.");
+        stream_out.rst.set(rst);
+        stream_out.abandon.set(restart.q);
         k.reset_instances(restart.q);
 
         stream_in.s_axis_tdata.set(io.s_axis_tdata);
@@ -190,7 +194,7 @@ impl Block for Core {
         labels.write.set(stream_in.complete);
         labels.last.set(stream_in.complete);
         labels.word.set(stream_in.label);
-        labels.m_axis_tready.set(stream_out.sent);
+        labels.m_axis_tready.set(stream_out.whole);
         k.unused([labels.m_axis_tlast, labels.m_axis_tvalid]);
 
         arrive_at!(sent_by!(engine), stream_out);
@@ -230,6 +234,7 @@ impl Block for Core {
         registers.clipped.set(stream_in.clipped);
         registers.partial.set(stream_in.partial);
         registers.misframed.set(stream_in.misframed);
+        registers.whole.set(stream_out.whole);
         registers.sent.set(stream_out.sent);
     }
 }

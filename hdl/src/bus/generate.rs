@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::fixed::Model;
-use dermis_golden::wire::registers::{c_header, constants, system_rdl, REGISTERS};
+use dermis_golden::wire::registers::{c_header, constants, core_header, system_rdl, REGISTERS};
 use serde_json::json;
 
 use super::core::hierarchy;
@@ -15,8 +15,8 @@ use crate::language::Change;
 use crate::manifest::GeneratedFile;
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
-/// place of the engine's, without taps; beside them `dermis_registers.h`, `registers.json` and `registers.rdl`, testbench and
-/// FuseSoC core file.
+/// place of the engine's, without taps; beside them `dermis_registers.h`, `<top>.h`, `registers.json` and `registers.rdl`, testbench
+/// and FuseSoC core file.
 ///
 /// # Errors
 /// As [`crate::generate()`]; [`HdlError::Unsupported`] for a scene that averages frames.
@@ -47,7 +47,7 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
 //   aclk, aresetn    clock, {clock} MHz; synchronous reset, active low
 //   s_axis           a taxel's code per beat, 32 bits signed; row-major, tlast on the last code of a frame
 //   m_axis           {{fx, fy, fz}} of 32 bits signed each without gaps, {forces} triples, then {others} of labels and status
-//   {pins:<16} registers: dermis_registers.h
+//   {pins:<16} registers: dermis_registers.h; sizes and scales: {top}.h
 //
 ",
         engine_top = engine.top,
@@ -62,13 +62,17 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     );
     let contents: BTreeMap<&str, u32> = constants(model, bytes).into_iter().collect();
     let map = json!({ "registers": REGISTERS, "constants": contents });
-    let own =
-        [("dermis_registers.h", c_header()), ("registers.json", format!("{map:#}\n")), ("registers.rdl", system_rdl())];
-    let own = own.map(|(name, text)| GeneratedFile { name: name.into(), text });
-    let around = Around { top, hierarchy, header, row: "bus" };
+    let own = [
+        ("dermis_registers.h", c_header()),
+        (&format!("{top}.h"), core_header(model, &top, suffix)),
+        ("registers.json", format!("{map:#}\n")),
+        ("registers.rdl", system_rdl()),
+    ];
+    let own = own.map(|(name, text)| GeneratedFile { name: name.to_owned(), text });
+    let around = Around { top, hierarchy, header, row: "bus", is_board: false };
     let mut core = around.generated(model, engine)?;
     core.files.extend(own);
-    core.add_core_file(model, testbench(model, &core.top, shape, command));
+    core.add_core_file(model, testbench(model, &core, shape, command));
     core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
     core.seal();
     Ok(core)

@@ -6,7 +6,8 @@
 //!                         '-------------------'   |
 //!  s_axil or wb <-> axi_lite or wishbone <-> registers <- events of both
 //! ```
-//! The map of the registers is [`dermis_golden::wire::registers`]. `labels` has the identifier of each frame that is under way.
+//! The map of the registers is [`dermis_golden::wire::registers`]. `labels` has the identifier of each frame that is under way. A reset by
+//! register resets all but `registers` and `stream_out`, which ends the frame that has begun to leave.
 
 mod axi_lite;
 mod core;

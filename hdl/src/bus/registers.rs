@@ -6,6 +6,7 @@ use dermis_golden::wire::registers::{self, Access, Register, ADDRESS_BITS, REGIS
 use super::tables_in::OCTET_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
+use crate::primitives::QUEUE_PLACES;
 
 /// Bytes of a register.
 const BYTES: usize = REGISTER_BITS / 8;
@@ -33,14 +34,18 @@ block! {
         in strobe: BYTES;
         /// The last taxel of a frame is received in this cycle.
         in complete;
-        /// The last beat of a frame is sent in this cycle.
+        /// The last beat of a whole frame is sent in this cycle.
         in sent;
         /// A code is clipped in this cycle.
         in clipped;
         /// An incomplete beat is received in this cycle.
         in partial;
-        /// A wrong `tlast` is received in this cycle.
+        /// A wrong `tlast` or `tid` is received in this cycle.
         in misframed;
+        /// A frame is whole on its way out in this cycle: a reset of engine and streams does not lose it.
+        in whole;
+        /// Engine and streams are reset in this cycle; not with `complete` or `whole`.
+        in restarting;
         /// The byte offered is accepted in this cycle.
         in octet_taken;
         /// A byte of an image of tables, and above it whether it is the last; valid with `octet_valid`.
@@ -131,7 +136,13 @@ impl Block for Registers {
                 *own
             })
             .collect();
-        let counters = counters(k, &io, wrong, clear);
+        // As many as there are labels in the queue.
+        let frames = Type::unsigned(count_bits(QUEUE_PLACES + 1));
+        let under_way = k.state("under_way", frames, io.rst, 0).comment("Frames that a reset would lose.");
+        let none = k.constant(frames.bits, 0);
+        under_way.set(io.restarting.mux(none, (*under_way + io.complete - io.whole).low(frames.bits)));
+        let lost = k.wire("lost", io.restarting.mux(*under_way, none));
+        let counters = counters(k, &io, [wrong, lost], clear);
         let value = |register: &Register| match register.access {
             Access::Constant => {
                 let own = self.constants.iter().find(|(name, _)| *name == register.name);
@@ -154,13 +165,14 @@ impl Block for Registers {
     }
 }
 
-/// Counters of events by the names of their registers, `wrong` that of refused accesses; `clear` sets them to 0.
+/// Counters of events by the names of their registers, `wrong` that of refused accesses, `lost` the frames lost in this cycle; `clear`
+/// sets them to 0.
 fn counters<'k>(
     k: &'k Builder,
     io: &RegistersPorts<Inside<'k>>,
-    wrong: Expr<'k>,
+    [wrong, lost]: [Expr<'k>; 2],
     clear: Expr<'k>,
-) -> [(&'static str, Expr<'k>); 7] {
+) -> [(&'static str, Expr<'k>); 8] {
     let events = [
         ("frames_in", io.complete),
         ("frames_out", io.sent),
@@ -169,6 +181,7 @@ fn counters<'k>(
         ("frames_misframed", io.misframed),
         ("accesses_refused", wrong),
         ("cycles", k.constant(1, 1)),
+        ("frames_lost", lost),
     ];
     events.map(|(name, event)| {
         let own = k.state(name, Type::unsigned(REGISTER_BITS), io.rst, 0);
@@ -198,7 +211,8 @@ mod tests {
     #[derive(Default)]
     struct Map {
         errors: u32,
-        counters: [u32; 7],
+        counters: [u32; 8],
+        under_way: u32,
         left: u64,
         answer: Option<(u32, bool)>,
         reset: bool,
@@ -223,9 +237,9 @@ mod tests {
 
         fn clock(&mut self, inputs: &[Word]) {
             let [rst, select, write, address, data, strobe] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number());
-            let events: Vec<bool> = (6..11).map(|k| inputs[k].number() == 1).collect();
+            let events: Vec<bool> = (6..13).map(|k| inputs[k].number() == 1).collect();
             let index = address as usize / 4;
-            let known = address % 4 == 0 && index < 17;
+            let known = address % 4 == 0 && index < 18;
             let room = self.writable && self.waiting.is_none() && self.reset;
             let takes = known && ([7, 8].contains(&index) || (index == 16 && room));
             let refused = select == 1 && if write == 1 { !takes } else { !known };
@@ -237,6 +251,7 @@ mod tests {
                     8 => self.errors,
                     16 if self.writable => 1 << 17 | u32::from(self.waiting.is_some()) << 16,
                     16 => 0,
+                    17 => self.counters[7],
                     _ => self.counters[index - 9],
                 };
                 self.answer = self.reset.then_some((content, refused));
@@ -247,21 +262,25 @@ mod tests {
                 8 if written => (0, data as u32 & 15),
                 _ => (0, 0),
             };
-            if inputs[11].number() == 1 {
+            if inputs[13].number() == 1 {
                 self.waiting = None;
             }
             if written && index == 16 && room {
                 self.octet = Some(data & 255 | (data & 256 & (strobe >> 1 << 8)));
                 self.waiting = self.octet;
             }
-            let [complete, sent, clipped, partial, misframed] = [0, 1, 2, 3, 4].map(|k| events[k]);
+            let [complete, sent, clipped, partial, misframed, whole, restarting] =
+                [0, 1, 2, 3, 4, 5, 6].map(|k| events[k]);
             let now = [clipped, partial, misframed, refused];
             let set: u32 = now.iter().enumerate().map(|(bit, event)| u32::from(*event) << bit).sum();
             self.errors = self.errors & !cleared | set;
-            let counted = [complete, sent, clipped, partial, misframed, refused, true];
-            for (counter, event) in self.counters.iter_mut().zip(counted) {
-                *counter = if commands & 2 == 2 { 0 } else { counter.wrapping_add(u32::from(event)) };
+            let counted = [complete, sent, clipped, partial, misframed, refused, true].map(u32::from);
+            let lost = if restarting { self.under_way } else { 0 };
+            for (counter, count) in self.counters.iter_mut().zip(counted.into_iter().chain([lost])) {
+                *counter = if commands & 2 == 2 { 0 } else { counter.wrapping_add(count) };
             }
+            let under_way = self.under_way.wrapping_add(u32::from(complete)).wrapping_sub(u32::from(whole));
+            self.under_way = if restarting { 0 } else { under_way & 31 };
             self.left = if commands & 1 == 1 { RESET_CYCLES } else { self.left.saturating_sub(1) };
             if rst == 1 {
                 let Map { answer, writable, octet, .. } = *self;
@@ -274,7 +293,7 @@ mod tests {
     fn every_register_answers_as_the_map_says() {
         let mut random = fastrand::Rng::with_seed(8);
         let stimulus = (0..30_000).map(|cycle| {
-            let address = if random.u8(..6) == 0 { random.u64(..256) } else { 4 * random.u64(..18) };
+            let address = if random.u8(..6) == 0 { random.u64(..256) } else { 4 * random.u64(..19) };
             let mut inputs = vec![
                 Word::from(cycle < 2 || random.u16(..900) == 0),
                 Word::from(random.bool()),
@@ -283,7 +302,7 @@ mod tests {
                 Word::from(u64::from(random.u32(..))),
                 Word::from(random.u64(..16)),
             ];
-            inputs.extend((0..6).map(|_| Word::from(random.u8(..4) == 0)));
+            inputs.extend((0..8).map(|_| Word::from(random.u8(..4) == 0)));
             inputs
         });
         let stimulus: Vec<_> = stimulus.collect();

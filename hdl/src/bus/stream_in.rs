@@ -12,8 +12,8 @@ pub const WORD_BYTES: usize = 4;
 block! {
     /// Takes one taxel's code from each beat, as a signed number of 32 bits, into a register. A code that the engine's
     /// codes cannot hold is clipped. With the last taxel the label of the frame is given away: its identifier and
-    /// whether a code was clipped or a beat was incomplete. A `tlast` that comes early begins the count anew, as in the
-    /// engine; the next frame is then the engine's next one too.
+    /// whether a code was clipped, a beat was incomplete, or one had another identifier than the first. A `tlast` that comes
+    /// early begins the count anew, as in the engine; the next frame is then the engine's next one too.
     pub struct StreamIn {
         /// Codes of a frame.
         taxels: usize,
@@ -27,7 +27,7 @@ block! {
         in s_axis_tdata: 8 * WORD_BYTES;
         /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
         in s_axis_tkeep: WORD_BYTES;
-        /// Identifier of the frame, that of its first beat counts; valid with `s_axis_tvalid`.
+        /// Identifier of the frame, the same in all its beats; valid with `s_axis_tvalid`.
         in s_axis_tid: ID_BITS;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
@@ -53,7 +53,8 @@ block! {
         out clipped;
         /// An incomplete beat is accepted in this cycle.
         out partial;
-        /// A `tlast` too early, or none where it should be, is accepted in this cycle.
+        /// A `tlast` too early, none where it should be, or the first beat of another identifier in a frame is accepted in this
+        /// cycle.
         out misframed;
     }
 }
@@ -71,7 +72,8 @@ impl Block for StreamIn {
         let bit = Type::unsigned(1);
         let count = k.state("count", Type::unsigned(count_bits(taxels)), io.rst, 0);
         let spoiled = k.state("spoiled", bit, io.rst, 0);
-        let frame = k.register("frame", Type::unsigned(ID_BITS));
+        let mixed = k.state("mixed", bit, io.rst, 0).comment("The frame has beats of several identifiers.");
+        let frame = k.register("frame", Type::unsigned(ID_BITS)).comment("Identifier of the frame.");
         let code = io.m_axis_tdata.register();
         let valid = io.m_axis_tvalid.state(io.rst, 0);
         let tlast = io.m_axis_tlast.register();
@@ -87,9 +89,10 @@ impl Block for StreamIn {
         let limit = concat(&[io.s_axis_tdata.top(), (!io.s_axis_tdata.top()).repeat(code_bits - 1)]);
         let clipped = io.clipped.set(taken & !fits);
         let partial = io.partial.set(taken & !io.s_axis_tkeep.all());
-        io.misframed.set(taken & io.s_axis_tlast.differs(ends));
+        let foreign = k.wire("foreign", taken & !begins & io.s_axis_tid.differs(*frame));
+        io.misframed.set((taken & io.s_axis_tlast.differs(ends)) | (foreign & !*mixed));
         io.complete.set(taken & ends);
-        let now_spoiled = k.wire("now_spoiled", clipped | partial | (*spoiled & !begins));
+        let now_spoiled = k.wire("now_spoiled", clipped | partial | foreign | (*spoiled & !begins));
         io.label.set(now_spoiled.concat(begins.mux(io.s_axis_tid, *frame)));
         k.when(moves, || {
             code.set(fits.mux(io.s_axis_tdata.low(code_bits), limit));
@@ -99,6 +102,7 @@ impl Block for StreamIn {
         k.when(taken, || {
             count.set((io.s_axis_tlast | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
             spoiled.set(now_spoiled);
+            mixed.set(foreign | (*mixed & !begins));
         });
         k.when(taken & begins, || frame.set(io.s_axis_tid));
     }
@@ -119,6 +123,7 @@ mod tests {
     struct Frames {
         count: usize,
         id: u64,
+        mixed: bool,
         spoiled: bool,
         beat: Option<(u64, u64)>,
         reset: bool,
@@ -131,6 +136,7 @@ mod tests {
         misframed: bool,
         complete: bool,
         id: u64,
+        foreign: bool,
         spoiled: bool,
         code: u64,
     }
@@ -143,14 +149,16 @@ mod tests {
             let code = word.clamp(-most, most - 1);
             let (clipped, partial) = (taken && code != word, taken && keep != 15);
             let end = self.count == TAXELS - 1;
+            let foreign = taken && self.count > 0 && id != self.id;
             Event {
                 taken,
                 clipped,
                 partial,
-                misframed: taken && (last == 1) != end,
+                misframed: taken && (last == 1) != end || foreign && !self.mixed,
                 complete: taken && end,
                 id: if self.count == 0 { id } else { self.id },
-                spoiled: clipped || partial || (self.spoiled && self.count > 0),
+                foreign,
+                spoiled: clipped || partial || foreign || (self.spoiled && self.count > 0),
                 code: code as u64 & ((1 << CODE_BITS) - 1),
             }
         }
@@ -185,6 +193,7 @@ mod tests {
             if event.taken {
                 self.beat = Some((event.code, last));
                 (self.id, self.spoiled) = (event.id, event.spoiled);
+                self.mixed = event.foreign || self.mixed && self.count > 0;
                 self.count = if last == 1 || event.complete { 0 } else { self.count + 1 };
             } else if inputs[7].number() == 1 {
                 self.beat = None;
@@ -195,17 +204,21 @@ mod tests {
     #[test]
     fn codes_are_clipped_and_frames_counted_as_in_the_engine() {
         let mut random = fastrand::Rng::with_seed(21);
-        let mut taxel = 0;
+        let (mut taxel, mut id) = (0, 0);
         let stimulus = (0..20_000).map(|cycle| {
             // Mostly right frames of small codes.
             let last = if random.u8(..40) == 0 { random.bool() } else { taxel == TAXELS - 1 };
             taxel = if last { 0 } else { (taxel + 1) % TAXELS };
+            // And mostly of one identifier.
+            if taxel == 1 || random.u8(..20) == 0 {
+                id = random.u64(..1 << ID_BITS);
+            }
             let word = if random.u8(..8) == 0 { random.u32(..) } else { random.i32(-2048..2048) as u32 };
             vec![
                 Word::from(cycle < 2 || random.u16(..500) == 0),
                 Word::from(u64::from(word)),
                 Word::from(if random.u8(..30) == 0 { random.u64(..16) } else { 15 }),
-                Word::from(random.u64(..1 << ID_BITS)),
+                Word::from(id),
                 Word::from(random.u8(..8) > 0),
                 Word::from(last),
                 Word::from(random.u8(..8) > 0),

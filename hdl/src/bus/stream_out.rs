@@ -20,8 +20,12 @@ block! {
     /// by `tkeep`.
     ///
     /// `tuser` has a bit for each word, high if it belongs to the beats behind the forces; above them a bit that is
-    /// high in every beat of a spoiled frame. `tid` is the frame's identifier. The label of the frame must be there
-    /// before its first beat.
+    /// high in every beat of a spoiled frame. `tid` is the frame's identifier. The label of a frame must be there from its first
+    /// beat to its last.
+    ///
+    /// `abandon` ends the frame of which beats have been accepted and not the last: three words of zeros that are no forces
+    /// follow, the frame is spoiled from then on, and `tlast` is on the last word. A beat on the output stays as it is until it
+    /// is accepted; what the receiver does not accept yet, it accepts later.
     pub struct StreamOut {
         /// Words of a beat of the output.
         width: usize,
@@ -39,8 +43,10 @@ block! {
         out s_axis_tready;
         /// The beat is the last of its frame; valid with `s_axis_tvalid`.
         in s_axis_tlast;
-        /// Identifier of the frame, and above it whether it is spoiled; valid while a frame is sent.
+        /// Identifier of the frame, and above it whether it is spoiled; valid with `s_axis_tvalid`.
         in label: ID_BITS + 1;
+        /// The rest of the frame will not come; no beat is accepted in this cycle.
+        in abandon;
         /// Words, the first in the low bits; valid with `m_axis_tvalid`.
         out m_axis_tdata: width * WORD;
         /// Bytes of the beat that are there; valid with `m_axis_tvalid`.
@@ -55,7 +61,9 @@ block! {
         in m_axis_tready;
         /// The beat is the last of its frame; valid with `m_axis_tvalid`.
         out m_axis_tlast;
-        /// The last beat of a frame is accepted in this cycle.
+        /// The last beat of a frame is taken over in this cycle.
+        out whole;
+        /// The last beat of a frame that was not abandoned is accepted in this cycle.
         out sent;
     }
 }
@@ -81,40 +89,54 @@ impl Block for StreamOut {
         let ending = k.state("ending", bit, io.rst, 0).comment("The last words of a frame wait.");
         let beat = k.state("beat", Type::unsigned(count_bits(forces + 1)), io.rst, 0);
         let beat = beat.comment("Beats taken of the frame, up to the number of forces.");
+        let label = k.register("own_label", Type::unsigned(ID_BITS + 1)).comment("Of the frame whose words wait.");
+        let closing =
+            k.state("closing", bit, io.rst, 0).comment("The frame was abandoned, and its end has no place yet.");
+        let abandoned = k.state("abandoned", bit, io.rst, 0).comment("The end of an abandoned frame waits.");
 
         let number = |value: usize| k.constant(filled_bits, value as u64);
-        let whole = k.wire("whole", !filled.less(number(width)));
-        let valid = io.m_axis_tvalid.set(whole | *ending);
+        let full = k.wire("full", !filled.less(number(width)));
+        let valid = io.m_axis_tvalid.set(full | *ending);
         let ends = io.m_axis_tlast.set(*ending & !number(width).less(*filled));
         let taken = k.wire("taken", valid & io.m_axis_tready);
-        let left = k.wire("left", taken.mux(whole.mux((*filled - number(width)).low(filled_bits), number(0)), *filled));
-        let takes = io.s_axis_tready.set(!*ending & left.less(number(width)));
-        let accepted = k.wire("accepted", io.s_axis_tvalid & takes);
-        let is_other = k.wire("is_other", beat.is(forces as u64));
+        let left = k.wire("left", taken.mux(full.mux((*filled - number(width)).low(filled_bits), number(0)), *filled));
+        let room = k.wire("room", !*ending & left.less(number(width)));
+        let is_open = k.wire("is_open", beat.any());
+        let closes = k.wire("closes", is_open & (io.abandon | *closing));
+        let takes = io.s_axis_tready.set(room & !closes & !io.abandon);
+        let given = k.wire("given", io.s_axis_tvalid & takes);
+        let closed = k.wire("closed", room & closes);
+        let accepted = k.wire("accepted", given | closed);
+        let is_other = k.wire("is_other", beat.is(forces as u64) | closes);
+        let last = k.wire("last", io.s_axis_tlast | closes);
+        closing.set(closes & !room);
+        abandoned.set(closed | (*abandoned & !(taken & ends)));
 
         // The words left move down, the three new ones come behind them; what is empty is zero.
-        let moved = |kept: Expr<'k>, new: Expr<'k>| {
+        let moved = |kept: Expr<'k>, new: Expr<'k>, comes: Expr<'k>| {
             let bits = kept.bits() / places;
             let down = taken.mux(kept.shift_right(width * bits).extend(kept.bits()), kept);
             let behind: Vec<(u64, Expr<'k>)> =
                 (0..width).map(|place| (place as u64, new.shift_left(place * bits).extend(kept.bits()))).collect();
-            down | accepted.mux(left.case(&behind[1..], behind[0].1), k.constant(1, 0).repeat(kept.bits()))
+            down | comes.mux(left.case(&behind[1..], behind[0].1), k.constant(1, 0).repeat(kept.bits()))
         };
-        words.set(moved(*words, io.s_axis_tdata));
-        kinds.set(moved(*kinds, is_other.repeat(TRIPLE)));
+        words.set(moved(*words, io.s_axis_tdata, given));
+        kinds.set(moved(*kinds, is_other.repeat(TRIPLE), accepted));
         filled.set((left + accepted.mux(number(TRIPLE), number(0))).low(filled_bits));
-        ending.set((accepted & io.s_axis_tlast) | (*ending & !(taken & ends)));
+        ending.set((accepted & last) | (*ending & !(taken & ends)));
         k.when(accepted, || {
             let next = is_other.mux(*beat, beat.plus(1));
-            beat.set(io.s_axis_tlast.mux(k.constant(count_bits(forces + 1), 0), next));
+            beat.set(last.mux(k.constant(count_bits(forces + 1), 0), next));
         });
+        k.when(given & !is_open, || label.set(io.label));
 
         io.m_axis_tdata.set(words.low(width * WORD));
         let there: Vec<_> = (0..width).rev().map(|word| number(word).less(*filled).repeat(WORD / 8)).collect();
         io.m_axis_tkeep.set(concat(&there));
-        io.m_axis_tuser.set(io.label.top().concat(kinds.low(width)));
-        io.m_axis_tid.set(io.label.low(ID_BITS));
-        io.sent.set(taken & ends);
+        io.m_axis_tuser.set((label.top() | *abandoned).concat(kinds.low(width)));
+        io.m_axis_tid.set(label.low(ID_BITS));
+        io.whole.set(given & io.s_axis_tlast);
+        io.sent.set(taken & ends & !*abandoned);
     }
 }
 
@@ -134,10 +156,20 @@ mod tests {
         width: usize,
         waiting: VecDeque<(u64, bool, bool)>,
         beat: usize,
+        /// Of the frame whose words wait, or the one before; none before the first.
+        label: Option<u64>,
+        /// The frame was abandoned, and its end does not wait yet; it waits.
+        closing: bool,
+        abandoned: bool,
         reset: bool,
     }
 
     impl Words {
+        fn new(width: usize) -> Self {
+            let waiting = VecDeque::new();
+            Words { width, waiting, beat: 0, label: None, closing: false, abandoned: false, reset: false }
+        }
+
         fn is_ending(&self) -> bool {
             self.waiting.back().is_some_and(|(_, _, last)| *last)
         }
@@ -150,14 +182,32 @@ mod tests {
             self.waiting.len().saturating_sub(if ready && self.is_valid() { self.width } else { 0 })
         }
 
-        fn takes(&self, ready: bool) -> bool {
+        fn has_room(&self, ready: bool) -> bool {
             !self.is_ending() && self.left(ready) < self.width
+        }
+
+        /// Whether the open frame is to be ended.
+        fn closes(&self, abandon: bool) -> bool {
+            self.beat > 0 && (abandon || self.closing)
+        }
+
+        fn takes(&self, ready: bool, abandon: bool) -> bool {
+            self.has_room(ready) && !self.closes(abandon) && !abandon
+        }
+
+        /// Puts a beat behind the words that wait.
+        fn push(&mut self, words: [u64; TRIPLE], is_other: bool, last: bool) {
+            let word = |(place, word): (usize, u64)| (word, is_other, last && place == TRIPLE - 1);
+            self.waiting.extend(words.into_iter().enumerate().map(word));
+            self.beat = if last { 0 } else { self.beat + 1 };
         }
     }
 
     impl Reference for Words {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let (label, ready) = (inputs[4].number(), inputs[5].number() == 1);
+            let [valid, ends, abandon, ready] = [2, 3, 5, 6].map(|k| inputs[k].number() == 1);
+            let takes = self.takes(ready, abandon);
+            let label = self.label.map(|label| label | u64::from(self.abandoned) << ID_BITS);
             let now: Vec<_> = self.waiting.iter().take(self.width).copied().collect();
             let last = self.is_ending() && self.waiting.len() <= self.width;
             let (mut data, mut keep, mut user) = (Word::default(), 0, 0);
@@ -171,35 +221,42 @@ mod tests {
             vec![
                 bit(self.is_valid()),
                 shown(Word::from(last)),
-                bit(self.takes(ready)),
+                bit(takes),
                 shown(data),
                 shown(Word::from(keep)),
-                shown(Word::from(user | (label >> ID_BITS) << self.width)),
-                Some(Word::from(label & ((1 << ID_BITS) - 1))),
-                bit(last && ready),
+                label.and_then(|label| shown(Word::from(user | (label >> ID_BITS) << self.width))),
+                label.and_then(|label| shown(Word::from(label & ((1 << ID_BITS) - 1)))),
+                bit(takes && valid && ends),
+                bit(last && ready && !self.abandoned),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             if inputs[0].number() == 1 {
-                *self = Words { width: self.width, waiting: VecDeque::new(), beat: 0, reset: true };
+                *self = Words { label: self.label, reset: true, ..Words::new(self.width) };
                 return;
             }
-            let (valid, last, ready) = (inputs[2].number() == 1, inputs[3].number() == 1, inputs[5].number() == 1);
-            let takes = self.takes(ready);
+            let [valid, last, abandon, ready] = [2, 3, 5, 6].map(|k| inputs[k].number() == 1);
+            let (takes, closes, has_room) = (self.takes(ready, abandon), self.closes(abandon), self.has_room(ready));
             if ready && self.is_valid() {
                 self.waiting.drain(..self.width.min(self.waiting.len()));
             }
-            if valid && takes {
-                for word in 0..TRIPLE {
-                    let ends = last && word == TRIPLE - 1;
-                    self.waiting.push_back((inputs[1].field(WORD * word, WORD), self.beat >= FORCES, ends));
+            self.abandoned &= !self.waiting.is_empty();
+            self.closing = closes && !has_room;
+            if closes && has_room {
+                self.push([0; TRIPLE], true, true);
+                self.abandoned = true;
+            } else if valid && takes {
+                if self.beat == 0 {
+                    self.label = Some(inputs[4].number());
                 }
-                self.beat = if last { 0 } else { self.beat + 1 };
+                let words = [0, 1, 2].map(|word| inputs[1].field(WORD * word, WORD));
+                self.push(words, self.beat >= FORCES, last);
             }
         }
     }
 
+    /// Beats of which some are of a frame that is abandoned.
     #[test]
     fn words_leave_without_gaps_in_every_width() {
         for width in WIDTHS {
@@ -213,12 +270,12 @@ mod tests {
                     Word::from(random.u8(..8) > 1),
                     Word::from(random.u8(..7) == 0),
                     Word::from(random.u64(..1 << (ID_BITS + 1))),
+                    Word::from(random.u8(..20) == 0),
                     Word::from(random.u8(..8) > 1),
                 ]
             });
             let stimulus: Vec<_> = stimulus.collect();
-            let mut words = Words { width, waiting: VecDeque::new(), beat: 0, reset: false };
-            check(&kernel_of(&StreamOut::new(width, FORCES)), &stimulus, &mut words);
+            check(&kernel_of(&StreamOut::new(width, FORCES)), &stimulus, &mut Words::new(width));
         }
     }
 }

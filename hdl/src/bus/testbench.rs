@@ -9,11 +9,13 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{ID, REGISTER_BITS};
 
 use super::{Bus, CoreShape};
+use crate::generate::Generated;
 use crate::manifest::GeneratedFile;
 use crate::testbench::{reconstruction, Opening, Reconstruction, SUFFIX};
 
-/// The testbench and its two memory files; `command` generates them.
-pub(super) fn testbench(model: &Model, top: &str, shape: CoreShape, command: String) -> Vec<GeneratedFile> {
+/// The testbench of `core` and its two memory files; `command` generates them.
+pub(super) fn testbench(model: &Model, core: &Generated, shape: CoreShape, command: String) -> Vec<GeneratedFile> {
+    let top = &core.top;
     let Reconstruction { codes, beats, patience } = reconstruction(model);
     let lines = |words: &[i32]| words.iter().map(|word| format!("{word:08x}\n")).collect::<String>();
     let words: Vec<i32> = beats.into_iter().flatten().collect();
@@ -28,7 +30,7 @@ pub(super) fn testbench(model: &Model, top: &str, shape: CoreShape, command: Str
         counts: [codes.len(), words.len()],
         patience,
     };
-    let text = opening.text(model, top) + &text(top, shape, 3 * model.force_triples());
+    let text = opening.text(model, top, &core.files) + &text(top, shape, 3 * model.force_triples());
     vec![file(".sv", text), file("_codes.hex", lines(&codes)), file("_words.hex", lines(&words))]
 }
 

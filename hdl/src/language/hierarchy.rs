@@ -20,6 +20,12 @@ pub(super) fn called(path: &str, name: &str) -> String {
     }
 }
 
+/// The memory file `name` of the design with the top module `top`. Two designs have different ones unless their top modules have one
+/// name, which every tool refuses: no memory file's name ends another's behind the separator.
+pub(crate) fn memory_file(top: &str, name: &str) -> String {
+    format!("{top}{SEPARATOR}{name}")
+}
+
 /// All blocks of a design.
 #[derive(Debug)]
 pub struct Hierarchy {
@@ -27,8 +33,8 @@ pub struct Hierarchy {
     blocks: BTreeMap<String, Arc<Kernel>>,
 }
 
-/// Attributes of memories by the path of their block and their name in it.
-pub type Attributes = BTreeMap<(String, String), String>;
+/// Values of the attribute `ram_style` by the path of a memory's block and its name in it.
+pub type RamStyles = BTreeMap<(String, String), String>;
 
 impl Hierarchy {
     /// The blocks of a design whose top has this kernel.
@@ -139,23 +145,32 @@ impl Hierarchy {
         Ok(())
     }
 
-    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories.
-    pub fn verilog(&self, top: &str, attributes: &Attributes) -> String {
-        let texts = self.blocks.keys().filter_map(|path| self.module(path, top, attributes));
+    /// The Verilog of all blocks, with the top module `top`. Memories that are not in `styles` have the kernels' own; without `styles` no
+    /// memory has one.
+    pub fn verilog(&self, top: &str, styles: Option<&RamStyles>) -> String {
+        let texts = self.blocks.keys().filter_map(|path| self.module(path, top, styles));
         texts.map(|text| text + "\n").collect()
     }
 
-    /// The Verilog of the block `path`.
-    pub fn module(&self, path: &str, top: &str, attributes: &Attributes) -> Option<String> {
+    /// The memory files that the Verilog with the top module `top` reads, and their texts. Their names begin with that of the top
+    /// module, so that the files of several designs can stand in one folder.
+    pub fn memory_files(&self, top: &str) -> Vec<(String, String)> {
+        let files = self.kernels().flat_map(|(_, kernel)| kernel.memory_files());
+        files.map(|(name, text)| (memory_file(top, &name), text)).collect()
+    }
+
+    /// The Verilog of the block `path`, as of [`Hierarchy::verilog`].
+    pub fn module(&self, path: &str, top: &str, styles: Option<&RamStyles>) -> Option<String> {
         let kernel = self.blocks.get(path)?;
         let name = |path: &str| match path {
             "" => top.to_owned(),
             path => format!("{top}{SEPARATOR}{path}"),
         };
-        let own = |((block, array), attribute): (&(String, String), &String)| {
-            (block == path).then(|| (array.clone(), attribute.clone()))
+        let own = |((block, array), style): (&(String, String), &String)| {
+            (block == path).then(|| (array.clone(), style.clone()))
         };
-        let mut body = kernel.verilog_with(&attributes.iter().filter_map(own).collect());
+        let own = styles.map(|styles| styles.iter().filter_map(own).collect());
+        let mut body = kernel.verilog_with(own.as_ref(), &memory_file(top, ""));
         for instance in &kernel.instances {
             let connect = |(port, ..): (&str, bool, usize, &str)| match (&kernel.clock, &instance.kernel.clock) {
                 (Some(clock), Some(own)) if own == port => format!("    .{port}({clock})"),

@@ -49,7 +49,8 @@ pub use build::{Builder, MemoryPort, Net};
 pub use change::Change;
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
-pub use hierarchy::{Attributes, Hierarchy};
+pub(crate) use hierarchy::memory_file;
+pub use hierarchy::{Hierarchy, RamStyles};
 pub use kernel::{Contents, Kernel, Memory, Type, SEPARATOR};
 pub use ports::{
     kernel_of, Block, Inside, Instantiate, Interface, Make, Output, Outside, View, Visit, VisitMut, Width, Widths,

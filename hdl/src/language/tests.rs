@@ -1,5 +1,7 @@
 mod errors;
 
+use std::collections::BTreeMap;
+
 use super::kernel::{Port, Role};
 use super::resources::FLATTENED;
 use super::testbench::{check, random_words, verilated, Reference, Subject};
@@ -480,6 +482,18 @@ impl Block for Around {
             later.q
         }));
     }
+}
+
+#[test]
+fn a_kind_of_ram_is_stated_once_or_not_at_all() {
+    let kernel = state();
+    let given = BTreeMap::from([("ram".to_owned(), "block".to_owned())]);
+    let stated =
+        |text: String| text.lines().filter(|line| line.contains("ram_style")).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(stated(kernel.verilog()), ["(* ram_style = \"distributed\" *)"]);
+    assert_eq!(stated(kernel.verilog_with(Some(&given), "")), ["(* ram_style = \"block\" *)"]);
+    assert_eq!(stated(kernel.verilog_with(None, "")), [""; 0]);
+    assert!(kernel.verilog_with(None, "dut__").contains("$readmemh(\"dut__rom.hex\", rom);"));
 }
 
 #[test]

@@ -12,8 +12,10 @@ use super::text::{number, Text};
 
 struct Printer<'a> {
     kernel: &'a Kernel,
-    /// Attributes of memories that the kernel does not state itself.
-    attributes: &'a BTreeMap<String, String>,
+    /// The kind of RAM of memories, in place of the kernel's own; none of any where it is `None`.
+    styles: Option<&'a BTreeMap<String, String>>,
+    /// What stands before the names of memory files.
+    prefix: &'a str,
     expressions: Text<'a>,
     /// Nodes to which such a wire has been printed.
     printed: BTreeSet<NodeId>,
@@ -23,13 +25,14 @@ struct Printer<'a> {
 impl Kernel {
     /// The module's body.
     pub fn verilog(&self) -> String {
-        self.verilog_with(&BTreeMap::new())
+        self.verilog_with(Some(&BTreeMap::new()), "")
     }
 
-    /// The module's body, with these attributes of memories by their name.
-    pub(super) fn verilog_with(&self, attributes: &BTreeMap<String, String>) -> String {
+    /// The module's body, with these values of `ram_style` by the memory's name in place of the kernel's own, or without any, and with
+    /// `prefix` before the names of memory files.
+    pub(super) fn verilog_with(&self, styles: Option<&BTreeMap<String, String>>, prefix: &str) -> String {
         let (expressions, printed) = (Text::new(self), BTreeSet::new());
-        let mut printer = Printer { kernel: self, attributes, expressions, printed, text: String::new() };
+        let mut printer = Printer { kernel: self, styles, prefix, expressions, printed, text: String::new() };
         printer.body();
         printer.text.truncate(printer.text.trim_end().len());
         printer.text
@@ -102,16 +105,18 @@ impl Printer<'_> {
 
     fn declare_memory(&mut self, memory: &Memory) {
         let Memory { name, words, bits, .. } = memory;
-        let style = memory.style.iter().map(|style| format!("ram_style = \"{style}\""));
         let unchecked = memory.unchecked.then(|| "no_rw_check".to_owned());
-        let given = self.attributes.get(name).cloned();
-        let attributes: Vec<String> = style.chain(unchecked).chain(given).collect();
+        let style = self.styles.and_then(|styles| styles.get(name).or(memory.style.as_ref()));
+        let style = style.map(|style| format!("ram_style = \"{style}\""));
+        let attributes: Vec<String> = unchecked.into_iter().chain(style).collect();
         if !attributes.is_empty() {
             self.line(&format!("(* {} *)", attributes.join(", ")));
         }
         self.line(&format!("reg [{}:0] {name} [0:{}];", bits - 1, words - 1));
         match &memory.contents {
-            Contents::File { name: file, .. } => self.line(&format!("initial $readmemh(\"{file}\", {name});")),
+            Contents::File { name: file, .. } => {
+                self.line(&format!("initial $readmemh(\"{}{file}\", {name});", self.prefix));
+            }
             Contents::Words(words) => {
                 self.line("initial begin");
                 for (address, word) in words {

@@ -71,7 +71,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         clock = model.board.clock_MHz,
         scan = pins_text(model),
     );
-    let around = Around { top, hierarchy, header, row: "link" };
+    let around = Around { top, hierarchy, header, row: "link", is_board: true };
     let mut board = around.generated(model, engine)?;
     board.seal();
     Ok(board)

@@ -26,7 +26,7 @@ pub use address::scan::Scan;
 pub use address::transposed_place::TransposedPlace;
 pub(crate) use arithmetic::butterfly::subtracted;
 pub use arithmetic::butterfly::Butterfly;
-pub use arithmetic::lanes::{Lanes, MEMORY_FILE};
+pub use arithmetic::lanes::{Lanes, LOW_FILE, MEMORY_FILE};
 pub use arithmetic::leading_one::by_leading_one;
 pub use arithmetic::rescaler::{count_saturations, operand_of, saturating_sum, Rescaler, SATURATION_BITS};
 pub(crate) use arithmetic::saturated::saturated;

@@ -72,7 +72,7 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
         scan = us(timing.scan),
         period = us(timing.period),
     );
-    let around = Around { top, hierarchy, header, row: "scan" };
+    let around = Around { top, hierarchy, header, row: "scan", is_board: false };
     let mut generated = around.generated(model, engine)?;
     generated.manifest["scan"] = json!({
         "converter": scan.converter.name,

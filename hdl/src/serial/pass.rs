@@ -17,13 +17,9 @@ use dermis_golden::fixed::Model;
 
 use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
-use crate::primitives::count_bits;
+use crate::primitives::{count_bits, LOW_FILE, MEMORY_FILE};
 use crate::wire::Word;
 
-/// File of the coefficients as wide as an operand.
-const WIDE_FILE: &str = "coefficients.hex";
-/// File of the low limb of Cz⁺.
-const LOW_FILE: &str = "coefficients_low.hex";
 const OPERAND: usize = OPERAND_BITS as usize;
 
 block! {
@@ -121,7 +117,7 @@ impl Block for Pass {
         let wide_word = coefficient_memory(
             k,
             Holds::Coefficients,
-            ["wide", "wide_word", WIDE_FILE],
+            ["wide", "wide_word", MEMORY_FILE],
             &self.wide,
             OPERAND,
             io.address,

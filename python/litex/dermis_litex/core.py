@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from litex.gen import ClockSignal, Instance, LiteXModule, ResetSignal
+from litex.gen import ClockSignal, If, Instance, LiteXModule, Mux, ResetSignal, Signal
 from litex.soc.interconnect import stream, wishbone
 
 WORD_BITS = 32
@@ -70,11 +70,50 @@ def require_forces(core):
         )
 
 
+def results(words):
+    """The layout of a core's results, `words` words in a beat."""
+    return [("data", WORD_BITS * words), ("keep", WORD_BITS // 8 * words), ("user", words + 1), ("id", ID_BITS)]
+
+
+class WholeFrames(LiteXModule):
+    """Results in, each of them with `count` words out, `words` in a beat: one that ends early, because a reset by register abandoned it,
+    is filled up with words of 0 that are spoiled and no forces. Its status has no cycles."""
+
+    def __init__(self, words, count):
+        self.sink = sink = stream.Endpoint(results(words))
+        self.source = source = stream.Endpoint(results(words))
+
+        # # #
+
+        beats = -(-count // words)
+        all_kept = 2 ** len(sink.keep) - 1
+        # A word has a bit of `keep` per byte.
+        last_kept = 2 ** (WORD_BITS // 8 * (count - (beats - 1) * words)) - 1
+        at, fills, ends, identifier = Signal(max=max(beats, 2)), Signal(), Signal(), Signal(ID_BITS)
+        self.comb += [
+            ends.eq(at == beats - 1),
+            source.valid.eq(sink.valid | fills),
+            source.last.eq(ends),
+            source.data.eq(Mux(fills, 0, sink.data)),
+            source.keep.eq(Mux(ends, last_kept, all_kept)),
+            source.user.eq(Mux(fills, 2 ** len(sink.user) - 1, sink.user)),
+            source.id.eq(Mux(fills, identifier, sink.id)),
+            sink.ready.eq(source.ready & ~fills),
+        ]
+        self.sync += If(
+            source.valid & source.ready,
+            identifier.eq(source.id),
+            at.eq(at + 1),
+            If(ends, at.eq(0), fills.eq(0)).Elif(sink.last, fills.eq(1)),
+        )
+
+
 class Dermis(LiteXModule):
     """A core between two streams.
 
     - `sink`: a taxel's code per beat, 32 bits signed, row-major; `last` on a frame's last taxel; `id` names the frame.
-    - `source`: words of 32 bits, fx, fy, fz of each taxel, then status; `keep`, `user` and `id` as the guide says.
+    - `source`: words of 32 bits, fx, fy, fz of each taxel, then status, always `words` of a frame (see `WholeFrames`); `keep`,
+      `user` and `id` as the guide says.
     - `bus`: the register map on Wishbone, addresses of words, 64 registers.
     - `manifest`: scales and counts, as in `manifest.json`.
     - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
@@ -94,9 +133,8 @@ class Dermis(LiteXModule):
         bits = self.manifest["core"]["stream_bits"]
         words = bits // WORD_BITS
         self.sink = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
-        self.source = stream.Endpoint(
-            [("data", bits), ("keep", bits // 8), ("user", words + 1), ("id", ID_BITS)]
-        )
+        self.frames = WholeFrames(words, self.words)
+        self.source = self.frames.source
         self.bus = wishbone.Interface(data_width=WORD_BITS, address_width=8, addressing="word")
 
         # # #
@@ -112,13 +150,13 @@ class Dermis(LiteXModule):
             i_s_axis_tvalid=self.sink.valid,
             o_s_axis_tready=self.sink.ready,
             i_s_axis_tlast=self.sink.last,
-            o_m_axis_tdata=self.source.data,
-            o_m_axis_tkeep=self.source.keep,
-            o_m_axis_tuser=self.source.user,
-            o_m_axis_tid=self.source.id,
-            o_m_axis_tvalid=self.source.valid,
-            i_m_axis_tready=self.source.ready,
-            o_m_axis_tlast=self.source.last,
+            o_m_axis_tdata=self.frames.sink.data,
+            o_m_axis_tkeep=self.frames.sink.keep,
+            o_m_axis_tuser=self.frames.sink.user,
+            o_m_axis_tid=self.frames.sink.id,
+            o_m_axis_tvalid=self.frames.sink.valid,
+            i_m_axis_tready=self.frames.sink.ready,
+            o_m_axis_tlast=self.frames.sink.last,
             i_wb_cyc=self.bus.cyc,
             i_wb_stb=self.bus.stb,
             i_wb_we=self.bus.we,
@@ -132,5 +170,5 @@ class Dermis(LiteXModule):
         platform.add_source(str(folder / f"{top}.v"))
         # $readmemh reads them from the folder in which the tool runs.
         for name in self.manifest["files"]:
-            if name.endswith(".hex") and not name.startswith(f"{top}_tb"):
+            if name.startswith(f"{top}__"):
                 platform.add_source(str(folder / name), copy=True)

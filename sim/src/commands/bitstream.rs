@@ -64,9 +64,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         return Ok((committed(arguments.scene.as_deref(), arguments.board.as_deref())?, true));
     };
     let mut scene = Scene::load(scene)?;
-    if let Some(board) = &arguments.board {
-        scene.hardware.board.clone_from(board);
-    }
+    scene.hardware.board = arguments.board.clone().or(scene.hardware.board);
     let scene = match arguments.search_width {
         Some(width) => with_search_width(scene, width),
         None => scene,
@@ -86,7 +84,8 @@ fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
     let _progress = Progress::start("models of the baselines");
     let mut all = Vec::new();
     for (of, baseline) in Baselines::committed().built_in() {
-        let named = scene.is_none_or(|scene| scene == of.name) && board.is_none_or(|board| board == of.hardware.board);
+        let named =
+            scene.is_none_or(|scene| scene == of.name) && board.is_none_or(|board| board == of.hardware.board_name());
         if named {
             all.push(Summary::new(&Model::new(&of)?, baseline.clone()));
         }

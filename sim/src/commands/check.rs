@@ -135,7 +135,7 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         spectral_radius: matrices.map(|own| own.spectral_radius),
         mu_max: scene.search.mu_max,
         dead: scene.input.dead.clone(),
-        board: scene.hardware.board.clone(),
+        board: scene.hardware.board_name().to_owned(),
         scene: scene.name,
         sensor: scene.sensor,
         hardware,

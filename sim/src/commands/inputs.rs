@@ -34,7 +34,7 @@ pub struct BoardOverride {
 impl BoardOverride {
     /// The scene with that board; unchanged where the option is absent.
     pub fn apply(&self, mut scene: Scene) -> Scene {
-        scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
+        scene.hardware.board = self.target_board.clone().or(scene.hardware.board);
         scene
     }
 }

@@ -332,7 +332,7 @@ mod tests {
         let scene = Scene::parse(&written(&[needed, more].concat(), "").0.unwrap(), "pad.toml").unwrap();
         assert_eq!((scene.input.full_scale_MPa, scene.search.mu_max), (Some(0.3), 0.4));
         assert_eq!(
-            (scene.hardware.board.as_str(), scene.medium.to_string().as_str()),
+            (scene.hardware.board_name(), scene.medium.to_string().as_str()),
             ("icebreaker", "bonded-layer, poisson 0.45")
         );
         // The file of a board is found from the scene's folder.

@@ -180,7 +180,7 @@ pub(super) fn software_engine() -> impl TypedValueParser<Value = EngineName> {
 pub(super) fn open(source: &Source, scene: &Scene, baud: Option<u32>) -> Result<(Box<dyn Read + Send>, String)> {
     let baud = match baud {
         Some(baud) => Some(baud),
-        None => dermis_golden::spec::board::Board::load(&scene.hardware.board)?.uart_baud,
+        None => dermis_golden::spec::board::Board::load(scene.hardware.board_name())?.uart_baud,
     };
     let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
     if let Some(address) = address {

@@ -92,7 +92,7 @@ pub fn verify_specimen(
     simulators: &[Simulator],
     build: &Path,
 ) -> Result<Verified> {
-    let board = Board::load(&scene.hardware.board)?;
+    let board = Board::load(scene.hardware.board_name())?;
     let mut hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
     if let Some(specimen) = specimen {
         hardware.load(specimen, 1)?;

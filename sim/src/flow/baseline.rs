@@ -112,7 +112,7 @@ impl Baselines {
             self.0.iter().flat_map(|(on, scenes)| scenes.iter().map(move |(name, baseline)| (on, name, baseline)));
         let on_board = |(on, name, baseline): (&String, &String, _)| {
             let mut scene = built_in(name)?;
-            scene.hardware.board.clone_from(on);
+            scene.hardware.board = Some(on.clone());
             Some((scene, baseline))
         };
         all.filter_map(on_board).collect()

@@ -111,7 +111,7 @@ impl Answer {
         self.statuses().map(|status| match status.raised {
             raised if raised.contains(Flag::TablesIncomplete) => "not whole".to_owned(),
             raised if raised.contains(Flag::TablesRefused) => "refused".to_owned(),
-            _ => status.tables.to_string(),
+            _ => status.tables_version.to_string(),
         })
     }
 

@@ -134,7 +134,7 @@ fn the_program_sends_checks_tares_and_streams() {
 #[test]
 fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let mut scene = Scene::builtin("eight-by-eight").unwrap();
-    scene.hardware.board = "icebreaker".to_string();
+    scene.hardware.board = Some("icebreaker".into());
     let model = Model::new(&scene).unwrap();
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
     let terminal = PseudoTerminal::of(&Hardware::new(model.clone(), &build).unwrap()).unwrap();

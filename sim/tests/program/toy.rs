@@ -15,7 +15,7 @@ use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vecto
 const TOY: &str = include_str!("../toy/toy.v");
 const GAIN: i64 = 3;
 /// One beat per cycle from the cycle after the last code: 6 forces and 1 status.
-const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13, interval: 1 };
+const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13, beat_interval: 1 };
 const TAPS: [&str; 2] = ["receive", "scale"];
 const STALLS: Stimulus = Stimulus::Stalls { seed: 7 };
 

@@ -8,7 +8,7 @@ use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::{CoefficientCheck, Scene};
-use dermis_hdl::{generate, usage::total};
+use dermis_hdl::{generate, usage::total, GeneratedFile};
 use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
@@ -93,7 +93,7 @@ fn every_tried_flip_is_told() {
         // Every word is read, and no flip is undetected.
         let words = hardware.model.storage().words();
         assert_eq!(undetected(hardware.model.first()), [0; 0], "{name}");
-        let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
+        let file = hardware.generated.files.iter().position(|file| file.name.ends_with("__coefficients.hex")).unwrap();
         let good = hardware.generated.files[file].text.clone();
         let bits = word_bits(hardware.model.formats());
         let mut random = fastrand::Rng::with_seed(1);
@@ -103,6 +103,30 @@ fn every_tried_flip_is_told() {
             assert!(tells(&hardware, &vector), "{name}: bit {bit} of word {word} went unnoticed");
         }
     }
+}
+
+/// A simulator, and a device, has zeros for a file that is missing.
+#[test]
+fn the_file_of_another_core_and_a_missing_one_are_told() {
+    let (scene, frames) = checked("eight-by-eight");
+    let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
+    let vector = hardware.vector(&frames[..1]).unwrap();
+    let of = |files: &[GeneratedFile]| files.iter().position(|file| file.name.ends_with("__coefficients.hex")).unwrap();
+    let mut thicker = scene.clone();
+    thicker.sensor.thickness_mm *= 1.25;
+    let other = generate(&Model::new(&thicker).unwrap()).unwrap();
+    let other = other.files[of(&other.files)].text.clone();
+    let own = of(&hardware.generated.files);
+    let right = hardware.generated.files[own].text.clone();
+    // Nothing else notices.
+    assert!(other.len() == right.len() && other != right);
+    let missing = right.replace(|digit: char| digit.is_ascii_hexdigit(), "0");
+    for wrong in [other, missing] {
+        hardware.generated.files[own].text = wrong;
+        assert!(tells(&hardware, &vector));
+    }
+    hardware.generated.files[own].text = right;
+    assert!(!tells(&hardware, &vector));
 }
 
 #[test]

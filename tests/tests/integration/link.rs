@@ -177,7 +177,7 @@ fn both_simulations_answer_as_the_model() {
 #[test]
 fn a_board_with_the_serial_engine_sends_forces_and_says_that_it_adds_nothing_up() {
     let (mut scene, _) = scene("eight-by-eight");
-    scene.hardware.board = "icebreaker".to_string();
+    scene.hardware.board = Some("icebreaker".into());
     let mut board = Board::of(shipped(&scene), &BOTH);
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let packets = board.receive();

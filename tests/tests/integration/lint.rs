@@ -59,7 +59,7 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
     let own = QUICK_SCENES.into_iter().filter(half_space).map(|name| (name, None));
     for (name, board) in own.chain([("eight-by-eight", Some("icebreaker"))]) {
         let mut scene = scene(name).0;
-        scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
+        scene.hardware.board = board.map(str::to_owned).or(scene.hardware.board);
         let generated = generate(&Model::new(&scene).unwrap()).unwrap();
         lint(&generated).unwrap_or_else(|log| panic!("{name}: {log}"));
         let waivers = generated.files.iter().find(|f| f.name.ends_with(".vlt")).unwrap();
@@ -96,7 +96,7 @@ fn cores_are_clean_with_the_engines_waivers() {
     let scenes = [("eight-by-eight", None), ("sensor-3-contacts", None), ("eight-by-eight", Some("icebreaker"))];
     for (name, board) in scenes {
         let mut scene = scene(name).0;
-        scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
+        scene.hardware.board = board.map(str::to_owned).or(scene.hardware.board);
         let model = Model::new(&scene).unwrap();
         for shape in [CoreShape { bus: Bus::AxiLite, words: 1 }, CoreShape { bus: Bus::Wishbone, words: 4 }] {
             lint(&generate_core(&model, shape).unwrap()).unwrap_or_else(|log| panic!("{name}, {shape:?}: {log}"));

@@ -17,7 +17,7 @@ const BOARD: &str = "icebreaker";
 const BOTH: &[Simulator] = &[Simulator::Verilator, Simulator::Kernel];
 
 fn on_board(mut scene: Scene) -> Scene {
-    scene.hardware.board = BOARD.to_string();
+    scene.hardware.board = Some(BOARD.into());
     scene
 }
 
@@ -111,6 +111,24 @@ fn memories_and_multipliers_are_those_of_yosys() {
     let cells = ["SB_RAM40_4K", "SB_SPRAM256KA", "SB_MAC16"].map(cells);
     let resources = &model.resources;
     assert_eq!(cells, [resources.block_rams(), resources.large_rams(), resources.multipliers()]);
+}
+
+/// A device without single-port RAMs has the banks of polynomials in block RAM.
+#[test]
+fn without_single_port_rams_block_rams_are_those_of_yosys() {
+    let folder = tempfile::tempdir().unwrap();
+    let board = folder.path().join("small.toml");
+    std::fs::write(&board, "device = \"LFE5U-25F\"\nengine = \"serial\"\nclock_MHz = 50\n").unwrap();
+    let mut scene = scene("eight-by-eight").0;
+    scene.hardware.board = Some(board.display().to_string());
+    let model = Model::new(&scene).unwrap();
+    let cells = cells(&generate(&model).unwrap(), "synth_ecp5 -run begin:map_ffram");
+    let resources = &model.resources;
+    let [block_rams, multipliers] = ["DP16KD", "MULT18X18D"].map(cells);
+    assert_eq!([block_rams, 0], [resources.block_rams(), resources.large_rams()]);
+    // The plan splits an operand of 19 bits, of which Yosys may find one to be constant.
+    assert!(multipliers <= resources.multipliers());
+    assert!(block_rams > 0 && block_rams <= model.board.block_rams as usize);
 }
 
 #[test]

@@ -270,7 +270,7 @@ fn a_table_is_measured_again_from_its_seed() {
     assert!(measure_deviations(&bonded, 40, 1, &|_, _| ()).is_ok());
     // The same for one that no board holds; few frames leave classes without errors.
     let mut large = scene;
-    large.hardware.board = "icebreaker".into();
+    large.hardware.board = Some("icebreaker".into());
     (large.sensor.rows, large.sensor.cols) = (12, 12);
     assert!(Model::new(&large).is_err() && measure_deviations(&large, 40, 1, &|_, _| ()).is_ok());
     let error = measure_deviations(&large, 2, 1, &|_, _| ()).unwrap_err().to_string();

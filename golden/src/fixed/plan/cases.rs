@@ -49,7 +49,7 @@ pub fn planned(scene: &Scene) -> Result<Plan, FixedError> {
 pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Plan, FixedError> {
     scene.require_supported()?;
     let scene = &scene.clone().with_chosen_hardware();
-    let board = Board::load(&scene.hardware.board)?;
+    let board = Board::load(scene.hardware.board_name())?;
     if board.engine == EngineKind::Serial {
         scene.require_serial()?;
     }

@@ -74,7 +74,7 @@ pub struct Cycles {
     /// Cycles from the first input beat to the last output beat, both included.
     pub total: u64,
     /// Least number of cycles from one output beat to the next.
-    pub interval: u64,
+    pub beat_interval: u64,
 }
 
 /// Cycles by which a search of fewer taxels per cycle is later than one of whole quads.
@@ -124,10 +124,10 @@ impl Cycles {
     /// The counts of a frame whose beats leave in these cycles, without the choice of the case.
     pub(in crate::fixed) fn of_beats(plan: &Plan, sending: &BeatCycles) -> Self {
         let codes = (plan.scene.sensor.taxels() * plan.scene.input.frames_per_result()) as u64;
-        let interval = if plan.board.engine == EngineKind::Serial { serial::BEAT } else { 1 };
+        let beat_interval = if plan.board.engine == EngineKind::Serial { serial::BEAT } else { 1 };
         let [first_output, latency] =
             [sending.beats.first(), sending.beats.last()].map(|beat| beat.copied().unwrap_or(0));
-        Cycles { first_output, latency, total: codes + latency, interval }
+        Cycles { first_output, latency, total: codes + latency, beat_interval }
     }
 
     /// The counts with those of the choice, where the hardware chooses among several cases.

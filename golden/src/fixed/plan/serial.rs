@@ -12,7 +12,7 @@
 //! | search | 16 cycles per polynomial and sweep: two Horner chains, nine candidates, one logarithm | 17 500 |
 //! | force, send | one multiplier, the same shifter: 10 cycles per beat | 680 |
 //!
-//! The polynomials are stored in two single-port memories. A sweep reads one and writes the other, so neither needs a
+//! The polynomials are stored in two single-port memories, in block RAM where the device has no single-port RAMs. A sweep reads one and writes the other, so neither needs a
 //! second port; the polynomial about the best centre stays in its own region until a better one is found.
 
 use super::resources::{count_bits, Holds, Memory, Resources};
@@ -133,10 +133,10 @@ fn resources(f: &Formats, board: &Board) -> Resources {
         block_rams: board.block_rams_for(words, bits),
         large_rams: 0,
     };
-    let large = |holds, words: usize, bits: usize| Memory {
-        block_rams: 0,
-        large_rams: board.large_rams_for(words, bits),
-        ..memory(holds, words, bits)
+    // A device without single-port RAMs has its block RAMs.
+    let large = |holds, words: usize, bits: usize| match board.large_rams {
+        0 => memory(holds, words, bits),
+        _ => Memory { block_rams: 0, large_rams: board.large_rams_for(words, bits), ..memory(holds, words, bits) },
     };
     // Each is stored twice: for the lane of its own parity and for that of the flipped parity.
     let operands = 2 << (count_bits(first_vector(f) + f.operand_vectors()) + count_bits(f.quads));

@@ -5,6 +5,7 @@ use crate::fixed::words::formats::HALVINGS;
 use crate::physics::matrices::Matrices;
 use crate::random::Random;
 use crate::result::reconstruct::Reconstruction;
+use crate::spec::scene::{CoefficientCheck, Condition};
 
 const HARDWARE: &str = "
 name = \"hardware\"
@@ -97,7 +98,25 @@ fn what_no_table_holds_is_refused_by_field() {
     let (_folder, mut scene) = specimen(2.0);
     assert_eq!(error(&scene, 0), "version: 0 is not possible; expected 1 to 32767");
     scene.sensor.thickness_mm = 3.0;
-    assert!(error(&scene, 1).starts_with("sensor: differs from that of the hardware's scene"));
+    assert!(error(&scene, 1).starts_with("sensor.thickness_mm: differs from that of the hardware's scene"));
+    let changes: [(&str, fn(&mut Scene)); 6] = [
+        ("hardware.table_range.gain", |scene| scene.hardware.table_range.gain = None),
+        ("hardware.coefficient_check", |scene| scene.hardware.coefficient_check = CoefficientCheck::Signature),
+        ("hardware.board", |scene| scene.hardware.board = Some("icebreaker".into())),
+        ("search.mu_max", |scene| scene.search.mu_max = 0.25),
+        ("fixed.coef_bits", |scene| scene.fixed.coef_bits -= 1),
+        ("partition.condition", |scene| scene.partition.condition = Condition::BothSigns),
+    ];
+    for (field, change) in changes {
+        let (_folder, mut scene) = specimen(2.0);
+        change(&mut scene);
+        let error = error(&scene, 1);
+        assert!(error.starts_with(&format!("{field}: differs from that of the hardware's scene")), "{field}: {error}");
+    }
+    // A board that is named is the one that a scene without a name has.
+    let (_folder, mut scene) = specimen(2.0);
+    scene.hardware.board = Some(scene.hardware.board_name().to_owned());
+    assert!(hardware.with_tables(&scene, 1).is_ok());
     let mut rom = hardware.scene.clone();
     rom.hardware = Default::default();
     let rom = Model::new(&rom).unwrap();
@@ -233,11 +252,11 @@ fn a_specimen_outside_the_range_is_refused_by_field() {
     );
     let mut other = with(&scene, 2.0, &[]);
     other.sensor.pitch_x_mm = 2.5;
-    assert!(error(&other).starts_with("sensor: differs"));
+    assert!(error(&other).starts_with("sensor.pitch_x_mm: differs"));
     // Without a range the cover is that of the bitstream.
     let mut fixed = super::super::Model::new(&of_range(4, "gain = [0.5, 2.0]")).unwrap();
     let thick = with(&fixed.scene, 2.5, &[]);
-    assert!(fixed.with_tables(&thick, 1).unwrap_err().to_string().starts_with("sensor: differs"));
+    assert!(fixed.with_tables(&thick, 1).unwrap_err().to_string().starts_with("sensor.thickness_mm: differs"));
     // An image of the same array without coefficients, or of another cover, is for other hardware.
     assert_eq!(fixed.load(&super::super::Model::new(&thick).unwrap().image()), Outcome::Refused);
     assert_eq!(fixed.load(&hardware.image()), Outcome::Refused);

@@ -106,6 +106,11 @@ impl StatusField {
         StatusField::new(name, [0, 2], [low, 1], feature, meaning)
     }
 
+    /// Index of the field's word among those of a status, three of each beat.
+    pub const fn index(&self) -> usize {
+        WORDS * self.beat + self.word
+    }
+
     /// The field's bits in its word.
     pub const fn mask(&self) -> u32 {
         u32::MAX >> (u32::BITS - self.bits) << self.low

@@ -222,6 +222,9 @@ pub(super) trait Table: Sized {
 
     /// Adds its fields.
     fn declare(fields: &mut Vec<Declared>);
+
+    /// The first field, as `table.field`, that differs from that of another.
+    fn differing_field(&self, other: &Self) -> Option<&'static str>;
 }
 
 /// A table as a member of another.
@@ -283,6 +286,11 @@ macro_rules! table {
             fn declare(fields: &mut Vec<$crate::spec::scene::declared::Declared>) {
                 use $crate::spec::scene::field::Member as _;
                 $($member.declare(concat!($table, ".", stringify!($field)), &[$($doc),*], fields);)*
+            }
+
+            fn differing_field(&self, other: &Self) -> Option<&'static str> {
+                let differs = [$((concat!($table, ".", stringify!($field)), self.$field != other.$field)),*];
+                differs.into_iter().find_map(|(field, differs)| differs.then_some(field))
             }
         }
     };

@@ -23,7 +23,7 @@ fn everything_but_the_sensor_has_a_default() {
         scene.fixed,
         FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20, lanes: None }
     );
-    assert_eq!((scene.search.mu_max, scene.hardware.board.as_str()), (0.6, "ulx3s-85f"));
+    assert_eq!((scene.search.mu_max, scene.hardware.board_name()), (0.6, "ulx3s-85f"));
     assert!(scene.require_supported().is_ok());
 }
 

@@ -81,7 +81,7 @@ fn an_input_of_an_instance_that_nothing_drives_is_named() {
 fn a_block_of_blocks_is_a_module_with_instances() {
     let hierarchy = hierarchy(Way::Chain);
     hierarchy.check().unwrap();
-    let text = hierarchy.verilog("chain", &Attributes::new());
+    let text = hierarchy.verilog("chain", None);
     let chain = "\
 module chain (
     // A bit.

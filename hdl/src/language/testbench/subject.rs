@@ -1,7 +1,7 @@
 //! What a test drives: a kernel alone, or a block with the blocks inside it.
 
 use crate::language::change::Change;
-use crate::language::hierarchy::{Attributes, Hierarchy};
+use crate::language::hierarchy::{Hierarchy, RamStyles};
 use crate::language::kernel::{Kernel, Role, Signal as KernelSignal};
 use crate::language::simulate::Simulation;
 use crate::wire::Word;
@@ -76,8 +76,8 @@ impl Subject<'_> {
             outputs
         };
         Subject {
-            verilog: hierarchy.verilog("dut", &Attributes::new()),
-            files: hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files()).collect(),
+            verilog: hierarchy.verilog("dut", Some(&RamStyles::new())),
+            files: hierarchy.memory_files("dut"),
             run: Box::new(cycle),
             clock,
             inputs,

@@ -90,7 +90,7 @@ block! {
 /// File of the coefficient memory, one line per word.
 pub const MEMORY_FILE: &str = "coefficients.hex";
 /// File of the memory of low limbs, one line per word.
-const LOW_FILE: &str = "low_coefficients.hex";
+pub const LOW_FILE: &str = "low_coefficients.hex";
 
 impl Lanes {
     /// The lanes of `model`, with the coefficients of all its cases in one memory.

@@ -168,7 +168,7 @@ mod tests {
         // 16×16 taxels in one subarray do not fit a small device; what makes them fit is told too.
         let mut scene = Scene::builtin("sensor-3").unwrap();
         (scene.sensor.rows, scene.sensor.cols) = (16, 16);
-        scene.hardware.board = "colorlight-i5".into();
+        scene.hardware.board = Some("colorlight-i5".into());
         let error = Model::new(&scene).unwrap_err().to_string();
         let told = in_one_line(&error);
         assert!(error.lines().count() > 1 && !told.contains('\n'), "{error}");

@@ -54,7 +54,7 @@ pub fn scenes(names: &[String]) -> Result<Vec<(String, Scene)>> {
     let load = |(name, board): (&str, Option<&str>)| {
         let mut scene = Scene::load(name)?;
         let Some(board) = board else { return Ok((scene.name.clone(), scene)) };
-        scene.hardware.board = board.to_owned();
+        scene.hardware.board = Some(board.to_owned());
         Ok((format!("{} on {board}", scene.name), scene))
     };
     of_table.chain(others).map(load).collect()

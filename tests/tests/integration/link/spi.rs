@@ -101,7 +101,7 @@ fn a_board_answers_as_the_model() {
 #[test]
 fn the_serial_engines_board_answers_at_a_rate_near_its_clock_without_a_gap() {
     let (mut scene, _) = scene("eight-by-eight");
-    scene.hardware.board = "icebreaker".to_string();
+    scene.hardware.board = Some("icebreaker".into());
     let mut board = Board::new(shipped(&scene), RATE, 0.7, &BOTH);
     board.answers_as_the_model(&[]);
     // One transaction for the frame and, after the time it takes, one for the answer.

@@ -51,7 +51,11 @@ fn codes_are_clipped_and_frames_counted() {
         // A code that is too large wraps.
         Change::value("stream_in", "fits", |k| k.constant(1, 1)),
         // A frame that is spoiled spoils the next one.
-        Change::value("stream_in", "now_spoiled", |k| k.named("clipped") | k.named("partial") | k.named("spoiled")),
+        Change::value("stream_in", "now_spoiled", |k| {
+            k.named("clipped") | k.named("partial") | k.named("foreign") | k.named("spoiled")
+        }),
+        // Beats of two frames are mixed unnoticed.
+        Change::value("stream_in", "foreign", |k| k.constant(1, 0)),
         // Codes are taken without room for a label.
         Change::value("stream_in", "s_axis_tready", |k| k.named("moves")),
     ];
@@ -70,6 +74,12 @@ fn words_leave_in_order_without_gaps() {
             }),
             // Words that were not taken are dropped.
             Change::value("stream_out", "taken", |k| k.named("m_axis_tvalid")),
+            // A frame that is abandoned while there is no room for its end stays open.
+            Change::value("stream_out", "closing", |k| k.constant(1, 0)),
+            // The end of a frame that is abandoned has what the engine sends.
+            Change::value("stream_out", "given", |k| {
+                k.named("closed") | (k.named("s_axis_tvalid") & k.named("s_axis_tready"))
+            }),
         ];
         proof(hardware, "stream_out.v", "stream_out", vec![("WORDS", number(words))], defects).run();
     }
