@@ -267,7 +267,7 @@ flags! {
         raised_by: "golden model, with evidence; others by the cross-check",
     }
     TaxelSuspect = 23 "taxel-suspect" {
-        raised_when: "a taxel reads what no force explains beside its neighbours: the other readings give it a density below e^-7 per peak, and a fit without it predicts a stress at least 1 % of the peak off. `suspects` names it with row, column, reading and expected stress; the estimate takes it as missing",
+        raised_when: "a taxel reads what no force explains beside its neighbours: the other readings give it a density below e^-7 per peak, or a fit without it predicts a load there that is more than 4.8 standard deviations off, and at least 1 % of the peak. `suspects` names it with row, column, reading and expected stress; the estimate takes it as missing",
         remedy: "repair the taxel, or list it in `input.dead`",
         raised_by: "golden model, with evidence; others by the cross-check",
     }

@@ -41,6 +41,8 @@ pub(super) struct Top {
     pub posterior: Posterior,
     /// Slope and information there.
     pub slope: Slope,
+    /// Number of posteriors on the way.
+    pub posteriors: usize,
 }
 
 impl Prior {
@@ -90,9 +92,9 @@ impl Prior {
 pub(super) fn ascend(design: &Design, readings: &Readings, mu: &[[f64; 2]], prior: Prior, steps: usize) -> Option<Top> {
     let top = |mu: Vec<[f64; 2]>, posterior: Posterior| {
         let slope = design.slope(readings, &posterior);
-        Top { mu, posterior, slope }
+        Top { mu, posterior, slope, posteriors: 0 }
     };
-    let mut best = top(mu.to_vec(), design.posterior(readings, mu)?);
+    let mut best = Top { posteriors: 1, ..top(mu.to_vec(), design.posterior(readings, mu)?) };
     if prior.mu_max == 0.0 {
         return Some(best);
     }
@@ -106,13 +108,14 @@ pub(super) fn ascend(design: &Design, readings: &Readings, mu: &[[f64; 2]], prio
             break;
         }
         let mut share = (prior.mu_max / longest).min(1.0);
-        let mut higher = None;
+        let (mut higher, mut posteriors) = (None, best.posteriors);
         for _ in 0..HALVINGS {
             let moved = |k: usize| {
                 let [x, y] = best.mu[k];
                 prior.within([x + share * step[2 * k], y + share * step[2 * k + 1]])
             };
             let mu: Vec<[f64; 2]> = (0..best.mu.len()).map(moved).collect();
+            posteriors += 1;
             let next = design.posterior(readings, &mu).filter(|next| next.value + prior.log(&mu) > value);
             if let Some(posterior) = next {
                 higher = Some(top(mu, posterior));
@@ -120,9 +123,10 @@ pub(super) fn ascend(design: &Design, readings: &Readings, mu: &[[f64; 2]], prio
             }
             share /= 2.0;
         }
-        match higher {
-            Some(higher) => best = higher,
-            None => break,
+        let ended = higher.is_none();
+        best = Top { posteriors, ..higher.unwrap_or(best) };
+        if ended {
+            break;
         }
     }
     Some(best)

@@ -20,6 +20,9 @@ pub struct Estimate {
     pub rounds: usize,
     /// Number of coefficients r of the pressures.
     pub rank: usize,
+    /// Multiplications of the posteriors of all fits of the frame from the start, in order of magnitude: the time it takes,
+    /// whatever the machine.
+    pub work: u64,
     /// Whether no fit explains the stress: the normal force is Σ b·area, the shear is not known.
     pub failed: bool,
     /// Root mean square of the baseline over the readings in MPa; 0 where no fit was made.

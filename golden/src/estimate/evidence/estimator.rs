@@ -19,6 +19,12 @@ const WINDOW_FROM: usize = 400;
 /// Distance from the cells of a contact within which taxels are read, in units of the depth.
 const WINDOW: f64 = 4.0;
 
+/// Multiplications after which no further fit of a frame begins, and no further round but the first ones and the last, per pair of
+/// taxels. Drawn presses take 1000 to 2500 in the median; without a limit noise and even loads take up to 26 times as much.
+const WORK: u64 = 3000;
+/// The same of fits whose μ a network gives, over that: each has further rounds with all coefficients.
+const ADVISED: u64 = 2;
+
 /// The estimator of one scene.
 pub struct Evidence {
     pub(super) cells: Cells,
@@ -35,6 +41,8 @@ pub struct Evidence {
     pub(super) noise_shares: Vec<f64>,
     pub(super) adviser: Option<Adviser>,
     pub(super) screen: Option<Screen>,
+    /// See [`WORK`]; for the whole array.
+    pub(super) work: u64,
 }
 
 /// A network, and whether the evidence has a say.
@@ -63,6 +71,7 @@ impl Evidence {
             prior: Prior { mu_max: scene.search.mu_max },
             spreads: SpreadPrior::ANY,
             screen: Screen::new(sensor, scene.medium, &alive),
+            work: WORK * (alive.len() as u64).pow(2),
             alive,
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,
@@ -84,7 +93,7 @@ impl Evidence {
 
     /// The same with the μ of each contact from a trained network; `combined` with the evidence's own or in its place.
     pub fn advised_by(self, network: Learned, combined: bool) -> Evidence {
-        Evidence { adviser: Some(Adviser { network, combined }), ..self }
+        Evidence { adviser: Some(Adviser { network, combined }), work: ADVISED * self.work, ..self }
     }
 
     /// The taxels that are read: all of a small array, those near the pressure `p` (N per cell) of a large one.

@@ -90,6 +90,8 @@ pub(super) struct Fit<'a> {
     now: Progress,
     /// Number of rounds.
     round: usize,
+    /// Multiplications of all posteriors.
+    work: u64,
 }
 
 /// What a fit says of one frame.
@@ -98,8 +100,8 @@ pub(super) struct Fitted {
     pub estimate: Estimate,
     /// The reading that the others explain least: taxel, and its distance in standard deviations.
     pub worst: Option<(usize, f64)>,
-    /// The stress on each taxel that is not used.
-    pub predicted: Vec<(usize, f64)>,
+    /// What the others say of each taxel that is not used.
+    pub predicted: Vec<Predicted>,
     /// What the rounds found.
     pub found: Progress,
     /// The number of contacts into which the pressure divides.
@@ -110,6 +112,17 @@ pub(super) struct Fitted {
     pub evidence: f64,
     /// Whether a pressure has more coefficients than the readings can tell.
     pub wide: bool,
+}
+
+/// What the readings of the others say of one taxel, in units of the peak.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Predicted {
+    /// The taxel.
+    pub taxel: usize,
+    /// Mean of its stress.
+    pub mean: f64,
+    /// Variance of its reading, noise and gain included.
+    pub variance: f64,
 }
 
 /// The contacts with their μ.
@@ -145,7 +158,7 @@ impl<'a> Fit<'a> {
         let missing = of(&|t| !used[t]);
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
         let (stated, offsets) = (stated.is_some(), scene.cells.offsets(&taxels));
-        Fit { scene, b, used, taxels, offsets, clipped, missing, readings, stated, now, round: 0 }
+        Fit { scene, b, used, taxels, offsets, clipped, missing, readings, stated, now, round: 0, work: 0 }
     }
 
     /// Whether a reading counts: it is neither clipped nor missing.
@@ -187,8 +200,8 @@ impl<'a> Fit<'a> {
                 self.join(a, b);
                 (joined, done) = (true, false);
             }
-            // Where the shear stays open, the regions are all that the rounds have to find.
-            if done || self.round == ROUNDS || regions.wide && self.round >= SEGMENTED {
+            // Where the shear stays open, the regions are all that the rounds have to find. A fit that has had its work ends.
+            if done || self.round == ROUNDS || regions.wide && self.round >= SEGMENTED || self.is_spent() {
                 return Some(());
             }
         }
@@ -205,7 +218,7 @@ impl<'a> Fit<'a> {
             let top = self.ascend(&mut regions.design, STEPS)?;
             let top = self.with_rest(&mut regions.design, top, 1, 1)?;
             self.take(&regions, &top);
-            if self.now.sigma > QUIETER * before || self.round == last {
+            if self.now.sigma > QUIETER * before || self.round == last || self.is_spent() {
                 break (regions, top);
             }
         };
@@ -222,6 +235,11 @@ impl<'a> Fit<'a> {
             found = self.advised(adviser, found)?;
         }
         self.estimate(&found)
+    }
+
+    /// Whether the fit has had its work.
+    fn is_spent(&self) -> bool {
+        self.work > self.scene.work
     }
 
     /// Change of μ per round below which the rounds end.
@@ -309,7 +327,9 @@ impl<'a> Fit<'a> {
     fn ascend(&mut self, design: &mut Design, steps: usize) -> Option<Top> {
         self.weigh();
         self.baseline(design);
-        ascend(design, &self.readings, &self.now.mu, self.scene.prior, steps)
+        let top = ascend(design, &self.readings, &self.now.mu, self.scene.prior, steps)?;
+        self.work += top.posteriors as u64 * design.work();
+        Some(top)
     }
 
     /// The same from `top`, with the noise, the baseline and the clipped readings that go with it, found anew at least `least`

@@ -149,6 +149,12 @@ impl Design {
         self.contact.len()
     }
 
+    /// Multiplications of one posterior, in order of magnitude: SᵀTS, its factor and its inverse.
+    pub fn work(&self) -> u64 {
+        let (readings, rank) = (self.s.nrows() as u64 / 3, self.rank() as u64);
+        (readings + rank) * rank * rank
+    }
+
     /// Number of unknowns of μ.
     fn unknowns(&self) -> usize {
         2 * self.contact.iter().max().map_or(0, |last| last + 1)

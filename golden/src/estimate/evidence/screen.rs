@@ -8,12 +8,12 @@
 //! ```
 //!
 //! a is the force on a cell under the peak's pressure, S the largest baseline, σ 1e-3 of the peak. z only ranks the readings:
-//! the one with the largest is what `suspect` tries first.
+//! `suspect` tries those with the largest.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b | taxels | of the peak |
-//! | out: taxel | 1 | index |
+//! | out: taxels | as many as there are | indices |
 
 use super::baseline::{terms, LARGEST};
 use crate::physics::influence::table;
@@ -59,8 +59,8 @@ impl Screen {
         Some(Screen { taxels, inverse })
     }
 
-    /// The taxel that its neighbours predict least.
-    pub fn least_predicted(&self, b: &[f64]) -> Option<usize> {
+    /// The taxels in order, those first that their neighbours predict least.
+    pub fn least_predicted(&self, b: &[f64]) -> Vec<usize> {
         let n = self.taxels.len();
         let mut weighted = vec![0.0; n];
         for (j, &taxel) in self.taxels.iter().enumerate() {
@@ -68,7 +68,9 @@ impl Screen {
             weighted.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * b[taxel]);
         }
         let size = |k: usize| weighted[k].abs() / self.inverse[(k, k)].sqrt();
-        (0..n).map(|k| (size(k), self.taxels[k])).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, taxel)| taxel)
+        let mut all: Vec<(f64, usize)> = (0..n).map(|k| (size(k), self.taxels[k])).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.into_iter().map(|(_, taxel)| taxel).collect()
     }
 }
 
@@ -88,7 +90,7 @@ mod tests {
         for taxel in [0, 7, 44, 55, 90] {
             let mut b: Vec<f64> = drawn.exact_MPa.iter().map(|b| b / peak).collect();
             b[taxel] += if b[taxel] > 0.5 { -0.6 } else { 0.6 };
-            assert_eq!(screen.least_predicted(&b), Some(taxel));
+            assert_eq!(screen.least_predicted(&b)[0], taxel);
         }
     }
 }

@@ -199,6 +199,7 @@ pub const FAULTS: &[Fault] = &[
         let largest = (0..r.now.len()).map(|k| surface(r.along(k)).abs()).fold(0.0, f64::max);
         r.plus(|at| s * surface(at) / largest)
     }),
+    shown("bowed zero", Percent, &[0.01, 0.05], |r, s, _| r.plus(|[x, y]| s * (x * x + y * y) / 2.0)),
     // Taxels.
     shown("taxel stuck, at the peak", Percent, STUCK, |r, s, _| r.stuck(r.peak_taxel, s)),
     shown("taxel stuck, beside the peak", Percent, STUCK, |r, s, _| r.stuck(beside(r), s)),
@@ -218,6 +219,10 @@ pub const FAULTS: &[Fault] = &[
     shown("column reads 0, through the peak", One, ONE, |r, _, _| {
         let col = r.row_col(r.peak_taxel)[1];
         r.of(|k| if r.row_col(k)[1] == col { 0.0 } else { r.now[k] })
+    }),
+    shown("row reads less, through the peak", Percent, &[0.9, 0.5], |r, s, _| {
+        let row = r.row_col(r.peak_taxel)[0];
+        r.of(|k| if r.row_col(k)[0] == row { s * r.now[k] } else { r.now[k] })
     }),
     shown("row doubled", One, ONE, |r, _, _| {
         let row = r.row_col(r.peak_taxel)[0];
@@ -249,6 +254,9 @@ pub const FAULTS: &[Fault] = &[
     shown("deadband", Percent, &[0.01, 0.05], |r, s, _| {
         r.of(|k| if r.now[k].abs() > s * r.peak_MPa { r.now[k] } else { 0.0 })
     }),
+    shown("soft threshold", Percent, &[0.01, 0.05], |r, s, _| {
+        r.of(|k| (r.now[k].abs() - s * r.peak_MPa).max(0.0).copysign(r.now[k]))
+    }),
     shown("sign reversed", One, ONE, |r, _, _| r.of(|k| -r.now[k])),
     // The transfer.
     shown("shifted by one taxel", One, ONE, |r, _, _| r.of(|k| r.now[(k + 1) % r.now.len()])),
@@ -274,6 +282,17 @@ pub const FAULTS: &[Fault] = &[
         r.of(|k| {
             let (left, right) = (k - usize::from(k % cols > 0), k + usize::from(k % cols + 1 < cols));
             (1.0 - 2.0 * s) * r.now[k] + s * (r.now[left] + r.now[right])
+        })
+    }),
+    hidden("blurred into the neighbours", Percent, &[0.03, 0.1], |r, s, _| {
+        let (rows, cols) = (r.sensor.rows, r.sensor.cols);
+        r.of(|k| {
+            let [i, j] = r.row_col(k);
+            let left = if j > 0 { k - 1 } else { k };
+            let right = if j + 1 < cols { k + 1 } else { k };
+            let above = if i > 0 { k - cols } else { k };
+            let below = if i + 1 < rows { k + cols } else { k };
+            (1.0 - 4.0 * s) * r.now[k] + s * [left, right, above, below].map(|k| r.now[k]).iter().sum::<f64>()
         })
     }),
     hidden("wrong unit", Times, &[10.0, 1e3, 1e-3], |r, s, _| r.of(|k| s * r.now[k])),

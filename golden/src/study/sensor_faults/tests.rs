@@ -81,6 +81,7 @@ fn faults_of_the_zero_add_a_smooth_surface() {
     near(&added("slope along x", 0.05), |_, j| 0.05 * x(j));
     near(&added("slope along y", 0.05), |i, _| 0.05 * y(i));
     near(&added("slope along the diagonal", 0.05), |i, j| 0.05 * (x(j) - y(i)) / 2.0);
+    near(&added("bowed zero", 0.05), |i, j| 0.05 * (x(j) * x(j) + y(i) * y(i)) / 2.0);
     let drift = added("smooth drift", 0.05);
     let largest = drift.iter().map(|b| b.abs()).fold(0.0, f64::max);
     assert!((largest - 0.05).abs() < 1e-12, "{largest}");
@@ -111,6 +112,7 @@ fn rows_and_columns_are_silent_doubled_or_shine_through() {
     let at = |i: usize, j: usize| b[i * COLS + j];
     near(&of("row reads 0, through the peak", 1.0), |i, j| if i == 1 { 0.0 } else { at(i, j) });
     near(&of("column reads 0, through the peak", 1.0), |i, j| if j == 2 { 0.0 } else { at(i, j) });
+    near(&of("row reads less, through the peak", 0.5), |i, j| if i == 1 { 0.5 * at(i, j) } else { at(i, j) });
     near(&of("row doubled", 1.0), |i, j| at(if i == 0 { 1 } else { i }, j));
     near(&of("column doubled", 1.0), |i, j| at(i, if j == 1 { 2 } else { j }));
     let row = |i: usize| ((0..COLS).map(|j| at(i, j)).sum::<f64>() / 5.0).max(0.0);
@@ -118,6 +120,11 @@ fn rows_and_columns_are_silent_doubled_or_shine_through() {
     near(&of("ghost rows and columns", 0.1), |i, j| at(i, j) + 0.1 * (row(i) + col(j)));
     near(&of("crosstalk to the next columns", 0.1), |i, j| {
         0.8 * at(i, j) + 0.1 * (at(i, j.saturating_sub(1)) + at(i, (j + 1).min(4)))
+    });
+    near(&of("blurred into the neighbours", 0.1), |i, j| {
+        let beside =
+            at(i, j.saturating_sub(1)) + at(i, (j + 1).min(4)) + at(i.saturating_sub(1), j) + at((i + 1).min(3), j);
+        0.6 * at(i, j) + 0.1 * beside
     });
     near(&of("creep: mixed with the next column", 0.3), |i, j| 0.7 * at(i, j) + 0.3 * at(i, j.saturating_sub(1)));
 }
@@ -130,6 +137,7 @@ fn the_converter_clips_rounds_and_drops() {
     near(&of("negative clipped", 1.0), |i, j| at(i, j).max(0.0));
     near(&of("sign reversed", 1.0), |i, j| -at(i, j));
     near(&of("deadband", 0.05), |i, j| if at(i, j).abs() > 0.1 { at(i, j) } else { 0.0 });
+    near(&of("soft threshold", 0.05), |i, j| at(i, j).signum() * (at(i, j).abs() - 0.1).max(0.0));
     let codes = of("coarse codes", 4.0);
     assert!(codes.iter().all(|code| (code * 4.0).fract() == 0.0), "{codes:?}");
     assert!(std::iter::zip(&codes, &b).all(|(code, b)| (code - b).abs() <= 0.125));

@@ -5,7 +5,7 @@
 //! | in: posterior of the last round | – | – |
 //! | out: [`Estimate`], and what it leaves of the readings | – | N per MPa of the peak |
 
-use super::{Fit, Fitted, Found, FLOOR};
+use super::{Fit, Fitted, Found, Predicted, FLOOR};
 use crate::data::frame::Forces;
 use crate::estimate::evidence::ascent::Top;
 use crate::estimate::evidence::contact::forces;
@@ -67,6 +67,7 @@ impl Fit<'_> {
             misfit_probability,
             rounds: self.round,
             rank,
+            work: self.work,
             ..Estimate::default()
         };
         Some(self.fitted(estimate, regions, top))
@@ -84,10 +85,13 @@ impl Fit<'_> {
         let load = counted.iter().map(|&k| self.b[self.taxels[k]] - baseline[k]).sum::<f64>();
         let square = counted.iter().map(|&k| baseline[k].powi(2)).sum::<f64>() / (counted.len().max(1) as f64);
         let worst = residual.worst(least).map(|(k, size)| (self.taxels[k], size));
-        let (predicted, correlation) = (
-            self.missing.iter().map(|&k| (self.taxels[k], stress[k][0])).collect(),
-            residual.correlation(sensor, &self.taxels),
-        );
+        let predicted = |&k: &usize| {
+            let (taxel, [mean, variance]) = (self.taxels[k], stress[k]);
+            let (noise, gain) = (self.noise(taxel), self.scene.gain_spread * mean);
+            Predicted { taxel, mean, variance: variance + noise * noise + gain * gain }
+        };
+        let predicted = self.missing.iter().map(predicted).collect();
+        let correlation = residual.correlation(sensor, &self.taxels);
         let found = self.now.clone();
         self.segment();
         Fitted {
