@@ -248,6 +248,8 @@ impl<'a> Run<'a> {
                 last.bias[channel] += within.ln() as f32;
             }
         }
+        // Of a short training too: what an output exceeds later is cut off in the hardware.
+        self.frames.draw(self.training.contacts)?;
         let (readings, _) = self.frames.mix(MEASURED, NOISE, random);
         self.mean.measure(self.features.of(&readings));
         let steps = self.losses.len();
