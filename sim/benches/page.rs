@@ -68,7 +68,6 @@ fn main() -> anyhow::Result<()> {
         line,
         received_s,
         answered_s,
-        time_ns: 0,
         times_ns: &[0],
         dropped,
         estimator,

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use anyhow::{anyhow, ensure, Context, Result};
 use clap::{value_parser, Args};
-use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
 use dermis_golden::spec::scene::{Scene, SearchSpec};
@@ -57,8 +56,9 @@ impl NoiseArguments {
             ensure!(read.is_some(), "{name}: ends after {} of {} frames (--frames)", frames.len(), self.frames);
             ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
             if !bytes.iter().all(u8::is_ascii_whitespace) {
-                let frame = frame(&mut lines, &bytes, number);
-                frames.extend(frame.map_err(|reason| anyhow!("{name}: line {number}: {reason}"))?);
+                let read = lines.frame(&bytes, number);
+                let read = read.map_err(|none| anyhow!("{name}: line {number}: {}", none.reason))?;
+                frames.extend(read.map(|line| line.frame));
                 bar.set(frames.len() as u64);
             }
         }
@@ -75,12 +75,6 @@ impl NoiseArguments {
         }
         Ok(Scene { search: SearchSpec { noise_floor_MPa: Some(noise_MPa), ..scene.search.clone() }, ..scene })
     }
-}
-
-/// The frame of a line, none of a comment and a header, or why there is none.
-fn frame(lines: &mut line::Frames, bytes: &[u8], number: u64) -> Result<Option<Frame>, String> {
-    let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-    lines.frame(text, number).map(|read| read.map(|line| line.frame)).map_err(|none| none.reason)
 }
 
 /// With the digits that are written.

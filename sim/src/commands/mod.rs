@@ -26,6 +26,7 @@
 //! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
 //! | [`mod@converters`] | `dermis converters`: the converters of a scan |
 //! | [`mod@registers`] | `dermis registers`: the register map of a core |
+//! | `scene_file` | what a command measured, written into the file of a scene |
 //! | [`mod@schema`] | `dermis schema`: the fields of scenes, frames and results |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
@@ -65,8 +66,8 @@ mod reconstruct_stream;
 pub mod registers;
 pub mod replay;
 pub mod report;
-pub mod scene_file;
-mod schema;
+mod scene_file;
+pub mod schema;
 mod sensor_faults;
 pub mod stability;
 pub mod stress;

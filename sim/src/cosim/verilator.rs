@@ -359,7 +359,7 @@ fn compile(design: &Design, sources: &[(&str, &str)], work: &Path, cache: &Path)
         verilator.arg("--public-flat-rw");
     }
     succeed(verilator.args(verilog))?;
-    // In a folder whose name nobody else knows: it is linked into what is loaded.
+    // In a fresh folder with a random name: no other process can put an object file there that is linked into the library.
     let own = cache.join(fingerprint(&[], "runtime"));
     let runtime = Runtime::new(&[design.optimisation.argument(), SHARED], &own).map_err(|error| error.to_string())?;
     succeed(runtime.compile(work, &[SHIM_FILE], LIBRARY).map_err(|error| error.to_string())?.args(LINK))

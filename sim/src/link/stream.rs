@@ -124,8 +124,7 @@ fn answer<P: Read + Write>(
     bytes: &[u8],
     number: u64,
 ) -> Result<Option<Reply>, (Value, anyhow::Error)> {
-    let text = std::str::from_utf8(bytes).map_err(|error| (Value::Null, error.into()))?;
-    let frame = frames.frame(text, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
+    let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
     let Some(LineFrame { id, frame, time_ns }) = frame else { return Ok(None) };
     let sent = SystemTime::now();
     let time_ns = times.time_ns(time_ns, nanoseconds(sent));

@@ -19,7 +19,7 @@ use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
 use crate::engine::typed;
-use crate::stream::{seconds, Answer, Estimators, Note, Outcome, Output};
+use crate::stream::{nanoseconds, seconds, Answer, Estimators, Note, Outcome, Output};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
 const RADIUS_IN_PITCHES: f64 = 2.0;
@@ -109,23 +109,22 @@ impl Hand {
         let (scene, mut change, start) = (estimators.scene(), None, Instant::now());
         for sequence in 0.. {
             let begun = Instant::now();
-            let (received_s, received_at) = (seconds(SystemTime::now()), estimators.clock().now());
+            let (received, received_at) = (SystemTime::now(), estimators.clock().now());
             let frame = self.frame(scene, noise, sequence, (begun - start).as_secs_f64())?;
             let frames = vec![frame; scene.input.frames_per_result()];
             let result = estimators.next(&frames).map_err(typed)?;
             let answered_s = seconds(SystemTime::now());
-            let (line, time_ns) = (sequence + 1, (received_s * 1e9) as i64);
+            let (line, times_ns) = (sequence + 1, vec![nanoseconds(received); frames.len()]);
             output(&Outcome::Answer(Answer {
                 sequence,
                 line,
-                received_s,
+                received_s: seconds(received),
                 answered_s,
                 dropped: 0,
                 estimator: estimators.name(),
                 estimator_change: change.take().as_deref(),
                 frames: &frames,
-                time_ns,
-                times_ns: &vec![time_ns; frames.len()],
+                times_ns: &times_ns,
                 result: &result,
             }))?;
             if let Some(Note { text, changed }) = estimators.after(line, received_at, 0) {

@@ -131,7 +131,6 @@ mod tests {
                 estimator: "search",
                 estimator_change: None,
                 frames,
-                time_ns,
                 times_ns: &[time_ns],
                 result,
             };

@@ -133,7 +133,7 @@ impl Recorder {
                 entry.messages.push((topic.to_owned(), Kind::of::<Image>(), cdr));
             }
         }
-        let header = header(answer.time_ns);
+        let header = header(answer.time_ns());
         if !answer.result.forces_N.fz.is_empty() {
             let points = Points::new(&self.sensor, answer.result);
             entry.add(FORCES, &points.cloud(&self.sensor, header.clone()))?;

@@ -10,7 +10,7 @@ use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
@@ -104,8 +104,6 @@ pub struct Answer<'a> {
     pub sequence: u64,
     /// Number of its last line, from 1.
     pub line: u64,
-    /// Nanoseconds since 1970 when its last frame was acquired: the time in its line if there is one, else that of its arrival.
-    pub time_ns: i64,
     /// Seconds since 1970 when that line was read.
     pub received_s: f64,
     /// Seconds since 1970 when the result was ready.
@@ -120,12 +118,25 @@ pub struct Answer<'a> {
     /// The frames of the block, the last one of that line; no part of the output line.
     #[serde(skip)]
     pub frames: &'a [Frame],
-    /// Nanoseconds since 1970 when each was acquired; no part of the output line.
-    #[serde(skip)]
+    /// Nanoseconds since 1970 when each was acquired, as `time_ns` the last one: the time in its line if there is one, else that
+    /// of its arrival.
+    #[serde(rename = "time_ns", serialize_with = "last")]
     pub times_ns: &'a [i64],
     /// The result.
     #[serde(flatten)]
     pub result: &'a Reconstruction,
+}
+
+impl Answer<'_> {
+    /// Nanoseconds since 1970 when its last frame was acquired.
+    pub fn time_ns(&self) -> i64 {
+        // A frame of its own completes every block.
+        self.times_ns.last().copied().unwrap_or(0)
+    }
+}
+
+fn last<S: Serializer>(times_ns: &[i64], serializer: S) -> Result<S::Ok, S::Error> {
+    times_ns.last().serialize(serializer)
 }
 
 /// A line without a result.
@@ -302,8 +313,6 @@ impl Stream<'_> {
         output(&Outcome::Answer(Answer {
             sequence,
             line,
-            // A frame of its own completes the block.
-            time_ns: times_ns.last().copied().unwrap_or(0),
             received_s,
             answered_s,
             dropped,
@@ -322,8 +331,7 @@ impl Stream<'_> {
     /// The frame in a line; `None` for a comment and a header.
     fn frame(&mut self, received: &Received) -> Result<Option<LineFrame>, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
-        let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
-        self.frames.frame(text, received.number).map_err(|none| none.reason)
+        self.frames.frame(bytes, received.number).map_err(|none| none.reason)
     }
 }
 
@@ -497,7 +505,7 @@ mod tests {
         let mut output = |outcome: &Outcome| {
             if let Outcome::Answer(answer) = outcome {
                 let stress = answer.frames.iter().map(|frame| frame.stress_MPa.clone());
-                seen.push((stress.collect::<Vec<_>>(), answer.times_ns.to_vec(), answer.time_ns));
+                seen.push((stress.collect::<Vec<_>>(), answer.times_ns.to_vec(), answer.time_ns()));
             }
             Ok(())
         };
@@ -525,7 +533,7 @@ mod tests {
         assert!(counts.to_string().ends_with(words), "{counts}");
     }
 
-    /// An engine whose results take a millisecond, and any time by a clock of its own.
+    /// An engine whose results take three milliseconds, and any time by a clock of its own.
     struct Slow {
         engine: Box<dyn Engine>,
         now_ms: Arc<AtomicU64>,
@@ -546,7 +554,8 @@ mod tests {
         }
 
         fn reconstruct_after(&self, state: &mut State, frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-            std::thread::sleep(Duration::from_millis(1));
+            // Long enough for the reader to fill the queue on a busy machine.
+            std::thread::sleep(Duration::from_millis(3));
             self.now_ms.fetch_add(self.cost_ms, Ordering::Relaxed);
             self.engine.reconstruct_after(state, frames)
         }

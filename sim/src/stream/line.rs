@@ -70,7 +70,8 @@ impl Frames {
     }
 
     /// The frame in a line and its id; `number` names a frame without one. `None` for a comment and a header.
-    pub(crate) fn frame(&mut self, text: &str, number: u64) -> Result<Option<LineFrame>, NoFrame> {
+    pub(crate) fn frame(&mut self, line: &[u8], number: u64) -> Result<Option<LineFrame>, NoFrame> {
+        let text = std::str::from_utf8(line).map_err(|error| NoFrame { id: Value::Null, reason: error.to_string() })?;
         // A line of its own: it brings one thing at most.
         let line = usize::try_from(number).unwrap_or(usize::MAX);
         let read = self.reader.push(Line { number: line, text }).pop();
@@ -115,7 +116,7 @@ mod tests {
 
     /// The frame of a line that is the only one.
     fn frame(text: &str, number: u64) -> Result<(Value, Frame), NoFrame> {
-        let read = Frames::new(&small(), Stated::default()).frame(text, number).map(Option::unwrap);
+        let read = Frames::new(&small(), Stated::default()).frame(text.as_bytes(), number).map(Option::unwrap);
         read.map(|LineFrame { id, frame, .. }| (id, frame))
     }
 
@@ -156,12 +157,12 @@ mod tests {
             assert!(reason.starts_with(wanted), "{text}: {reason}");
         }
         let mut frames = Frames::new(&small(), Stated::default());
-        assert_eq!((frames.frame("a,b,c,d", 1), frames.note().as_deref()), (Ok(None), Some("line 1 is a header")));
-        assert_eq!((frames.frame("# a remark", 2), frames.note()), (Ok(None), None));
-        assert!(frames.frame("1;2;3;4", 3).unwrap().is_some());
+        assert_eq!((frames.frame(b"a,b,c,d", 1), frames.note().as_deref()), (Ok(None), Some("line 1 is a header")));
+        assert_eq!((frames.frame(b"# a remark", 2), frames.note()), (Ok(None), None));
+        assert!(frames.frame(b"1;2;3;4", 3).unwrap().is_some());
         let layout = "lines from 3 on: a frame per line, separated by semicolons, readings in columns 1 to 4";
         assert_eq!(frames.note().as_deref(), Some(layout));
-        let other = frames.frame("1,2,3,4", 4).unwrap_err().reason;
+        let other = frames.frame(b"1,2,3,4", 4).unwrap_err().reason;
         assert_eq!(
             other,
             "1 values, wanted 4; this line is separated by commas, those before are separated by semicolons"

@@ -165,19 +165,10 @@ fn assemble(header: Header, pages: Vec<Page>, source: &Source) -> Result<Recordi
     let unit = header.pitch_mm.and_then(|pitch| unit(&frames, pitch[0] * pitch[1]));
     let device = header.matrix.map(|matrix| format!("novel, matrix {matrix}"));
     Ok(Recording {
-        format: Format::Lst,
         device: device.or(Some("novel".to_string())),
-        rows,
-        cols,
         pitch_mm: header.pitch_mm,
         unit,
-        bits: None,
-        full_scale: None,
-        missing: Vec::new(),
-        layout: None,
-        left_out: Vec::new(),
-        cut: None,
-        frames,
+        ..Recording::bare(Format::Lst, [rows, cols], frames)
     })
 }
 

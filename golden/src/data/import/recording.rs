@@ -112,6 +112,11 @@ pub(super) fn side(source: &Source, field: &str, text: &str) -> Result<usize, Im
     count.ok_or_else(|| source.field(field, text, format!("a whole number from 1 to {LARGEST_SIDE}")))
 }
 
+/// The unit that a field names.
+pub(super) fn unit(source: &Source, field: &str, text: &str) -> Result<Unit, ImportError> {
+    Unit::named(text).ok_or_else(|| source.field(field, text, format!("one of {}", Unit::names())))
+}
+
 /// The file's text: UTF-8, else Latin-1; without the mark U+FEFF.
 pub(super) fn decoded(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {

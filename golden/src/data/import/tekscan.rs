@@ -19,7 +19,7 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, unfinished, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
 use crate::data::text::{point, Separator};
 
@@ -47,23 +47,17 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     let size = |count: Option<usize>, key| {
         count.ok_or_else(|| source.missing(key, "the header of a Tekscan file states it before ASCII_DATA"))
     };
-    let (rows, cols) = (size(header.rows, "ROWS")?, size(header.cols, "COLS")?);
-    let (frames, cut) = frames(lines, [rows, cols], header.period_s, unfinished(text), source)?;
+    let shape = [size(header.rows, "ROWS")?, size(header.cols, "COLS")?];
+    let (frames, cut) = frames(lines, shape, header.period_s, unfinished(text), source)?;
     let [x, y] = header.pitch_mm;
     Ok(Recording {
-        format: Format::Tekscan,
         device: header.device,
-        rows,
-        cols,
         pitch_mm: x.zip(y).map(|(x, y)| [x, y]),
         unit: header.unit,
         bits: Some(BITS),
         full_scale: header.saturation.and_then(|text| saturation(&text, header.unit)),
-        missing: Vec::new(),
-        layout: None,
-        left_out: Vec::new(),
         cut,
-        frames,
+        ..Recording::bare(Format::Tekscan, shape, frames)
     })
 }
 
@@ -82,8 +76,7 @@ fn frames<'a>(
             return Ok((frames, None));
         }
         if Some(line) == unfinished {
-            // What is left of a number can be another one.
-            left += usize::from(left == 0);
+            // What is left of a number can be another one; a frame whose rows were all before is whole.
             break;
         }
         match frames.last_mut().filter(|_| left > 0) {
@@ -165,10 +158,7 @@ impl Header {
             // Columns are apart along x.
             "COL_SPACING" => self.pitch_mm[0] = Some(length()?),
             "ROW_SPACING" => self.pitch_mm[1] = Some(length()?),
-            "UNITS" => {
-                let unit = Unit::named(value);
-                self.unit = Some(unit.ok_or_else(|| source.field(key, value, format!("one of {}", Unit::names())))?);
-            }
+            "UNITS" => self.unit = Some(unit(source, key, value)?),
             "SECONDS_PER_FRAME" => {
                 let seconds = point(value).parse().ok().filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite());
                 self.period_s = Some(seconds.ok_or_else(|| source.field(key, value, "a number above 0"))?);

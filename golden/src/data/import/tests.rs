@@ -360,6 +360,18 @@ fn of_a_file_that_is_cut_no_frame_is_another_one() {
     }
 }
 
+/// What is left of the line that begins a frame takes nothing from the frame before.
+#[test]
+fn a_file_that_is_cut_between_two_frames_keeps_the_one_before() {
+    let text = decoded(ISCAN);
+    let partial = Settings { partial: true, ..counts() };
+    for behind in ["", "Fr", "Frame 70", "Frame 70, 6"] {
+        let cut = format!("{}{behind}", text.split("Frame 70").next().unwrap());
+        assert_eq!(message("a.csv", cut.as_bytes(), &counts()).matches("the 10 frames").count(), 1, "{behind:?}");
+        assert_eq!(import("a.csv", cut.as_bytes(), &partial).unwrap().frames.len(), 10, "{behind:?}");
+    }
+}
+
 /// Lines of a comment are no keys, and a file that a spreadsheet has saved again is the same recording.
 #[test]
 fn comments_and_spreadsheets_change_nothing() {

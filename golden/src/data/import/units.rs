@@ -94,8 +94,8 @@ impl Unit {
     /// ```
     pub fn named(name: &str) -> Option<Unit> {
         let name = name.replace('²', "2").replace([' ', '^'], "");
-        let all = Unit::ALL.into_iter().map(|(own, unit, _)| (own, unit)).chain(Unit::SYNONYMS);
-        all.into_iter().find(|(own, _)| own.eq_ignore_ascii_case(&name)).map(|(_, unit)| unit)
+        let mut all = Unit::ALL.into_iter().map(|(own, unit, _)| (own, unit)).chain(Unit::SYNONYMS);
+        all.find(|(own, _)| own.eq_ignore_ascii_case(&name)).map(|(_, unit)| unit)
     }
 
     /// Name in options and summaries.

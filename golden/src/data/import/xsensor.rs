@@ -12,7 +12,7 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, unfinished, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
 
 /// A key without quotes and colon.
@@ -36,10 +36,11 @@ impl Header {
     fn read(&mut self, line: &str, source: &Source) -> Result<(), ImportError> {
         let mut cells = line.split(',').map(cell);
         let (key, value) = (cells.next().unwrap_or(""), cells.next().unwrap_or(""));
-        let (name, unit) =
+        let (name, of) =
             key.split_once('(').map_or((key, ""), |(name, unit)| (name.trim(), unit.trim_end_matches(')')));
         let pitch = || {
-            millimetres(&format!("{value} {unit}")).ok_or_else(|| source.field(key, format!("{value} {unit}"), LENGTHS))
+            let length = format!("{value} {of}");
+            millimetres(&length).ok_or_else(|| source.field(key, &length, LENGTHS))
         };
         match name {
             "FRAME" | "Frame" => self.number = value.parse().ok(),
@@ -47,11 +48,8 @@ impl Header {
             "Columns" => self.cols = Some(side(source, key, value)?),
             "Sensel Width" => self.pitch_mm[0] = Some(pitch()?),
             "Sensel Height" => self.pitch_mm[1] = Some(pitch()?),
-            "Units" => {
-                let unit = Unit::named(value);
-                self.unit = Some(unit.ok_or_else(|| source.field(key, value, format!("one of {}", Unit::names())))?);
-            }
-            "Est. Load" if unit == "N" => self.force_N = value.parse().ok().filter(|force: &f64| force.is_finite()),
+            "Units" => self.unit = Some(unit(source, key, value)?),
+            "Est. Load" if of == "N" => self.force_N = value.parse().ok().filter(|force: &f64| force.is_finite()),
             _ => {}
         }
         Ok(())

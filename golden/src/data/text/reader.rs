@@ -244,11 +244,10 @@ impl Reader {
             self.layout = Some(own.clone());
             return self.line(&own, line);
         }
-        let [now, before] = match own.separator == layout.separator {
-            true => [&own, layout].map(|layout| format!("of {} values", layout.cells)),
-            false => [&own, layout].map(|layout| format!("separated by {}", layout.separator)),
-        };
-        reason.reason += &format!("; this line is {now}, those before are {before}");
+        if own.separator != layout.separator {
+            let (now, before) = (own.separator, layout.separator);
+            reason.reason += &format!("; this line is separated by {now}, those before are separated by {before}");
+        }
         self.other = Some((own, count));
         Read::LeftOut(LeftOut { id: Value::Null, reason })
     }

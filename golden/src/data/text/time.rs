@@ -25,7 +25,7 @@ const NANO_DIGITS: usize = 9;
 /// Seconds since 1970 from which on a number is one of a date: 1973 to 5138.
 const UNIX_S: std::ops::Range<f64> = 1e8..1e11;
 
-/// Whether a time in ns is one since 1970, 1973 or later, and not since a moment that nobody states.
+/// Whether a time in ns is a Unix time, of 1973 or later, and not one that counts from power-on or the start of a recording.
 pub fn is_date(ns: i64) -> bool {
     UNIX_S.contains(&(ns as f64 * 1e-9))
 }
