@@ -148,7 +148,7 @@ nightly: fuzz program tools ## run all variants of the tests, those too that `ma
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check
 
-train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
+train: program ## train the network of SCENE (minutes)
 	mkdir -p $(BUILD)
 	$(DERMIS) --build-dir $(BUILD) train $(SCENE) --out $(BUILD)/$(notdir $(basename $(SCENE))).network
 

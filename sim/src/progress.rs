@@ -33,6 +33,23 @@ impl Progress {
         Progress(bar)
     }
 
+    /// Steps of a bar of shares.
+    pub const SHARES: f64 = 1000.0;
+
+    /// Shows `message` with a bar of a share that is done.
+    pub fn share(message: &str) -> Self {
+        let bar = Progress::steps(message, Self::SHARES as u64);
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent} % ({elapsed}, {eta} left)") {
+            bar.0.set_style(style);
+        }
+        bar
+    }
+
+    /// Writes a line to stderr, above the bar.
+    pub fn say(&self, line: &str) {
+        LINES.suspend(|| eprintln!("{line}"));
+    }
+
     /// Sets the number of finished steps and their total.
     pub fn set_of(&self, done: u64, total: u64) {
         self.0.set_length(total);

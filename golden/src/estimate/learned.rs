@@ -14,7 +14,7 @@
 //! | `window` | the taxels that are read |
 //! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
 //! | `network` | layers with the mirror symmetry |
-//! | `frames`, `training` | drawn frames; loss and Adam |
+//! | `options`, `frames`, `training`, `adam` | drawn frames, loss, steps |
 //! | `file` | bytes, signature |
 //! | `trial` | a network of a few steps, for tests |
 //! | `composed` | the layers as plain matrices of the stress, for the hardware |
@@ -26,12 +26,14 @@
 //! | in: stress of one contact | taxels | MPa |
 //! | out: μ with standard deviations | 2 | – |
 
+mod adam;
 mod composed;
 mod error;
 mod features;
 mod file;
 mod frames;
 mod network;
+mod options;
 #[cfg(test)]
 mod tests;
 mod training;
@@ -43,7 +45,8 @@ pub use file::Signature;
 pub(crate) use frames::{GAINS, NOISE, RATIO};
 pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
-pub use training::{Stage, Training};
+pub use options::Training;
+pub use training::{Stage, MEASURED_NOISE};
 pub use trial::with_network;
 
 use crate::read::bytes_up_to;
@@ -54,6 +57,7 @@ use faer::Mat;
 use features::{Features, Readings};
 use network::Network;
 use std::borrow::Cow;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Largest file of a network in bytes.
@@ -100,25 +104,28 @@ pub struct Trained {
     pub learned: Learned,
     /// The file.
     pub bytes: Vec<u8>,
+    /// Steps done.
+    pub steps: usize,
     /// Mean loss of the first and of the last twentieth of the steps.
     pub loss: [f64; 2],
 }
 
 impl Learned {
-    /// Trains a network for a scene; `progress` is told what is done.
+    /// Trains a network for a scene; `progress` sees what is done, and may end it: then the result is the best
+    /// network so far.
     ///
     /// # Errors
     /// [`LearnedError::Option`], [`LearnedError::Frames`], [`LearnedError::NotConverged`] or [`LearnedError::Diverged`].
     pub fn train(
         scene: &Scene,
         training: &Training,
-        progress: &(dyn Fn(Stage) + Sync),
+        progress: &mut dyn FnMut(&Stage) -> ControlFlow<()>,
     ) -> Result<Trained, LearnedError> {
         let signature = Signature::of(scene);
         let (network, losses) = training::train(scene, signature.window, training, progress)?;
         let bytes = file::encode(&network, &signature)?;
         let learned = Learned::from_bytes(scene, EstimatorKind::Network, &bytes, "the trained network")?;
-        Ok(Trained { learned, bytes, loss: [losses.first, losses.last] })
+        Ok(Trained { learned, bytes, steps: losses.steps, loss: [losses.first, losses.last] })
     }
 
     /// The network that a scene names with `search.network`, for one of its estimators: a file, or `dermis:NAME`, a part of

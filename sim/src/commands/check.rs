@@ -19,7 +19,7 @@ use dermis_hdl::{explain::explain, generate, manifest};
 
 use super::check_noise::NoiseArguments;
 use super::check_rate::rates;
-use super::inputs::{estimator_instead, noise_not_stated, BoardOverride};
+use super::inputs::{beside, estimator_instead, noise_not_stated, BoardOverride};
 use crate::microcontroller;
 use crate::progress::Progress;
 use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
@@ -136,20 +136,34 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
         mu_max: scene.search.mu_max,
         dead: scene.input.dead.clone(),
         board: scene.hardware.board_name().to_owned(),
-        scene: scene.name,
-        sensor: scene.sensor,
+        scene: scene.name.clone(),
+        sensor: scene.sensor.clone(),
         hardware,
         hardware_refused,
         microcontroller,
         microcontroller_refused,
         noise,
         noise_not_stated,
+        network: network(&scene, &arguments.target),
         rates,
         not_measured,
         tare_load,
         errors,
         other_medium,
         not_drawn,
+    })
+}
+
+/// The command that makes a network for the hardware of a scene which has none and may have one; `None` for frames without noise.
+fn network(scene: &Scene, target: &str) -> Option<String> {
+    let wanted = scene.search.network.is_none() && scene.search.noise_floor_MPa != Some(0.0);
+    let allowed = wanted && scene.require_network().is_ok();
+    let file = beside(target, scene, "network");
+    let file = file.file_name().unwrap_or_default().to_string_lossy();
+    allowed.then(|| {
+        format!(
+            "dermis train {target} (minutes), then [search] network = \"{file}\", [hardware] estimator = \"network\""
+        )
     })
 }
 

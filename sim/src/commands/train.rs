@@ -1,17 +1,18 @@
 //! `dermis train`: a network for the estimators that have one, trained on frames drawn from the scene's own physics.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::data::generator::slip::Slip;
-use dermis_golden::estimate::learned::{Learned, Stage, Training};
+use dermis_golden::estimate::learned::{Learned, Stage, Trained, Training, MEASURED_NOISE};
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::study::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 use dermis_golden::write::write;
 
 use super::inputs::beside;
+use crate::jobs::Interrupt;
 use crate::progress::Progress;
 use crate::report;
 
@@ -28,12 +29,15 @@ const MOST_MEASURED: usize = 4096;
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis train sensor-1 --steps 200 --contacts 500 --draws 10 --out quick.network     seconds: to see it work
-  dermis train my-scene.toml                         my-scene.network beside it, a quarter of an hour
+  dermis train my-scene.toml                         my-scene.network beside it, some three minutes for 10 × 10 taxels on two cores
+  dermis train my-scene.toml --minutes 15            longer, for a little more accuracy
+  dermis train my-scene.toml --poisson-tolerance 0.02 --thickness-tolerance 0.05     a cover that is not known exactly
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
   dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
 Then, in the scene: [search] with estimator = \"evidence+network\" and network = \"my-scene.network\",
 [hardware] with estimator = \"network\".
+Interrupted (Ctrl-C), it keeps the best network so far; a second time, it ends at once and writes nothing.
 Prints the errors on frames that were not in the training; exit code 1 if they are not better than no shear.")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
@@ -41,10 +45,13 @@ pub struct Arguments {
     /// Steps of the training.
     #[arg(long, default_value_t = Training::default().steps)]
     steps: usize,
+    /// Train for so many minutes in place of a number of steps; such a file cannot be made again to the bit.
+    #[arg(long, conflicts_with = "steps")]
+    minutes: Option<f64>,
     /// Frames per step.
     #[arg(long, default_value_t = Training::default().batch)]
     batch: usize,
-    /// Frames whose contacts are drawn; shear, noise and gains are drawn anew in every step.
+    /// Contacts that are drawn while the steps go on; shear, noise and gains are drawn anew in every step.
     #[arg(long, default_value_t = Training::default().contacts)]
     contacts: usize,
     /// Widths of the hidden layers.
@@ -57,6 +64,12 @@ pub struct Arguments {
     /// networks are of full slip.
     #[arg(long, default_value_t = Training::default().slip)]
     slip: Slip,
+    /// How far the Poisson ratio of a bonded cover may be from the scene's.
+    #[arg(long, default_value_t = 0.0)]
+    poisson_tolerance: f64,
+    /// How far the thickness of the cover may be from the scene's, as a share of it.
+    #[arg(long, default_value_t = 0.0)]
+    thickness_tolerance: f64,
     /// Seed of weights and frames; equal seeds give equal files on one machine.
     #[arg(long, default_value_t = Training::default().seed)]
     seed: u64,
@@ -67,7 +80,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Train nothing; measure the limit of the misfit for this network of the scene and write it into the file.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["steps", "batch", "hidden", "rate", "draws", "out"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["steps", "minutes", "batch", "hidden", "rate", "draws", "out"])]
     limit_of: Option<PathBuf>,
 }
 
@@ -84,11 +97,14 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     }
     let training = Training {
         steps: arguments.steps,
+        minutes: arguments.minutes,
         batch: arguments.batch,
         contacts: arguments.contacts,
         hidden: arguments.hidden.clone(),
         rate: arguments.rate,
         slip: arguments.slip,
+        poisson_tolerance: arguments.poisson_tolerance,
+        thickness_tolerance: arguments.thickness_tolerance,
         seed: arguments.seed,
     };
     let frames = training.contacts.min(MOST_MEASURED);
@@ -96,39 +112,24 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         return Ok((measured(&mut scene, file, frames, training.seed)?, true));
     }
     let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.scene, &scene, "network"));
-    let bar = Progress::steps(&format!("{}: contacts, then training", scene.name), 0);
-    let loss = std::sync::Mutex::new(Vec::new());
-    let (contacts, every) = (AtomicUsize::new(0), (training.steps / 10).max(1));
-    let trained = Learned::train(&scene, &training, &|stage| match stage {
-        Stage::Contacts(_) => {
-            let done = contacts.fetch_add(1, Ordering::Relaxed) + 1;
-            bar.set_of(done as u64, (training.contacts + training.steps) as u64);
-        }
-        Stage::Steps(steps, mean) => {
-            bar.set((training.contacts + steps) as u64);
-            if steps % every < 20 {
-                loss.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((steps, mean));
-            }
-        }
-    })?;
-    drop(bar);
+    let (trained, losses) = trained(&scene, &training)?;
     write(&out, &trained.bytes)?;
     let limit = measured(&mut scene, &out, frames, training.seed)?;
     let mut text = format!(
-        "{}: {} weights, {} bytes\ntraining        {} steps of {} frames, {} contacts drawn, slip {}, seed {}\n",
+        "{}: {} weights, {} bytes\ntraining        {} steps of {} frames, at most {} contacts drawn, slip {}, seed {}\n\
+         tolerances      Poisson ratio ± {}, thickness ± {} %\n",
         out.display(),
         trained.learned.weights(),
         trained.bytes.len(),
-        training.steps,
+        trained.steps,
         training.batch,
         training.contacts,
         training.slip,
-        training.seed
+        training.seed,
+        training.poisson_tolerance,
+        100.0 * training.thickness_tolerance
     );
-    text.push_str(&format!("trained for     {}\n{limit}", describe(&trained.learned)));
-    for (steps, mean) in loss.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        text.push_str(&format!("loss            {mean:8.4} at step {steps}\n"));
-    }
+    text.push_str(&format!("trained for     {}\n{limit}{losses}", describe(&trained.learned)));
     text.push_str(&format!("loss            {:8.4} at first, {:.4} at last\n\n", trained.loss[0], trained.loss[1]));
     let mut study = ShapeStudy {
         levels: LEVELS.to_vec(),
@@ -145,6 +146,34 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         row.estimator == "none" || row.summary.tangential.median.value < 1.0
     };
     Ok((text, rows.iter().all(better)))
+}
+
+/// Trains, with a bar and the errors so far on standard error; also the mean losses, a line each. An interruption ends the
+/// training, not the command.
+fn trained(scene: &Scene, training: &Training) -> Result<(Trained, String)> {
+    let interrupt = Interrupt::with(|| {
+        eprintln!("interrupted: the best network so far is measured and written; a second signal ends at once");
+    })?;
+    let bar = Progress::share(&format!("{}: training", scene.name));
+    let (mut losses, mut next) = (String::new(), 0.0);
+    let trained = Learned::train(scene, training, &mut |stage: &Stage| {
+        bar.set((stage.done * Progress::SHARES) as u64);
+        if stage.done >= next {
+            next += 0.1;
+            losses.push_str(&format!("loss            {:8.4} at step {}\n", stage.loss, stage.steps));
+        }
+        if let Some(errors) = stage.errors {
+            let of = |(noise, error): (f64, f64)| format!("{:.1} % at {:.1} % noise", 100.0 * error, 100.0 * noise);
+            let errors: Vec<String> = MEASURED_NOISE.into_iter().zip(errors).map(of).collect();
+            bar.say(&format!("{:3.0} % done: median error of the shear {}", 100.0 * stage.done, errors.join(", ")));
+        }
+        if interrupt.check().is_ok() {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    })?;
+    Ok((trained, losses))
 }
 
 /// Measures the limit of the misfit for the network in `file`, which the scene then names, and writes it into the file.

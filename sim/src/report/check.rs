@@ -69,6 +69,9 @@ pub struct SceneCheck {
     pub noise: StatedNoise,
     /// Whether every result of the hardware carries `noise-not-stated`.
     pub noise_not_stated: bool,
+    /// What makes a network for the hardware where the scene names none and its frames are of a sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network: Option<String>,
     /// The rates of the estimators on this machine, where they were measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rates: Option<Vec<RateRow>>,
@@ -209,6 +212,9 @@ pub fn scene_check(check: &SceneCheck) -> String {
     text += &noise(&check.noise);
     if check.noise_not_stated {
         text += &format!("            {NOISE_NOT_STATED}\n");
+    }
+    if let Some(command) = &check.network {
+        text += &format!("network     none, and noise misleads the search: {command}\n");
     }
     match &check.not_drawn {
         Some(reason) => text += &format!("errors      none: {reason}\n"),

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 68] = [
+const NOT_RUN: [(&str, &str); 70] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis replay glove.mcap --topic /tactile/left --mpa-per-count 0.0001", "python/tests/test_recording.py"),
@@ -57,8 +57,13 @@ const NOT_RUN: [(&str, &str); 68] = [
     ("dermis noise sensor-1 --shapes table --level 0.01 --gain-spread 0.01 --frames 64 --coverage", "a minute or more"),
     ("dermis noise sensor-3 --shapes table --contacts 3 --level 0.0005", "a minute or more"),
     ("dermis noise sensor-1 --shapes table --sensitivity", "minutes"),
-    ("dermis train sensor-1", "a quarter of an hour; the short one is run"),
-    ("dermis train my-scene.toml", "a quarter of an hour"),
+    ("dermis train sensor-1", "three minutes; the short one is run"),
+    ("dermis train my-scene.toml", "three minutes"),
+    ("dermis train my-scene.toml --minutes 15", "a quarter of an hour"),
+    (
+        "dermis train my-scene.toml --poisson-tolerance 0.02 --thickness-tolerance 0.05",
+        "minutes; golden/src/estimate/learned/tests.rs",
+    ),
     ("dermis train my-scene.toml --limit-of my-scene.network", "needs a network of an older version"),
     ("dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network", "minutes"),
     ("dermis study input-bits", "a minute; accuracy.rs measures the same"),

@@ -97,6 +97,7 @@ mod tests {
     use super::super::{Network, OneContact, Training};
     use super::*;
     use crate::spec::scene::Scene;
+    use std::ops::ControlFlow::Continue;
 
     /// The outputs of the layers for the parities of b/s, and of the mask where the first layer takes it.
     fn outputs(layers: &[ComposedLayer], mut inputs: Parities, mask: Option<&Parities>) -> Mat<f32> {
@@ -113,8 +114,8 @@ mod tests {
                 })
             });
             if index + 1 < layers.len() {
-                let images = exchanged(&inputs).map(|own| Mat::from_fn(own.nrows(), 1, |k, _| own[(k, 0)].max(0.0)));
-                inputs = exchanged(&images);
+                let images = exchanged(inputs).map(|own| Mat::from_fn(own.nrows(), 1, |k, _| own[(k, 0)].max(0.0)));
+                inputs = exchanged(images);
             }
         }
         Network::outputs(&inputs)
@@ -126,7 +127,7 @@ mod tests {
         let mut scene = Scene::builtin("sensor-3").unwrap();
         scene.search.estimator = Some(crate::spec::scene::EstimatorKind::EvidenceNetwork);
         let training = Training { steps: 30, batch: 16, contacts: 60, hidden: vec![16, 8], ..Training::default() };
-        let learned = Learned::train(&scene, &training, &|_| ()).unwrap().learned;
+        let learned = Learned::train(&scene, &training, &mut |_| Continue(())).unwrap().learned;
         let mut random = crate::random::Random::new(6);
         let b: Vec<f64> = (0..400).map(|_| random.normal()).collect();
         let alive: Vec<bool> = (0..400).map(|taxel| taxel % 7 != 3).collect();
@@ -141,7 +142,7 @@ mod tests {
             let quads = window.quads();
             let parities = |of: &dyn Fn(Option<usize>) -> f64| {
                 let image = |lane| Mat::from_fn(quads.len(), 1, |quad, _| of(taxels[quads.taxel(quad, lane)]) as f32);
-                exchanged(&std::array::from_fn(image))
+                exchanged(std::array::from_fn(image))
             };
             let (stress, mask) =
                 (parities(&|t| t.map_or(0.0, |t| b[t] / s)), parities(&|t| if t.is_none() { 1.0 } else { 0.0 }));
@@ -177,7 +178,7 @@ mod tests {
                     }
                 })
             };
-            let found = outputs(&learned.composed(&alive), exchanged(&std::array::from_fn(image)), None);
+            let found = outputs(&learned.composed(&alive), exchanged(std::array::from_fn(image)), None);
             for axis in [0, 1] {
                 let mu = f64::from(found[(axis, 0)]) * scene.search.mu_max;
                 assert!((mu - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");

@@ -94,14 +94,21 @@ impl Features {
     pub fn of(&self, readings: &Readings) -> Parities {
         let Readings { b, masked } = readings;
         let (q, frames, deconvolved) = (self.quads.len(), b.ncols(), LEVELS.len() * self.quads.len());
-        let scales: Vec<f32> = b.col_iter().map(|b| power_above(b.norm_max())).collect();
+        let scales: Vec<f32> = b.col_iter().map(|b| AMPLITUDE / power_above(b.norm_max())).collect();
+        let taxels: [Vec<usize>; 4] =
+            std::array::from_fn(|lane| (0..q).map(|quad| self.quads.taxel(quad, lane)).collect());
         let of_taxels = |values: &Mat<f32>, factor: &dyn Fn(usize) -> f32| {
-            let image = |lane| {
-                Mat::from_fn(q, frames, |quad, frame| factor(frame) * values[(self.quads.taxel(quad, lane), frame)])
-            };
-            exchanged(&std::array::from_fn(image))
+            let mut images: Parities = std::array::from_fn(|_| Mat::zeros(q, frames));
+            for frame in 0..frames {
+                let (values, factor) = (values.col_as_slice(frame), factor(frame));
+                for (image, taxels) in images.iter_mut().zip(&taxels) {
+                    let image = image.col_as_slice_mut(frame);
+                    image.iter_mut().zip(taxels).for_each(|(image, &taxel)| *image = factor * values[taxel]);
+                }
+            }
+            exchanged(images)
         };
-        let stress = of_taxels(b, &|frame| AMPLITUDE / scales[frame]);
+        let stress = of_taxels(b, &|frame| scales[frame]);
         let mask = of_taxels(masked, &|_| 1.0);
         std::array::from_fn(|parity| {
             let mut inputs = Mat::<f32>::zeros(2 * q + deconvolved, frames);
@@ -140,7 +147,7 @@ mod tests {
             b: Mat::from_fn(100, 1, |t, _| (load * cz[(t, 44)]) as f32),
             masked: Mat::from_fn(100, 1, |t, _| if t == 3 { 1.0 } else { 0.0 }),
         };
-        let images = |load: f64| exchanged(&features.of(&readings(load)));
+        let images = |load: f64| exchanged(features.of(&readings(load)));
         let (light, heavy, other) = (images(0.125), images(16.0), images(12.0));
         assert_eq!(light[0].nrows(), 100);
         for lane in 0..4 {
@@ -169,8 +176,7 @@ mod tests {
         let features = Features::new(&window, &sensor, Medium::HalfSpace).unwrap();
         let of = |taxel: usize| {
             let b = Mat::from_fn(20, 1, |t, _| if t == taxel { 0.75f32 } else { 0.0 });
-            let inputs = features.of(&Readings { b, masked: Mat::zeros(20, 1) });
-            exchanged(&inputs)
+            exchanged(features.of(&Readings { b, masked: Mat::zeros(20, 1) }))
         };
         // Cz is symmetric, and so is every function of it: the answer at one taxel to stress at another.
         let quads = window.quads();

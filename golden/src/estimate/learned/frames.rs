@@ -6,6 +6,7 @@
 //! | drawn | range |
 //! |---|---|
 //! | spread of the shear | the training's [`Slip`] |
+//! | cover | the scene's, or 16 of them spread evenly over the training's tolerances of thickness and Poisson ratio |
 //! | contacts | [`Draws`], all shapes in turn; one, or in windows around contacts one to four, as many as fit |
 //! | μ | 0 … 0.85 mu_max, any direction |
 //! | load | times 1 … 2, its logarithm evenly |
@@ -21,13 +22,14 @@
 //! | out: readings, μ | window × frames, 2 × frames | MPa, of mu_max |
 
 use super::features::Readings;
+use super::options::Training;
 use crate::data::generator::draws::{DrawOptions, Draws, Shape};
-use crate::data::generator::slip::Slip;
 use crate::data::generator::support::Support;
 use crate::data::generator::GeneratorError;
 use crate::estimate::float::objective::taxels::Taxels;
 use crate::random::Random;
-use crate::spec::scene::Scene;
+use crate::spec::scene::{Medium, Scene};
+use crate::spec::sensor::Sensor;
 use crate::spec::window::{Place, Window};
 use faer::Mat;
 use rayon::prelude::*;
@@ -43,6 +45,14 @@ pub(crate) const GAINS: [f64; 2] = [2e-3, 3e-2];
 const DEAD: f64 = 0.125;
 /// Largest share of the others' stress that a second round leaves.
 const LEFT: f64 = 0.1;
+/// Range of the Poisson ratios of a tolerance.
+const POISSON: [f64; 2] = [0.01, 0.499];
+/// Contacts that are kept, each some 1.5 kB.
+const KEPT: usize = 1 << 16;
+/// Covers over which tolerances are spread.
+const COVERS: usize = 16;
+/// Normally distributed numbers from which noise and gains are taken: drawing as many anew costs as much as the rest of a step.
+const NORMALS: usize = 1 << 18;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -56,59 +66,87 @@ struct Item {
     masked: Vec<bool>,
 }
 
-/// Drawn contacts.
+/// Contacts that are drawn one after the other, and the frames mixed from those that there are.
 pub(super) struct Frames {
+    scene: Scene,
     window: Window,
-    unipolar: bool,
-    mu_max: f64,
+    seed: u64,
+    /// Those of one, two, … contacts.
+    draws: Vec<Draws>,
+    /// The window under each of the covers.
+    covers: Vec<Taxels>,
+    /// Number of the next array.
+    next: u64,
+    /// Contacts drawn so far.
+    drawn: usize,
     items: Vec<Item>,
+    /// Normally distributed; the noise of a frame begins anywhere in it.
+    normals: Vec<f32>,
 }
 
 impl Frames {
-    /// Draws at least `count` contacts of a scene; `progress` is called with every contact made.
+    /// No contacts yet, of a scene and a training; `seed` is that of the contacts.
     ///
     /// # Errors
-    /// As [`Draws::contacts`].
-    pub fn new(
-        scene: &Scene,
-        window: Window,
-        slip: Slip,
-        count: usize,
-        seed: u64,
-        progress: &(dyn Fn() + Sync),
-    ) -> Result<Frames, GeneratorError> {
-        let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
+    /// As [`Draws::new`].
+    pub fn new(scene: &Scene, window: Window, training: &Training, seed: u64) -> Result<Frames, GeneratorError> {
         let most = match window.place {
             Place::Array => 1,
             Place::Contact => 4,
         };
         let draws = (1..=most)
             .map(|contacts| {
-                let ratio = [0.0, RATIO * scene.search.mu_max];
-                let shapes = shapes.clone();
+                let (ratio, shapes) =
+                    ([0.0, RATIO * scene.search.mu_max], Shape::NAMES.map(|(_, shape)| shape).to_vec());
+                let slip = training.slip;
                 Draws::new(scene, DrawOptions { shapes, contacts, ratio, slip, seed, ..Default::default() })
             })
-            .collect::<Result<Vec<_>, _>>()?;
-        let array = Taxels::new(&window.sensor(&scene.sensor), scene.medium);
-        let frame = |number: usize| -> Result<Vec<Item>, GeneratorError> {
-            // Where so many do not fit on the array, fewer.
-            let (most, number) = (number % draws.len(), number as u64);
-            let fewer = (0..most).rev();
-            let contacts = fewer
-                .fold(draws[most].contacts(number), |drawn, count| drawn.or_else(|_| draws[count].contacts(number)))?;
-            let supports = contacts.iter().map(Support::new).collect::<Result<Vec<_>, _>>()?;
-            let mut random = Random::new((seed ^ number << 24).wrapping_mul(SPREAD));
-            let own = (0..supports.len()).map(|own| item(scene, window, &array, &supports, own, &mut random));
-            progress();
-            Ok(own.collect())
-        };
-        let items: Vec<Vec<Item>> = (0..count).into_par_iter().map(frame).collect::<Result<_, _>>()?;
-        let items = items.into_iter().flatten().collect();
-        Ok(Frames { window, unipolar: scene.input.unipolar, mu_max: scene.search.mu_max, items })
+            .collect::<Result<_, _>>()?;
+        let mut random = Random::new(seed.wrapping_mul(SPREAD));
+        let normals = (0..NORMALS).map(|_| random.normal() as f32).collect();
+        let covers = covers(scene, window, training, &mut random);
+        Ok(Frames { scene: scene.clone(), window, seed, draws, covers, next: 0, drawn: 0, items: Vec::new(), normals })
     }
 
-    /// Mixes `frames` frames: their readings, and μ in units of mu_max.
-    pub fn mix(&self, frames: usize, random: &mut Random) -> (Readings, Mat<f32>) {
+    /// Draws until at least `count` contacts have been drawn; the last [`KEPT`] of them are mixed.
+    ///
+    /// # Errors
+    /// As [`Draws::contacts`].
+    pub fn draw(&mut self, count: usize) -> Result<(), GeneratorError> {
+        while self.drawn < count {
+            let arrays = (count - self.drawn).min(KEPT).div_ceil(self.draws.len()) as u64;
+            let numbers = self.next..self.next + arrays;
+            let items: Vec<Vec<Item>> =
+                numbers.into_par_iter().map(|number| self.array(number)).collect::<Result<_, _>>()?;
+            for item in items.into_iter().flatten() {
+                match self.items.get_mut(self.drawn % KEPT) {
+                    Some(oldest) => *oldest = item,
+                    None => self.items.push(item),
+                }
+                self.drawn += 1;
+            }
+            self.next += arrays;
+        }
+        Ok(())
+    }
+
+    /// The contacts of an array, each in its window.
+    fn array(&self, number: u64) -> Result<Vec<Item>, GeneratorError> {
+        // Where so many do not fit on the array, fewer.
+        let most = number as usize % self.draws.len();
+        let contacts = (0..most).rev().fold(self.draws[most].contacts(number), |drawn, count| {
+            drawn.or_else(|_| self.draws[count].contacts(number))
+        })?;
+        let supports = contacts.iter().map(Support::new).collect::<Result<Vec<_>, _>>()?;
+        let mut random = Random::new((self.seed ^ number << 24).wrapping_mul(SPREAD));
+        let cover = (random.between(0.0, self.covers.len() as f64) as usize).min(self.covers.len() - 1);
+        let (scene, window, cover) = (&self.scene, self.window, &self.covers[cover]);
+        Ok((0..supports.len()).map(|own| item(scene, window, cover, &supports, own, &mut random)).collect())
+    }
+
+    /// Mixes `frames` frames of the contacts drawn so far: their readings, and μ in units of mu_max. `noise` is the range of
+    /// the noise in units of the peak.
+    pub fn mix(&self, frames: usize, noise: [f64; 2], random: &mut Random) -> (Readings, Mat<f32>) {
         let n = self.window.taxels();
         let mut readings = Readings { b: Mat::zeros(n, frames), masked: Mat::zeros(n, frames) };
         let mut truth = Mat::zeros(2, frames);
@@ -116,7 +154,8 @@ impl Frames {
             let at = (random.between(0.0, self.items.len() as f64) as usize).min(self.items.len() - 1);
             let (size, towards) = (random.between(0.0, RATIO), random.between(0.0, TAU));
             let mu = [size * towards.cos(), size * towards.sin()];
-            self.frame(&self.items[at], mu, frame, &mut readings, random);
+            let into = [readings.b.col_as_slice_mut(frame), readings.masked.col_as_slice_mut(frame)];
+            self.frame(&self.items[at], mu, noise, into, random);
             for axis in [0, 1] {
                 truth[(axis, frame)] = mu[axis] as f32;
             }
@@ -124,35 +163,63 @@ impl Frames {
         (readings, truth)
     }
 
-    /// One frame of a contact with μ in units of mu_max.
-    fn frame(&self, item: &Item, mu: [f64; 2], at: usize, into: &mut Readings, random: &mut Random) {
-        let n = self.window.taxels();
-        let [x, y] = mu.map(|mu| (mu * self.mu_max) as f32);
+    /// One frame of a contact with μ in units of mu_max: its readings and its mask.
+    fn frame(&self, item: &Item, mu: [f64; 2], noise: [f64; 2], into: [&mut [f32]; 2], random: &mut Random) {
+        let ([b, masked], n) = (into, self.window.taxels());
+        let [x, y] = mu.map(|mu| (mu * self.scene.search.mu_max) as f32);
         let left = if random.coin() { 1.0 } else { random.between(-LEFT, LEFT) as f32 };
-        let other = |t: usize| item.others.get(t).map_or(0.0, |other| left * other);
         let load = random.between(0.0, 1.0).exp2() as f32;
-        let exact: Vec<f32> =
-            (0..n).map(|t| load * (item.axes[2][t] + x * item.axes[0][t] + y * item.axes[1][t] + other(t))).collect();
-        let own_peak = exact.iter().fold(0.0f32, |peak, b| b.abs().max(peak));
+        let [of_x, of_y, of_z] = &item.axes;
+        for (((b, of_x), of_y), of_z) in b.iter_mut().zip(of_x).zip(of_y).zip(of_z) {
+            *b = load * (of_z + x * of_x + y * of_y);
+        }
+        b.iter_mut().zip(&item.others).for_each(|(b, other)| *b += load * left * other);
+        let peak = b.iter().fold(0.0f32, |peak, b| b.abs().max(peak));
         let log = |[low, high]: [f64; 2], random: &mut Random| random.between(low.ln(), high.ln()).exp() as f32;
-        let sigma = own_peak * log(NOISE, random);
+        let sigma = peak * log(noise, random);
         let gains = if random.coin() { log(GAINS, random) } else { 0.0 };
-        let mut masked = item.masked.clone();
+        let [first, second] = [(); 2].map(|()| self.normals(n, random));
+        for ((b, gain), noise) in b.iter_mut().zip(first).zip(second) {
+            *b = (1.0 + gains * gain) * *b + sigma * noise;
+        }
+        masked.iter_mut().zip(&item.masked).for_each(|(own, masked)| *own = f32::from(u8::from(*masked)));
         if random.between(0.0, 1.0) < DEAD {
             for _ in 0..=(random.between(0.0, 3.0) as usize) {
-                masked[(random.between(0.0, n as f64) as usize).min(n - 1)] = true;
+                masked[(random.between(0.0, n as f64) as usize).min(n - 1)] = 1.0;
             }
         }
-        for t in 0..n {
-            if masked[t] {
-                into.masked[(t, at)] = 1.0;
-                continue;
-            }
-            let gain = if gains > 0.0 { 1.0 + gains * random.normal() as f32 } else { 1.0 };
-            let b = gain * exact[t] + sigma * random.normal() as f32;
-            into.b[(t, at)] = if self.unipolar { b.max(0.0) } else { b };
-        }
+        let least = if self.scene.input.unipolar { 0.0 } else { f32::NEG_INFINITY };
+        b.iter_mut().zip(masked.iter()).for_each(|(b, masked)| *b = if *masked > 0.0 { 0.0 } else { b.max(least) });
     }
+
+    /// `count` of the normally distributed numbers, from anywhere.
+    fn normals(&self, count: usize, random: &mut Random) -> &[f32] {
+        let first = random.between(0.0, (self.normals.len() - count) as f64) as usize;
+        &self.normals[first..first + count]
+    }
+}
+
+/// The window under covers as they may be: as stated, or spread evenly over the tolerances.
+fn covers(scene: &Scene, window: Window, training: &Training, random: &mut Random) -> Vec<Taxels> {
+    let (sensor, medium) = (window.sensor(&scene.sensor), scene.medium);
+    let Training { poisson_tolerance, thickness_tolerance, .. } = *training;
+    if poisson_tolerance == 0.0 && thickness_tolerance == 0.0 {
+        return vec![Taxels::new(&sensor, medium)];
+    }
+    let cover = |index: usize| {
+        // The values of one are in even steps, those of the other at random.
+        let even = (index as f64 + 0.5) / COVERS as f64 * 2.0 - 1.0;
+        let thickness_mm = sensor.thickness_mm * (1.0 + thickness_tolerance * random.between(-1.0, 1.0));
+        let medium = match medium {
+            Medium::HalfSpace => medium,
+            Medium::BondedLayer { poisson } => {
+                let poisson = poisson + poisson_tolerance * even;
+                Medium::BondedLayer { poisson: poisson.clamp(POISSON[0], POISSON[1]) }
+            }
+        };
+        Taxels::new(&Sensor { thickness_mm, ..sensor.clone() }, medium)
+    };
+    (0..COVERS).map(cover).collect()
 }
 
 /// Contact `own` of an array in its window.

@@ -34,13 +34,51 @@ pub(crate) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
 pub(super) type Parities = [Mat<f32>; 4];
 
 /// Mirror images from parities, and back: half their Hadamard transform.
-pub(super) fn exchanged(of: &Parities) -> Parities {
-    let mut to = of.each_ref().map(|own| Mat::zeros(own.nrows(), own.ncols()));
-    for (row, col) in (0..of[0].ncols()).flat_map(|col| (0..of[0].nrows()).map(move |row| (row, col))) {
-        let sums = hadamard(of.each_ref().map(|own| own[(row, col)]));
-        to.iter_mut().zip(sums).for_each(|(own, sum)| own[(row, col)] = 0.5 * sum);
+pub(super) fn exchanged(mut of: Parities) -> Parities {
+    by_columns(&mut of, |a, b, c, d| {
+        for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
+            [*a, *b, *c, *d] = halved([*a, *b, *c, *d]);
+        }
+    });
+    of
+}
+
+/// Mirror images after ReLU, from parities.
+fn rectified(mut of: Parities) -> Parities {
+    by_columns(&mut of, |a, b, c, d| {
+        for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
+            [*a, *b, *c, *d] = halved([*a, *b, *c, *d]).map(|image| image.max(0.0));
+        }
+    });
+    of
+}
+
+/// The slope in front of a ReLU, in parities, from that behind it; `images` are its outputs.
+pub(super) fn through_relu(mut slopes: Parities, images: &Parities) -> Parities {
+    for column in 0..slopes[0].ncols() {
+        let [p, q, r, s] = images.each_ref().map(|own| own.col_as_slice(column));
+        let [a, b, c, d] = slopes.each_mut().map(|own| own.col_as_slice_mut(column));
+        let slopes = a.iter_mut().zip(b).zip(c).zip(d);
+        for ((((a, b), c), d), (((p, q), r), s)) in slopes.zip(p.iter().zip(q).zip(r).zip(s)) {
+            let behind = halved([*a, *b, *c, *d]);
+            let image = [*p, *q, *r, *s];
+            [*a, *b, *c, *d] = halved(std::array::from_fn(|k| if image[k] > 0.0 { behind[k] } else { 0.0 }));
+        }
     }
-    to
+    slopes
+}
+
+/// The transform of one quad.
+pub(super) fn halved(of: [f32; 4]) -> [f32; 4] {
+    hadamard(of).map(|sum| 0.5 * sum)
+}
+
+/// Does `work` with each column of the four; slices in a row are what the compiler makes vector instructions of.
+fn by_columns(of: &mut Parities, work: impl Fn(&mut [f32], &mut [f32], &mut [f32], &mut [f32])) {
+    for column in 0..of[0].ncols() {
+        let [a, b, c, d] = of.each_mut().map(|own| own.col_as_slice_mut(column));
+        work(a, b, c, d);
+    }
 }
 
 /// One layer.
@@ -72,9 +110,12 @@ pub(super) struct Activation {
 impl Layer {
     fn apply(&self, inputs: &Parities) -> Parities {
         std::array::from_fn(|parity| {
-            let bias = |row: usize| if parity == EVEN { self.bias[row] } else { 0.0 };
-            let mut outputs = Mat::from_fn(self.bias.len(), inputs[parity].ncols(), |row, _| bias(row));
-            matmul(&mut outputs, Accum::Add, &self.weights[parity], &inputs[parity], 1.0, Par::Seq);
+            let mut outputs = Mat::zeros(self.bias.len(), inputs[parity].ncols());
+            matmul(&mut outputs, Accum::Replace, &self.weights[parity], &inputs[parity], 1.0, Par::Seq);
+            for column in 0..if parity == EVEN { outputs.ncols() } else { 0 } {
+                let outputs = outputs.col_as_slice_mut(column);
+                outputs.iter_mut().zip(&self.bias).for_each(|(output, bias)| *output += bias);
+            }
             outputs
         })
     }
@@ -98,16 +139,26 @@ impl Network {
             let next = layer.apply(&all[k].parities);
             all.push(match k + 1 < self.layers.len() {
                 true => {
-                    let images = exchanged(&next).map(|mut images| {
-                        images.col_iter_mut().for_each(|column| column.iter_mut().for_each(|a| *a = a.max(0.0)));
-                        images
-                    });
-                    Activation { parities: exchanged(&images), images: Some(images) }
+                    let images = rectified(next);
+                    Activation { parities: exchanged(images.clone()), images: Some(images) }
                 }
                 false => Activation { images: None, parities: next },
             });
         }
         all
+    }
+
+    /// Moves every weight and bias towards those of `other` by this share of the way.
+    pub fn approach(&mut self, other: &Network, share: f32) {
+        let towards = |own: &mut [f32], other: &[f32]| {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own += share * (other - *own));
+        };
+        for (own, other) in self.layers.iter_mut().zip(&other.layers) {
+            towards(&mut own.bias, &other.bias);
+            for (own, other) in own.weights.iter_mut().zip(&other.weights) {
+                (0..own.ncols()).for_each(|column| towards(own.col_as_slice_mut(column), other.col_as_slice(column)));
+            }
+        }
     }
 
     /// Sets the largest output of each layer from frames with these inputs.
@@ -152,7 +203,7 @@ mod tests {
 
     /// Inputs of one frame from their mirror images.
     fn frame(images: [&[f32]; 4]) -> Parities {
-        exchanged(&images.map(|image| Mat::from_fn(image.len(), 1, |row, _| image[row])))
+        exchanged(images.map(|image| Mat::from_fn(image.len(), 1, |row, _| image[row])))
     }
 
     #[test]

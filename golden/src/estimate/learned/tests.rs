@@ -5,6 +5,7 @@ use crate::spec::partition::Case;
 use crate::spec::scene::EstimatorKind;
 use crate::spec::window::{Place, Window};
 use crate::study::noise::{shape_study, Candidate, ShapeStudy};
+use std::ops::ControlFlow::{Break, Continue};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();
@@ -17,7 +18,7 @@ fn small(steps: usize) -> Training {
 }
 
 fn trained(scene: &Scene, steps: usize) -> Trained {
-    Learned::train(scene, &small(steps), &|_| ()).unwrap()
+    Learned::train(scene, &small(steps), &mut |_| Continue(())).unwrap()
 }
 
 fn ask(learned: &Learned, b: &[f64], alive: &[bool], centre_mm: [f64; 2]) -> Gaussian {
@@ -33,7 +34,8 @@ fn near(a: Gaussian, b: Gaussian, sign: [f64; 2]) -> bool {
 fn a_small_network_learns() {
     let scene = scene("sensor-1");
     let training = Training { rate: 5e-3, contacts: 1500, ..small(1000) };
-    let Trained { learned, loss: [first, last], bytes } = Learned::train(&scene, &training, &|_| ()).unwrap();
+    let Trained { learned, loss: [first, last], bytes, .. } =
+        Learned::train(&scene, &training, &mut |_| Continue(())).unwrap();
     assert!(last < first - 0.8, "loss {first} {last}");
     assert!(bytes.len() < 2 * learned.weights(), "{} bytes", bytes.len());
     let draws = Draws::new(&scene, DrawOptions { seed: 77, ..Default::default() }).unwrap();
@@ -74,9 +76,44 @@ fn the_shipped_network_is_accurate() {
 #[test]
 fn equal_seeds_give_equal_files() {
     let scene = scene("eight-by-eight");
-    let bytes = |seed: u64| Learned::train(&scene, &Training { seed, ..small(3) }, &|_| ()).unwrap().bytes;
+    let bytes =
+        |seed: u64| Learned::train(&scene, &Training { seed, ..small(3) }, &mut |_| Continue(())).unwrap().bytes;
     assert_eq!(bytes(1), bytes(1));
     assert_ne!(bytes(1), bytes(2));
+}
+
+/// A training that is ended early gives the network so far, and its number of steps.
+#[test]
+fn an_ended_training_gives_its_network() {
+    let scene = scene("sensor-1");
+    let mut stages = Vec::new();
+    let Trained { learned, steps, .. } = Learned::train(&scene, &small(100), &mut |stage| {
+        stages.push(*stage);
+        if stage.steps < 40 {
+            Continue(())
+        } else {
+            Break(())
+        }
+    })
+    .unwrap();
+    assert_eq!((steps, stages.len()), (40, 2));
+    assert!(stages.iter().all(|stage| stage.done < 0.4 && stage.loss.is_finite()));
+    assert!(ask(&learned, &vec![0.1; 100], &[true; 100], [0.0; 2]).sigma.iter().all(|sigma| *sigma > 0.0));
+    // So much time is over after the first step.
+    let brief = Training { minutes: Some(1e-9), ..small(100) };
+    assert_eq!(Learned::train(&scene, &brief, &mut |_| Continue(())).unwrap().steps, 1);
+}
+
+/// Covers within the tolerances are drawn, and what is trained on them differs.
+#[test]
+fn tolerances_are_trained() {
+    let scene = scene("eight-by-eight-bonded");
+    let bytes = |poisson_tolerance: f64, thickness_tolerance: f64| {
+        let training = Training { poisson_tolerance, thickness_tolerance, ..small(3) };
+        Learned::train(&scene, &training, &mut |_| Continue(())).unwrap().bytes
+    };
+    let exact = bytes(0.0, 0.0);
+    assert!(exact != bytes(0.02, 0.0) && exact != bytes(0.0, 0.05));
 }
 
 /// Load, mirror image and dead taxels: what cannot matter does not.
@@ -134,7 +171,7 @@ fn as_many_contacts_are_drawn_as_fit() {
     let draws = Draws::new(&scene, options).unwrap();
     assert!((0..15).any(|frame| draws.contacts(4 * frame + 3).is_err()));
     let training = Training { contacts: 60, seed: 1, ..small(2) };
-    assert!(Learned::train(&scene, &training, &|_| ()).is_ok());
+    assert!(Learned::train(&scene, &training, &mut |_| Continue(())).is_ok());
 }
 
 /// A network for windows serves every place, and every array of that pitch.

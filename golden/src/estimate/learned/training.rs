@@ -6,176 +6,276 @@
 //! ```
 //!
 //! The factor σ (Seitzer et al. 2022, β = ½) keeps frames whose μ is easy from outweighing the others. The rate falls from its first value
-//! to zero as half a cosine, after a rise over the first 2 % of the steps (Adam: Kingma and Ba 2015).
+//! to zero as half a cosine, after a rise over the first 2 % of the training. The trained network is the mean over about the last 5 %
+//! of the steps so far, which is better than the last one also where the training is interrupted.
 //!
-//! Equal options give equal weights on one machine.
+//! Contacts are drawn while the steps go on, the first eighth at once, the others in even shares, and the oldest forgotten: of a fixed set
+//! the network learns what other contacts do not have. The frames of a step are in
+//! [`PARTS`] equal parts, one a thread. After the training σ is scaled so that it covers as many frames of other contacts as a normal
+//! distribution does.
+//!
+//! Equal options give equal weights on one machine, whatever the number of threads, but for a training of stated minutes.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: scene, options | – | – |
 //! | out: network, mean loss of the first and of the last steps | – | – |
 
+use super::adam::{Adam, OfLayer};
 use super::error::LearnedError;
 use super::features::Features;
-use super::frames::Frames;
-use super::network::{exchanged, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, PLACES};
-use crate::data::generator::slip::Slip;
+use super::frames::{Frames, NOISE};
+use super::network::{through_relu, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, PLACES};
+use super::options::Training;
 use crate::physics::symmetry::folded::EVEN;
 use crate::random::Random;
 use crate::spec::scene::Scene;
 use crate::spec::window::Window;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
+use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
-/// Decay of Adam's means of the gradient and of its square.
-const DECAY: [f32; 2] = [0.9, 0.999];
-/// Added to the root of the mean square.
-const LEAST: f32 = 1e-8;
-/// Share of the steps in which the rate rises.
+/// Share of the training in which the rate rises.
 const RISE: f32 = 0.02;
 /// Share of the steps at either end over which the loss is averaged.
 const ENDS: f64 = 0.05;
-/// Frames on which the largest output of each layer is measured after the training.
+/// Reciprocal of the share of the steps so far over which the network is averaged.
+const AVERAGED: f32 = 20.0;
+/// Share of the contacts that is drawn before the first step.
+const AT_FIRST: f64 = 0.125;
+/// Parts of a step's frames.
+const PARTS: usize = 2;
+/// Frames on which the largest output of each layer, σ and the errors are measured.
 const MEASURED: usize = 4096;
-/// Steps between two calls of `progress`.
+/// Contacts of the frames on which σ and the errors are measured, none of which is in the training.
+const OTHERS: usize = 1024;
+/// Added to the seed of the training for them.
+const OF_OTHERS: u64 = 3_000_003;
+/// Share of a normal distribution within one standard deviation.
+const WITHIN: f64 = 0.683;
+/// Noise of the errors that are measured during the training.
+pub const MEASURED_NOISE: [f64; 2] = [2e-3, 1e-2];
+/// Time between two measurements of the errors.
+const BETWEEN: Duration = Duration::from_secs(30);
+/// Bytes of the block.
+const FREED: usize = 16 << 20;
+/// Steps between two calls of `progress`, and between contacts drawn.
 const EVERY: usize = 20;
 
-/// Size of a training.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Training {
-    /// Steps of Adam, 1 to 10 million.
-    pub steps: usize,
-    /// Frames of a step, 1 to 65 536.
-    pub batch: usize,
-    /// Frames of contacts that are drawn, 1 to 10 million.
-    pub contacts: usize,
-    /// Widths of the hidden layers, each 1 to 4096.
-    pub hidden: Vec<usize>,
-    /// Largest rate of a step.
-    pub rate: f64,
-    /// How the shear is spread over the contacts.
-    pub slip: Slip,
-    /// Seed of weights and frames.
-    pub seed: u64,
-}
-
-impl Default for Training {
-    fn default() -> Self {
-        let (hidden, slip) = (vec![150, 75, 25], Slip::Mixed);
-        Training { steps: 60_000, batch: 384, contacts: 60_000, hidden, rate: 2e-3, slip, seed: 1 }
-    }
-}
-
-/// What a training does at present.
+/// What a training has done.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stage {
-    /// Contacts drawn.
-    Contacts(usize),
-    /// Steps done, with the mean loss of the last ones.
-    Steps(usize, f64),
+pub struct Stage {
+    /// Share of the training.
+    pub done: f64,
+    /// Steps.
+    pub steps: usize,
+    /// Mean loss of the last ones.
+    pub loss: f64,
+    /// Every half minute: median of |m − μ|/|μ| on frames that are not in the training, for each of [`MEASURED_NOISE`].
+    pub errors: Option<[f64; 2]>,
 }
 
 /// Mean loss of the first and of the last steps.
 pub(super) struct Losses {
+    /// Number of steps.
+    pub steps: usize,
     /// Of the first twentieth.
     pub first: f64,
     /// Of the last twentieth.
     pub last: f64,
 }
 
-/// First and second moment of the gradient of one layer.
-struct Moments {
-    /// Of each parity's weights.
-    weights: [[Vec<f32>; 2]; 4],
-    bias: [Vec<f32>; 2],
+/// A training under way.
+struct Run<'a> {
+    training: &'a Training,
+    features: Features,
+    frames: Frames,
+    others: Frames,
+    network: Network,
+    /// The mean network.
+    mean: Network,
+    adam: Adam,
+    /// Of each part of the frames.
+    randoms: Vec<Random>,
+    losses: Vec<f64>,
 }
 
-/// Trains a network for a scene.
+/// Trains a network for a scene until it is done or `progress` breaks; then the best network so far is the result.
 pub(super) fn train(
     scene: &Scene,
     window: Window,
     training: &Training,
-    progress: &(dyn Fn(Stage) + Sync),
+    progress: &mut dyn FnMut(&Stage) -> ControlFlow<()>,
 ) -> Result<(Network, Losses), LearnedError> {
-    check(training)?;
-    let drawn = std::sync::atomic::AtomicUsize::new(0);
-    let one = || {
-        let count = drawn.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-        progress(Stage::Contacts(count));
-    };
-    let frames = Frames::new(scene, window, training.slip, training.contacts, training.seed, &one)?;
-    let features = Features::new(&window, &scene.sensor, scene.medium)?;
-    let mut random = Random::new(training.seed);
-    let widths: Vec<usize> = std::iter::once(Features::channels(&window))
-        .chain(training.hidden.iter().copied())
-        .chain(std::iter::once(OUTPUT_CHANNELS))
-        .collect();
-    let mut network = Network::random(&widths, &mut random);
-    // The first estimate is μ = 0 with σ = mu_max.
-    if let Some(last) = network.layers.last_mut() {
-        last.weights.iter_mut().for_each(|weights| *weights *= faer::Scale(0.1f32));
-    }
-    let mut moments: Vec<Moments> = network.layers.iter().map(Moments::zero).collect();
-    let ends = ((training.steps as f64 * ENDS) as usize).max(1);
-    let (mut losses, mut recent) = (Losses { first: 0.0, last: 0.0 }, 0.0);
-    for step in 0..training.steps {
-        let (readings, truth) = frames.mix(training.batch, &mut random);
-        let activations = network.activations(features.of(&readings));
-        let (loss, slope) = slope(&Network::outputs(&activations[activations.len() - 1].parities), &truth);
-        descend(&mut network, &mut moments, &activations, &slope, rate(training, step), step);
-        if step < ends {
-            losses.first += loss / ends as f64;
+    training.check(scene.medium)?;
+    // Until so large a block has been freed once, glibc returns the memory of every step to the system: a fifth of the time.
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(FREED)));
+    let mut run = Run::new(scene, window, training)?;
+    let (clock, mut measured) = (Instant::now(), Instant::now());
+    let mut best: Option<(f64, Network)> = None;
+    while let Some(done) = training.done(run.losses.len(), clock.elapsed()) {
+        if run.losses.len() % EVERY == 0 {
+            let drawn = training.contacts as f64 * (AT_FIRST + (1.0 - AT_FIRST) * done);
+            run.frames.draw((drawn as usize).max(1))?;
         }
-        if step + ends >= training.steps {
-            losses.last += loss / ends as f64;
+        run.step(training.rate_at(done));
+        if run.losses.len() % EVERY != 0 {
+            continue;
         }
-        recent += loss / EVERY as f64;
-        if (step + 1) % EVERY == 0 {
-            progress(Stage::Steps(step + 1, recent));
-            recent = 0.0;
+        let errors = (measured.elapsed() >= BETWEEN).then(|| {
+            measured = Instant::now();
+            run.errors()
+        });
+        if let Some(own) = errors.map(|errors| errors.iter().sum::<f64>()) {
+            if best.as_ref().is_none_or(|(least, _)| own < *least) {
+                best = Some((own, run.mean.clone()));
+            }
+        }
+        let loss = mean(&run.losses[run.losses.len() - EVERY..]);
+        if progress(&Stage { done, steps: run.losses.len(), loss, errors }).is_break() {
+            if let Some((least, network)) = best {
+                if least < run.errors().iter().sum::<f64>() {
+                    run.mean = network;
+                }
+            }
+            break;
         }
     }
-    let (readings, _) = frames.mix(MEASURED, &mut random);
-    network.measure(features.of(&readings));
-    let finite = |layer: &Layer| layer.bias.iter().all(|bias| bias.is_finite());
-    match losses.last.is_finite() && network.layers.iter().all(finite) {
-        true => Ok((network, losses)),
-        false => Err(LearnedError::Diverged { rate: training.rate }),
+    run.finish()
+}
+
+impl Training {
+    /// Share of the training that is done after so many steps and so much time; `None` at its end.
+    fn done(&self, steps: usize, time: Duration) -> Option<f64> {
+        let done = match self.minutes {
+            Some(minutes) => time.as_secs_f64() / (60.0 * minutes),
+            None => steps as f64 / self.steps as f64,
+        };
+        // One step at least.
+        (done < 1.0 || steps == 0).then_some(done.min(1.0))
+    }
+
+    /// The rate at a share of the training.
+    fn rate_at(&self, done: f64) -> f32 {
+        let done = done as f32 + 0.5 / self.steps as f32;
+        self.rate as f32 * (done / RISE).min(1.0) * 0.5 * (1.0 + (PI * done.min(1.0)).cos())
     }
 }
 
-fn check(training: &Training) -> Result<(), LearnedError> {
-    let fail = |field, value, allowed| Err(LearnedError::Option { field, value, allowed });
-    let Training { steps, batch, contacts, hidden, rate, .. } = training;
-    if !(1..=10_000_000).contains(steps) {
-        return fail("steps", *steps as f64, "a whole number from 1 to 10 million");
+impl<'a> Run<'a> {
+    fn new(scene: &Scene, window: Window, training: &'a Training) -> Result<Run<'a>, LearnedError> {
+        let mut random = Random::new(training.seed);
+        let widths: Vec<usize> = std::iter::once(Features::channels(&window))
+            .chain(training.hidden.iter().copied())
+            .chain(std::iter::once(OUTPUT_CHANNELS))
+            .collect();
+        let mut network = Network::random(&widths, &mut random);
+        // The first estimate is μ = 0 with σ = mu_max.
+        if let Some(last) = network.layers.last_mut() {
+            last.weights.iter_mut().for_each(|weights| *weights *= faer::Scale(0.1f32));
+        }
+        let mut others = Frames::new(scene, window, training, training.seed.wrapping_add(OF_OTHERS))?;
+        others.draw(OTHERS.min(training.contacts))?;
+        Ok(Run {
+            training,
+            features: Features::new(&window, &scene.sensor, scene.medium)?,
+            frames: Frames::new(scene, window, training, training.seed)?,
+            others,
+            mean: network.clone(),
+            adam: Adam::new(&network),
+            network,
+            randoms: (0..PARTS as u64).map(|part| Random::new(!training.seed.wrapping_sub(part))).collect(),
+            losses: Vec::new(),
+        })
     }
-    if !(1..=65_536).contains(batch) {
-        return fail("batch", *batch as f64, "a whole number from 1 to 65 536");
+
+    /// One step.
+    fn step(&mut self, rate: f32) {
+        let (batch, network, features, frames) = (self.training.batch, &self.network, &self.features, &self.frames);
+        let part = |(part, random): (usize, &mut Random)| {
+            let count = batch * (part + 1) / PARTS - batch * part / PARTS;
+            let (readings, truth) = frames.mix(count, NOISE, random);
+            let activations = network.activations(features.of(&readings));
+            let outputs = Network::outputs(&activations[activations.len() - 1].parities);
+            let (loss, slope) = slope(&outputs, &truth, batch);
+            (loss, slopes(network, &activations, &slope))
+        };
+        let parts: Vec<(f64, Vec<OfLayer>)> = self.randoms.par_iter_mut().enumerate().map(part).collect();
+        let mut loss = 0.0;
+        // In the order of the parts: the sum is the same whichever thread is first.
+        let sum = parts.into_iter().map(|(own, slopes)| {
+            loss += own;
+            slopes
+        });
+        let sum = sum.reduce(|mut sum, own| {
+            sum.iter_mut().zip(&own).for_each(|(sum, own)| sum.add(own));
+            sum
+        });
+        self.adam.step(&mut self.network, &sum.unwrap_or_default(), rate);
+        self.losses.push(loss);
+        let steps = self.losses.len() as f32;
+        self.mean.approach(&self.network, AVERAGED / (AVERAGED + steps - 1.0));
     }
-    if !(1..=10_000_000).contains(contacts) {
-        return fail("contacts", *contacts as f64, "a whole number from 1 to 10 million");
+
+    /// Median of |m − μ|/|μ| of the mean network on frames of other contacts, for each of [`MEASURED_NOISE`].
+    fn errors(&self) -> [f64; 2] {
+        MEASURED_NOISE.map(|noise| {
+            let (readings, truth) = self.others.mix(MEASURED / 4, [noise; 2], &mut Random::new(self.training.seed));
+            let found = self.mean.shear(self.features.of(&readings));
+            let error = |(frame, (mean, _)): (usize, &([f64; 2], [f64; 2]))| {
+                let [x, y] = [0, 1].map(|axis| f64::from(truth[(axis, frame)]));
+                (mean[0] - x).hypot(mean[1] - y) / x.hypot(y)
+            };
+            share_below(found.iter().enumerate().map(error).collect(), 0.5)
+        })
     }
-    if let Some(width) = hidden.iter().find(|width| !(1..=4096).contains(*width)) {
-        return fail("hidden", *width as f64, "whole numbers from 1 to 4096");
+
+    /// The mean network with its σ and its largest outputs.
+    fn finish(mut self) -> Result<(Network, Losses), LearnedError> {
+        let random = &mut Random::new(!self.training.seed);
+        let (readings, truth) = self.others.mix(MEASURED, NOISE, random);
+        let found = self.mean.shear(self.features.of(&readings));
+        for axis in [0, 1] {
+            let z = |(frame, (mean, sigma)): (usize, &([f64; 2], [f64; 2]))| {
+                (mean[axis] - f64::from(truth[(axis, frame)])).abs() / sigma[axis]
+            };
+            let (_, channel) = PLACES[2 + axis];
+            let within = share_below(found.iter().enumerate().map(z).collect(), WITHIN);
+            if let Some(last) = self.mean.layers.last_mut().filter(|_| within > 0.0) {
+                last.bias[channel] += within.ln() as f32;
+            }
+        }
+        // Of a short training too: what an output exceeds later is cut off in the hardware.
+        self.frames.draw(self.training.contacts)?;
+        let (readings, _) = self.frames.mix(MEASURED, NOISE, random);
+        self.mean.measure(self.features.of(&readings));
+        let steps = self.losses.len();
+        let ends = ((steps as f64 * ENDS) as usize).clamp(1, steps.max(1));
+        let losses = Losses { steps, first: mean(&self.losses[..ends]), last: mean(&self.losses[steps - ends..]) };
+        let finite = |layer: &Layer| layer.bias.iter().all(|bias| bias.is_finite());
+        match losses.last.is_finite() && self.mean.layers.iter().all(finite) {
+            true => Ok((self.mean, losses)),
+            false => Err(LearnedError::Diverged { rate: self.training.rate }),
+        }
     }
-    if !(*rate > 0.0 && *rate <= 1.0) {
-        return fail("rate", *rate, "a number above 0, at most 1");
-    }
-    Ok(())
 }
 
-/// The rate of a step.
-fn rate(training: &Training, step: usize) -> f32 {
-    let done = (step as f32 + 0.5) / training.steps as f32;
-    training.rate as f32 * (done / RISE).min(1.0) * 0.5 * (1.0 + (PI * done).cos())
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Mean loss of the frames, and its slope in the outputs.
-fn slope(outputs: &Mat<f32>, truth: &Mat<f32>) -> (f64, Mat<f32>) {
-    let frames = outputs.ncols();
-    let share = 1.0 / frames as f32;
+/// The value below which a share of the values is.
+fn share_below(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get((values.len() as f64 * share) as usize).copied().unwrap_or(0.0)
+}
+
+/// Loss of a part of a step's `batch` frames, and its slope in the outputs, both over the number of all of them.
+fn slope(outputs: &Mat<f32>, truth: &Mat<f32>, batch: usize) -> (f64, Mat<f32>) {
+    let (frames, share) = (outputs.ncols(), 1.0 / batch as f32);
     let mut slope = Mat::zeros(OUTPUTS, frames);
     let mut loss = 0.0f64;
     for frame in 0..frames {
@@ -192,82 +292,35 @@ fn slope(outputs: &Mat<f32>, truth: &Mat<f32>) -> (f64, Mat<f32>) {
             slope[(2 + axis, frame)] = if stuck { 0.0 } else { share * sigma * pull };
         }
     }
-    (loss / frames as f64, slope)
+    (loss / batch as f64, slope)
 }
 
-/// One step of Adam on all layers, from the slope in the outputs back.
-fn descend(
-    network: &mut Network,
-    moments: &mut [Moments],
-    activations: &[Activation],
-    slope: &Mat<f32>,
-    rate: f32,
-    step: usize,
-) {
-    let power = step as i32 + 1;
-    let scale = rate * (1.0 - DECAY[1].powi(power)).sqrt() / (1.0 - DECAY[0].powi(power));
+/// The slope of the loss in every number of the network, from that in the outputs.
+fn slopes(network: &Network, activations: &[Activation], slope: &Mat<f32>) -> Vec<OfLayer> {
     let mut slopes: Parities = std::array::from_fn(|_| Mat::zeros(OUTPUT_CHANNELS, slope.ncols()));
     for (output, (parity, channel)) in PLACES.into_iter().enumerate() {
         slopes[parity].row_mut(channel).copy_from(slope.row(output));
     }
-    for k in (0..network.layers.len()).rev() {
-        let (layer, inputs) = (&mut network.layers[k], &activations[k]);
-        let before = inputs.images.as_ref().map(|images| {
-            let slopes = std::array::from_fn(|parity| layer.weights[parity].transpose() * &slopes[parity]);
-            through_relu(&slopes, images)
+    let mut all = Vec::new();
+    for (layer, inputs) in network.layers.iter().zip(activations).rev() {
+        let weights = std::array::from_fn(|parity| {
+            let mut own = Mat::<f32>::zeros(layer.weights[parity].nrows(), layer.weights[parity].ncols());
+            matmul(&mut own, Accum::Replace, &slopes[parity], inputs.parities[parity].transpose(), 1.0, Par::Seq);
+            own
         });
-        for (parity, weights) in layer.weights.iter_mut().enumerate() {
-            let mut gradient = Mat::<f32>::zeros(weights.nrows(), weights.ncols());
-            let inputs = inputs.parities[parity].transpose();
-            matmul(&mut gradient, Accum::Replace, &slopes[parity], inputs, 1.0, Par::Seq);
-            let [first, second] = &mut moments[k].weights[parity];
-            let rows = weights.nrows();
-            for (col, (weights, gradient)) in weights.col_iter_mut().zip(gradient.col_iter()).enumerate() {
-                let range = col * rows..(col + 1) * rows;
-                move_by(weights.iter_mut(), gradient.iter(), &mut first[range.clone()], &mut second[range], scale);
-            }
-        }
-        let bias: Vec<f32> = slopes[EVEN].row_iter().map(|row| row.iter().sum()).collect();
-        let [first, second] = &mut moments[k].bias;
-        move_by(layer.bias.iter_mut(), bias.iter(), first, second, scale);
-        match before {
-            Some(before) => slopes = before,
-            None => break,
+        let bias = slopes[EVEN].row_iter().map(|row| row.iter().sum()).collect();
+        all.push(OfLayer { weights, bias });
+        if let Some(images) = &inputs.images {
+            let before = std::array::from_fn(|parity| {
+                let mut before = Mat::zeros(layer.weights[parity].ncols(), slope.ncols());
+                matmul(&mut before, Accum::Replace, layer.weights[parity].transpose(), &slopes[parity], 1.0, Par::Seq);
+                before
+            });
+            slopes = through_relu(before, images);
         }
     }
-}
-
-/// The slope in front of a ReLU, in parities, from that behind it; `images` are its outputs.
-fn through_relu(slopes: &Parities, images: &Parities) -> Parities {
-    let mut slopes = exchanged(slopes);
-    for (slopes, images) in slopes.iter_mut().zip(images) {
-        for (slopes, images) in slopes.col_iter_mut().zip(images.col_iter()) {
-            slopes.iter_mut().zip(images.iter()).filter(|(_, a)| **a <= 0.0).for_each(|(slope, _)| *slope = 0.0);
-        }
-    }
-    exchanged(&slopes)
-}
-
-fn move_by<'a>(
-    values: impl Iterator<Item = &'a mut f32>,
-    gradient: impl Iterator<Item = &'a f32>,
-    first: &mut [f32],
-    second: &mut [f32],
-    scale: f32,
-) {
-    for (((value, gradient), m), v) in values.zip(gradient).zip(first).zip(second) {
-        *m += (1.0 - DECAY[0]) * (gradient - *m);
-        *v += (1.0 - DECAY[1]) * (gradient * gradient - *v);
-        *value -= scale * *m / (v.sqrt() + LEAST);
-    }
-}
-
-impl Moments {
-    fn zero(layer: &Layer) -> Moments {
-        let zeros = |count: usize| [vec![0.0; count], vec![0.0; count]];
-        let of = |weights: &Mat<f32>| zeros(weights.nrows() * weights.ncols());
-        Moments { weights: layer.weights.each_ref().map(of), bias: zeros(layer.bias.len()) }
-    }
+    all.reverse();
+    all
 }
 
 #[cfg(test)]
@@ -281,9 +334,9 @@ mod tests {
         let outputs = |k: usize, step: f32| {
             Mat::from_fn(OUTPUTS, 1, |i, _| [0.1f32, 0.05, -1.0, -2.0][i] + if i == k { step } else { 0.0 })
         };
-        let (_, got) = slope(&outputs(0, 0.0), &truth);
+        let (_, got) = slope(&outputs(0, 0.0), &truth, 1);
         for k in 0..OUTPUTS {
-            let difference = (slope(&outputs(k, 1e-3), &truth).0 - slope(&outputs(k, -1e-3), &truth).0) / 2e-3;
+            let difference = (slope(&outputs(k, 1e-3), &truth, 1).0 - slope(&outputs(k, -1e-3), &truth, 1).0) / 2e-3;
             let sigma = f64::from([-1.0f32, -2.0][k % 2].exp());
             let wanted = sigma * difference;
             assert!(
@@ -308,11 +361,11 @@ mod tests {
         };
         // The first step of Adam moves every number by the rate, against the sign of its slope.
         let mut moved = network.clone();
-        let mut moments: Vec<Moments> = network.layers.iter().map(Moments::zero).collect();
         let slope = Mat::from_fn(OUTPUTS, 2, |_, _| 1.0f32);
-        descend(&mut moved, &mut moments, &network.activations(inputs.clone()), &slope, 1e-3, 0);
+        let all = slopes(&network, &network.activations(inputs.clone()), &slope);
+        Adam::new(&network).step(&mut moved, &all, 1e-3);
         let mut compared = 0;
-        for (k, moments) in moments.iter().enumerate() {
+        for (k, slopes) in all.iter().enumerate() {
             for parity in 0..4 {
                 let weights = &network.layers[k].weights[parity];
                 let (rows, cols) = (weights.nrows(), weights.ncols());
@@ -324,7 +377,7 @@ mod tests {
                     };
                     let wanted = (at(1e-2) - at(-1e-2)) / 2e-2;
                     let step = |network: &Network| network.layers[k].weights[parity][(row, col)];
-                    let own = moments.weights[parity][0][col * rows + row] / (1.0 - DECAY[0]);
+                    let own = slopes.weights[parity][(row, col)];
                     assert!((own - wanted).abs() < 0.02 * wanted.abs().max(0.1), "{k} {parity}: {own} {wanted}");
                     if wanted.abs() > 0.1 {
                         assert_eq!((step(&moved) - step(&network)).signum(), -wanted.signum());
@@ -341,7 +394,7 @@ mod tests {
     fn a_linear_map_is_learned() {
         let mut random = Random::new(3);
         let mut network = Network::random(&[3, 16, OUTPUT_CHANNELS], &mut random);
-        let mut moments: Vec<Moments> = network.layers.iter().map(Moments::zero).collect();
+        let mut adam = Adam::new(&network);
         let training = Training { steps: 800, rate: 1e-2, ..Default::default() };
         let (mut first, mut last) = (0.0, 0.0);
         for step in 0..training.steps {
@@ -351,27 +404,14 @@ mod tests {
                 0.5 * odd[(axis, k)] - 0.25 * odd[(2, k)]
             });
             let activations = network.activations(inputs);
-            let (loss, slope) = slope(&Network::outputs(&activations[2].parities), &truth);
-            descend(&mut network, &mut moments, &activations, &slope, rate(&training, step), step);
+            let (loss, slope) = slope(&Network::outputs(&activations[2].parities), &truth, 64);
+            let all = slopes(&network, &activations, &slope);
+            adam.step(&mut network, &all, training.rate_at(step as f64 / training.steps as f64));
             if step == 0 {
                 first = loss;
             }
             last = loss;
         }
         assert!(last < first - 3.0, "{first} {last}");
-    }
-
-    #[test]
-    fn options_out_of_range() {
-        let scene = Scene::builtin("sensor-1").unwrap();
-        let refused = |training: Training| match train(&scene, Window::of(&scene.sensor), &training, &|_| ()) {
-            Err(LearnedError::Option { field, .. }) => field,
-            _ => "none",
-        };
-        assert_eq!(refused(Training { steps: 0, ..Default::default() }), "steps");
-        assert_eq!(refused(Training { batch: 0, ..Default::default() }), "batch");
-        assert_eq!(refused(Training { contacts: 0, ..Default::default() }), "contacts");
-        assert_eq!(refused(Training { hidden: vec![0], ..Default::default() }), "hidden");
-        assert_eq!(refused(Training { rate: f64::NAN, ..Default::default() }), "rate");
     }
 }

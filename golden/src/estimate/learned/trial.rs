@@ -4,6 +4,7 @@
 use super::{Learned, LearnedError, Training};
 use crate::spec::scene::Scene;
 use crate::write::FileError;
+use std::ops::ControlFlow::Continue;
 use tempfile::NamedTempFile;
 
 impl Training {
@@ -18,7 +19,7 @@ impl Training {
 /// # Errors
 /// As [`Learned::train`], or the file cannot be written.
 pub fn with_network(mut scene: Scene, training: &Training) -> Result<(Scene, NamedTempFile), LearnedError> {
-    let trained = Learned::train(&scene, training, &|_| ())?;
+    let trained = Learned::train(&scene, training, &mut |_| Continue(()))?;
     let file = NamedTempFile::new().map_err(FileError::at(&std::env::temp_dir()))?;
     std::fs::write(file.path(), trained.bytes).map_err(FileError::at(file.path()))?;
     scene.search.network = Some(file.path().to_owned());

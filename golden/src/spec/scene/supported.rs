@@ -221,7 +221,10 @@ impl Scene {
     }
 
     /// Checks that a network can give the μ of the whole array and p(μ) be that of the series.
-    pub(super) fn require_network(&self) -> Result<(), SceneError> {
+    ///
+    /// # Errors
+    /// [`SceneError`] with the first field that forbids it.
+    pub fn require_network(&self) -> Result<(), SceneError> {
         let (search, sensor) = (&self.search, &self.sensor);
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([

@@ -1,0 +1,121 @@
+//! Options: the size of a training and what its frames allow for.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: options, medium of the scene | – | – |
+//! | out: the options, or the first that is out of range | – | – |
+
+use super::error::LearnedError;
+use crate::data::generator::slip::Slip;
+use crate::spec::scene::Medium;
+
+/// Size of a training, and what its frames allow for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Training {
+    /// Steps of Adam, 1 to 10 million.
+    pub steps: usize,
+    /// Time for the steps in minutes, above 0 to 10 000; `None`: as many as `steps`, which one machine does equally every time.
+    pub minutes: Option<f64>,
+    /// Frames of a step, 1 to 65 536.
+    pub batch: usize,
+    /// Contacts drawn until the last step, 1 to 10 million.
+    pub contacts: usize,
+    /// Widths of the hidden layers, each 1 to 4096.
+    pub hidden: Vec<usize>,
+    /// Largest rate of a step.
+    pub rate: f64,
+    /// How the shear is spread over the contacts.
+    pub slip: Slip,
+    /// How far the Poisson ratio of a bonded layer may be from the scene's, 0 to 0.1.
+    pub poisson_tolerance: f64,
+    /// How far the thickness of the cover may be from the scene's, as a share of it, 0 to 0.2.
+    pub thickness_tolerance: f64,
+    /// Seed of weights and frames.
+    pub seed: u64,
+}
+
+impl Default for Training {
+    fn default() -> Self {
+        Training {
+            steps: 40_000,
+            minutes: None,
+            batch: 384,
+            contacts: 400_000,
+            hidden: vec![150, 75, 25],
+            rate: 2e-3,
+            slip: Slip::Mixed,
+            poisson_tolerance: 0.0,
+            thickness_tolerance: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Training {
+    /// Checks the options for a medium.
+    ///
+    /// # Errors
+    /// [`LearnedError::Option`] with the first that is out of range.
+    pub(super) fn check(&self, medium: Medium) -> Result<(), LearnedError> {
+        let fail = |field, value, allowed| Err(LearnedError::Option { field, value, allowed });
+        if !(1..=10_000_000).contains(&self.steps) {
+            return fail("steps", self.steps as f64, "a whole number from 1 to 10 million");
+        }
+        if let Some(minutes) = self.minutes.filter(|minutes| !(*minutes > 0.0 && *minutes <= 10_000.0)) {
+            return fail("minutes", minutes, "a number above 0, at most 10 000");
+        }
+        if !(1..=65_536).contains(&self.batch) {
+            return fail("batch", self.batch as f64, "a whole number from 1 to 65 536");
+        }
+        if !(1..=10_000_000).contains(&self.contacts) {
+            return fail("contacts", self.contacts as f64, "a whole number from 1 to 10 million");
+        }
+        if let Some(width) = self.hidden.iter().find(|width| !(1..=4096).contains(*width)) {
+            return fail("hidden", *width as f64, "whole numbers from 1 to 4096");
+        }
+        if !(self.rate > 0.0 && self.rate <= 1.0) {
+            return fail("rate", self.rate, "a number above 0, at most 1");
+        }
+        match medium {
+            Medium::HalfSpace if self.poisson_tolerance != 0.0 => {
+                return fail(
+                    "poisson_tolerance",
+                    self.poisson_tolerance,
+                    "0 on a half-space, whose stress does not depend on it",
+                );
+            }
+            _ if !(0.0..=0.1).contains(&self.poisson_tolerance) => {
+                return fail("poisson_tolerance", self.poisson_tolerance, "a number from 0 to 0.1");
+            }
+            _ => {}
+        }
+        if !(0.0..=0.2).contains(&self.thickness_tolerance) {
+            return fail("thickness_tolerance", self.thickness_tolerance, "a number from 0 to 0.2");
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_out_of_range() {
+        let refused = |training: Training| match training.check(Medium::HalfSpace) {
+            Err(LearnedError::Option { field, .. }) => field,
+            _ => "none",
+        };
+        assert_eq!(refused(Training::default()), "none");
+        assert_eq!(refused(Training { steps: 0, ..Default::default() }), "steps");
+        assert_eq!(refused(Training { batch: 0, ..Default::default() }), "batch");
+        assert_eq!(refused(Training { contacts: 0, ..Default::default() }), "contacts");
+        assert_eq!(refused(Training { hidden: vec![0], ..Default::default() }), "hidden");
+        assert_eq!(refused(Training { rate: f64::NAN, ..Default::default() }), "rate");
+        assert_eq!(refused(Training { minutes: Some(0.0), ..Default::default() }), "minutes");
+        assert_eq!(refused(Training { thickness_tolerance: 0.3, ..Default::default() }), "thickness_tolerance");
+        let poisson = Training { poisson_tolerance: 0.02, ..Default::default() };
+        assert!(poisson.check(Medium::BondedLayer { poisson: 0.48 }).is_ok());
+        assert_eq!(refused(poisson), "poisson_tolerance");
+    }
+}
