@@ -182,7 +182,11 @@ mod tests {
             on.insert(name.into(), baseline());
         }
         let scenes: Vec<Scene> = all.built_in().into_iter().map(|(scene, _)| scene).collect();
-        assert_eq!(scenes, [Scene::builtin("sensor-1").unwrap(), variant]);
+        let on_board = |mut scene: Scene| {
+            scene.hardware.board = Some("ulx3s-85f".into());
+            scene
+        };
+        assert_eq!(scenes, [Scene::builtin("sensor-1").unwrap(), variant].map(on_board));
     }
 
     #[test]
