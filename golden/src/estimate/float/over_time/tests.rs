@@ -135,7 +135,9 @@ fn other_covers_contacts_and_faulty_taxels_have_templates_too() {
         // From a frame on at which the template can hold again.
         let found = results(&golden, &frames);
         let [error, held] = figures(&frames, &found, FRAMES - 80);
-        assert!(error < 0.15 && held > 0.9, "{name}: e_t {error}, held {held}");
+        // Without tension one fit is worse, whatever the mean.
+        let most = if scene.input.unipolar { 0.2 } else { 0.15 };
+        assert!(error < most && held > 0.9, "{name}: e_t {error}, held {held}");
         let contacts = found[FRAMES - 1].contacts().unwrap();
         assert_eq!(contacts.len(), if motion == Motion::Second { 2 } else { 1 }, "{name}");
         // The forces of contacts and of taxels have the same sum.
