@@ -99,7 +99,8 @@ fn what_no_table_holds_is_refused_by_field() {
     assert_eq!(error(&scene, 0), "version: 0 is not possible; expected 1 to 32767");
     scene.sensor.thickness_mm = 3.0;
     assert!(error(&scene, 1).starts_with("sensor.thickness_mm: differs from that of the hardware's scene"));
-    let changes: [(&str, fn(&mut Scene)); 6] = [
+    type Change = (&'static str, fn(&mut Scene));
+    let changes: [Change; 6] = [
         ("hardware.table_range.gain", |scene| scene.hardware.table_range.gain = None),
         ("hardware.coefficient_check", |scene| scene.hardware.coefficient_check = CoefficientCheck::Signature),
         ("hardware.board", |scene| scene.hardware.board = Some("icebreaker".into())),
