@@ -99,8 +99,8 @@ struct TimeArguments {
     #[arg(long, value_name = "S", default_value_t = 0.8, requires = "time")]
     seconds: f64,
     /// Standard deviation of the taxels' gains.
-    #[arg(long = "gains", value_name = "SHARE", default_value_t = 0.01, requires = "time")]
-    gain_spread: f64,
+    #[arg(long, value_name = "SHARE", default_value_t = 0.01, requires = "time")]
+    gains: f64,
     /// Width of the codes in bits.
     #[arg(long, value_name = "BITS", default_value_t = 10, requires = "time")]
     bits: u32,
@@ -219,7 +219,7 @@ fn over_time(arguments: &Arguments, scene: &Scene, format: Format) -> Result<Str
     let mut engines: Vec<PressEngine> = estimators.iter().copied().map(PressEngine::Golden).collect();
     engines.extend(arguments.shapes.hardware.then_some(PressEngine::Fixed));
     let all = PressStudy::default();
-    let converter = Converter { gain_spread: own.gain_spread, bits: Some(own.bits), ..Converter::default() };
+    let converter = Converter { gain_spread: own.gains, bits: Some(own.bits), ..Converter::default() };
     let draw = DrawOptions { converter, seed: arguments.seed, ..all.press.draw };
     let frames = (own.rate * own.seconds).round() as usize + 1;
     let press = Press { rate_Hz: own.rate, frames, draw, ..all.press };
