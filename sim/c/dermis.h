@@ -437,7 +437,7 @@ dermis_status dermis_reconstruct_many(const dermis_scene *scene,
 
 /**
  * Begin a stream of frames of a scene. It belongs to the caller: dermis_stream_free; the scene may be freed before it. After
- * an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses, or with a sliding mean.
+ * an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses.
  *
  * engine is "golden" or "fixed", as for dermis_reconstruct. cross_check says which results the estimator evidence reads too,
  * where the engine has another one: every so many, from the first one on, before they are given; 0: none;
