@@ -97,9 +97,8 @@ impl Track {
     fn next(&mut self, contact: &FoundContact, centre_mm: [f64; 2], moving: Option<bool>) {
         let own = &mut self.shown;
         own.age += 1;
-        for axis in 0..2 {
-            let way_mm = centre_mm[axis] - own.centre_mm[axis];
-            own.velocity_mm[axis] += (way_mm - own.velocity_mm[axis]) / SMOOTH;
+        for (velocity_mm, (now, before)) in own.velocity_mm.iter_mut().zip(std::iter::zip(centre_mm, own.centre_mm)) {
+            *velocity_mm += (now - before - *velocity_mm) / SMOOTH;
         }
         own.centre_mm = centre_mm;
         let [x, y, normal] = contact.force_N;

@@ -100,10 +100,10 @@ fn manifests_of_another_version_or_with_paths_are_refused() {
     refuses("{\"manifest_version\": 99}\n", "manifest_version = 99 is not allowed");
     refuses("{}", "the last line has no end");
     refuses("[]\n", "not an object");
-    refuses("{\"manifest_version\": 1}\n", "checksum is missing");
+    refuses("{\"manifest_version\": 2}\n", "checksum is missing");
     let outside = concat!(
         "{\n  \"files\": {\n    \"../f\": {\n      \"bytes\": 1,\n      \"crc32\": 1\n    }\n  },\n",
-        "  \"manifest_version\": 1\n}\n"
+        "  \"manifest_version\": 2\n}\n"
     );
     let sum = crc32fast::hash(outside.as_bytes());
     let sealed = outside.replacen('{', &format!("{{\n  \"checksum\": {sum},"), 1);
