@@ -18,7 +18,7 @@ use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use serde_json::json;
 
-use super::noise::by_name;
+use super::noise::motion;
 use crate::progress::Progress;
 use crate::recording::header;
 
@@ -64,11 +64,6 @@ impl PressArguments {
         // Both ends are frames.
         Ok(Press { motion, frames: frames as usize + 1, rate_Hz: self.rate, speed_mm_s: self.speed, draw })
     }
-}
-
-/// Parses a motion by its name.
-pub(super) fn motion(name: &str) -> Result<Motion, String> {
-    by_name(name, &Motion::NAMES).map_err(|known| format!("one of {known}"))
 }
 
 /// Writes press number `number` to a file, a recording if its name ends in `.mcap`; returns the lines without one.

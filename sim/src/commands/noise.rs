@@ -19,7 +19,6 @@ use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
 use dermis_golden::study::noise::{press_study, sensitivities, shape_study, slip_study, study, unlike_study};
 use dermis_golden::study::noise::{Candidate, PressEngine, PressStudy, ShapeStudy, Study};
 
-use super::generate_press::motion;
 use crate::progress::Progress;
 use crate::report::{self, Format};
 
@@ -275,6 +274,11 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
         (false, true, Format::Markdown) => Ok(report::coverage(&rows)),
         _ => report::shapes(&rows, format),
     }
+}
+
+/// Parses a motion by its name.
+pub(super) fn motion(name: &str) -> Result<Motion, String> {
+    named(name, &Motion::NAMES)
 }
 
 /// Parses an objective by its name in scene files.
