@@ -103,6 +103,7 @@ fn bare(result: &Reconstruction) -> Reconstruction {
     let mut bare = result.clone();
     bare.frame.clear();
     (bare.checks.constant_share, bare.checks.torn_share) = (None, None);
+    bare.extra.tracks.clear();
     bare
 }
 
