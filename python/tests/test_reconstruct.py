@@ -157,7 +157,9 @@ def test_blocks_and_sliding_means_have_their_frames() -> None:
     sliding = dermis.Scene.from_toml(text + 'mean = "sliding"\n').reconstruct(stress)
     assert [result.to_dict()["mean_frames"] for result in sliding] == [1, 2, 3, 3]
     with dermis.Scene.from_toml(text + 'mean = "sliding"\n').tracker() as tracker:
-        assert [tracker.push(frame).to_dict() for frame in stress] == [result.to_dict() for result in sliding]
+        pushed = [tracker.push(frame) for frame in stress]
+    assert [result.to_dict()["mean_frames"] for result in pushed] == [1, 2, 3, 3]
+    assert (np.stack([result.resultant_N for result in pushed]) == sliding.resultant_N).all()
 
 
 def test_an_adaptive_mean_follows_a_press() -> None:

@@ -5,7 +5,7 @@
 //! | `--contact shape:key=value:…` | keys `at`, `size`, `normal`, `shear`, `slip`, `friction` |
 //! | `--like FILE` | those described in a frame file |
 //! | `--random N` | N random ones, drawn from the seed |
-//! | `--press MOTION` | one random one that holds or moves: a recording in place of a frame, [`generate_press`](super::generate_press) |
+//! | `--press MOTION` | one random one that holds or moves: a recording in place of a frame, `generate_press` |
 
 use std::path::PathBuf;
 
