@@ -172,13 +172,13 @@ impl Input {
         }
         let mut averaged = Err(count());
         for frame in frames {
-            averaged = Ok(self.slide(memory, frame));
+            averaged = Ok(self.slide(memory, frame).0);
         }
         averaged
     }
 
-    /// The mean that slides, with one more frame.
-    fn slide(&self, memory: &mut Memory, frame: &Frame) -> Averaged {
+    /// The mean that slides, with one more frame, and this frame as [`Input::complete_after`] has it.
+    fn slide(&self, memory: &mut Memory, frame: &Frame) -> (Averaged, Frame) {
         let own = self.without_drift(&mut memory.drift, std::slice::from_ref(frame))[0].clone();
         let complete = self.continued(memory, &own);
         let taxels = frame.stress_MPa.len();
@@ -196,7 +196,12 @@ impl Input {
         let mean = Frame { stress_MPa: means.mean(&window), missing: means.never_read(), ..own };
         let frames_held = if adapts { Some(window.frames_held()) } else { self.spec.frames_held(means.frames()) };
         let lag_frames = adapts.then_some(window.age);
-        Averaged { mean, variance: window.variance, frames_held, lag_frames }
+        let mut device = frame.clone();
+        for &taxel in &frame.missing {
+            let moved = memory.drift.moved.get(taxel).unwrap_or(&0.0);
+            device.stress_MPa[taxel] = complete.stress_MPa[taxel] + moved;
+        }
+        (Averaged { mean, variance: window.variance, frames_held, lag_frames }, device)
     }
 
     /// A frame with a value for each missing reading: the mean so far, else what the other taxels predict.
@@ -215,19 +220,7 @@ impl Input {
             return results.flat_map(|frames| self.complete(frames).into_owned()).collect();
         }
         let mut memory = memory.clone();
-        let next = |frame: &Frame| {
-            let moved = memory.drift.moved.clone();
-            let own = self.without_drift(&mut memory.drift.clone(), std::slice::from_ref(frame))[0].clone();
-            let mut complete = self.continued(&memory, &own);
-            for &taxel in &frame.missing {
-                complete.stress_MPa[taxel] += moved.get(taxel).unwrap_or(&0.0);
-            }
-            self.slide(&mut memory, frame);
-            let read =
-                |taxel: usize| if frame.lacks(taxel) { complete.stress_MPa[taxel] } else { frame.stress_MPa[taxel] };
-            Frame { stress_MPa: (0..frame.stress_MPa.len()).map(read).collect(), ..frame.clone() }
-        };
-        frames.iter().map(next).collect()
+        frames.iter().map(|frame| self.slide(&mut memory, frame).1).collect()
     }
 
     /// The frames of a block, of the scene's sensor, with a value for each missing reading: the mean of the frames that have it;

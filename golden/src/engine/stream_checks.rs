@@ -152,11 +152,12 @@ impl StreamChecks {
     /// # Errors
     /// As [`Engine::reconstruct_after`].
     pub fn next(&mut self, engine: &(impl Engine + ?Sized), frames: &[Frame]) -> Result<Reconstruction, EngineError> {
-        let memory = self.state.past.memory.clone();
+        // Only the cross-check begins where the engine began.
+        let before = self.check.as_ref().map(|_| self.state.past.memory.clone()).unwrap_or_default();
         let mut result = engine.reconstruct_after(&mut self.state, frames)?;
         self.state.begun = true;
         self.tracks.follow(&self.scene.sensor, &mut result);
-        self.add_after(memory, frames, result.resultant_N, &mut result.diagnostics());
+        self.add_after(before, frames, result.resultant_N, &mut result.diagnostics());
         Ok(result)
     }
 

@@ -19,8 +19,8 @@ const WINDOW_FROM: usize = 400;
 /// Distance from the cells of a contact within which taxels are read, in units of the depth.
 const WINDOW: f64 = 4.0;
 
-/// Multiplications after which no further fit of a frame begins, and no further round but the first ones and the last, per pair of
-/// taxels. Drawn presses take 1000 to 2500 in the median; without a limit noise and even loads take up to 26 times as much.
+/// Multiplications of a fit after which μ takes no further step, and no further round begins but the first ones and the last, per
+/// pair of taxels. Drawn presses take 1000 to 2500 in the median; without a limit noise and even loads take up to 26 times as much.
 const WORK: u64 = 3000;
 /// The same of fits whose μ a network gives, over that: each has further rounds with all coefficients.
 const ADVISED: u64 = 2;
@@ -78,6 +78,12 @@ impl Evidence {
             noise_shares: vec![1.0; sensor.taxels()],
             adviser: None,
         }
+    }
+
+    /// The same estimator whose fits take what work they want.
+    #[cfg(test)]
+    pub(crate) fn without_limit(self) -> Evidence {
+        Evidence { work: u64::MAX, ..self }
     }
 
     /// Whether the influence of every cell is a finite number, and presses on the taxel below it.

@@ -323,10 +323,12 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The largest posterior of μ under the present envelopes within `steps` steps; without a step that at the present μ.
+    /// The largest posterior of μ under the present envelopes within `steps` steps; without a step, as where the work is done, that at
+    /// the present μ.
     fn ascend(&mut self, design: &mut Design, steps: usize) -> Option<Top> {
         self.weigh();
         self.baseline(design);
+        let steps = if self.is_spent() { 0 } else { steps };
         let top = ascend(design, &self.readings, &self.now.mu, self.scene.prior, steps)?;
         self.work += top.posteriors as u64 * design.work();
         Some(top)
@@ -337,7 +339,8 @@ impl<'a> Fit<'a> {
     fn with_rest(&mut self, design: &mut Design, mut top: Top, steps: usize, least: usize) -> Option<Top> {
         for pass in 0..PASSES {
             self.find_rest(design, &top);
-            if pass >= least && !self.now.sizes.matter() && self.clipped.is_empty() {
+            let settled = !self.now.sizes.matter() && self.clipped.is_empty();
+            if pass >= least && (settled || self.is_spent()) {
                 break;
             }
             self.find_spread(design, &top);

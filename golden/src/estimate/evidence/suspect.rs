@@ -291,33 +291,4 @@ mod tests {
         let of = |scene| trial(scene, &zeros).distance(&Predicted { taxel: 9, mean: -0.2, variance: 1e-4 });
         assert!(of(&evidence) > UNPREDICTED && of(&unipolar) == 0.0);
     }
-
-    /// Frames that no contact causes take little more work than presses; without the limit they would take many times as much.
-    #[test]
-    fn no_frame_takes_much_longer_than_a_press() {
-        let ((scene, draws), mut random) = (draws("sensor-1"), Random::new(63));
-        let taxels = scene.sensor.taxels();
-        let along = |k: usize| [k % 10, k / 10].map(|at| at as f64 / 4.5 - 1.0);
-        let mut patterns: Vec<Vec<f64>> = vec![
-            (0..taxels).map(|k| f64::from(u8::from(along(k)[0] > 0.2))).collect(),
-            (0..taxels).map(|k| (-along(k).map(|at| (at - 0.3).powi(2)).iter().sum::<f64>()).exp()).collect(),
-            (0..taxels).map(|k| 0.5 + 0.3 * along(k)[0] + 0.2 * along(k)[1]).collect(),
-            (0..taxels).map(|k| if k % 7 == 3 { 1.0 } else { 0.01 * random.normal() }).collect(),
-        ];
-        patterns.extend((0..4).map(|_| (0..taxels).map(|_| random.normal()).collect::<Vec<f64>>()));
-        let work = |evidence: &Evidence, b: &[f64]| {
-            let peak = peak(b, &vec![true; taxels]).unwrap();
-            let b: Vec<f64> = b.iter().map(|b| b / peak).collect();
-            fit(evidence, &b, &vec![true; taxels], None).map_or(0, |fitted| fitted.estimate.work)
-        };
-        let evidence = Evidence::new(&scene);
-        let mut presses: Vec<u64> =
-            (0..9).map(|number| work(&evidence, &draws.frame(number).unwrap().exact_MPa)).collect();
-        presses.sort_unstable();
-        let most = |evidence: &Evidence| patterns.iter().map(|b| work(evidence, b)).max().unwrap();
-        let (median, limited) = (presses[4], most(&evidence));
-        assert!(limited < 6 * median, "{limited} {median}");
-        let free = most(&Evidence { work: u64::MAX, ..evidence });
-        assert!(free > 8 * median, "{free} {median}");
-    }
 }

@@ -160,8 +160,9 @@ impl Serialize for Kind {
 }
 
 /// A drawn press.
-struct Press {
-    exact_MPa: Vec<f64>,
+#[derive(Clone)]
+pub(super) struct Press {
+    pub exact_MPa: Vec<f64>,
     /// Stress of another press.
     other_MPa: Vec<f64>,
     total_N: [f64; 3],
@@ -189,7 +190,7 @@ impl Press {
     }
 
     /// The stream with its fault; `noise` as a share of the peak.
-    fn spoiled(&self, sensor: &Sensor, fault: &Fault, size: f64, noise: f64) -> Vec<Vec<f64>> {
+    pub fn spoiled(&self, sensor: &Sensor, fault: &Fault, size: f64, noise: f64) -> Vec<Vec<f64>> {
         let (mut read, mut before) = (Vec::new(), Vec::new());
         for moment in 0..MOMENTS {
             let mut random = self.random(1 + moment as u64);
@@ -458,7 +459,7 @@ fn chosen(asked: &SensorFaults) -> Result<Vec<&'static Fault>, StudyError> {
 }
 
 /// The presses of a scene.
-fn presses(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Press>, StudyError> {
+pub(super) fn presses(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Press>, StudyError> {
     let draws = Draws::new(scene, DrawOptions { seed: asked.seed, ..DrawOptions::default() })?;
     let press = |number: u64| -> Result<Press, GeneratorError> {
         let (own, other) = (draws.frame(number)?, draws.frame(number + 1)?);

@@ -1,11 +1,13 @@
 //! What each fault does to a frame, and that the verdicts are those of hand-made results.
 
 use super::faults::{beside, Readings};
-use super::study::MOMENTS;
+use super::study::{presses, Press, MOMENTS};
 use super::*;
+use crate::estimate::evidence::Evidence;
 use crate::random::Random;
 use crate::spec::scene::Scene;
 use crate::spec::sensor::Sensor;
+use rayon::prelude::*;
 
 const ROWS: usize = 4;
 const COLS: usize = 5;
@@ -248,6 +250,40 @@ fn the_network_of_a_scene_has_columns_of_its_own() {
         assert!(ENGINES[7].name() == "fixed with network, stream" && network.frames == 1);
         assert_eq!((network.silent, search.silent), (0, 0), "{}", row.fault);
     }
+}
+
+/// No frame, spoiled or not, takes much more work than a median clean press: in multiplications at most 5.5 times as much, of which
+/// the time, that also holds what a fit takes apart from them, is some 3 to 4.
+#[test]
+fn the_work_of_a_frame_is_bounded() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    let evidence = Evidence::new(&scene);
+    let work = |evidence: &Evidence, b: &[f64]| evidence.solve(b, None).work;
+    let of = |frames: usize| presses(&scene, &SensorFaults { frames, seed: 63, ..Default::default() }).unwrap();
+    let median = |presses: Vec<Press>| {
+        let mut all: Vec<u64> = presses.par_iter().map(|press| work(&evidence, &press.exact_MPa)).collect();
+        all.sort_unstable();
+        all[all.len() / 2]
+    };
+    let median = median(of(60));
+    let sized = FAULTS.iter().flat_map(|fault| fault.sizes.iter().map(move |size| (fault, *size)));
+    let all: Vec<_> = of(3)
+        .into_iter()
+        .flat_map(|press| sized.clone().map(move |(fault, size)| (press.clone(), fault, size)))
+        .collect();
+    let spoiled = |(press, fault, size): &(Press, &Fault, f64)| {
+        let noise = if fault.kind == Kind::Clean { *size } else { 0.0 };
+        press.spoiled(&scene.sensor, fault, *size, noise).pop().unwrap()
+    };
+    let mut works: Vec<(u64, &str, f64)> =
+        all.par_iter().map(|task| (work(&evidence, &spoiled(task)), task.1.name, task.2)).collect();
+    works.sort_by_key(|own| std::cmp::Reverse(own.0));
+    let (most, kind) = (works[0].0 as f64 / median as f64, &works[..5]);
+    assert!(most < 5.5, "{most} times the median, {kind:?}");
+    // A press whose suspect taxels are looked for takes more than one fit; patterns that no limit ends take many times as much.
+    let unlimited = evidence.without_limit();
+    let free = all.par_iter().map(|task| work(&unlimited, &spoiled(task))).max().unwrap();
+    assert!(free > 8 * median, "{free}, median {median}");
 }
 
 #[test]
