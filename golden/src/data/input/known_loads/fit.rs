@@ -219,8 +219,11 @@ mod tests {
     /// MPa.
     const LOADS: [f64; 6] = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2];
 
-    /// Characteristics of drawn sensors: counts over the offset at a stress in MPa, of a taxel whose shape differs by the factor.
-    const DRAWN: [(&str, fn(f64, f64) -> f64); 4] = [
+    /// Counts over the offset at a stress in MPa, of a taxel whose shape differs by the factor.
+    type Shape = fn(f64, f64) -> f64;
+
+    /// Characteristics of drawn sensors.
+    const DRAWN: [(&str, Shape); 4] = [
         // A force-sensing resistor under a divider: its conductance is a power of the load.
         ("divider, exponent 0.8", |s, own| 1023.0 * s.powf(0.8) / (s.powf(0.8) + (0.15 * own).powf(0.8))),
         ("divider, exponent 1", |s, own| 1023.0 * s / (s + 0.2 * own)),
@@ -229,7 +232,7 @@ mod tests {
     ];
 
     /// Means of loads with this noise in counts, and a taxel's exact reading.
-    fn drawn(shape: fn(f64, f64) -> f64, noise: f64) -> (Vec<Mean>, impl Fn(usize, f64) -> f64) {
+    fn drawn(shape: Shape, noise: f64) -> (Vec<Mean>, impl Fn(usize, f64) -> f64) {
         let mut random = Random::new(11);
         let own: Vec<[f64; 3]> = (0..TAXELS)
             .map(|_| [20.0 + 3.0 * random.normal(), 1.0 + 0.15 * random.normal(), 1.0 + 0.1 * random.normal()])
