@@ -53,6 +53,12 @@ impl Frame {
         grid(py, &self.0.readings(), self.lengths())
     }
 
+    /// When it was acquired, in ns since 1970 or since a moment that its file does not say; None where it is not known.
+    #[getter]
+    fn time_ns(&self) -> Option<i64> {
+        self.0.time_ns
+    }
+
     /// True force of all contacts in N, shape (3,): x, y, normal; None where it is not known.
     #[getter]
     fn resultant_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {

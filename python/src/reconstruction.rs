@@ -99,14 +99,15 @@ impl Contact {
 #[pyclass(frozen, module = "dermis")]
 pub struct Reconstruction {
     result: Arc<Solved>,
+    time_ns: Option<i64>,
     rows: usize,
     cols: usize,
 }
 
 impl Reconstruction {
-    /// A result on an array of `rows` by `cols` taxels.
-    pub fn new(result: Arc<Solved>, [rows, cols]: [usize; 2]) -> Reconstruction {
-        Reconstruction { result, rows, cols }
+    /// A result on an array of `rows` by `cols` taxels, whose last frame was acquired at `time_ns`.
+    pub fn new(result: Arc<Solved>, time_ns: Option<i64>, [rows, cols]: [usize; 2]) -> Reconstruction {
+        Reconstruction { result, time_ns, rows, cols }
     }
 }
 
@@ -133,6 +134,12 @@ impl Reconstruction {
     #[getter]
     fn engine(&self) -> &str {
         &self.result.engine
+    }
+
+    /// When the last of its frames was acquired, in ns, as it was handed in; None where it was not stated.
+    #[getter]
+    fn time_ns(&self) -> Option<i64> {
+        self.time_ns
     }
 
     /// Force on each taxel in N, shape (rows, cols, 3): x, y, normal; None with output.forces = "resultants".
@@ -209,18 +216,24 @@ impl Reconstruction {
 #[pyclass(frozen, module = "dermis")]
 pub struct Reconstructions {
     results: Vec<Arc<Solved>>,
+    /// When the last frame of each was acquired.
+    times_ns: Vec<Option<i64>>,
     rows: usize,
     cols: usize,
 }
 
 impl Reconstructions {
-    /// Results on an array of `rows` by `cols` taxels.
-    pub fn new(results: Vec<Arc<Solved>>, [rows, cols]: [usize; 2]) -> Reconstructions {
-        Reconstructions { results, rows, cols }
+    /// Results on an array of `rows` by `cols` taxels, and when the last frame of each was acquired.
+    pub fn new(results: Vec<Arc<Solved>>, times_ns: Vec<Option<i64>>, [rows, cols]: [usize; 2]) -> Reconstructions {
+        Reconstructions { results, times_ns, rows, cols }
     }
 
-    fn one(&self, result: &Arc<Solved>) -> Reconstruction {
-        Reconstruction::new(Arc::clone(result), [self.rows, self.cols])
+    fn one(&self, (result, time_ns): (&Arc<Solved>, &Option<i64>)) -> Reconstruction {
+        Reconstruction::new(Arc::clone(result), *time_ns, [self.rows, self.cols])
+    }
+
+    fn timed(&self) -> impl Iterator<Item = (&Arc<Solved>, &Option<i64>)> {
+        self.results.iter().zip(&self.times_ns)
     }
 }
 
@@ -234,14 +247,21 @@ impl Reconstructions {
         let length = self.results.len();
         let counted = if index < 0 { index.checked_add_unsigned(length) } else { Some(index) };
         let place = counted.and_then(|index| usize::try_from(index).ok());
-        let result = place.and_then(|index| self.results.get(index));
+        let result = place.and_then(|index| self.timed().nth(index));
         let absent = || PyIndexError::new_err(format!("index {index} of {length} results"));
         result.map(|result| self.one(result)).ok_or_else(absent)
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let all: Vec<Reconstruction> = self.results.iter().map(|result| self.one(result)).collect();
+        let all: Vec<Reconstruction> = self.timed().map(|result| self.one(result)).collect();
         Ok(PyList::new(py, all)?.try_iter()?.into_any())
+    }
+
+    /// When the last frame of each result was acquired, in ns, shape (time,); None where one was not stated.
+    #[getter]
+    fn times_ns<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<i64>>> {
+        let times: Option<Vec<i64>> = self.times_ns.iter().copied().collect();
+        times.map(|times| PyArray1::from_vec(py, times))
     }
 
     /// Force on each taxel in N, shape (time, rows, cols, 3): x, y, normal; None with output.forces = "resultants".

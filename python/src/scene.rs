@@ -194,6 +194,9 @@ impl Scene {
     ///     Every so many results, the estimator evidence reads the frames too, where the engine has another estimator, and
     ///     flags what noise, baseline or a faulty taxel hides from that, as `dermis reconstruct` does; 0: never. This takes
     ///     longer than a search. checks["cross_check_age"] says how many results ago.
+    /// times_ns : sequence of int, shape (time,), optional
+    ///     When each of several frames was acquired, in nanoseconds of any clock; default: the own times of Frames. A result has
+    ///     that of the last of its frames.
     ///
     /// Returns
     /// -------
@@ -208,20 +211,31 @@ impl Scene {
     /// ------
     /// InputError
     ///     An argument of another shape or type, a scene or frame that the model refuses.
-    #[pyo3(signature = (frames, engine = "golden", *, cross_check = 1))]
+    #[pyo3(signature = (frames, engine = "golden", *, cross_check = 1, times_ns = None))]
     fn reconstruct<'py>(
         &self,
         py: Python<'py>,
         frames: &Bound<'py, PyAny>,
         engine: &str,
         cross_check: u64,
+        times_ns: Option<Vec<i64>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let name = EngineName::software(engine).map_err(model)?;
-        let Frames { frames, single } = self::frames(&self.spec, frames)?;
+        let Frames { mut frames, single } = self::frames(&self.spec, frames)?;
+        if let Some(times_ns) = times_ns {
+            let (own, wanted) = (times_ns.len(), frames.len());
+            if single || own != wanted {
+                let of =
+                    if single { "one frame without an axis of time".to_owned() } else { format!("{wanted} frames") };
+                return Err(input(format!("times_ns has {own} values for {of}")));
+            }
+            frames.iter_mut().zip(times_ns).for_each(|(frame, ns)| frame.time_ns = Some(ns));
+        }
         let engine = py.detach(|| self.engines.engine(name, &self.spec, &frames)).map_err(model)?;
         if single {
             let result = py.detach(|| engine::result(&engine, &frames, cross_check > 0)).map_err(model)?;
-            return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), self.lengths()))?.into_any());
+            let time_ns = frames.last().and_then(|last| last.time_ns);
+            return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), time_ns, self.lengths()))?.into_any());
         }
         let engine = engine.engine();
         let mut checks = StreamChecks::new(engine, CheckPace::Every(cross_check));
@@ -229,13 +243,14 @@ impl Scene {
             let result = checks.next(engine, frames).map_err(engine::typed)?;
             anyhow::Ok(Arc::new(result))
         };
-        let mut results = Vec::new();
+        let (mut results, mut times_ns) = (Vec::new(), Vec::new());
         for frames in self.spec.input.frames_of_results(&frames) {
+            times_ns.push(frames.last().and_then(|last| last.time_ns));
             results.push(py.detach(|| next(self.spec.input.newest(frames))).map_err(model)?);
             // Ctrl-C ends a long call.
             py.check_signals()?;
         }
-        Ok(Bound::new(py, Reconstructions::new(results, self.lengths()))?.into_any())
+        Ok(Bound::new(py, Reconstructions::new(results, times_ns, self.lengths()))?.into_any())
     }
 
     /// Reconstruct frames that do not depend on each other, on all cores.
@@ -284,7 +299,8 @@ impl Scene {
             // Ctrl-C ends a long call.
             py.check_signals()?;
         }
-        Ok(Reconstructions::new(results, self.lengths()))
+        let times_ns = vec![None; results.len()];
+        Ok(Reconstructions::new(results, times_ns, self.lengths()))
     }
 
     /// Begin to reconstruct the frames of a sensor in the order of time, one by one.

@@ -45,27 +45,34 @@ impl Tracker {
     /// ----------
     /// frame : array of shape (rows, cols), or Frame
     ///     As for Scene.reconstruct.
+    /// time_ns : int, optional
+    ///     When it was acquired, in nanoseconds of any clock, such as time.time_ns(); default: the Frame's own.
     ///
     /// Returns
     /// -------
     /// Reconstruction or None
-    ///     None where input.average = k, until the last of 2^k frames.
+    ///     None where input.average = k, until the last of 2^k frames; time_ns is that of the last frame.
     ///
     /// Raises
     /// ------
     /// InputError
     ///     An array of another shape, a frame that the model refuses, which has no part in the results; a closed tracker.
-    fn push(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Reconstruction>> {
+    #[pyo3(signature = (frame, *, time_ns = None))]
+    fn push(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_ns: Option<i64>) -> PyResult<Option<Reconstruction>> {
         let Frames { mut frames, single } = frames(&self.scene, frame)?;
         let frame: Stress =
             frames.pop().filter(|_| single).ok_or_else(|| input("frame: a tracker takes one at a time"))?;
+        let frame = Stress { time_ns: time_ns.or(frame.time_ns), ..frame };
         let result = py.detach(|| {
             let mut checks = self.checks.lock().unwrap_or_else(PoisonError::into_inner);
             let checks = checks.as_mut().ok_or_else(|| input("the tracker is closed"))?;
             checks.push(self.engine.engine(), frame).map_err(|error| model(typed(error)))
         })?;
         let lengths = [self.scene.sensor.rows, self.scene.sensor.cols];
-        Ok(result.map(|(_, result)| Reconstruction::new(Arc::new(result), lengths)))
+        let timed = |(frames, result): (Vec<Stress>, _)| {
+            Reconstruction::new(Arc::new(result), frames.last().and_then(|last| last.time_ns), lengths)
+        };
+        Ok(result.map(timed))
     }
 
     /// Forget the frames so far: the next one is the first.

@@ -246,6 +246,58 @@ def test_a_batch_reads_the_array_where_it_stands() -> None:
     assert len(results) == 4000 and most < stress.nbytes / 10, most
 
 
+def test_times_go_through_to_the_nanosecond() -> None:
+    # A float would lose the last digits.
+    first_ns = 1_732_770_000_020_000_003
+    stress = growing(4)
+    times = [first_ns + k for k in range(4)]
+    scene = dermis.Scene.from_toml(SMALL + SEARCH)
+    results = scene.reconstruct(stress, times_ns=times)
+    assert results.times_ns is not None and results.times_ns.dtype == np.int64
+    assert results.times_ns.tolist() == times == [result.time_ns for result in results]
+    assert results[-1].time_ns == times[-1] and scene.reconstruct(stress, times_ns=np.array(times))[1].time_ns == times[1]
+    assert scene.reconstruct(stress).times_ns is None and scene.reconstruct(stress[0]).time_ns is None
+    for average, wanted in [("average = 1\n", times[1::2]), ('average = 1\nmean = "sliding"\n', times)]:
+        blocks = dermis.Scene.from_toml(SMALL + SEARCH + "[input]\n" + average)
+        given = blocks.reconstruct(stress, times_ns=times).times_ns
+        assert given is not None and given.tolist() == wanted
+        with blocks.tracker() as tracker:
+            pushed = [tracker.push(frame, time_ns=time) for frame, time in zip(stress, times)]
+        assert [result.time_ns for result in pushed if result is not None] == wanted
+    with scene.tracker() as tracker:
+        for frame in stress[:2]:
+            result = tracker.push(frame)
+            assert result is not None and result.time_ns is None
+    for wrong, text in [(times[:3], "times_ns has 3 values for 4 frames"), (times + times, "8 values for 4 frames")]:
+        with pytest.raises(dermis.InputError, match=text):
+            scene.reconstruct(stress, times_ns=wrong)
+    with pytest.raises(dermis.InputError, match="times_ns has 1 values for one frame without an axis of time"):
+        scene.reconstruct(stress[0], times_ns=times[:1])
+    with pytest.raises(TypeError):
+        scene.reconstruct(stress, times_ns=np.array(times, dtype=float))
+
+
+def test_frames_of_a_file_have_its_times(tmp_path: Path) -> None:
+    path = tmp_path / "frames.csv"
+    rows = [f"2024-11-28T05:00:00.02000000{k},{','.join(['0.1'] * 64)}" for k in range(3)]
+    path.write_text("time," + ",".join(f"t{k}" for k in range(64)) + "\n" + "\n".join(rows) + "\n")
+    scene = dermis.Scene.from_toml(SMALL + SEARCH)
+    frames = scene.load_frames(path)
+    wanted = [1_732_770_000_020_000_000 + k for k in range(3)]
+    assert [frame.time_ns for frame in frames] == wanted
+    times = scene.reconstruct(frames).times_ns
+    assert times is not None and times.tolist() == wanted
+    assert scene.reconstruct(frames[1]).time_ns == wanted[1]
+    with scene.tracker() as tracker:
+        result = tracker.push(frames[2])
+        assert result is not None and result.time_ns == wanted[2]
+        result = tracker.push(frames[2], time_ns=-5)
+        assert result is not None and result.time_ns == -5
+    kept = tmp_path / "one.json"
+    kept.write_text(frames[1].to_json())
+    assert dermis.Frame.load(kept).time_ns == wanted[1]
+
+
 def test_a_tracker_has_the_history_of_a_stream() -> None:
     scene = dermis.Scene.from_toml(SMALL)
     stress = growing(12)

@@ -386,6 +386,13 @@ void dermis_result_free(dermis_result *result);
 dermis_status dermis_result_resultant(const dermis_result *result, double *force_N);
 
 /**
+ * Write when the last frame of the result was acquired to time_ns, as dermis_stream_push_at was told; of a block it is the last
+ * of its frames. DERMIS_STATUS_ABSENT if that was not stated.
+ */
+dermis_status dermis_result_time(const dermis_result *result,
+                                 int64_t *time_ns);
+
+/**
  * Write the force on each taxel in N to fx_N, fy_N and fz_N, which have room for as many values as there are taxels.
  * DERMIS_STATUS_ABSENT if the result has resultants only: output.forces = "resultants" in the scene, or a frame sent for its
  * resultants.
@@ -465,6 +472,16 @@ dermis_status dermis_stream_push(dermis_stream *stream,
                                  const double *stress_MPa,
                                  size_t count,
                                  dermis_result **result);
+
+/**
+ * As dermis_stream_push, of a frame that was acquired at time_ns: nanoseconds since 1970, or of any clock of the caller's.
+ * dermis_result_time gives it back to the nanosecond.
+ */
+dermis_status dermis_stream_push_at(dermis_stream *stream,
+                                    const double *stress_MPa,
+                                    size_t count,
+                                    int64_t time_ns,
+                                    dermis_result **result);
 
 /**
  * Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene

@@ -9,6 +9,7 @@
 //! | missing | list of taxels | – | ascending |
 //! | cell forces | 3 × taxels | N | finite, on the body |
 //! | resultant | 3 | N | finite, [x, y, normal] of the whole contact |
+//! | time of acquisition | – | ns | whole; since 1970, or since a moment that the file does not say |
 //!
 //! A loaded frame is finite and has as many stresses as its sensor has taxels; [`Frame::check`] compares its sensor
 //! with the scene's.
@@ -104,6 +105,8 @@ pub struct Frame {
     pub stress_MPa: Vec<f64>,
     /// Taxels without a reading in this frame: row-major indices, ascending.
     pub missing: Vec<usize>,
+    /// When the stress was read, in ns since 1970 ([`is_date`](crate::data::text::is_date)) or since a moment that is not stated, if known.
+    pub time_ns: Option<i64>,
     /// Remarks of the frame's author.
     pub notes: Option<String>,
 }
@@ -142,6 +145,7 @@ impl Frame {
             cell_forces_N: None,
             stress_MPa,
             missing: Vec::new(),
+            time_ns: None,
             notes: None,
         };
         frame.with_missing(id)
@@ -186,6 +190,7 @@ impl Frame {
             cell_forces_N: None,
             stress_MPa: (0..sensor.taxels()).map(stress).collect(),
             missing: Vec::new(),
+            time_ns: None,
             notes: None,
         }
     }

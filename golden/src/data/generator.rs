@@ -108,6 +108,7 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         cell_forces_N: Some(cell_forces),
         stress_MPa,
         missing: Vec::new(),
+        time_ns: None,
         notes: None,
     })
 }

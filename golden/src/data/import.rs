@@ -1,7 +1,7 @@
 //! Import: recordings of real pressure arrays become a scene and frames.
 //!
 //! ```text
-//! file ── format ── tekscan │ lst │ npy │ xsensor │ csv ── readings ── correction ── crop ── ÷ units per MPa ┬─ scene, dead taxels
+//! file ── format ── tekscan │ lst │ npy │ … │ csv ── readings ── correction ── crop ── ÷ units per MPa ┬─ scene, dead taxels
 //!                                                                                                            ├─ frames
 //!                                                                                                            └─ summary: codes, noise, closure
 //! ```
@@ -12,6 +12,9 @@
 //! | novel LST | `Pict-No` | size, pitch, force per picture | |
 //! | XSENSOR CSV | `SENSELS` | size, pitch, unit, force | |
 //! | novel pliance and pedar `.asc`, BodiTrak CSV | their headers | unit, times | size, pitch |
+//! | serial bytes of a FlexiTac | marks `AA 55` at equal distances | width of a count | size, pitch, full scale |
+//! | PaXini PXSR CSV | `Timestamp`, `-NxN-Z[` | forces of the taxels and of the sensor, times | size, pitch; sensor, of several |
+//! | XELA server, JSON lines | `message`, `taxels` | forces or counts, times | size, pitch; sensor, of several; full scale of counts |
 //! | NumPy `.npy` | first six bytes | size | unit, pitch |
 //! | lines of numbers | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch; layout where it can be read in two ways |
 //!
@@ -23,12 +26,14 @@ mod correction;
 mod crop;
 mod csv;
 mod error;
+mod flexitac;
 mod folder;
 mod format;
 mod loggers;
 mod lst;
 mod measure;
 mod npy;
+mod paxini;
 mod recording;
 mod scene;
 mod shipped;
@@ -36,7 +41,9 @@ mod summary;
 mod tekscan;
 #[cfg(test)]
 mod tests;
+mod triaxial;
 mod units;
+mod xela;
 mod xsensor;
 
 pub use correction::Correction;
@@ -91,6 +98,8 @@ pub struct Settings {
     pub partial: bool,
     /// Layout of the lines of a plain text.
     pub layout: Stated,
+    /// Name of the sensor, of a file with several.
+    pub sensor: Option<String>,
     /// Zero, sign and orientation of the readings, which the file has otherwise.
     pub correction: Correction,
 }
@@ -154,9 +163,9 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     let frames_in_file = recording.frames.len();
     settings.correction.apply(&mut recording, &source)?;
     select(&mut recording, settings.frames, &source)?;
-    let (unit, per_MPa) = scale(&recording, settings, &source)?;
-    let pitch = settings.pitch_mm.or(recording.pitch_mm);
-    let pitch = pitch.ok_or_else(|| source.missing("the pitch", "give it with --pitch X,Y in mm"))?;
+    let stated_mm = settings.pitch_mm.or(recording.pitch_mm);
+    let (unit, per_MPa) = scale(&recording, settings, stated_mm, &source)?;
+    let pitch = stated_mm.ok_or_else(|| missing_pitch(&source))?;
     let window = crop::window(&recording, settings.crop, &source)?;
     let bare_mm = BARE_DEPTH * pitch[0].min(pitch[1]);
     let sensor = Sensor {
@@ -241,11 +250,17 @@ impl Settings {
 
 /// Reads the file in its format.
 fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
+    if bytes.starts_with(format::HDF5_MAGIC) {
+        return Err(ImportError::Hdf5 { file: file.to_string() });
+    }
     let format = settings.format.or_else(|| Format::of(file, bytes));
     match format.ok_or_else(|| ImportError::Unrecognised { file: file.to_string() })? {
         Format::Tekscan => tekscan::parse(&decoded(bytes), source),
         Format::Lst => lst::parse(&decoded(bytes), source),
         Format::Xsensor => xsensor::parse(&decoded(bytes), source),
+        Format::Flexitac => flexitac::parse(bytes, settings.size, source),
+        Format::Paxini => paxini::parse(&decoded(bytes), settings.size, settings.sensor.as_deref(), source),
+        Format::Xela => xela::parse(&decoded(bytes), settings.size, settings.sensor.as_deref(), source),
         Format::Npy => npy::parse(bytes, settings.size, source),
         Format::Csv => csv::parse(&decoded(bytes), settings.size, &settings.layout, source),
     }
@@ -268,14 +283,28 @@ fn select(recording: &mut Recording, wanted: Option<[usize; 2]>, source: &Source
     Ok(())
 }
 
+fn missing_pitch(source: &Source) -> ImportError {
+    source.missing("the pitch", "give it with --pitch X,Y in mm")
+}
+
 /// The unit of the readings and its number per MPa.
-fn scale(recording: &Recording, settings: &Settings, source: &Source) -> Result<(Unit, f64), ImportError> {
+fn scale(
+    recording: &Recording,
+    settings: &Settings,
+    pitch_mm: Option<[f64; 2]>,
+    source: &Source,
+) -> Result<(Unit, f64), ImportError> {
     let unit = settings
         .unit
         .or(recording.unit)
         .ok_or_else(|| source.missing("the unit", format!("give it with --units, one of {}", Unit::names())))?;
     if let Some(per_MPa) = unit.per_MPa() {
         return Ok((unit, per_MPa));
+    }
+    if unit == Unit::Newton {
+        // 1 MPa is 1 N on each mm² of a taxel.
+        let [x_mm, y_mm] = pitch_mm.ok_or_else(|| missing_pitch(source))?;
+        return Ok((unit, x_mm * y_mm));
     }
     let counts = "raw counts have no stress; give that of the largest count in MPa with --full-scale";
     let full_scale_MPa = settings.full_scale_MPa.ok_or_else(|| source.missing("the full scale", counts))?;

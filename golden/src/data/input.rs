@@ -11,6 +11,7 @@
 //! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`](crate::spec::sliding) |
 //! | `mean = "adaptive"` | the same, of a length that follows how fast readings change, [`adaptive`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
+//! | `curve = [[u, b], …]` | the characteristic that follows the table, b = c(gain · (reading − zero)), [`curve`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::physics::matrices::Matrices::without`] |
 //! | `zero = "running"` | the zero of each taxel follows its readings while nothing presses, [`running_zero`] |
@@ -25,6 +26,7 @@
 pub mod adaptive;
 pub mod calibration;
 pub mod change_noise;
+pub mod curve;
 pub mod drift;
 pub mod known_loads;
 pub mod means;
@@ -39,6 +41,7 @@ pub mod unloaded;
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::{InputSpec, MeanKind, Scene};
 use calibration::{Calibration, CalibrationError};
+use curve::Curve;
 use means::Means;
 use memory::{Averaged, Memory};
 use missing::mean_reading;
@@ -51,6 +54,8 @@ use thiserror::Error;
 pub struct Input {
     /// Zero and gain of each taxel, if the scene has a table or a tare frame.
     scale: Option<(Vec<f64>, Vec<f64>)>,
+    /// The characteristic behind it, where it is not straight.
+    curve: Option<Curve>,
     /// Standard deviation of a calibrated frame in MPa as the scene states it, else 0.
     stated_noise_MPa: f64,
     /// The same of each taxel, from tare frames, and the number of those; `None` where the scene states it.
@@ -97,7 +102,8 @@ impl Input {
         let stated_noise_MPa = scene.search.noise_floor_MPa();
         let largest_gain = scene.hardware.largest_gain(table.as_ref().map(|table| table.gain.as_slice()));
         let (cols, spec) = (scene.sensor.cols, spec.clone());
-        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, cols, largest_gain, spec };
+        let curve = Curve::new(&spec.curve);
+        let input = Input { scale: None, curve, stated_noise_MPa, taxel_noise_MPa: None, cols, largest_gain, spec };
         if table.is_none() && tare.is_none() {
             return Ok(input);
         }
@@ -105,7 +111,9 @@ impl Input {
         let Some(Tare { zero, spread, frames: taken }) = tare else {
             return Ok(Input { scale: Some((offset, gain)), ..input });
         };
-        let noise = |spread: Vec<f64>| (spread.iter().zip(&gain).map(|(s, gain)| s * gain.abs()).collect(), taken);
+        let slope = input.slope_without_load();
+        let noise =
+            |spread: Vec<f64>| (spread.iter().zip(&gain).map(|(s, gain)| s * gain.abs() * slope).collect(), taken);
         let taxel_noise_MPa = spread.filter(|_| stated_noise_MPa == 0.0).map(noise);
         Ok(Input { taxel_noise_MPa, scale: Some((zero, gain)), ..input })
     }
@@ -247,7 +255,18 @@ impl Input {
 
     /// The reading of a taxel whose calibrated stress is `stress_MPa`.
     fn reading(&self, taxel: usize, stress_MPa: f64) -> f64 {
+        let stress_MPa = self.curve.as_ref().map_or(stress_MPa, |curve| curve.straight_MPa(stress_MPa));
         self.scale.as_ref().map_or(stress_MPa, |(zero, gain)| stress_MPa / gain[taxel] + zero[taxel])
+    }
+
+    /// The stress of a calibrated value, by the scene's curve.
+    fn curved(&self, straight_MPa: f64) -> f64 {
+        self.curve.as_ref().map_or(straight_MPa, |curve| curve.stress_MPa(straight_MPa))
+    }
+
+    /// Stress over calibrated value without load.
+    fn slope_without_load(&self) -> f64 {
+        self.curve.as_ref().map_or(1.0, Curve::slope_without_load)
     }
 
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
@@ -257,7 +276,8 @@ impl Input {
 
     /// Limit of a running zero in readings; `None` where zeros are fixed.
     fn zero_limit(&self) -> Option<f64> {
-        self.spec.running_zero().map(|running| running.limit_MPa / self.largest_gain)
+        let per_reading = self.largest_gain * self.slope_without_load();
+        self.spec.running_zero().map(|running| running.limit_MPa / per_reading)
     }
 
     /// The largest share of the stated full scale that the frames of one reconstruction reach; `None` if the scene
@@ -275,7 +295,7 @@ impl Input {
             let stress = |k: usize| {
                 let reading = frame.stress_MPa[k];
                 let code = largest_gain * reading.abs().max(zero(k).abs());
-                code.max((gain(k) * (reading - zero(k))).abs())
+                code.max(self.curved(gain(k) * (reading - zero(k))).abs())
             };
             (0..frame.stress_MPa.len()).filter(live).map(stress).fold(0.0, f64::max) / full_scale_MPa
         };
@@ -298,7 +318,7 @@ impl Input {
     }
 
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
-    /// frame. Dead taxels become 0.
+    /// frame, behind them the curve. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
         #[cfg(test)]
         tests::CALIBRATIONS.with(|count| count.set(count.get() + 1));
@@ -307,6 +327,9 @@ impl Input {
             for (b, (zero, gain)) in frame.stress_MPa.iter_mut().zip(zero.iter().zip(gain)) {
                 *b = gain * (*b - zero);
             }
+        }
+        if self.curve.is_some() {
+            frame.stress_MPa.iter_mut().for_each(|b| *b = self.curved(*b));
         }
         frame.mask_dead(&self.spec.dead)
     }

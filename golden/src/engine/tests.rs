@@ -44,6 +44,38 @@ fn search_is_warned_of_baseline_and_stuck_taxel() {
     }
 }
 
+/// Zeros that have moved, all alike, by a share of the peak: a press keeps its normal force, or a flag says that the fit failed. It is
+/// never an array without contact.
+#[test]
+fn a_press_over_zeros_that_moved_is_not_lost() {
+    let text = "[sensor]\nrows = 6\ncols = 6\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 2\n\
+                [input]\nfull_scale_MPa = 2\n[search]\nnoise_floor_MPa = NOISE\n";
+    let bare = Scene::parse(&text.replace("NOISE", "0"), "pad.toml").unwrap();
+    let draws = Draws::new(&bare, DrawOptions { seed: 5, ..Default::default() }).unwrap();
+    let failed = [Flag::Misfit, Flag::LoadMismatch, Flag::MuAtBound, Flag::EstimatesDiffer, Flag::ShearUnreliable];
+    for number in 0..6 {
+        let drawn = draws.frame(number).unwrap();
+        let (peak_MPa, true_N) = (drawn.peak_MPa(), drawn.total_N[2]);
+        let noise = format!("{:e}", 5e-4 * peak_MPa);
+        let scene = Scene::parse(&text.replace("NOISE", &noise), "pad.toml").unwrap();
+        let golden: Box<dyn Engine> = Box::new(Golden::new(&scene).unwrap());
+        let engines = [golden, Box::new(Model::new(&scene).unwrap())].map(CheckedEngine::new);
+        for share in [-0.03, -0.01, -0.005, 0.02] {
+            let stress_MPa = drawn.frame.stress_MPa.iter().map(|b| b + share * peak_MPa).collect();
+            let moved = Frame::from_stress("moved", &scene.sensor, stress_MPa).unwrap();
+            for (k, checked) in engines.iter().enumerate() {
+                let result = checked.result(std::slice::from_ref(&moved), true).unwrap();
+                let normal_N = result.resultant_N[2];
+                let is_near = (normal_N / true_N - 1.0).abs() < 0.15;
+                let is_told = failed.iter().any(|flag| result.flags.contains(flag));
+                let what =
+                    format!("frame {number}, engine {k}, {share}: {normal_N} N of {true_N} N, {:?}", result.flags);
+                assert!(normal_N > 0.0 && !result.flags.contains(&Flag::NoContact) && (is_near || is_told), "{what}");
+            }
+        }
+    }
+}
+
 /// A force that is not that of the readings: the seeded fault is one of the result, not of the readings.
 #[test]
 fn another_force_than_that_of_evidence_is_flagged() {

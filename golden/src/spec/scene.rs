@@ -42,7 +42,7 @@ use crate::spec::sliding;
 use adc_scan::ScanFields;
 use estimator::FORMER_NAMES;
 use field::{choice, nested, table, whole, File, Flag, Kind as _, Limits, Listed, Number};
-use kinds::{BoardName, DeadTaxels};
+use kinds::{BoardName, DeadTaxels, Knots};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -430,6 +430,9 @@ table! {
             .hardware("`\"block\"`, `\"sliding\"`");
         /// Table of the taxels' offsets and gains: a file, relative to the scene.
         calibration: Option<PathBuf> = File.optional("none").page("files");
+        /// Characteristic common to all taxels, behind the table, where it is curved: \[MPa by the table, MPa\] each, both rising,
+        /// \[0, 0\] among them; between them a monotone cubic.
+        curve: Vec<[f64; 2]> = Knots.or(Vec::new()).hardware("none").page("files");
         /// Frames without contact, a file or folder, relative to the scene: their mean is the zero, the spread of 8 or more the noise
         /// of each taxel.
         tare: Option<PathBuf> = File.optional("none").page("files");

@@ -60,6 +60,8 @@ impl From<FoundContact> for dermis_contact {
 /// The forces of one frame. Any number of threads may read one at the same time.
 pub struct dermis_result {
     source: Source,
+    /// When its last frame was acquired, in ns, if the caller stated it.
+    time_ns: Option<i64>,
     json: OnceLock<CString>,
 }
 
@@ -74,12 +76,17 @@ enum Source {
 impl dermis_result {
     /// The result of a model, or of a board that sent all forces.
     pub fn of_model(result: Reconstruction) -> dermis_result {
-        dermis_result { source: Source::Reconstruction(Box::new(result)), json: OnceLock::new() }
+        dermis_result { source: Source::Reconstruction(Box::new(result)), time_ns: None, json: OnceLock::new() }
     }
 
     /// The result of a board that sent resultants.
     pub fn of_board(answer: PhysicalAnswer) -> dermis_result {
-        dermis_result { source: Source::Answer(Box::new(answer)), json: OnceLock::new() }
+        dermis_result { source: Source::Answer(Box::new(answer)), time_ns: None, json: OnceLock::new() }
+    }
+
+    /// The same of frames of which the last was acquired at that time in ns.
+    pub(crate) fn at(self, time_ns: Option<i64>) -> dermis_result {
+        dermis_result { time_ns, ..self }
     }
 
     pub(crate) fn into_raw(self) -> *mut dermis_result {
@@ -141,6 +148,18 @@ pub unsafe extern "C" fn dermis_result_resultant(result: *const dermis_result, f
     guarded(|| {
         let result = unsafe { reference("result", result) }?;
         copy(&result.resultant_N(), unsafe { room("force_N", force_N, 3) }?);
+        Ok(())
+    })
+}
+
+/// Write when the last frame of the result was acquired to time_ns, as dermis_stream_push_at was told; of a block it is the last
+/// of its frames. DERMIS_STATUS_ABSENT if that was not stated.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_result_time(result: *const dermis_result, time_ns: *mut i64) -> dermis_status {
+    guarded(|| {
+        let place = unsafe { place("time_ns", time_ns) }?;
+        let time_ns = unsafe { reference("result", result) }?.time_ns;
+        place.write(time_ns.ok_or_else(|| Error::absent("time of acquisition"))?);
         Ok(())
     })
 }

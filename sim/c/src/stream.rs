@@ -10,6 +10,7 @@
 use std::ffi::c_char;
 use std::path::Path;
 
+use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_sim::engine::{typed, EngineName};
 
@@ -78,6 +79,30 @@ pub unsafe extern "C" fn dermis_stream_push(
     count: usize,
     result: *mut *mut dermis_result,
 ) -> dermis_status {
+    unsafe { push(stream, stress_MPa, count, None, result) }
+}
+
+/// As dermis_stream_push, of a frame that was acquired at time_ns: nanoseconds since 1970, or of any clock of the caller's.
+/// dermis_result_time gives it back to the nanosecond.
+#[no_mangle]
+pub unsafe extern "C" fn dermis_stream_push_at(
+    stream: *mut dermis_stream,
+    stress_MPa: *const f64,
+    count: usize,
+    time_ns: i64,
+    result: *mut *mut dermis_result,
+) -> dermis_status {
+    unsafe { push(stream, stress_MPa, count, Some(time_ns), result) }
+}
+
+/// Take the next frame, with the time of its acquisition if that is stated.
+unsafe fn push(
+    stream: *mut dermis_stream,
+    stress_MPa: *const f64,
+    count: usize,
+    time_ns: Option<i64>,
+    result: *mut *mut dermis_result,
+) -> dermis_status {
     guarded(|| {
         let result = unsafe { place("result", result) }?;
         result.write(std::ptr::null_mut());
@@ -87,8 +112,9 @@ pub unsafe extern "C" fn dermis_stream_push(
         let frame = frame.filter(|_| others == 0).ok_or_else(|| {
             Error::input(format!("count = {count} is not allowed; a stream takes one frame at a time"))
         })?;
-        if let Some((_, found)) = checks.push(&**engine, frame).map_err(typed)? {
-            result.write(dermis_result::of_model(found).into_raw());
+        if let Some((frames, found)) = checks.push(&**engine, Frame { time_ns, ..frame }).map_err(typed)? {
+            let time_ns = frames.last().and_then(|last| last.time_ns);
+            result.write(dermis_result::of_model(found).at(time_ns).into_raw());
         }
         Ok(())
     })

@@ -6,11 +6,11 @@ use std::str::FromStr;
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::input::known_loads::{KnownLoad, LoadFit, Residual};
+use dermis_golden::data::input::known_loads::{Curvature, KnownLoad, LoadFit, Residual};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 use serde::Serialize;
-use toml_edit::Value;
+use toml_edit::{Array, Value};
 
 use super::layout::LayoutArguments;
 use super::scene_file::{has_file, lines, state, Measured};
@@ -25,7 +25,8 @@ use crate::report;
 A recording is a text with one frame per line or one row per line, as a stream has them, an MCAP file, a JSON frame, or a folder of such files,
 in the unit of the readings. Each must be taken under the same stress on every taxel, as air pressure on a foil applies it. With three loads
 or more each is left out once, and the table of the others is compared with it. The table is what `input.calibration`
-reads; that field and those of full scale, dead taxels and noise are written into the file of the scene, where all else
+reads. Where the readings are no straight lines, and four loads or more, one of them 0, show it, `input.curve` has their characteristic,
+which the hardware does not take. These fields and those of full scale, dead taxels and noise are written into the file of the scene, where all else
 stays.")]
 pub struct Arguments {
     /// Built-in name or path of the scene that defines the sensor.
@@ -71,6 +72,7 @@ struct Answer<'a> {
     least_full_scale_MPa: f64,
     saturated_MPa: &'a [f64],
     curved_share: Option<f64>,
+    curvature: &'a Option<Curvature>,
     dead: &'a [[usize; 2]],
     offset: &'a [f64],
     gain: &'a [f64],
@@ -116,6 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         least_full_scale_MPa: fit.full_scale_MPa,
         saturated_MPa: &fit.saturated_MPa,
         curved_share: fit.curved_share(),
+        curvature: &fit.curvature,
         dead: &fit.dead,
         offset: &fit.table.offset,
         gain: &fit.table.gain,
@@ -135,6 +138,9 @@ fn fields(fit: &LoadFit, scene: &Scene, arguments: &Arguments) -> Result<Vec<Mea
     if let Some(out) = &arguments.out {
         let table = beside_scene(out, Path::new(&arguments.scene))?;
         fields.push(Measured::new("input", "calibration", table, "from readings under known loads"));
+    }
+    if let Some(curve) = curve(fit, scene)? {
+        fields.push(Measured::new("input", "curve", curve, "the characteristic behind the table, [MPa by it, MPa]"));
     }
     // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
     let least = (fit.full_scale_MPa * (1.0 - ROUNDING) / STEP).ceil() * STEP;
@@ -159,6 +165,18 @@ fn fields(fit: &LoadFit, scene: &Scene, arguments: &Arguments) -> Result<Vec<Mea
         fields.push(Measured::new("search", "noise_floor_MPa", noise_MPa, "of one frame, as these loads show it"));
     }
     Ok(fields)
+}
+
+/// The knots of a curved characteristic; none in place of an older curve.
+fn curve(fit: &LoadFit, scene: &Scene) -> Result<Option<Value>> {
+    let Some(Curvature { knots, .. }) = &fit.curvature else {
+        return Ok((!scene.input.curve.is_empty()).then(|| Value::Array(Array::new())));
+    };
+    let knot = |knot: &[f64; 2]| -> Result<Value> {
+        let figures = knot.iter().map(|figure| rounded(&format!("{figure:.5e}"))).collect::<Result<Array>>()?;
+        Ok(Value::Array(figures))
+    };
+    Ok(Some(Value::Array(knots.iter().map(knot).collect::<Result<Array>>()?)))
 }
 
 /// The number that is shown so.

@@ -18,7 +18,8 @@ use crate::report::document::percent_text;
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// Recording: Tekscan ASF or CSV, novel LST or .asc, XSENSOR or BodiTrak CSV, NumPy .npy, or lines of numbers.
+    /// Recording: Tekscan ASF or CSV, novel LST or .asc, XSENSOR, BodiTrak or PaXini CSV, XELA messages, FlexiTac bytes,
+    /// NumPy .npy, or lines of numbers.
     file: PathBuf,
     /// Folder for scene, frames and recording.json; default: recordings/NAME in the build folder.
     #[arg(long, value_name = "DIR")]
@@ -26,10 +27,10 @@ pub struct Arguments {
     /// Name of the scene; default: the file's.
     #[arg(long)]
     name: Option<String>,
-    /// Format, if it is not recognised: tekscan, lst, npy, xsensor or csv.
+    /// Format, if it is not recognised: tekscan, lst, npy, xsensor, flexitac, paxini, xela or csv.
     #[arg(long, value_name = "NAME", value_parser = format)]
     format: Option<Format>,
-    /// Unit of the readings: Pa, kPa, MPa, bar, mbar, N/cm2, psi, mmHg, kg/cm2, g/cm2 or raw; default: the file's.
+    /// Unit of the readings: Pa, kPa, MPa, bar, mbar, N/cm2, psi, mmHg, kg/cm2, g/cm2, N (on each taxel) or raw; default: the file's.
     #[arg(long, value_name = "UNIT", value_parser = unit)]
     units: Option<Unit>,
     /// Stress of the largest reading in MPa; raw counts need it.
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// Rows and columns of the array, for plain CSV and arrays of one line per frame.
     #[arg(long, value_name = "ROWSxCOLS")]
     size: Option<String>,
+    /// Sensor to read, where the file has several, as 0-1 (PaXini: channel and slot) or 2 (XELA).
+    #[arg(long, value_name = "NAME")]
+    sensor: Option<String>,
     /// Pitch in mm along columns and rows; default: the file's.
     #[arg(long, value_name = "X,Y")]
     pitch: Option<String>,
@@ -124,6 +128,8 @@ const EXAMPLES: &str = "Examples:
   dermis import press.npy --units kPa --pitch 2.5,2.5 --thickness 3
   dermis import log.csv --size 4x4 --units N/cm2 --pitch 5,5 --json
   dermis import glove.csv --size 4x4 --units raw --bits 12 --full-scale 0.1 --pitch 5,5 --invert --zero first:20
+  dermis import skin.bin --size 16x32 --full-scale 0.2 --pitch 2,2 --zero first:30 --partial
+  dermis import paxini.csv --sensor 0-1 --size 4x6 --pitch 3,3
   dermis import left.csv --size 4x4 --units kPa --pitch 5,5 --transpose --flip x
 
 Reads the size, pitch and unit that the file states. A sensel without a reading (B, NaN, empty) in any
@@ -178,6 +184,7 @@ impl Arguments {
             thickness_mm: self.thickness,
             partial: self.partial,
             layout,
+            sensor: self.sensor.clone(),
             correction: self.correction.correction(),
         })
     }

@@ -1,6 +1,6 @@
 //! What `dermis calibrate` prints: the fields of the scene, and the residuals of the loads.
 
-use dermis_golden::data::input::known_loads::LoadFit;
+use dermis_golden::data::input::known_loads::{Curvature, LoadFit};
 
 use super::document::percent_text;
 use super::table::{markdown, significant_digits};
@@ -13,10 +13,17 @@ pub fn calibration(fit: &LoadFit, stand: &str, fields: &str) -> String {
             "left out: the load of {stress_MPa} MPa, whose readings stand at the end of the converter's range\n"
         );
     }
-    if let Some(share) = fit.curved_share() {
+    if let Some(Curvature { line_share, ratio, .. }) = &fit.curvature {
+        let off = percent_text(*line_share);
+        text += &format!(
+            "curved: straight lines leave {off} of the range, {ratio:.0} times what the taxels' scatter explains; input.curve has the \
+             characteristic, which the floating-point model takes and the hardware does not\n"
+        );
+    } else if let Some(share) = fit.curved_share() {
         let off = percent_text(share);
         text += &format!(
-            "curved: the readings are no straight line of the load, off by {off} of the largest one; see below\n"
+            "curved: the readings are no straight line of the load, off by {off} of the largest one; see below. With four \
+             loads under which they rise, one of them 0, a curve is fitted\n"
         );
     }
     text += &format!("{stand}:\n\n{fields}");

@@ -171,6 +171,13 @@ fn prepare(work: &Path) {
     {
         fs::copy(recordings.join(file), work.join(name)).unwrap();
     }
+    // Frames of 16×32 counts, and of a sensor of 4×6 taxels that measures three axes.
+    fs::write(work.join("skin.bin"), [&[0xaa, 0x55][..], &[7; 512]].concat().repeat(40)).unwrap();
+    let axes = |of: String| ["X", "Y", "Z"].map(|axis| of.replace("AXIS", axis)).join(",");
+    let taxels: Vec<String> = (0..24).map(|k| axes(format!("0-1-NxN-AXIS[{k}]"))).collect();
+    let row = format!("09:41:07.250,0,0,48{}\n", ",0,0,2".repeat(24));
+    let log = format!("Timestamp,{},{}\n{}", axes("0-1-1x1-AXIS".into()), taxels.join(","), row.repeat(20));
+    fs::write(work.join("paxini.csv"), log).unwrap();
     for name in ["log.csv", "glove.csv", "left.csv"] {
         fs::write(work.join(name), "0,0,0,0,0,5,6,0,0,7,9,0,0,0,0,0\n".repeat(20)).unwrap();
     }

@@ -14,7 +14,7 @@ use dermis_hdl::manifest;
 /// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
 type Target = (&'static str, fn(&[u8]) -> bool);
 /// All readers.
-pub const TARGETS: [Target; 12] = [
+pub const TARGETS: [Target; 15] = [
     ("scene", scene),
     ("board", board),
     ("frame.json", json),
@@ -26,6 +26,9 @@ pub const TARGETS: [Target; 12] = [
     ("import.lst", |bytes| recording("fuzz.lst", Format::Lst, bytes)),
     ("import.npy", |bytes| recording("fuzz.npy", Format::Npy, bytes)),
     ("import.xsensor", |bytes| recording("fuzz.csv", Format::Xsensor, bytes)),
+    ("import.flexitac", |bytes| recording("fuzz.bin", Format::Flexitac, bytes)),
+    ("import.paxini", |bytes| recording("fuzz.csv", Format::Paxini, bytes)),
+    ("import.xela", |bytes| recording("fuzz.log", Format::Xela, bytes)),
     ("import.csv", |bytes| recording("fuzz.csv", Format::Csv, bytes)),
 ];
 
@@ -131,6 +134,7 @@ fn packets(bytes: &[u8]) -> bool {
 /// Imports a recording of 3×4 sensels, where its format does not state the size, in the format's unit or as counts.
 fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
     let plain = matches!(format, Format::Npy | Format::Csv);
+    let sized = matches!(format, Format::Flexitac | Format::Paxini | Format::Xela);
     // Some are corrected.
     let [corrected, turned] = [3, 5].map(|k| bytes.len().is_multiple_of(k));
     let zero_frames = corrected.then_some(1);
@@ -139,10 +143,11 @@ fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
     let settings = Settings {
         format: Some(format),
         // NumPy states the size, but for lines of sensels.
-        size: (plain && (format == Format::Csv || !bytes.len().is_multiple_of(2))).then_some([3, 4]),
+        size: (sized || plain && (format == Format::Csv || !bytes.len().is_multiple_of(2))).then_some([3, 4]),
         unit: plain.then_some(Unit::KiloPa),
-        pitch_mm: plain.then_some([2.0, 3.0]),
-        full_scale_MPa: (format == Format::Tekscan).then_some(1.0),
+        pitch_mm: (plain || sized).then_some([2.0, 3.0]),
+        full_scale_MPa: (sized || format == Format::Tekscan).then_some(1.0),
+        partial: sized && turned,
         correction,
         ..Settings::default()
     };

@@ -35,7 +35,7 @@ pub(super) fn parse_all(
     }
     let several = read.frames.len() > 1;
     let one = |own: crate::data::text::TextFrame| {
-        let frame = Frame::from_stress(stem, sensor, own.readings)?;
+        let frame = Frame { time_ns: own.time_ns, ..Frame::from_stress(stem, sensor, own.readings)? };
         let of = if several { format!("{file}, line {}", own.first_line) } else { file.to_string() };
         frame.check_missing(&of, scene)?;
         Ok(frame)

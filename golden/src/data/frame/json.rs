@@ -30,6 +30,8 @@ struct Raw {
     cell_forces_N: Option<Forces>,
     /// Stress in MPa, or readings that a calibration table turns into it, of all taxels, row-major; `null` for a missing reading.
     stress_MPa: Vec<Option<f64>>,
+    /// When it was acquired, in ns since 1970, or since any moment.
+    time_ns: Option<i64>,
     /// Anything else.
     notes: Option<String>,
 }
@@ -49,6 +51,8 @@ struct Written<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     cell_forces_N: Option<&'a Forces>,
     stress_MPa: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_ns: Option<i64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     notes: Option<&'a str>,
 }
@@ -71,6 +75,7 @@ impl Frame {
             cell_forces_N: self.cell_forces_N.as_ref(),
             // NaN is written as null.
             stress_MPa: self.readings(),
+            time_ns: self.time_ns,
             notes: self.notes.as_deref(),
         };
         // Numbers, texts and lists of them can always be written as JSON.
@@ -110,6 +115,7 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
         cell_forces_N: raw.cell_forces_N,
         stress_MPa: raw.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect(),
         missing: Vec::new(),
+        time_ns: raw.time_ns,
         notes: raw.notes,
     };
     frame.with_missing(file)

@@ -44,7 +44,9 @@ impl Recording {
                 continue;
             }
             let id = frame_name(&stem, count);
-            let frame = Frame::from_stress(&id, &scene.sensor, recorded.stress_MPa)?;
+            // A stamp of 0 states no time.
+            let time_ns = i64::try_from(recorded.time_ns).ok().filter(|ns| *ns > 0);
+            let frame = Frame { time_ns, ..Frame::from_stress(&id, &scene.sensor, recorded.stress_MPa)? };
             frame.check_missing(&format!("{file}:{count}"), Some(scene))?;
             found.push(frame);
             if found.len() * shape[0] * shape[1] > MOST_READINGS {
@@ -77,6 +79,15 @@ mod tests {
     use crate::data::recording::message::{Header, Image, Time};
     use crate::data::recording::{frame_messages, Kind, RecordingFile, Stamp};
 
+    /// Stamp of frame k from 0.
+    fn stamp_ns(k: usize) -> u64 {
+        if k == 0 {
+            0
+        } else {
+            1_732_770_000_020_000_000 + k as u64
+        }
+    }
+
     /// A recording of three frames of the scene, whose first taxel lacks a reading in the second one.
     fn recorded(path: &Path) -> (Scene, Vec<Frame>) {
         let scene = Scene::builtin("eight-by-eight").unwrap();
@@ -85,15 +96,18 @@ mod tests {
         lacking[0] = f64::NAN;
         frames[1] = Frame::from_stress("press-0002", &scene.sensor, lacking).unwrap();
         let mut file = RecordingFile::create(path).unwrap();
-        for frame in &frames {
-            let header = Header { stamp: Time::from(0), frame_id: "skin".into() };
+        for (k, frame) in frames.iter().enumerate() {
+            // The first frame has no time.
+            let header = Header { stamp: Time::from(stamp_ns(k)), frame_id: "skin".into() };
             for (topic, cdr) in frame_messages([8, 8], &header, &frame.readings()).unwrap() {
                 file.message(topic, Kind::of::<Image>(), Stamp { sequence: 0, logged: 0 }, &cdr).unwrap();
             }
         }
         file.finish().unwrap();
         let plain = |(k, frame): (usize, &Frame)| {
-            Frame::from_stress(&frame_name("press", k + 1), &scene.sensor, frame.readings()).unwrap()
+            let time_ns = (k > 0).then(|| stamp_ns(k) as i64);
+            let plain = Frame::from_stress(&frame_name("press", k + 1), &scene.sensor, frame.readings()).unwrap();
+            Frame { time_ns, ..plain }
         };
         let frames = frames.iter().enumerate().map(plain).collect();
         (scene, frames)

@@ -32,6 +32,12 @@ pub enum ImportError {
         /// Path as given.
         file: String,
     },
+    /// HDF5 has arrays of any names and shapes, and is not read.
+    #[error("{file}: HDF5 is not read; in Python: numpy.save(\"frames.npy\", h5py.File({file:?})[\"NAME\"][:]) writes the array NAME; then import frames.npy with --units, --pitch and, for a line of taxels per frame, --size")]
+    Hdf5 {
+        /// Path as given.
+        file: String,
+    },
     /// A text holds no frames of the array.
     #[error("{}", reason.in_file(file))]
     Text {

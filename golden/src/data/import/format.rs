@@ -5,6 +5,12 @@ use std::path::Path;
 use super::loggers;
 use serde::{Deserialize, Serialize};
 
+/// First bytes of an HDF5 file.
+pub(super) const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// Begin of a frame of a FlexiTac.
+pub(super) const MARK: &[u8] = b"\xaa\x55";
+/// Frames by which a file is recognised.
+const RECOGNISED_BY: usize = 3;
 /// First bytes of a NumPy file.
 pub(super) const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -20,22 +26,31 @@ pub enum Format {
     Npy,
     /// CSV of XSENSOR.
     Xsensor,
+    /// Serial bytes of a FlexiTac.
+    Flexitac,
+    /// CSV of PaXini's PXSR.
+    Paxini,
+    /// Messages of XELA's server.
+    Xela,
     /// Values separated by commas, semicolons, tabs or spaces, one frame per line.
     Csv,
 }
 
 impl Format {
     /// Every format with its name.
-    pub const ALL: [(&'static str, Format); 5] = [
+    pub const ALL: [(&'static str, Format); 8] = [
         ("tekscan", Format::Tekscan),
         ("lst", Format::Lst),
         ("npy", Format::Npy),
         ("xsensor", Format::Xsensor),
+        ("flexitac", Format::Flexitac),
+        ("paxini", Format::Paxini),
+        ("xela", Format::Xela),
         ("csv", Format::Csv),
     ];
 
     /// The names of all formats.
-    pub fn names() -> [&'static str; 5] {
+    pub fn names() -> [&'static str; 8] {
         Format::ALL.map(|(name, _)| name)
     }
 
@@ -62,6 +77,15 @@ impl Format {
         if has_line("SENSELS") && has_line("Rows") && has_line("Columns") {
             return Some(Format::Xsensor);
         }
+        if head.lines().next().is_some_and(is_paxini_header) {
+            return Some(Format::Paxini);
+        }
+        if head.lines().next().is_some_and(is_xela_message) {
+            return Some(Format::Xela);
+        }
+        if frame_bytes(bytes).is_some() {
+            return Some(Format::Flexitac);
+        }
         if loggers::of(&head).is_some() {
             return Some(Format::Csv);
         }
@@ -71,4 +95,27 @@ impl Format {
             _ => None,
         }
     }
+}
+
+/// Bytes of a FlexiTac's frame behind its mark, if a file begins with some of equal length.
+pub(super) fn frame_bytes(bytes: &[u8]) -> Option<usize> {
+    let body = bytes.strip_prefix(MARK)?;
+    let is_begin = |start: usize| bytes[start..].starts_with(MARK);
+    let ends = body.windows(MARK.len()).enumerate().filter(|(_, own)| *own == MARK).map(|(at, _)| at);
+    // The mark may stand within a frame.
+    ends.filter(|own| *own > 0).find(|own| {
+        (1..RECOGNISED_BY).all(|k| k * (own + MARK.len()) < bytes.len() && is_begin(k * (own + MARK.len())))
+    })
+}
+
+/// Whether a line is the header of PaXini's CSV.
+pub(super) fn is_paxini_header(line: &str) -> bool {
+    line.trim_start_matches(['\u{feff}', '"']).starts_with("Timestamp") && line.contains("-NxN-Z[")
+}
+
+/// Whether a line is a message of XELA's server with readings, or the greeting before them.
+pub(super) fn is_xela_message(line: &str) -> bool {
+    line.trim_start().starts_with('{')
+        && line.contains("\"message\"")
+        && (line.contains("\"taxels\"") || line.contains("Welcome"))
 }

@@ -138,6 +138,8 @@ pub(super) fn frames(
             device_N: raw.device.map(|figure| figure.force_N(area_mm2 / per_MPa)),
         };
         frame.source = Some(record.source());
+        // As the stamps of the recording, of which 0 states no time.
+        frame.time_ns = raw.time_s.map(|time_s| (time_s * 1e9).round() as i64).filter(|ns| *ns > 0);
         Ok((frame, record))
     };
     let all = recording.frames.iter().enumerate().map(frame).collect::<Result<Vec<_>, ImportError>>()?;

@@ -67,6 +67,63 @@ fn inverted_counts_are_told_by_the_level_without_load() {
     }
 }
 
+/// The same falling counts in every format that has counts: told in each, and with what is told the same stress.
+#[test]
+fn inverted_counts_are_told_and_turned_in_every_format() {
+    let count = |frame: i32, k: i32| 200 - k % 3 - if k == 5 { 50 * frame } else { 0 };
+    let frames: Vec<Vec<i32>> = (0..4).map(|frame| (0..16).map(|k| count(frame, k)).collect()).collect();
+    let joined = |row: &[i32]| row.iter().map(i32::to_string).collect::<Vec<_>>().join(",");
+    let lines: String = frames.iter().map(|frame| joined(frame) + "\n").collect();
+    let rows = |frame: &Vec<i32>| frame.chunks(4).map(|row| joined(row) + "\n").collect::<String>();
+    let grid = frames.iter().map(rows).collect::<Vec<_>>().join("\n");
+    let tekscan: String =
+        frames.iter().enumerate().map(|(k, frame)| format!("\nFrame {}\n{}", k + 1, rows(frame))).collect();
+    let tekscan =
+        format!("ROWS 4\nCOLS 4\nROW_SPACING 5 mm\nCOL_SPACING 5 mm\nUNITS RAW\nASCII_DATA @@\n{tekscan}@@\n");
+    let bytes: Vec<u8> = frames.concat().iter().map(|count| *count as u8).collect();
+    let npy = |shape: &str| {
+        let header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}\n");
+        [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &bytes].concat()
+    };
+    let serial: Vec<u8> = bytes.chunks(16).flat_map(|frame| [&[0xaa, 0x55][..], frame].concat()).collect();
+    let message = |frame: &Vec<i32>| {
+        let data: Vec<String> = frame.iter().map(|count| format!("0,0,{count:X}")).collect();
+        format!(
+            "{{\"message\": 1, \"1\": {{\"data\": \"{}\", \"taxels\": 16, \"calibrated\": null}}}}\n",
+            data.join(",")
+        )
+    };
+    let files = [
+        ("glove.csv", lines.into_bytes()),
+        ("grid.csv", grid.into_bytes()),
+        ("glove.asf", tekscan.into_bytes()),
+        ("frames.npy", npy("(4, 4, 4)")),
+        ("lines.npy", npy("(4, 16)")),
+        ("glove.bin", serial),
+        ("glove.log", frames.iter().map(message).collect::<String>().into_bytes()),
+    ];
+    let stated = Settings {
+        unit: Some(Unit::Raw),
+        bits: Some(8),
+        size: Some([4, 4]),
+        pitch_mm: Some([5.0, 5.0]),
+        ..counts_of(0.255)
+    };
+    let correction = Correction { zero_frames: Some(1), invert: true, ..Correction::default() };
+    for (file, bytes) in files {
+        let read = |settings: &Settings| import(file, &bytes, settings).map_err(|error| error.to_string()).unwrap();
+        let as_is = read(&stated).summary;
+        assert!(as_is.idle.unwrap().falls && as_is.idle_share() > Some(0.7), "{file}: {:?}", as_is.idle);
+        let turned = read(&Settings { correction, ..stated.clone() });
+        assert_eq!(turned.summary.idle_share(), None, "{file}");
+        for (k, frame) in turned.frames.iter().enumerate() {
+            let pressed = |b: &f64| (b * 1e3).round();
+            let wanted: Vec<f64> = (0..16).map(|taxel| if taxel == 5 { 50.0 * k as f64 } else { 0.0 }).collect();
+            assert_eq!(frame.stress_MPa.iter().map(pressed).collect::<Vec<_>>(), wanted, "{file}, frame {k}");
+        }
+    }
+}
+
 #[test]
 fn tekscan_in_kilopascal_around_the_foot() {
     let imported = import("fscan-walk.asf", FSCAN, &Settings { crop: Crop::Contact, ..Settings::default() }).unwrap();

@@ -8,6 +8,7 @@
 //! | `psi` | 145.037738 |
 //! | `mmHg` | 7500.6168 |
 //! | `kg/cm2`, `g/cm2` | 10.1971621, 10197.1621 |
+//! | `N` | the area of a taxel in mm²: a force on each |
 //! | `raw` | the largest count over the full scale, which the user states |
 //!
 //! Stress is the reading divided by this number: readings in kPa come out as the decimal fractions they are.
@@ -47,14 +48,17 @@ pub enum Unit {
     /// Gram-force per square centimetre.
     #[serde(rename = "g/cm2")]
     GramPerCm2,
+    /// Newton on each taxel.
+    #[serde(rename = "N")]
+    Newton,
     /// Counts of a converter.
     #[serde(rename = "raw")]
     Raw,
 }
 
 impl Unit {
-    /// Every unit with its name and its number per MPa; `None` for counts.
-    pub const ALL: [(&'static str, Unit, Option<f64>); 11] = [
+    /// Every unit with its name and its number per MPa; `None` for forces, of which it is the area of a taxel, and counts.
+    pub const ALL: [(&'static str, Unit, Option<f64>); 12] = [
         ("Pa", Unit::Pa, Some(1e6)),
         ("kPa", Unit::KiloPa, Some(1e3)),
         ("MPa", Unit::MegaPa, Some(1.0)),
@@ -65,6 +69,7 @@ impl Unit {
         ("mmHg", Unit::MmHg, Some(7_500.616_8)),
         ("kg/cm2", Unit::KgPerCm2, Some(10.197_162_1)),
         ("g/cm2", Unit::GramPerCm2, Some(10_197.162_1)),
+        ("N", Unit::Newton, None),
         ("raw", Unit::Raw, None),
     ];
 
@@ -103,7 +108,7 @@ impl Unit {
         Unit::ALL.iter().find(|(_, unit, _)| *unit == self).map_or("", |(name, ..)| name)
     }
 
-    /// Its number per MPa; `None` for counts.
+    /// Its number per MPa; `None` for forces and counts.
     pub fn per_MPa(self) -> Option<f64> {
         Unit::ALL.iter().find(|(_, unit, _)| *unit == self).and_then(|(.., per_MPa)| *per_MPa)
     }

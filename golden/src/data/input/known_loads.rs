@@ -10,6 +10,9 @@
 //! load in turn is left out, the table of the others is applied to its readings, and the difference from its stress is its
 //! residual. The smallest and the largest load are extrapolated then.
 //!
+//! Where a line leaves more than the taxels' scatter, the characteristic is curved: b = c(gain · (reading − offset)) with one monotone
+//! curve c for all taxels, [`fit`].
+//!
 //! A taxel counts in the frames that have its reading, and a load for the taxels that have one under it; a taxel with a reading
 //! under fewer than two different loads is dead.
 //!
@@ -20,19 +23,23 @@
 //! |---|---|---|
 //! | in: loads | stress, frames of readings | MPa, unit of the readings |
 //! | out: table | offset, gain per taxel | unit of the readings, MPa per unit |
+//! | out: curve | knots, if it is curved | MPa by the table, MPa |
 //! | out: residuals | mean, root mean square, largest per load | MPa |
 //! | out: noise | root mean square over the taxels, of one frame | MPa |
 //! | out: dead taxels | list | row, column |
+
+mod fit;
+
+pub use fit::Curvature;
 
 use super::calibration::Calibration;
 use super::missing::{mean_reading, readings};
 use crate::data::frame::{Frame, FrameError};
 use crate::spec::scene::Scene;
+use fit::{different, Characteristic, Mean};
 use serde::Serialize;
 use thiserror::Error;
 
-/// A taxel is dead where its reading changes by less than this share of the median taxel's, or the other way.
-const DEAD_SHARE: f64 = 0.1;
 /// Fewest loads for residuals: two for the table, one left out.
 const FEWEST_FOR_RESIDUALS: usize = 3;
 
@@ -72,6 +79,8 @@ pub struct Residual {
 pub struct LoadFit {
     /// Offset and gain of each taxel; a dead one has the median gain.
     pub table: Calibration,
+    /// The characteristic behind it, where it is curved.
+    pub curvature: Option<Curvature>,
     /// Taxels whose reading does not follow the load, [row, col].
     pub dead: Vec<[usize; 2]>,
     /// Standard deviation of a live taxel in one frame in MPa; `None` if no load has two frames.
@@ -80,7 +89,8 @@ pub struct LoadFit {
     pub full_scale_MPa: f64,
     /// Stresses in MPa of loads that are saturated and left out.
     pub saturated_MPa: Vec<f64>,
-    /// Residuals of the loads, each left out of the table that it is compared with; empty with two different loads.
+    /// Residuals of the loads, each left out of the table that it is compared with, where the characteristic is curved all but the
+    /// smallest and the largest one; empty with two different loads.
     pub residuals: Vec<Residual>,
 }
 
@@ -160,7 +170,8 @@ impl LoadFit {
         if different(&all) < 2 {
             return Err(LoadError::TooFew { different: different(&all) });
         }
-        let (table, live) = table(&all, taxels);
+        let whole = Characteristic::of(&all, taxels);
+        let Characteristic { table, live, .. } = &whole;
         if live.iter().filter(|live| **live).count() * 2 < taxels {
             let stresses = || loads.iter().map(|load| load.stress_MPa);
             let (low, high) = (stresses().fold(f64::INFINITY, f64::min), stresses().fold(f64::NEG_INFINITY, f64::max));
@@ -174,9 +185,14 @@ impl LoadFit {
         let residual = |left_out: usize| -> Option<Residual> {
             let others: Vec<&Mean> =
                 means.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, mean)| mean).collect();
-            let (table, _) = (different(&others) >= 2).then(|| self::table(&others, taxels))?;
             let (stress_MPa, readings) = &means[left_out];
-            let off = |k: usize| table.gain[k] * (readings[k].unwrap_or(0.0) - table.offset[k]) - stress_MPa;
+            let within = others.iter().any(|own| own.0 < *stress_MPa) && others.iter().any(|own| own.0 > *stress_MPa);
+            let enough = if whole.curvature.is_some() { within } else { different(&others) >= 2 };
+            let of_others = enough.then(|| match whole.curvature.is_some() {
+                true => Characteristic::curved(&others, taxels),
+                false => Some(Characteristic::straight(&others, taxels)),
+            })??;
+            let off = |k: usize| of_others.stress_MPa(k, readings[k].unwrap_or(0.0)) - stress_MPa;
             let with_reading = |k: usize| others.iter().filter(|(_, readings)| readings[k].is_some()).count();
             let there = |k: &usize| live[*k] && readings[*k].is_some() && with_reading(*k) >= 2;
             let live: Vec<usize> = (0..taxels).filter(there).collect();
@@ -198,10 +214,11 @@ impl LoadFit {
         let readings = &mut live_taxels.flat_map(|k| loads.iter().flat_map(move |load| readings(&load.frames, k)));
         Ok(LoadFit {
             saturated_MPa: saturated.iter().map(|load| load.stress_MPa).collect(),
-            noise_MPa: noise(&loads, &means, &table, &live),
+            noise_MPa: noise(&loads, &means, &whole),
             full_scale_MPa: largest(&mut table.gain.iter().copied()) * largest(readings),
             dead: (0..taxels).filter(|&k| !live[k]).map(place).collect(),
-            table,
+            table: whole.table,
+            curvature: whole.curvature,
             residuals,
         })
     }
@@ -233,61 +250,14 @@ fn is_saturated(load: &KnownLoad, loads: &[KnownLoad]) -> bool {
         && loads.iter().any(has_noise)
 }
 
-/// The stress of a load in MPa and the mean reading of each taxel; `None` where no frame has one.
-type Mean = (f64, Vec<Option<f64>>);
-
-/// Number of different stresses.
-fn different(means: &[&Mean]) -> usize {
-    let mut stresses: Vec<f64> = means.iter().map(|(stress, _)| *stress).collect();
-    stresses.sort_by(f64::total_cmp);
-    stresses.dedup();
-    stresses.len()
-}
-
-/// Table and live taxels of at least two different loads.
-fn table(means: &[&Mean], taxels: usize) -> (Calibration, Vec<bool>) {
-    let lines: Vec<Line> = (0..taxels).map(|k| Line::of(means, k)).collect();
-    let mut sorted: Vec<f64> = lines.iter().map(|line| line.slope).collect();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted[taxels / 2];
-    let live: Vec<bool> = lines.iter().map(|line| median != 0.0 && line.slope / median > DEAD_SHARE).collect();
-    let gain = lines.iter().zip(&live).map(|(line, live)| 1.0 / if *live { line.slope } else { median }).collect();
-    let of = |(line, live): (&Line, &bool)| line.reading - if *live { line.slope * line.stress_MPa } else { 0.0 };
-    let offset = lines.iter().zip(&live).map(of).collect();
-    (Calibration { offset, gain }, live)
-}
-
-/// The straight line through the readings of a taxel.
-struct Line {
-    /// Mean stress of the loads under which it has a reading.
-    stress_MPa: f64,
-    /// Mean of these readings.
-    reading: f64,
-    /// Change of the reading per MPa; 0 where the loads do not differ.
-    slope: f64,
-}
-
-impl Line {
-    fn of(means: &[&Mean], k: usize) -> Line {
-        let points = || means.iter().filter_map(|(stress, readings)| Some((*stress, readings[k]?)));
-        let count = points().count().max(1) as f64;
-        let centre = points().map(|(stress, _)| stress / count).sum::<f64>();
-        let spread: f64 = points().map(|(stress, _)| (stress - centre).powi(2)).sum();
-        let first = points().next().map_or(0.0, |(_, reading)| reading);
-        // Against the first load, so that equal readings give exactly 0; the sum of the stresses' differences is 0.
-        let change = points().map(|(stress, reading)| (stress - centre) * (reading - first)).sum::<f64>();
-        let slope = if spread > 0.0 { change / spread } else { 0.0 };
-        Line { stress_MPa: centre, reading: points().map(|(_, reading)| reading / count).sum(), slope }
-    }
-}
-
 /// Standard deviation of a live taxel around the mean of its load.
-fn noise(loads: &[&KnownLoad], means: &[Mean], table: &Calibration, live: &[bool]) -> Option<f64> {
+fn noise(loads: &[&KnownLoad], means: &[Mean], whole: &Characteristic) -> Option<f64> {
     let (mut squares, mut degrees) = (0.0, 0usize);
     for (load, (_, mean)) in loads.iter().zip(means) {
-        for (k, mean) in mean.iter().enumerate().filter(|(k, _)| live[*k]) {
+        for (k, mean) in mean.iter().enumerate().filter(|(k, _)| whole.live[*k]) {
             let Some(mean) = mean else { continue };
-            squares += readings(&load.frames, k).map(|own| (table.gain[k] * (own - mean)).powi(2)).sum::<f64>();
+            let off = |own: f64| whole.stress_MPa(k, own) - whole.stress_MPa(k, *mean);
+            squares += readings(&load.frames, k).map(|own| off(own).powi(2)).sum::<f64>();
             degrees += readings(&load.frames, k).count() - 1;
         }
     }
@@ -341,10 +311,11 @@ mod tests {
     fn a_curved_characteristic_shows_in_the_residuals() {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let curved = |k: usize, stress: f64| linear(k, stress - 0.5 * stress * stress);
-        let residuals = LoadFit::new(&scene, &loads(&scene, 0.0, curved)).unwrap().residuals;
-        // The line through s − s²/2 at 0, 0.1 and 0.2 is 0.00167 + 0.9 s; at 0.05 the readings are 0.04875.
-        let off = (0.04875 - 0.005 / 3.0) / 0.9 - 0.05;
-        assert!((residuals[1].mean_MPa - off).abs() < 1e-9, "{residuals:?}");
+        let fit = LoadFit::new(&scene, &loads(&scene, 0.0, curved)[..3]).unwrap();
+        let residuals = fit.residuals;
+        // The line through s − s²/2 at 0 and 0.1 is 0.95 s; at 0.05 the readings are 0.04875. Three loads give no curve.
+        let off = 0.04875 / 0.95 - 0.05;
+        assert!((residuals[1].mean_MPa - off).abs() < 1e-9 && fit.curvature.is_none(), "{residuals:?}");
         assert!(residuals.iter().all(|r| r.rms_MPa > 5e-4), "{residuals:?}");
     }
 

@@ -1,6 +1,6 @@
-//! Values of fields that stand for themselves: a board's name, dead taxels.
+//! Values of fields that stand for themselves: a board's name, dead taxels, the knots of a curve.
 
-use super::field::Kind;
+use super::field::{number_of, Kind};
 use crate::spec::board::Board;
 use crate::spec::sensor::MAX_SIDE;
 use serde_json::{json, Value as Json};
@@ -63,6 +63,40 @@ impl Kind for DeadTaxels {
     }
 
     fn show(&self, value: &Vec<[usize; 2]>) -> Option<Value> {
+        value.is_empty().then(|| Value::Array(Vec::new()))
+    }
+}
+
+/// Most knots of a curve.
+const MOST_KNOTS: usize = 64;
+
+/// Knots of a curve, [u, b] each, both rising, with [0, 0]; or none.
+pub(super) struct Knots;
+
+impl Kind for Knots {
+    type Value = Vec<[f64; 2]>;
+
+    fn read(&self, value: &Value, _: &str) -> Option<Vec<[f64; 2]>> {
+        let knot = |value: &Value| match value.as_array()?.as_slice() {
+            [u, b] => Some([number_of(u)?, number_of(b)?]),
+            _ => None,
+        };
+        let knots = value.as_array()?.iter().map(knot).collect::<Option<Vec<_>>>()?;
+        let rise = knots.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]);
+        let fits = (2..=MOST_KNOTS).contains(&knots.len()) && rise && knots.contains(&[0.0, 0.0]);
+        (knots.is_empty() || fits).then_some(knots)
+    }
+
+    fn allowed(&self) -> String {
+        format!("a list of 2 to {MOST_KNOTS} [MPa by the table, MPa], both rising, with [0, 0]; or []")
+    }
+
+    fn schema(&self) -> Json {
+        let knot = json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
+        json!({ "type": "array", "items": knot, "maxItems": MOST_KNOTS })
+    }
+
+    fn show(&self, value: &Vec<[f64; 2]>) -> Option<Value> {
         value.is_empty().then(|| Value::Array(Vec::new()))
     }
 }

@@ -10,6 +10,7 @@
 //! | `search.estimator` | all, as below | any: the hardware has `hardware.estimator` |
 //! | `hardware.estimator` | any: the model has `search.estimator` | "search", "network" |
 //! | `search.form` | all, "orthogonal" up to [`crate::estimate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
+//! | `input.curve` | all | none |
 //! | `input.mean` | all | "block", "sliding" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | with a network |
@@ -146,6 +147,7 @@ impl Scene {
                 search.degree.unwrap_or_default().to_string(),
                 "1 to 3",
             ),
+            rule(!input.curve.is_empty(), "input.curve", "[…]".to_string(), "none; a table of gains and offsets alone"),
             rule(input.mean == MeanKind::Adaptive, "input.mean", "adaptive".to_string(), "block, sliding"),
             rule(
                 !input.dead.is_empty() && !matches!(self.partition.case, Case::WHOLE | Case::Contacts),

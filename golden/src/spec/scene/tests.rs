@@ -63,6 +63,7 @@ fn every_field_is_read() {
         average = 6
         mean = "sliding"
         calibration = "table.csv"
+        curve = [[-0.1, -0.2], [0, 0], [0.1, 0.12]]
         tare = "zero.json"
         dead = [[3, 4], [0, 9], [3, 4]]
         unipolar = true
@@ -94,6 +95,7 @@ fn every_field_is_read() {
         average: 6,
         mean: MeanKind::Sliding,
         calibration: Some("table.csv".into()),
+        curve: vec![[-0.1, -0.2], [0.0, 0.0], [0.1, 0.12]],
         tare: Some("zero.json".into()),
         dead: vec![[0, 9], [3, 4]],
         unipolar: true,

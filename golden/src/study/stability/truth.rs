@@ -103,6 +103,7 @@ fn made(scene: &Scene, id: &str, p: &[f64], mu: [f64; 2]) -> Frame {
         cell_forces_N: Some(forces),
         stress_MPa: extended::stress_MPa(&scene.sensor, scene.medium, p, mu),
         missing: Vec::new(),
+        time_ns: None,
         notes: None,
     }
 }

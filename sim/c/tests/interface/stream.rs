@@ -120,6 +120,41 @@ fn the_cross_check_beside_it_is_in_a_later_result() {
     }));
 }
 
+/// Of a block the time of its last frame, to the nanosecond; none where the last frame states none.
+#[test]
+fn a_result_has_the_time_of_its_last_frame() {
+    const TIME_NS: i64 = 1_732_770_000_020_000_003;
+    let good = stress();
+    for (more, frames) in [("", 1), ("[input]\naverage = 1\n", 2), ("[input]\nmean = \"sliding\"\naverage = 1\n", 1)] {
+        let stream = begun(more, c"golden", 0).unwrap();
+        let push = |time_ns: Option<i64>| {
+            let mut result = null_mut::<dermis_result>();
+            let (own, count) = (good.as_ptr(), good.len());
+            let status = match time_ns {
+                Some(time_ns) => unsafe { dermis_stream_push_at(stream.0, own, count, time_ns, &mut result) },
+                None => unsafe { dermis_stream_push(stream.0, own, count, &mut result) },
+            };
+            assert_eq!(status, dermis_status::Ok, "{}", last_error());
+            let mut found = -1;
+            let status = unsafe { dermis_result_time(result, &mut found) };
+            unsafe { dermis_result_free(result) };
+            (status, found)
+        };
+        for k in 0..4 {
+            let (status, found) = push(Some(TIME_NS + k));
+            let complete = (k + 1) % frames == 0;
+            // Before a block is complete there is no result.
+            let wanted = if complete { (dermis_status::Ok, TIME_NS + k) } else { (dermis_status::Input, -1) };
+            assert_eq!((status, found), wanted, "{more}: {k}");
+        }
+        for _ in 1..frames {
+            push(None);
+        }
+        assert_eq!(push(None), (dermis_status::Absent, -1), "{more}");
+        assert_eq!(last_error(), "the result has no time of acquisition");
+    }
+}
+
 #[test]
 fn what_is_refused_is_named_and_the_stream_goes_on() {
     let refused = |more: &str, engine: &CStr| begun(more, engine, 1).err().unwrap_or_default();

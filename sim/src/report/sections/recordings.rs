@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use dermis_golden::data::import::Summary;
+use dermis_golden::data::import::{Summary, Unit};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 
@@ -45,9 +45,9 @@ pub fn recordings(all: &[Recorded]) -> Result<Section> {
 /// Device, unit and what is known of the shear.
 fn origin(summary: &Summary) -> String {
     let device = summary.device.as_deref().unwrap_or("a device that the file does not name");
-    let unit = match summary.unit.per_MPa() {
-        Some(_) => format!("readings in {}", summary.unit.name()),
-        None => format!(
+    let unit = match summary.unit {
+        unit if unit != Unit::Raw => format!("readings in {}", unit.name()),
+        _ => format!(
             "raw counts, whose stress and force rest on the full scale of {} MPa that the user stated",
             summary.full_scale_MPa
         ),
