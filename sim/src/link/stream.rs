@@ -15,7 +15,7 @@ use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
 use crate::stream::acquisition::Acquisition;
-use crate::stream::line::{self, Frames, LineFrame, NoFrame};
+use crate::stream::line::{self, Frames, NoFrame};
 use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
 
 /// An output line with an answer.
@@ -125,10 +125,16 @@ fn answer<P: Read + Write>(
     number: u64,
 ) -> Result<Option<Reply>, (Value, anyhow::Error)> {
     let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    let Some(LineFrame { id, frame, time_ns }) = frame else { return Ok(None) };
+    let Some(line) = frame else { return Ok(None) };
     let sent = SystemTime::now();
-    let time_ns = times.time_ns(time_ns, nanoseconds(sent));
-    reply(session, checks, &id, (time_ns, sent), &frame).map(Some).map_err(|error| (id, error))
+    let time_ns = times.time_ns(line.time_ns, nanoseconds(sent));
+    match reply(session, checks, &line.id, (time_ns, sent), &line.frame) {
+        Ok(mut reply) => {
+            reply.answer.diagnostics().raise(line.flag());
+            Ok(Some(reply))
+        }
+        Err(error) => Err((line.id, error)),
+    }
 }
 
 fn reply<P: Read + Write>(

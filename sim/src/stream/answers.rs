@@ -8,6 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
+use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use serde::{Serialize, Serializer};
 
@@ -201,9 +202,9 @@ pub fn run_until(
         })
     };
     stop.add(&queue);
-    let (times_ns, counts) = (Vec::new(), Counts::default());
+    let (times_ns, flags, counts) = (Vec::new(), Vec::new(), Counts::default());
     let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
-    let mut stream = Stream { estimators, frames, change: None, times_ns, counts };
+    let mut stream = Stream { estimators, frames, change: None, times_ns, flags, counts };
     stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
     loop {
         if stop.stopped() {
@@ -260,6 +261,8 @@ struct Stream<'a> {
     change: Option<String>,
     /// Nanoseconds since 1970 when each frame of a block that is not complete was acquired.
     times_ns: Vec<i64>,
+    /// Flags that its lines raise.
+    flags: Vec<Flag>,
     counts: Counts,
 }
 
@@ -277,15 +280,17 @@ impl Stream<'_> {
             output(&Outcome::Note(&note))?;
         }
         let result = frame.and_then(|frame| {
-            let Some(LineFrame { frame, time_ns, .. }) = frame else { return Ok(None) };
-            self.times_ns.push(self.counts.acquisition.time_ns(time_ns, nanoseconds(received.time)));
-            self.estimators.push(frame).map_err(|error| {
+            let Some(line) = frame else { return Ok(None) };
+            self.times_ns.push(self.counts.acquisition.time_ns(line.time_ns, nanoseconds(received.time)));
+            self.flags.extend(line.flag());
+            self.estimators.push(line.frame).map_err(|error| {
                 self.times_ns.clear();
+                self.flags.clear();
                 typed(error).to_string()
             })
         });
         let line = received.number;
-        let (frames, result) = match result {
+        let (frames, mut result) = match result {
             Ok(None) => return Ok(()),
             Ok(Some(complete)) => complete,
             Err(error) => {
@@ -293,6 +298,7 @@ impl Stream<'_> {
                 return output(&Outcome::Refusal(Refusal { line, error: &error }));
             }
         };
+        result.diagnostics().raise(self.flags.drain(..));
         let (times_ns, change) = (std::mem::take(&mut self.times_ns), self.change.take());
         let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
         let estimator = self.estimators.name();

@@ -16,6 +16,7 @@ mod guide_links;
 mod host;
 mod live;
 mod live_sources;
+mod lost_bytes;
 mod page;
 mod recording;
 mod report;

@@ -91,6 +91,11 @@ fn what_does_not_fit_is_left_out_and_named() {
             "line 2, value 4: \"4.0\" has 1 decimals, the others 2",
         ),
         ("1.5,2,3,4\n1,015,3,4\n2,3,4,5\n", "line 2, value 2: \"015\" begins with a zero"),
+        ("1.5,2,3,4\n1,.15,3,4\n2,3,4,5\n", "line 2, value 2: \".15\" has no digit before its decimal mark"),
+        (
+            "0012,0003,-004,5\n0012,003,-004,0005\n0002,0003,-004,0005\n",
+            "line 1, value 4: \"5\" has 1 digits, the others 4",
+        ),
         (
             "1.0e-01,2.0e-01,0.0e+00,4.0e-01\n1.0e-01,2.0e-01,0.0e+00,4.0e-0\n1.0e-01,2.0e-01,0.0e+00,4.0e-01\n",
             "line 2, value 4: \"4.0e-0\" has an exponent that is cut",
