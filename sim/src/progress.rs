@@ -47,7 +47,7 @@ impl Progress {
 
     /// Writes a line to stderr, above the bar.
     pub fn say(&self, line: &str) {
-        LINES.suspend(|| eprintln!("{line}"));
+        LINES.suspend(|| say!("{line}"));
     }
 
     /// Sets the number of finished steps and their total.

@@ -69,9 +69,9 @@ impl NoiseArguments {
         let measured = format!("measured from {} frames without load", frames.len());
         if has_file(target) {
             state(Path::new(target), &[Measured::new("search", "noise_floor_MPa", noise_MPa, &measured)])?;
-            eprintln!("{target}: {stated}, {measured}, is written");
+            say!("{target}: {stated}, {measured}, is written");
         } else {
-            eprintln!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
+            say!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
         }
         Ok(Scene { search: SearchSpec { noise_floor_MPa: Some(noise_MPa), ..scene.search.clone() }, ..scene })
     }

@@ -1,6 +1,6 @@
 //! `dermis host --stream`: frames and answers as lines of JSON; of a board that scans its array, answers alone.
 
-use std::io::{BufRead, ErrorKind, Read, Write};
+use std::io::{BufRead, Read, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
@@ -14,6 +14,7 @@ use serde_json::Value;
 use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
+use crate::output::write;
 use crate::stream::acquisition::Acquisition;
 use crate::stream::line::{self, Frames, NoFrame};
 use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
@@ -93,7 +94,7 @@ pub(crate) fn run<P: Read + Write>(
                 Some(true) => answer(session, &mut checks, (&mut frames, &mut times), &bytes, number),
             };
         if let Some(note) = frames.note() {
-            eprintln!("standard input: {note}");
+            say!("standard input: {note}");
         }
         let text = match text {
             Ok(None) => continue,
@@ -109,7 +110,7 @@ pub(crate) fn run<P: Read + Write>(
                 serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
             }
         };
-        if !write_line(output, &text)? {
+        if !write(output, format!("{text}\n").as_bytes())? {
             break;
         }
     }
@@ -167,18 +168,9 @@ pub(crate) fn run_scans<P: Read + Write>(
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;
-        if !write_line(output, &serde_json::to_string(&reply)?)? {
+        if !write(output, (serde_json::to_string(&reply)? + "\n").as_bytes())? {
             break;
         }
     }
     Ok(sent)
-}
-
-/// Writes a line at once; whether somebody reads on.
-fn write_line(output: &mut dyn Write, text: &str) -> Result<bool> {
-    match writeln!(output, "{text}").and_then(|()| output.flush()) {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-        Err(error) => Err(anyhow!("standard output: {error}")),
-        Ok(()) => Ok(true),
-    }
 }

@@ -205,7 +205,7 @@ pub fn run_until(
     let (times_ns, flags, counts) = (Vec::new(), Vec::new(), Counts::default());
     let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
     let mut stream = Stream { estimators, frames, change: None, times_ns, flags, counts };
-    stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
+    stream.choice(output).map_err(|error| anyhow!("standard output: {error}"))?;
     loop {
         if stop.stopped() {
             queue.close();
@@ -225,7 +225,7 @@ pub fn run_until(
                 queue.close();
                 return Ok(stream.counts);
             }
-            Err(error) => return Err(anyhow!("output: {error}")),
+            Err(error) => return Err(anyhow!("standard output: {error}")),
             Ok(()) => (),
         }
     }

@@ -9,6 +9,7 @@ mod cli;
 mod contacts;
 mod contract;
 mod examples;
+mod failing;
 mod fake;
 mod firmware;
 mod guide;
