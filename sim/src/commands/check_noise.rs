@@ -57,6 +57,9 @@ impl NoiseArguments {
             ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
             if !bytes.iter().all(u8::is_ascii_whitespace) {
                 let read = lines.frame(&bytes, number);
+                if let Some(note) = lines.note() {
+                    bar.say(&format!("{name}: {note}"));
+                }
                 let read = read.map_err(|none| anyhow!("{name}: line {number}: {}", none.reason))?;
                 frames.extend(read.map(|line| line.frame));
                 bar.set(frames.len() as u64);

@@ -142,7 +142,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let rate = Rate { rate, simulated };
     let summary = summary(&session.identity, sent.answered, &rate, session.client.link_errors, &before, &after);
     if arguments.stream {
-        eprint!("{summary}");
+        say!("{}", summary.trim_end());
     }
     match (arguments.stream, sent.refused) {
         (true, 0) => Ok((String::new(), sent.equal)),

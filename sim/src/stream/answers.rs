@@ -398,7 +398,7 @@ mod tests {
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
             assert_eq!(answers[1]["error"], "2 values, wanted 64");
-            assert!(answers[3]["error"].as_str().unwrap().contains("missing field `stress_MPa`"));
+            assert!(answers[3]["error"].as_str().unwrap().contains("stress_MPa is missing"));
             for (answer, frame, sequence) in [(&answers[0], &frames[0], 0), (&answers[2], &frames[1], 1)] {
                 let plain = Frame { resultant_N: None, ..frame.clone() };
                 let result = CheckedEngine::new(engine_of(&scene, name)).result(&[plain], true).unwrap();

@@ -163,7 +163,7 @@ mod tests {
             ("1,x,3,4", "value 2: \"x\" is not a finite number"),
             ("0,1,0,2,0,3,0,4", "8 values, wanted 4; a decimal mark is a point where commas separate values"),
             ("1,inf,3,4", "value 2: \"inf\" is not a finite number"),
-            ("{\"stress\": []}", "column 9: unknown field `stress`"),
+            ("{\"stress\": []}", "column 9: unknown field stress; there are id, stress_MPa"),
         ];
         for (text, wanted) in cases {
             let reason = frame(text, 1).unwrap_err().reason;

@@ -19,6 +19,7 @@ mod live;
 mod live_sources;
 mod lost_bytes;
 mod page;
+mod printed;
 mod recording;
 mod report;
 mod stream;

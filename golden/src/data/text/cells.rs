@@ -82,7 +82,9 @@ pub(super) struct Digits {
     exponent: Option<usize>,
     /// A zero may stand without decimals.
     bare_zero: bool,
-    /// Characters before the decimal mark, the sign among them, where numbers are filled with zeros in front to as many.
+    /// Numbers are filled with zeros in front.
+    padded: bool,
+    /// Characters before the decimal mark to which they are, a sign in front or among them.
     width: Option<usize>,
     /// Nearly all numbers have a digit before the decimal mark.
     leading: bool,
@@ -147,7 +149,8 @@ impl Digits {
             decimals: fixed(|number| number.decimals.len()).filter(|_| zero_at_end),
             exponent: fixed(|number| number.exponent.len()),
             bare_zero: numbers.iter().filter(|number| number.is_bare_zero()).count() > 1,
-            width: fixed(|number| number.whole.len()).filter(|_| padded),
+            padded,
+            width: fixed(|number| number.whole.len() + usize::from(number.signed)).filter(|_| padded),
             leading: share(&|number| !number.whole.is_empty()) >= LIKE,
         }
     }
@@ -181,7 +184,7 @@ impl Digits {
                 Some(width) if !number.is_as_wide(width) => {
                     Err(format!("{} has {} digits, the others {width}", shown(cell), number.whole.len()))
                 }
-                None if number.is_padded() => Err(format!("{} begins with a zero", shown(cell))),
+                None if number.is_padded() && !self.padded => Err(format!("{} begins with a zero", shown(cell))),
                 _ => Ok(value),
             },
             false => Ok(value),

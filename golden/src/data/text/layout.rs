@@ -115,7 +115,9 @@ impl Layout {
         if cells.len() != self.cells && !ends_without {
             let empty = usize::from(self.trailing);
             let got = cells.len() - empty.min(usize::from(cells.last().is_some_and(|cell| cell.is_empty())));
-            return Err(NoReadings::of_line(line, format!("{got} values, wanted {}", self.cells - empty)).cut());
+            let none = NoReadings::of_line(line, format!("{got} values, wanted {}", self.cells - empty));
+            // A remark of the device is none of its frames.
+            return Err(if has_numbers(cells) { none.cut() } else { none });
         }
         let own = (self.first..self.first + self.readings).map(|column| {
             let cell = &cells[column];

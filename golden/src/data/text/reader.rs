@@ -5,6 +5,8 @@ use serde_json::Value;
 
 use super::layout::has_numbers;
 use super::time::TimeUnit;
+use crate::plain_words::JsonError;
+
 use super::{Form, Layout, Line, NoReadings, Separator, Stated};
 
 /// Lines of another layout in a row after which a stream is taken to have it.
@@ -365,9 +367,8 @@ fn json_frame(line: &Line, taxels: usize) -> Read {
     let request: Request = match serde_json::from_str(&without_nan(line.text)) {
         Ok(request) => request,
         Err(error) => {
-            let text = error.to_string();
-            let message = text.split(" at line ").next().unwrap_or(&text);
-            return left_out(Value::Null, format!("column {}: {message}", error.column()), !error.is_data());
+            let JsonError { column, message, .. } = JsonError::new(&error);
+            return left_out(Value::Null, format!("column {column}: {message}"), !error.is_data());
         }
     };
     let got = request.stress_MPa.len();
