@@ -183,9 +183,9 @@ mod tests {
             ("{\"centre_mm\": [1e9, 0], \"force_N\": [0, 0, 1]}", "centre_mm = [1000000000.0, 0.0] is not allowed"),
             ("{\"centre_mm\": [0, 0], \"force_N\": [0, 0, 0]}", "force_N = [0.0, 0.0, 0.0] is not allowed"),
             ("{\"centre_mm\": [0, 0], \"force_N\": [0, 2000, 1]}", "force_N = [0.0, 2000.0, 1.0] is not allowed"),
-            ("{\"centre_mm\": [0, 0]}", "force_N is missing"),
-            ("{\"force\": 1}", "unknown field force;"),
-            ("", "EOF"),
+            ("{\"centre_mm\": [0, 0]}", "line 1, column 21: force_N is missing"),
+            ("{\"force\": 1}", "line 1, column 8: unknown field force;"),
+            ("", "line 1, column 1: the text ends where a value is wanted"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.starts_with(wanted), "{error}");

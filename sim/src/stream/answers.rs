@@ -391,7 +391,7 @@ mod tests {
     #[test]
     fn results_are_those_of_the_engines_and_bad_lines_are_numbered() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
+        let input = format!("{}\nx,y\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
         for name in EngineName::SOFTWARE {
             let (counts, answers) = answers(&scene, name, input.clone(), ALL, false);
             assert_eq!((counts.answered, counts.refused, counts.dropped), (2, 2, 0));
