@@ -18,11 +18,14 @@ LITEX      = gcc-riscv64-unknown-elf libevent-dev libjson-c-dev zlib1g-dev
 CORTEX     = gcc-arm-none-eabi qemu-system-arm
 # A clean environment for the Python package and its tests.
 VENV       = $(BUILD)/python
+# A reader for make coverage, and for how long.
+READER    ?=
+MINUTES   ?= 5
 # The short report: make report QUICK=1
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python buses c docs bench build cosim bitstream gateware report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python wheel buses c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -80,6 +83,10 @@ python: setup ## build the Python package, install it into a new environment, bu
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
 
+wheel: setup ## build a wheel of the Python package into build/wheels, for machines without Rust
+	python3 -m venv $(VENV)-wheel
+	$(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
+
 buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
 	$(CARGO) build --locked --quiet --bin dermis
@@ -96,7 +103,7 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps
 
-bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, and the drawing of the live page
+bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, and the drawing of the live page
 	$(CARGO) bench --locked --package dermis-golden
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
@@ -135,6 +142,12 @@ netlist: setup ## co-simulate the synthesised netlist of a small scene with sear
 fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
 	@echo '== fuzz'
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --locked --release -p dermis-tests --test fuzz -- --nocapture
+
+# Without READER it says which there are; new inputs go to build/fuzz, of which `-merge=1` keeps those that reach other code.
+coverage: ## fuzz READER, a folder of tests/corpus, by coverage with libFuzzer for MINUTES
+	mkdir -p $(BUILD)/fuzz/$(READER)
+	cd tests/fuzz-targets && DERMIS_READER=$(READER) CARGO_TARGET_DIR=$(abspath $(CARGO_TARGET_DIR))/fuzz-targets $(CARGO) run --release -- \
+	    -max_total_time=$$((60 * $(MINUTES))) -rss_limit_mb=4096 -timeout=10 $(abspath $(BUILD))/fuzz/$(READER) ../corpus/$(READER)
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release -p dermis-tests --test integration -- streams:: --nocapture

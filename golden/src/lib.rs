@@ -49,7 +49,7 @@
 //! | [`wire`] | packets and registers between a computer and the hardware |
 //! | [`study`] | errors against noise, conditioning and the paper |
 //!
-//! Beside them stand [`mod@write`], atomic file writing, and what is private: bounded reading, random numbers.
+//! Beside them stand [`mod@write`], atomic file writing, [`plain_words`], what readers of JSON and TOML say, and what is private: bounded reading, random numbers.
 //!
 //! # Conventions
 //!
@@ -63,6 +63,7 @@ pub mod engine;
 pub mod estimate;
 pub mod fixed;
 pub mod physics;
+pub mod plain_words;
 pub mod result;
 pub mod spec;
 pub mod study;

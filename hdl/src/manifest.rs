@@ -7,6 +7,7 @@
 //! | `files` | name to `bytes` and `crc32`, for all files except the manifest |
 //! | `checksum` | CRC-32 of the manifest without it, as JSON with sorted keys, two-space indent and a final newline |
 
+use dermis_golden::plain_words::JsonError;
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
@@ -104,7 +105,7 @@ pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
     if !text.ends_with('\n') {
         return Err(syntax("truncated: the last line has no end".to_owned()));
     }
-    let manifest: Value = serde_json::from_str(text).map_err(|error| syntax(error.to_string()))?;
+    let manifest: Value = serde_json::from_str(text).map_err(|error| syntax(JsonError::new(&error).to_string()))?;
     if !manifest.is_object() {
         return Err(syntax("not an object".to_owned()));
     }

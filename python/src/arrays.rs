@@ -3,6 +3,7 @@
 use dermis_golden::data::frame::Forces;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 
 use crate::exceptions::input;
 
@@ -12,16 +13,19 @@ const REAL: [&str; 3] = ["i", "u", "f"];
 /// An argument called `name` as a contiguous array of real numbers. An array that is one is not copied.
 ///
 /// # Errors
-/// `InputError` for what is no array, or not of real numbers.
+/// `InputError` for what is no array, not of real numbers, or has masked ones.
 pub fn numbers<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let borrowed =
         |array: &Bound<'py, PyArrayDyn<f64>>| array.try_readonly().map_err(|error| input(format!("{name}: {error}")));
+    let numpy = value.py().import("numpy")?;
+    if numpy.getattr("ma")?.call_method1("is_masked", (value,))?.is_truthy()? {
+        return Err(input(format!("{name} has masked values, wanted numbers")));
+    }
     if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
         if array.is_c_contiguous() {
             return borrowed(array);
         }
     }
-    let numpy = value.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (value,)).map_err(|error| input(format!("{name}: {error}")))?;
     let dtype = array.getattr("dtype")?;
     if !REAL.contains(&dtype.getattr("kind")?.extract::<String>()?.as_str()) {
@@ -36,11 +40,8 @@ pub fn numbers<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonl
 /// As [`numbers`].
 pub fn readings<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let numpy = value.py().import("numpy")?;
-    let masked = numpy.getattr("ma")?;
-    if value.is_instance(&masked.getattr("MaskedArray")?)? {
-        let numbers = value.call_method1("astype", ("float64",)).map_err(|error| input(format!("{name}: {error}")))?;
-        return self::numbers(name, &numbers.call_method1("filled", (f64::NAN,))?);
-    }
+    let masked = numpy.getattr("ma")?.getattr("MaskedArray")?;
+    let value = &unmasked(value, &masked).map_err(|error| input(format!("{name}: {error}")))?;
     if value.cast::<PyArrayDyn<f64>>().is_ok() {
         return numbers(name, value);
     }
@@ -53,6 +54,18 @@ pub fn readings<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadon
     let all_real = array.call_method0("ravel")?.try_iter()?.all(|item| item.is_ok_and(real));
     let array = if all_real { array.call_method1("astype", ("float64",))? } else { array };
     numbers(name, &array)
+}
+
+/// NaN in place of what is masked: in an array, and in lists of arrays and numbers, of which NumPy would drop the masks.
+fn unmasked<'py>(value: &Bound<'py, PyAny>, masked: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if value.is_instance(masked)? {
+        return value.call_method1("astype", ("float64",))?.call_method1("filled", (f64::NAN,));
+    }
+    if !value.is_instance_of::<PyList>() && !value.is_instance_of::<PyTuple>() {
+        return Ok(value.clone());
+    }
+    let items = value.try_iter()?.map(|item| unmasked(&item?, masked)).collect::<PyResult<Vec<_>>>()?;
+    Ok(PyList::new(value.py(), items)?.into_any())
 }
 
 /// An argument called `name` as a vector of N finite numbers.

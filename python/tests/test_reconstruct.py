@@ -135,9 +135,19 @@ def test_nan_none_and_masked_values_are_missing_readings(engine: str) -> None:
             assert np.allclose(again.resultant_N, result.resultant_N, rtol=1e-2)
         else:
             assert again.to_dict() == result.to_dict()
+    # Of a list NumPy would drop the masks: of arrays, of rows, of numbers.
+    rows = [np.ma.masked_array(row, mask=absent) for row, absent in zip(stress, missing)]
+    numbers = [[np.ma.masked if absent else value for value, absent in zip(*row)] for row in zip(stress, missing)]
+    for listed in [rows, numbers]:
+        assert scene.reconstruct(listed, engine).to_dict() == result.to_dict()
+    _, listed_last = scene.reconstruct([stress, masked], engine)
     # A frame in time has its own missing readings.
     first, second = scene.reconstruct(np.stack([stress, lacking]), engine)
     assert "taxel-missing" not in first.flags and "taxel-missing" in second.flags
+    assert listed_last.to_dict() == second.to_dict()
+    # Where nothing can be missing a mask is refused.
+    with pytest.raises(dermis.InputError, match="value_N has masked values, wanted numbers"):
+        dermis.errors([0, 0, 1], np.ma.masked_array([0.0, 0.0, 1.0], mask=[True, False, False]))
     [frame] = [dermis.Scene.from_name("eight-by-eight").frames[1]]
     assert not np.isnan(frame.stress_MPa).any()
 

@@ -35,7 +35,7 @@ impl Interrupt {
     pub fn on_signals() -> Result<Interrupt> {
         // Tasks that run are not stopped and may take half a minute.
         Interrupt::with(|| {
-            eprintln!("interrupted: the tasks that run are ended first; a second signal ends them at once");
+            say!("interrupted: the tasks that run are ended first; a second signal ends them at once");
         })
     }
 

@@ -14,23 +14,16 @@ pub struct Progress(ProgressBar);
 impl Progress {
     /// Shows `message` with a spinner and the elapsed time.
     pub fn start(message: &str) -> Self {
-        let bar = LINES.add(ProgressBar::new_spinner());
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
-            bar.set_style(style);
-        }
-        bar.set_message(message.to_owned());
-        bar.enable_steady_tick(Duration::from_millis(120));
-        Progress(bar)
+        let line = Progress::new(message, ProgressBar::new_spinner(), "{spinner} {msg} ({elapsed})");
+        line.0.enable_steady_tick(Duration::from_millis(120));
+        line
     }
 
-    /// Shows `message` with a bar of `total` steps.
+    /// Shows `message` with a bar of `total` steps; 0 if their number is known later.
     pub fn steps(message: &str, total: u64) -> Self {
-        let bar = LINES.add(ProgressBar::new(total));
-        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} ({elapsed}, {eta} left)") {
-            bar.set_style(style);
-        }
-        bar.set_message(message.to_owned());
-        Progress(bar)
+        // A bar of no steps would be full.
+        let bar = if total == 0 { ProgressBar::no_length() } else { ProgressBar::new(total) };
+        Progress::new(message, bar, "{msg} [{bar:30}] {pos}/{len} ({elapsed}, {eta} left)")
     }
 
     /// Steps of a bar of shares.
@@ -38,16 +31,19 @@ impl Progress {
 
     /// Shows `message` with a bar of a share that is done.
     pub fn share(message: &str) -> Self {
-        let bar = Progress::steps(message, Self::SHARES as u64);
-        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent} % ({elapsed}, {eta} left)") {
-            bar.0.set_style(style);
-        }
-        bar
+        let bar = ProgressBar::new(Self::SHARES as u64);
+        Progress::new(message, bar, "{msg} [{bar:30}] {percent} % ({elapsed}, {eta} left)")
+    }
+
+    /// The line of `bar`, which is drawn when it is added.
+    fn new(message: &str, bar: ProgressBar, template: &str) -> Self {
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Progress(LINES.add(bar.with_style(style).with_message(message.to_owned())))
     }
 
     /// Writes a line to stderr, above the bar.
     pub fn say(&self, line: &str) {
-        LINES.suspend(|| eprintln!("{line}"));
+        LINES.suspend(|| say!("{line}"));
     }
 
     /// Sets the number of finished steps and their total.

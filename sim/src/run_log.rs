@@ -20,6 +20,7 @@ use std::path::Path;
 use anyhow::{anyhow, Context, Result};
 use serde::{Deserialize, Serialize};
 
+use dermis_golden::plain_words::JsonError;
 use dermis_golden::write::write;
 
 /// Name of the folder within the build folder.
@@ -109,7 +110,7 @@ impl RunLog {
         paths.sort();
         let read = |path: &std::path::PathBuf| -> Result<RunLog> {
             let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-            serde_json::from_str(&text).with_context(|| path.display().to_string())
+            serde_json::from_str(&text).map_err(|error| anyhow!("{}, {}", path.display(), JsonError::new(&error)))
         };
         paths.iter().map(read).collect()
     }
@@ -136,6 +137,6 @@ mod tests {
         assert_eq!(RunLog::load_all(build.path()).unwrap(), [RunLog::new("other"), run.clone()]);
         assert_eq!(run.targets[0].to_string(), "scene: 3 inputs: 2 refused, 1 taken; 0.2 s");
         fs::write(build.path().join("tried/c.json"), "{}").unwrap();
-        assert!(format!("{:#}", RunLog::load_all(build.path()).unwrap_err()).contains("c.json: missing field"));
+        assert!(format!("{:#}", RunLog::load_all(build.path()).unwrap_err()).contains("c.json, line 1, column "));
     }
 }

@@ -33,6 +33,7 @@
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 
 pub mod baseline;
+pub mod readers;
 pub mod tools;
 mod variants;
 

@@ -34,6 +34,7 @@
 mod tests;
 
 use crate::data::frame::Frame;
+use crate::plain_words::JsonError;
 use crate::read::text_up_to;
 use crate::result::checks::{largest_spread, relative_spread, Checks, COUNTS_FROM};
 use crate::result::reconstruct::{shear_sigma_N, Reconstruction};
@@ -208,7 +209,8 @@ impl Deviations {
     /// [`DeviationsError::Damaged`].
     pub fn parse(text: &str, file: &str) -> Result<Deviations, DeviationsError> {
         let damaged = |reason: String| DeviationsError::Damaged { file: file.to_owned(), reason };
-        let table: Deviations = serde_json::from_str(text).map_err(|error| damaged(error.to_string()))?;
+        let table: Deviations =
+            serde_json::from_str(text).map_err(|error| damaged(JsonError::new(&error).to_string()))?;
         let rising = |all: &[f64]| all.windows(2).all(|pair| pair[0] < pair[1]) && all.iter().all(|x| *x > 0.0);
         let positive = |sigma: &[f64; 3]| sigma.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite());
         let whole = |row: &Vec<[f64; 3]>| row.len() == table.sizes.len() + 1 && row.iter().all(positive);

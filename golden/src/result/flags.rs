@@ -255,8 +255,8 @@ flags! {
         },
     }
     TornFrame = 21 "torn-frame" {
-        raised_when: "in a stream, a part of the frame is that of the frame before to the bit, and the rest has changed (`torn_share` above 0.08 of the range)",
-        remedy: "give frames that are whole: read them between two scans",
+        raised_when: "in a stream, a part of the frame is that of the frame before to the bit, and the rest has changed (`torn_share` above 0.08 of the range); or one of the last 100 lines has lost characters, and a digit that this frame's numbers lose does not show",
+        remedy: "give frames that are whole: read them between two scans; write numbers with a fixed number of decimals (`%.4f`) or filled with zeros (`%04d`), so that what is lost shows, and lower the bit rate",
         raised_by: "streams of all engines",
         rule: |checks, _| checks.torn_share.is_some_and(|share| share > TORN),
         figure: |checks| checks.torn_share.map(|share| format!("{:.0} % of the range", 1e2 * share)),

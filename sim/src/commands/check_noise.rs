@@ -57,6 +57,9 @@ impl NoiseArguments {
             ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
             if !bytes.iter().all(u8::is_ascii_whitespace) {
                 let read = lines.frame(&bytes, number);
+                if let Some(note) = lines.note() {
+                    bar.say(&format!("{name}: {note}"));
+                }
                 let read = read.map_err(|none| anyhow!("{name}: line {number}: {}", none.reason))?;
                 frames.extend(read.map(|line| line.frame));
                 bar.set(frames.len() as u64);
@@ -69,9 +72,9 @@ impl NoiseArguments {
         let measured = format!("measured from {} frames without load", frames.len());
         if has_file(target) {
             state(Path::new(target), &[Measured::new("search", "noise_floor_MPa", noise_MPa, &measured)])?;
-            eprintln!("{target}: {stated}, {measured}, is written");
+            say!("{target}: {stated}, {measured}, is written");
         } else {
-            eprintln!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
+            say!("{target}: {measured}: [search] {stated}; a built-in scene has no file to write it into");
         }
         Ok(Scene { search: SearchSpec { noise_floor_MPa: Some(noise_MPa), ..scene.search.clone() }, ..scene })
     }

@@ -7,15 +7,15 @@
 //! | 2 | an argument or input is wrong, a file cannot be used, or a needed program is not installed |
 //! | 130 | interrupted by SIGINT or SIGTERM |
 
-use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{anyhow, Result};
+use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::cache;
 use dermis_golden::spec::scene::Scene;
+use dermis_golden::write::FileError;
 use dermis_hdl::HdlError;
 
 use super::inputs::BoardOverride;
@@ -24,6 +24,7 @@ use crate::cosim::verilator::VerilatorError;
 use crate::flow::tools::ToolError;
 use crate::jobs::Interrupted;
 use crate::link::{HostError, IdentityError, PseudoTerminal};
+use crate::output::write;
 use crate::report;
 
 /// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
@@ -162,7 +163,7 @@ pub fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error}");
+            say!("error: {}", with_causes(&error));
             ExitCode::from(exit_code(&error))
         }
     }
@@ -174,6 +175,18 @@ pub fn main() -> ExitCode {
 /// What the program would print: an unknown command or option, a value or argument that is missing or wrong.
 pub fn check_arguments<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), clap::Error> {
     Arguments::try_parse_from(words).map(drop)
+}
+
+/// An error and what caused it, each said once.
+fn with_causes(error: &anyhow::Error) -> String {
+    error
+        .chain()
+        .map(ToString::to_string)
+        .reduce(|text, cause| match text.contains(&cause) {
+            true => text,
+            false => format!("{text}: {cause}"),
+        })
+        .unwrap_or_default()
 }
 
 /// The exit code of an error: 1 for internal errors and for tools that fail on generated files, 2 for wrong input,
@@ -225,7 +238,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let scene = target.apply(Scene::load(scene)?);
             let terminal = PseudoTerminal::of(&Hardware::new(Model::new(&scene)?, build_dir)?)?;
             print(&format!("{}\n", terminal.path().display()))?;
-            eprintln!("{}: simulated; rates and times at the port are the simulation's", scene.name);
+            say!("{}: simulated; rates and times at the port are the simulation's", scene.name);
             terminal.wait()?;
             Ok((String::new(), true))
         }
@@ -248,9 +261,10 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((String::from_utf8(text)?, true))
         }
         Command::Man { folder } => {
-            let file = |error| anyhow!("{}: {error}", folder.display());
-            std::fs::create_dir_all(folder).map_err(file)?;
-            clap_mangen::generate_to(Arguments::command(), folder).map_err(file)?;
+            std::fs::create_dir_all(folder).map_err(FileError::at(folder))?;
+            let mut command = Arguments::command().disable_help_subcommand(true);
+            command.build();
+            write_manual(&command, folder)?;
             Ok((format!("{}\n", folder.display()), true))
         }
         Command::Table(arguments) => super::table::run(arguments, build_dir),
@@ -260,19 +274,34 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
     }
 }
 
+/// Writes the manual pages of a command and of those below it.
+fn write_manual(command: &clap::Command, folder: &Path) -> Result<()> {
+    let page = clap_mangen::Man::new(command.clone());
+    let (name, mut text) = (page.get_filename(), Vec::new());
+    page.render(&mut text)?;
+    dermis_golden::write::write(&folder.join(name), &text)?;
+    command.get_subcommands().try_for_each(|command| write_manual(command, folder))
+}
+
 /// Writes to stdout; a closed pipe is not an error.
 fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(anyhow!("standard output: {error}")),
-        _ => Ok(()),
-    }
+    write(&mut std::io::stdout().lock(), text.as_bytes()).map(drop)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use anyhow::anyhow;
     use dermis_golden::spec::board::Board;
-    use dermis_golden::write::FileError;
+    use std::io::ErrorKind;
+
+    #[test]
+    fn causes_are_said_once() {
+        let cause = || std::io::Error::from(ErrorKind::NotFound);
+        let file: anyhow::Error = FileError { path: "a".into(), source: cause() }.into();
+        assert_eq!(with_causes(&file), format!("a: {}", cause()));
+        assert_eq!(with_causes(&anyhow::Error::from(cause()).context("a")), format!("a: {}", cause()));
+    }
 
     #[test]
     fn internal_errors_exit_with_1_and_input_errors_with_2() {

@@ -298,7 +298,7 @@ fn output(command: &str, root: &Path, build: &Path) -> Result<String> {
     drop(progress);
     let stderr = String::from_utf8_lossy(&output.stderr);
     ensure!(output.status.success(), "{command}: {}: {}", output.status, stderr.trim());
-    eprintln!("{:7.1} s  {command}", begun.elapsed().as_secs_f64());
+    say!("{:7.1} s  {command}", begun.elapsed().as_secs_f64());
     String::from_utf8(output.stdout).with_context(|| command.to_owned())
 }
 

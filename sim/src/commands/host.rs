@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
     let simulated = is_pseudo_terminal(&arguments.port);
     if simulated && arguments.baud.is_some() {
-        eprintln!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
+        say!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
     }
     let timeout = Duration::from_millis(arguments.timeout);
     let client = open_board(&arguments.port, &model, arguments.baud, timeout, "host")?;
@@ -142,7 +142,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let rate = Rate { rate, simulated };
     let summary = summary(&session.identity, sent.answered, &rate, session.client.link_errors, &before, &after);
     if arguments.stream {
-        eprint!("{summary}");
+        say!("{}", summary.trim_end());
     }
     match (arguments.stream, sent.refused) {
         (true, 0) => Ok((String::new(), sent.equal)),

@@ -66,10 +66,10 @@ pub(super) fn noise_not_stated(scene: &Scene) -> Result<bool> {
 pub(super) fn note_hardware(scene: &Scene) -> Result<()> {
     if let (Some(hardware), None) = (estimator_instead(scene), scene.hardware.estimator) {
         let (model, (_, reason)) = (scene.model_estimator().name(), scene.choose_for_hardware());
-        eprintln!("{}: estimator {hardware} in hardware, {model} in floating point: {reason}", scene.name);
+        say!("{}: estimator {hardware} in hardware, {model} in floating point: {reason}", scene.name);
     }
     if noise_not_stated(scene)? {
-        eprintln!("{}: {}", scene.name, report::NOISE_NOT_STATED);
+        say!("{}: {}", scene.name, report::NOISE_NOT_STATED);
     }
     Ok(())
 }

@@ -146,7 +146,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
     let listener = TcpListener::bind(listen).map_err(|error| anyhow!("--listen {listen}: {error}"))?;
     let address = listener.local_addr()?;
     if let Some(address) = open_to_others(address) {
-        eprintln!("warning: {address} is open to the network; whoever reaches it sees the frames and moves the finger");
+        say!("warning: {address} is open to the network; whoever reaches it sees the frames and moves the finger");
     }
     let newest = Arc::new(Newest::default());
     let hand = arguments.finger().then(|| Arc::new(Hand::default()));
@@ -155,12 +155,12 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
         None => format!("finger, noise {noise}"),
     };
     let server = Server::new(&scene, &source, Arc::clone(&newest), hand.clone());
-    let serving = std::thread::spawn(move || server.run(&listener, |text| eprintln!("{address}: {text}")));
+    let serving = std::thread::spawn(move || server.run(&listener, |text| say!("{address}: {text}")));
     print(&format!("http://{address}/\n"))?;
     let mut show = Show::new(&newest);
     let mut output = |outcome: &Outcome| {
         if let Outcome::Note(text) = outcome {
-            eprintln!("{}: {text}", scene.name);
+            say!("{}: {text}", scene.name);
         }
         show.outcome(outcome)
     };
@@ -177,7 +177,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
                 StreamOptions { queue: 1, policy: Policy::Latest, live: true, layout: arguments.layout.stated() };
             let counts = run_stream(estimators, (input, &name), options, &mut output)?;
             let answered = counts.answered;
-            eprintln!("{}: {name} has ended after {answered} results; {counts}; the last one is shown", scene.name);
+            say!("{}: {name} has ended after {answered} results; {counts}; the last one is shown", scene.name);
         }
         (None, None) => (),
     }

@@ -73,14 +73,6 @@ enum Cover {
     Free,
 }
 
-impl FromStr for Cover {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Cover, String> {
-        <Cover as ValueEnum>::from_str(text, true)
-    }
-}
-
 /// Whether an array reads tension.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 enum Tension {
@@ -90,11 +82,14 @@ enum Tension {
     No,
 }
 
-impl FromStr for Tension {
+/// One of the values of an option as an answer, in small letters or capitals.
+struct Choice<T>(T);
+
+impl<T: ValueEnum> FromStr for Choice<T> {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Tension, String> {
-        <Tension as ValueEnum>::from_str(text, true)
+    fn from_str(text: &str) -> Result<Choice<T>, String> {
+        T::from_str(text, true).map(Choice)
     }
 }
 
@@ -161,6 +156,14 @@ impl Asker<'_> {
         }
     }
 
+    /// The value of an option that is one of several; `None` for an empty answer.
+    fn choice<T: ValueEnum>(&mut self, given: Option<T>, question: &str) -> Result<Option<T>> {
+        match given {
+            Some(value) => Ok(Some(value)),
+            None => Ok(self.ask(question)?.map(|Choice(value)| value)),
+        }
+    }
+
     /// Asks until the answer can be read; `None` for an empty one, or without a terminal.
     fn ask<T: FromStr>(&mut self, question: &str) -> Result<Option<T>> {
         let Asker::Terminal(input, output) = self else { return Ok(None) };
@@ -197,8 +200,9 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let medium = medium_fields(arguments, asker)?;
     let noise = asker.optional(&arguments.noise, "standard deviation of one reading in MPa")?;
     let full_scale = asker.optional(&arguments.full_scale, "stress of the largest reading in MPa")?;
-    let tension = "whether readings go below zero in tension, yes or no; most arrays, as of FSR, read pressure alone";
-    let unipolar = asker.optional(&arguments.tension, tension)?.map(|reads| (reads == Tension::No).to_string());
+    let tension =
+        "whether readings go below zero in tension, yes or no; most arrays, as of FSR, read pressure alone; empty: unknown";
+    let unipolar = asker.choice(arguments.tension, tension)?.map(|reads| (reads == Tension::No).to_string());
     let mut text =
         "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
             .to_owned();
@@ -261,10 +265,7 @@ fn line(path: &str, value: Option<String>) -> Result<String> {
 /// A Poisson ratio of a free cover.
 fn medium_fields(arguments: &Arguments, asker: &mut Asker) -> Result<Vec<(&'static str, Option<String>)>> {
     let question = "how the cover is held, bonded to a rigid base or free; empty: bonded, as nearly every array has it";
-    let cover = match arguments.cover {
-        Some(cover) => cover,
-        None => asker.ask(question)?.unwrap_or_default(),
-    };
+    let cover = asker.choice(arguments.cover, question)?.unwrap_or_default();
     let kind = |name: &str| ("kind", Some(format!("{name:?}")));
     match (cover, arguments.poisson) {
         (Cover::Bonded, poisson) => {

@@ -109,7 +109,7 @@ impl StreamArguments {
         let mut lines = as_lines(&mut stdout, self.brief);
         let mut output = |outcome: &Outcome| {
             if let Outcome::Note(text) = outcome {
-                eprintln!("{}: {text}", scene.name);
+                say!("{}: {text}", scene.name);
             }
             if let Some(recorder) = &mut recorder {
                 recorder.outcome(outcome).map_err(|error| Error::other(error.to_string()))?;
@@ -120,12 +120,12 @@ impl StreamArguments {
         // Completed whatever ended the stream.
         let recorded = recorder.map(Recorder::finish).transpose();
         if let (Ok(Some(results)), Some(path)) = (&recorded, &self.record) {
-            eprintln!("{}: {results} results recorded", path.display());
+            say!("{}: {results} results recorded", path.display());
         }
         let counts = counts?;
         let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
         let (answered, refused) = (counts.answered, counts.refused);
-        eprintln!("{}: {answered} results, {rate:.1} per second; {counts}", scene.name);
+        say!("{}: {answered} results, {rate:.1} per second; {counts}", scene.name);
         recorded?;
         interrupted.check().map_err(|_| Interrupted("the recording is complete"))?;
         if refused > 0 {
@@ -184,7 +184,7 @@ pub(super) fn open(source: &Source, scene: &Scene, baud: Option<u32>) -> Result<
     };
     let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
     if let Some(address) = address {
-        eprintln!("{}: listening on udp:{address}", scene.name);
+        say!("{}: listening on udp:{address}", scene.name);
     }
     Ok((input, source.name().to_owned()))
 }

@@ -1,14 +1,18 @@
 //! `dermis replay`: the frames or the results of a recording, line by line.
 
-use std::io::{copy, ErrorKind, Write};
-use std::path::PathBuf;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
 use dermis_golden::data::recording::message::Text;
 use dermis_golden::data::recording::{End, FrameOptions, Messages};
 
+use crate::output::write;
 use crate::recording::{Lines, Pace, RESULT};
+
+/// Bytes that are read at once.
+const BUFFER: usize = 1 << 16;
 
 /// Arguments of `dermis replay`.
 #[derive(Args, Debug)]
@@ -61,43 +65,55 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     };
     let named = |error: &dyn std::fmt::Display| anyhow!("{}: {error}", file.display());
     let mut output = std::io::stdout().lock();
-    let written = match results {
-        true => write_results(Messages::open(file).map_err(|error| named(&error))?, &mut output),
+    let mut write = |bytes: &[u8]| write(&mut output, bytes);
+    let end = match results {
+        true => write_results(file, &mut write)?,
         false => {
             let options = FrameOptions { shape: None, topic: topic.clone(), MPa_per_count: *mpa_per_count };
-            let mut lines = Lines::open(file.clone(), options, pace, [false, true]).map_err(|error| named(&error))?;
-            copy(&mut lines, &mut output).map(|_| lines.end()).map_err(anyhow::Error::from)
+            let lines = Lines::open(file.clone(), options, pace, [false, true]).map_err(|error| named(&error))?;
+            write_frames(lines, file, &mut write)?
         }
-    };
-    let closed = |error: &anyhow::Error| {
-        error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
-    };
-    let end = match written {
-        Err(error) if !closed(&error) => return Err(named(&error)),
-        Err(_) => End::Complete,
-        Ok(end) => end,
     };
     match end.words() {
         Some(words) if end == End::Cut && !partial => return Err(named(&format!("{words}; --partial allows it"))),
-        Some(words) => eprintln!("{}: {words}", file.display()),
+        Some(words) => say!("{}: {words}", file.display()),
         None => (),
     }
     Ok(String::new())
 }
 
-fn write_results(mut messages: Messages, output: &mut dyn Write) -> Result<End> {
+/// Writes bytes; whether anything reads them.
+type Write<'a> = dyn FnMut(&[u8]) -> Result<bool> + 'a;
+
+fn write_frames(mut lines: Lines, file: &Path, write: &mut Write) -> Result<End> {
+    let mut buffer = vec![0; BUFFER];
+    loop {
+        match lines.read(&mut buffer) {
+            Err(error) if error.kind() == ErrorKind::Interrupted => (),
+            Err(error) => bail!("{}: {error}", file.display()),
+            Ok(0) => return Ok(lines.end()),
+            Ok(bytes) if write(&buffer[..bytes])? => (),
+            Ok(_) => return Ok(End::Complete),
+        }
+    }
+}
+
+fn write_results(file: &Path, write: &mut Write) -> Result<End> {
+    let named = |error: &dyn std::fmt::Display| anyhow!("{}: {error}", file.display());
+    let mut messages = Messages::open(file).map_err(|error| named(&error))?;
     let mut found = false;
-    while let Some(message) = messages.next_message()? {
+    while let Some(message) = messages.next_message().map_err(|error| named(&error))? {
         if message.topic == RESULT {
-            let text: Text = message.decoded().map_err(|error| anyhow!("{RESULT}: {error}"))?;
+            let text: Text = message.decoded().map_err(|error| named(&format!("{RESULT}: {error}")))?;
             found = true;
-            output.write_all(text.data.as_bytes())?;
-            output.write_all(b"\n")?;
+            if !write((text.data + "\n").as_bytes())? {
+                return Ok(End::Complete);
+            }
         }
     }
     match found || messages.end() == End::Cut {
         true => Ok(messages.end()),
-        false => bail!(messages.without(RESULT)),
+        false => Err(named(&messages.without(RESULT))),
     }
 }
 

@@ -152,7 +152,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
 /// training, not the command.
 fn trained(scene: &Scene, training: &Training) -> Result<(Trained, String)> {
     let interrupt = Interrupt::with(|| {
-        eprintln!("interrupted: the best network so far is measured and written; a second signal ends at once");
+        say!("interrupted: the best network so far is measured and written; a second signal ends at once");
     })?;
     let bar = Progress::share(&format!("{}: training", scene.name));
     let (mut losses, mut next) = (String::new(), 0.0);

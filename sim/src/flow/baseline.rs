@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::tools::ToolError;
+use dermis_golden::plain_words::JsonError;
 use dermis_golden::spec::board::Board;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
@@ -93,7 +94,8 @@ impl Baselines {
             return Ok(Baselines::default());
         }
         let text = std::fs::read_to_string(path).map_err(ToolError::io(path))?;
-        serde_json::from_str(&text).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })
+        let wrong = |e| ToolError::Output { path: path.to_owned(), reason: JsonError::new(&e).to_string() };
+        serde_json::from_str(&text).map_err(wrong)
     }
 
     /// Writes the file at `path`, completely or not at all.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use dermis_golden::plain_words::JsonError;
 use dermis_golden::spec::board::Family;
 use dermis_golden::write::write;
 use serde_json::Value;
@@ -58,7 +59,7 @@ pub fn cells(folder: &Path, top: &str) -> Result<BTreeMap<String, u64>, ToolErro
 }
 
 fn read(path: &Path) -> Result<Value, ToolError> {
-    let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
+    let wrong = |error| ToolError::Output { path: path.to_owned(), reason: JsonError::new(&error).to_string() };
     serde_json::from_slice(&fs::read(path).map_err(ToolError::io(path))?).map_err(wrong)
 }
 

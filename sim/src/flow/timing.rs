@@ -1,5 +1,6 @@
 //! Results of a place-and-route run, from nextpnr's report.
 
+use dermis_golden::plain_words::JsonError;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -60,7 +61,7 @@ impl Placed {
     ) -> Result<Placed, ToolError> {
         let text = std::fs::read_to_string(path).map_err(ToolError::io(path))?;
         let wrong = |reason: String| ToolError::Output { path: path.to_owned(), reason };
-        let report: Report = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let report: Report = serde_json::from_str(&text).map_err(|error| wrong(JsonError::new(&error).to_string()))?;
         let (links, others): (Vec<_>, Vec<_>) =
             report.fmax.iter().partition(|(name, _)| link.is_some_and(|pin| name.contains(pin)));
         let least = |clocks: &[(&String, &Fmax)]| {

@@ -1,6 +1,6 @@
 //! `dermis host --stream`: frames and answers as lines of JSON; of a board that scans its array, answers alone.
 
-use std::io::{BufRead, ErrorKind, Read, Write};
+use std::io::{BufRead, Read, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
@@ -14,8 +14,9 @@ use serde_json::Value;
 use super::answer::{Answer, PhysicalAnswer};
 use super::error::HostError;
 use super::session::Session;
+use crate::output::write;
 use crate::stream::acquisition::Acquisition;
-use crate::stream::line::{self, Frames, LineFrame, NoFrame};
+use crate::stream::line::{self, Frames, NoFrame};
 use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
 
 /// An output line with an answer.
@@ -93,7 +94,7 @@ pub(crate) fn run<P: Read + Write>(
                 Some(true) => answer(session, &mut checks, (&mut frames, &mut times), &bytes, number),
             };
         if let Some(note) = frames.note() {
-            eprintln!("standard input: {note}");
+            say!("standard input: {note}");
         }
         let text = match text {
             Ok(None) => continue,
@@ -109,7 +110,7 @@ pub(crate) fn run<P: Read + Write>(
                 serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
             }
         };
-        if !write_line(output, &text)? {
+        if !write(output, format!("{text}\n").as_bytes())? {
             break;
         }
     }
@@ -125,10 +126,16 @@ fn answer<P: Read + Write>(
     number: u64,
 ) -> Result<Option<Reply>, (Value, anyhow::Error)> {
     let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    let Some(LineFrame { id, frame, time_ns }) = frame else { return Ok(None) };
+    let Some(line) = frame else { return Ok(None) };
     let sent = SystemTime::now();
-    let time_ns = times.time_ns(time_ns, nanoseconds(sent));
-    reply(session, checks, &id, (time_ns, sent), &frame).map(Some).map_err(|error| (id, error))
+    let time_ns = times.time_ns(line.time_ns, nanoseconds(sent));
+    match reply(session, checks, &line.id, (time_ns, sent), &line.frame) {
+        Ok(mut reply) => {
+            reply.answer.diagnostics().raise(line.flag());
+            Ok(Some(reply))
+        }
+        Err(error) => Err((line.id, error)),
+    }
 }
 
 fn reply<P: Read + Write>(
@@ -161,18 +168,9 @@ pub(crate) fn run_scans<P: Read + Write>(
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;
-        if !write_line(output, &serde_json::to_string(&reply)?)? {
+        if !write(output, (serde_json::to_string(&reply)? + "\n").as_bytes())? {
             break;
         }
     }
     Ok(sent)
-}
-
-/// Writes a line at once; whether somebody reads on.
-fn write_line(output: &mut dyn Write, text: &str) -> Result<bool> {
-    match writeln!(output, "{text}").and_then(|()| output.flush()) {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-        Err(error) => Err(anyhow!("standard output: {error}")),
-        Ok(()) => Ok(true),
-    }
 }

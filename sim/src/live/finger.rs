@@ -15,6 +15,7 @@ use anyhow::Result;
 use dermis_golden::data::frame::{Contact, Forces, Frame};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::generate;
+use dermis_golden::plain_words::JsonError;
 use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
@@ -48,7 +49,8 @@ impl Finger {
     /// # Errors
     /// Anything but `null` or two finite coordinates on the array and a force with a positive normal part.
     pub fn read(body: &[u8], scene: &Scene) -> Result<Option<Finger>, String> {
-        let finger: Option<Finger> = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+        let finger: Option<Finger> =
+            serde_json::from_slice(body).map_err(|error| JsonError::new(&error).to_string())?;
         let Some(Finger { centre_mm, force_N }) = finger else { return Ok(None) };
         let half = scene.sensor.half_mm();
         if (0..2).any(|axis| centre_mm[axis].abs() > half[axis] || !centre_mm[axis].is_finite()) {
@@ -84,20 +86,35 @@ impl Finger {
     }
 }
 
-/// The finger as the mouse last described it; `None` before its first word, while a press plays.
+/// What the mouse has said.
+#[derive(Clone, Copy, Default)]
+enum Mouse {
+    /// Nothing yet: a press plays.
+    #[default]
+    Silent,
+    /// That it does not press.
+    Up,
+    /// Where it presses, and how.
+    Down(Finger),
+}
+
+/// The finger as the mouse last described it; before its first word a press plays.
 #[derive(Default)]
-pub struct Hand(Mutex<Option<Option<Finger>>>);
+pub struct Hand(Mutex<Mouse>);
 
 impl Hand {
     /// Takes what the mouse does now.
     pub fn set(&self, finger: Option<Finger>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(finger);
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = finger.map_or(Mouse::Up, Mouse::Down);
     }
 
     /// The finger `time_s` after the start.
     fn now(&self, scene: &Scene, time_s: f64) -> Option<Finger> {
-        let mouse = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        mouse.unwrap_or_else(|| Some(Finger::playing(scene, time_s)))
+        match *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            Mouse::Silent => Some(Finger::playing(scene, time_s)),
+            Mouse::Up => None,
+            Mouse::Down(finger) => Some(finger),
+        }
     }
 
     /// Draws, reconstructs and shows a frame in every `period`, or as soon as the one before is done; `noise` is its
@@ -166,9 +183,9 @@ mod tests {
             ("{\"centre_mm\": [1e9, 0], \"force_N\": [0, 0, 1]}", "centre_mm = [1000000000.0, 0.0] is not allowed"),
             ("{\"centre_mm\": [0, 0], \"force_N\": [0, 0, 0]}", "force_N = [0.0, 0.0, 0.0] is not allowed"),
             ("{\"centre_mm\": [0, 0], \"force_N\": [0, 2000, 1]}", "force_N = [0.0, 2000.0, 1.0] is not allowed"),
-            ("{\"centre_mm\": [0, 0]}", "missing field `force_N`"),
-            ("{\"force\": 1}", "unknown field `force`"),
-            ("", "EOF"),
+            ("{\"centre_mm\": [0, 0]}", "line 1, column 21: force_N is missing"),
+            ("{\"force\": 1}", "line 1, column 8: unknown field force;"),
+            ("", "line 1, column 1: the text ends where a value is wanted"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.starts_with(wanted), "{error}");

@@ -153,7 +153,7 @@ fn write_all(file: RecordingFile, entries: &Receiver<Entry>, name: &str) -> Writ
     let mut results = 0;
     let error = write_until_failure(file, entries, &mut results).err();
     if let Some(error) = &error {
-        eprintln!("{name}: {error}; it ends with {results} results, the answers go on");
+        say!("{name}: {error}; it ends with {results} results, the answers go on");
         entries.iter().for_each(drop);
     }
     Written { results, error }

@@ -8,6 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
+use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use serde::{Serialize, Serializer};
 
@@ -201,10 +202,10 @@ pub fn run_until(
         })
     };
     stop.add(&queue);
-    let (times_ns, counts) = (Vec::new(), Counts::default());
+    let (times_ns, flags, counts) = (Vec::new(), Vec::new(), Counts::default());
     let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
-    let mut stream = Stream { estimators, frames, change: None, times_ns, counts };
-    stream.choice(output).map_err(|error| anyhow!("output: {error}"))?;
+    let mut stream = Stream { estimators, frames, change: None, times_ns, flags, counts };
+    stream.choice(output).map_err(|error| anyhow!("standard output: {error}"))?;
     loop {
         if stop.stopped() {
             queue.close();
@@ -224,7 +225,7 @@ pub fn run_until(
                 queue.close();
                 return Ok(stream.counts);
             }
-            Err(error) => return Err(anyhow!("output: {error}")),
+            Err(error) => return Err(anyhow!("standard output: {error}")),
             Ok(()) => (),
         }
     }
@@ -260,6 +261,8 @@ struct Stream<'a> {
     change: Option<String>,
     /// Nanoseconds since 1970 when each frame of a block that is not complete was acquired.
     times_ns: Vec<i64>,
+    /// Flags that its lines raise.
+    flags: Vec<Flag>,
     counts: Counts,
 }
 
@@ -277,15 +280,17 @@ impl Stream<'_> {
             output(&Outcome::Note(&note))?;
         }
         let result = frame.and_then(|frame| {
-            let Some(LineFrame { frame, time_ns, .. }) = frame else { return Ok(None) };
-            self.times_ns.push(self.counts.acquisition.time_ns(time_ns, nanoseconds(received.time)));
-            self.estimators.push(frame).map_err(|error| {
+            let Some(line) = frame else { return Ok(None) };
+            self.times_ns.push(self.counts.acquisition.time_ns(line.time_ns, nanoseconds(received.time)));
+            self.flags.extend(line.flag());
+            self.estimators.push(line.frame).map_err(|error| {
                 self.times_ns.clear();
+                self.flags.clear();
                 typed(error).to_string()
             })
         });
         let line = received.number;
-        let (frames, result) = match result {
+        let (frames, mut result) = match result {
             Ok(None) => return Ok(()),
             Ok(Some(complete)) => complete,
             Err(error) => {
@@ -293,6 +298,7 @@ impl Stream<'_> {
                 return output(&Outcome::Refusal(Refusal { line, error: &error }));
             }
         };
+        result.diagnostics().raise(self.flags.drain(..));
         let (times_ns, change) = (std::mem::take(&mut self.times_ns), self.change.take());
         let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
         let estimator = self.estimators.name();
@@ -385,14 +391,14 @@ mod tests {
     #[test]
     fn results_are_those_of_the_engines_and_bad_lines_are_numbered() {
         let (scene, frames) = (scene(), Frame::shipped(&scene()));
-        let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
+        let input = format!("{}\nx,y\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
         for name in EngineName::SOFTWARE {
             let (counts, answers) = answers(&scene, name, input.clone(), ALL, false);
             assert_eq!((counts.answered, counts.refused, counts.dropped), (2, 2, 0));
             let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
             assert_eq!(lines, [1, 3, 4, 5]);
             assert_eq!(answers[1]["error"], "2 values, wanted 64");
-            assert!(answers[3]["error"].as_str().unwrap().contains("missing field `stress_MPa`"));
+            assert!(answers[3]["error"].as_str().unwrap().contains("stress_MPa is missing"));
             for (answer, frame, sequence) in [(&answers[0], &frames[0], 0), (&answers[2], &frames[1], 1)] {
                 let plain = Frame { resultant_N: None, ..frame.clone() };
                 let result = CheckedEngine::new(engine_of(&scene, name)).result(&[plain], true).unwrap();

@@ -4,6 +4,7 @@ use std::io::{self, BufRead, Read as _};
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::text::{Form, Layout, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
+use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::sensor::Sensor;
 use serde_json::Value;
 
@@ -18,6 +19,15 @@ pub(crate) struct LineFrame {
     pub(crate) frame: Frame,
     /// Time that the line states, in ns since 1970 or another moment.
     pub(crate) time_ns: Option<i64>,
+    /// Whether a digit may be lost, [`Reader::is_doubtful`].
+    pub(crate) doubtful: bool,
+}
+
+impl LineFrame {
+    /// The flag of a result with this frame, if there is one.
+    pub(crate) fn flag(&self) -> Option<Flag> {
+        self.doubtful.then_some(Flag::TornFrame)
+    }
 }
 
 /// Why a line holds no frame, with its id if that could be read.
@@ -98,7 +108,10 @@ impl Frames {
                     other => other.to_string(),
                 };
                 match Frame::from_stress(&name, &self.sensor, readings) {
-                    Ok(frame) => Ok(Some(LineFrame { id, frame: Frame { resultant_N, ..frame }, time_ns })),
+                    Ok(frame) => {
+                        let (frame, doubtful) = (Frame { resultant_N, ..frame }, self.reader.is_doubtful());
+                        Ok(Some(LineFrame { id, frame, time_ns, doubtful }))
+                    }
                     Err(error) => Err(NoFrame { id, reason: error.to_string() }),
                 }
             }
@@ -150,7 +163,7 @@ mod tests {
             ("1,x,3,4", "value 2: \"x\" is not a finite number"),
             ("0,1,0,2,0,3,0,4", "8 values, wanted 4; a decimal mark is a point where commas separate values"),
             ("1,inf,3,4", "value 2: \"inf\" is not a finite number"),
-            ("{\"stress\": []}", "column 9: unknown field `stress`"),
+            ("{\"stress\": []}", "column 9: unknown field stress; there are id, stress_MPa"),
         ];
         for (text, wanted) in cases {
             let reason = frame(text, 1).unwrap_err().reason;

@@ -135,7 +135,7 @@ impl Growing {
             return Ok(());
         }
         let what = if replaced { "another file has this name" } else { "the file was cut" };
-        eprintln!("{}: {what}: read from its start", self.path.display());
+        say!("{}: {what}: read from its start", self.path.display());
         if replaced {
             self.file = File::open(&self.path)?;
         } else {

@@ -122,6 +122,12 @@ fn examples(text: &str) -> Vec<String> {
     lines.map(command).collect()
 }
 
+/// Examples that run everywhere and end, in order.
+pub(crate) fn runnable() -> Vec<String> {
+    let not_run: BTreeSet<String> = NOT_RUN.iter().map(|(line, _)| (*line).to_owned()).collect();
+    all_examples().difference(&not_run).cloned().collect()
+}
+
 fn all_examples() -> BTreeSet<String> {
     let overview = help(&[]);
     let listed = overview.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
@@ -131,7 +137,7 @@ fn all_examples() -> BTreeSet<String> {
 }
 
 /// Creates the files that examples name.
-fn prepare(work: &Path) {
+pub(crate) fn prepare(work: &Path) {
     write_example(work);
     let scene =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();

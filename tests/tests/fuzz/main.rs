@@ -3,32 +3,32 @@
 //!
 //! | part | input | must hold |
 //! |---|---|---|
-//! | scene, frame, calibration, manifest | seeds of `corpus/`, mutated bytes and words | error or value, no panic |
+//! | scene, frame, calibration, manifest, recordings, lines, requests | seeds of `corpus/`, mutated bytes and words | error in plain words or value, no panic |
 //! | frame.json | the same | a frame that is read, written and read again is the same |
 //! | packets | the same | a packet that is found is found again after encoding |
 //! | whole | random scenes, random and invalid frames | error or finite forces, in floating and fixed point |
 //!
 //! No input takes longer than [`LONGEST`], and reading allocates at most [`BYTES_PER_BYTE`] per byte of text plus
 //! [`BYTES`]. Inputs depend on a seed only and are reproducible; failing ones are counted and printed, to be added to
-//! `corpus/`, which is read first.
+//! `corpus/`, which is read first. The same readers are fuzzed by libFuzzer, which sees what code an input reaches: `tests/fuzz-targets`
+//! has added what it found to `corpus/`.
 //!
 //! `make fuzz` runs 10⁷ inputs on the readers and 10⁵ on the whole path, and stores the counts in `build/tried` for the
 //! report; without its variables both parts are short.
 
 use std::time::{Duration, Instant};
 
+use dermis_tests::readers::{corpus, TARGETS};
 use dermis_tests::wanted;
 use fastrand::Rng;
 
 mod counting;
 mod draw;
-mod readers;
 mod run;
 mod whole;
 
 use counting::Counting;
 use draw::mutated;
-use readers::{corpus, TARGETS};
 use run::{conclude, on_all_processors, Outcome};
 
 /// Time limit for one input of a reader.

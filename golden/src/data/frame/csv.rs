@@ -11,7 +11,7 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
         (Some(frame), 0) => Ok(frame),
         (_, others) => {
             let reason = format!("has {} frames, wanted one", others + 1);
-            Err(FrameError::Text { file: file.to_string(), reason: NoReadings { line: None, cell: None, reason } })
+            Err(FrameError::Text { file: file.to_string(), reason: NoReadings::of_text(reason) })
         }
     }
 }

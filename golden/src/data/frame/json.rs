@@ -3,6 +3,7 @@
 
 use super::{Contact, Forces, Frame, FrameError};
 use crate::data::text::without_nan;
+use crate::plain_words::JsonError;
 use crate::spec::plain_text::json_schema;
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
@@ -129,27 +130,8 @@ fn is_possible(medium: &Medium) -> bool {
     }
 }
 
-/// The reader's error with line and column stated once, in the terms of JSON.
+/// The reader's error, in the terms of JSON.
 fn wrong(file: &str, field: Option<String>, error: &serde_json::Error) -> FrameError {
-    let (line, column) = (error.line(), error.column());
-    let text = error.to_string();
-    let message = text.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&text);
-    // At a line's very start the reader counts column 0.
-    FrameError::Json { file: file.to_string(), line, column: column.max(1), field, message: in_json_words(message) }
-}
-
-/// Replaces Rust type names in a message by JSON terms.
-fn in_json_words(message: &str) -> String {
-    let Some((before, expected)) = message.split_once("expected ") else {
-        return message.to_string();
-    };
-    let expected = match expected {
-        "f64" => "a number",
-        "usize" => "a whole number",
-        "a sequence" => "a list",
-        _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
-        other => other,
-    };
-    let before = before.replace("type: map", "type: object").replace("type: sequence", "type: list");
-    format!("{before}expected {}", expected.replace("an array of length", "a list of length"))
+    let JsonError { line, column, message } = JsonError::new(error);
+    FrameError::Json { file: file.to_string(), line, column, field, message }
 }

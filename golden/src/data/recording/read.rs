@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use mcap::records::Record;
+use mcap::records::{op, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::McapError;
 
@@ -33,7 +33,9 @@ const ENCODINGS: [(&str, NumberKind, usize); 9] = [
 ];
 /// Longest record in bytes that is taken.
 const LONGEST_RECORD: usize = 1 << 28;
-/// Bytes that are read at a time, at least.
+/// Records that are read, of those that the parser knows.
+const READ: [u8; 5] = [op::HEADER, op::FOOTER, op::SCHEMA, op::CHANNEL, op::MESSAGE];
+/// Bytes that are read at a time.
 const PART: usize = 1 << 16;
 
 /// One message of a file.
@@ -96,7 +98,7 @@ struct Channel {
 
 /// The messages of a file; errors have no file's name.
 pub struct Messages {
-    file: File,
+    file: Box<dyn Read + Send>,
     reader: LinearReader,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
@@ -111,10 +113,15 @@ impl Messages {
     /// # Errors
     /// A file that cannot be read.
     pub fn open(path: &Path) -> Result<Messages> {
+        Ok(Messages::of(File::open(path)?))
+    }
+
+    /// The messages in the bytes of a file.
+    pub fn of(file: impl Read + Send + 'static) -> Messages {
         let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
         let reader = LinearReader::new_with_options(options.with_record_length_limit(LONGEST_RECORD));
         let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
-        Ok(Messages { file: File::open(path)?, reader, schemas, channels, own: None, end: End::Complete })
+        Messages { file: Box::new(file), reader, schemas, channels, own: None, end: End::Complete }
     }
 
     /// The next message; `None` at the end of the file, of which [`Messages::end`] knows more.
@@ -134,13 +141,20 @@ impl Messages {
                     continue;
                 }
                 Some(Err(error)) => return Err(named(error)),
-                Some(Ok(LinearReadEvent::ReadRequest(bytes))) => {
-                    let read = self.file.read(self.reader.insert(bytes.max(PART)))?;
+                // A part of what is asked for: a length that is wrong takes no memory that the file does not fill.
+                Some(Ok(LinearReadEvent::ReadRequest(_))) => {
+                    let read = self.file.read(self.reader.insert(PART))?;
                     self.reader.notify_read(read);
                     continue;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => (opcode, data),
             };
+            if !READ.contains(&opcode) {
+                continue;
+            }
+            if !lengths_fit(opcode, data) {
+                return Err(RecordingError::new("a record has a text or list that is longer than the record"));
+            }
             match mcap::parse_record(opcode, data).map_err(named)? {
                 Record::Header(header) => self.own = Some(header.library.starts_with(LIBRARY)),
                 Record::Footer(footer) if footer.summary_start == 0 && self.own == Some(true) => {
@@ -193,6 +207,33 @@ impl Messages {
     }
 }
 
+/// Whether the texts and lists of a record, each behind its length, end within it; the parser takes memory for any length.
+fn lengths_fit(opcode: u8, data: &[u8]) -> bool {
+    // Numbers in front of the texts, and how many there are.
+    let (numbers, count) = match opcode {
+        op::HEADER => (0, 2),
+        op::SCHEMA => (2, 3),
+        op::CHANNEL => (4, 3),
+        _ => return true,
+    };
+    let next = |rest: &'_ [u8]| -> Option<usize> {
+        let length = u32::from_le_bytes(rest.first_chunk().copied()?) as usize;
+        Some(4 + length).filter(|end| *end <= rest.len())
+    };
+    let Some(mut rest) = data.get(numbers..) else { return false };
+    let mut last = rest;
+    for _ in 0..count {
+        let Some(end) = next(rest) else { return false };
+        (last, rest) = (&rest[4..end], &rest[end..]);
+    }
+    // The last of a channel is a list of texts.
+    while opcode == op::CHANNEL && !last.is_empty() {
+        let Some(end) = next(last) else { return false };
+        last = &last[end..];
+    }
+    true
+}
+
 /// An error in words of the file.
 fn named(error: McapError) -> RecordingError {
     match error {
@@ -240,6 +281,11 @@ impl Frames {
     /// A file that cannot be read.
     pub fn open(path: &Path, options: FrameOptions) -> Result<Frames> {
         Ok(Frames { messages: Messages::open(path)?, options, count: 0 })
+    }
+
+    /// The frames in the bytes of a file.
+    pub fn of(file: impl Read + Send + 'static, options: FrameOptions) -> Frames {
+        Frames { messages: Messages::of(file), options, count: 0 }
     }
 
     /// The next frame; `None` at the end.

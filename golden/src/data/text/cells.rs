@@ -84,6 +84,10 @@ pub(super) struct Digits {
     bare_zero: bool,
     /// Numbers are filled with zeros in front.
     padded: bool,
+    /// Characters before the decimal mark to which they are, a sign in front or among them.
+    width: Option<usize>,
+    /// Nearly all numbers have a digit before the decimal mark.
+    leading: bool,
 }
 
 /// Share of the numbers from which on all are taken to be written alike.
@@ -91,6 +95,7 @@ const LIKE: f64 = 0.9;
 
 /// The parts of a number.
 struct Number<'t> {
+    signed: bool,
     whole: &'t str,
     decimals: &'t str,
     exponent: &'t str,
@@ -99,10 +104,16 @@ struct Number<'t> {
 impl<'t> Number<'t> {
     /// The parts of a text that is a number with decimal point.
     fn of(text: &'t str) -> Number<'t> {
-        let text = text.trim_start_matches(['-', '+']);
-        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, ""));
+        let unsigned = text.trim_start_matches(['-', '+']);
+        let (mantissa, exponent) = unsigned.split_once(['e', 'E']).unwrap_or((unsigned, ""));
         let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-        Number { whole, decimals, exponent: exponent.trim_start_matches(['-', '+']) }
+        let signed = unsigned.len() < text.len();
+        Number { signed, whole, decimals, exponent: exponent.trim_start_matches(['-', '+']) }
+    }
+
+    /// Whether it has as many characters before the decimal mark; a sign counts or stands in front of them.
+    fn is_as_wide(&self, width: usize) -> bool {
+        self.whole.len() == width || self.signed && self.whole.len() + 1 == width
     }
 
     fn is_bare_zero(&self) -> bool {
@@ -132,12 +143,15 @@ impl Digits {
             (share(&|number| length(number) == middle) >= LIKE).then_some(middle)
         };
         let zero_at_end = numbers.iter().any(|number| number.decimals.ends_with('0'));
+        let padded = share(&|number| number.is_padded()) > 1.0 - LIKE;
         Digits {
             mark,
             decimals: fixed(|number| number.decimals.len()).filter(|_| zero_at_end),
             exponent: fixed(|number| number.exponent.len()),
             bare_zero: numbers.iter().filter(|number| number.is_bare_zero()).count() > 1,
-            padded: share(&|number| number.is_padded()) > 1.0 - LIKE,
+            padded,
+            width: fixed(|number| number.whole.len() + usize::from(number.signed)).filter(|_| padded),
+            leading: share(&|number| !number.whole.is_empty()) >= LIKE,
         }
     }
 
@@ -163,9 +177,28 @@ impl Digits {
             true if differs(number.exponent.len(), self.exponent) => {
                 Err(format!("{} has an exponent that is cut", shown(cell)))
             }
-            true if number.is_padded() && !self.padded => Err(format!("{} begins with a zero", shown(cell))),
-            _ => Ok(value),
+            true if self.leading && number.whole.is_empty() => {
+                Err(format!("{} has no digit before its decimal mark", shown(cell)))
+            }
+            true => match self.width {
+                Some(width) if !number.is_as_wide(width) => {
+                    Err(format!("{} has {} digits, the others {width}", shown(cell), number.whole.len()))
+                }
+                None if number.is_padded() && !self.padded => Err(format!("{} begins with a zero", shown(cell))),
+                _ => Ok(value),
+            },
+            false => Ok(value),
         }
+    }
+
+    /// Whether the number in a cell would be another one without one of its digits, and be read: where numbers are as long as
+    /// they need to be, nothing shows that one is cut.
+    pub(super) fn hide_a_lost_digit(&self, cell: &str) -> bool {
+        let text = point(cell);
+        let number = Number::of(&text);
+        number.whole.len() > 1 && self.width.is_none()
+            || !number.decimals.is_empty() && self.decimals.is_none()
+            || !number.exponent.is_empty() && self.exponent.is_none()
     }
 }
 

@@ -115,12 +115,28 @@ impl Layout {
         if cells.len() != self.cells && !ends_without {
             let empty = usize::from(self.trailing);
             let got = cells.len() - empty.min(usize::from(cells.last().is_some_and(|cell| cell.is_empty())));
-            return Err(NoReadings::of_line(line, format!("{got} values, wanted {}", self.cells - empty)));
+            let none = NoReadings::of_line(line, format!("{got} values, wanted {}", self.cells - empty));
+            // A remark of the device is none of its frames.
+            return Err(if has_numbers(cells) { none.cut() } else { none });
         }
         let own = (self.first..self.first + self.readings).map(|column| {
-            self.digits.reading(&cells[column]).map_err(|reason| NoReadings::of_cell(line, column + 1, reason))
+            let cell = &cells[column];
+            self.digits.reading(cell).map_err(|reason| {
+                let none = NoReadings::of_cell(line, column + 1, reason);
+                // A word in place of a number, such as `inf`, is no part of one.
+                if cell.contains(|c: char| c.is_ascii_digit()) {
+                    none.cut()
+                } else {
+                    none
+                }
+            })
         });
         own.collect()
+    }
+
+    /// Whether a reading among the cells of a line would be another number without one of its digits, and be read.
+    pub(super) fn hides_a_lost_digit(&self, cells: &[Cow<str>]) -> bool {
+        cells.iter().skip(self.first).take(self.readings).any(|cell| self.digits.hide_a_lost_digit(cell))
     }
 
     /// Whether the other layout reads lines alike: all but the number of the first line.

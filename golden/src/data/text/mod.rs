@@ -17,6 +17,10 @@
 //! | a separator behind each line | an empty last cell in every line, one too many |
 //! | a frame per line, or a grid of one line per row | the number of cells |
 //! | decimals | where zeros at the end show that their number is fixed; a cell with fewer or more has lost or gained characters |
+//! | digits before the decimal mark | where zeros in front show that their number is fixed; where others have one, a cell has one too |
+//!
+//! A digit that a whole number has lost shows nowhere. Where lines of a stream show that the link loses characters, those near them
+//! are doubted ([`Reader::is_doubtful`]).
 //!
 //! | in | a cell is |
 //! |---|---|
@@ -78,19 +82,26 @@ pub struct NoReadings {
     pub cell: Option<usize>,
     /// What is wrong, in words.
     pub reason: String,
+    /// Whether characters seem to be lost: more or fewer values than the lines before have, or a number that is cut.
+    pub cut: bool,
 }
 
 impl NoReadings {
-    fn of_text(reason: impl Into<String>) -> NoReadings {
-        NoReadings { line: None, cell: None, reason: reason.into() }
+    pub(crate) fn of_text(reason: impl Into<String>) -> NoReadings {
+        NoReadings { line: None, cell: None, reason: reason.into(), cut: false }
     }
 
     fn of_line(line: &Line, reason: impl Into<String>) -> NoReadings {
-        NoReadings { line: Some(line.number), cell: None, reason: reason.into() }
+        NoReadings { line: Some(line.number), ..NoReadings::of_text(reason) }
     }
 
     fn of_cell(line: &Line, cell: usize, reason: impl Into<String>) -> NoReadings {
-        NoReadings { line: Some(line.number), cell: Some(cell), reason: reason.into() }
+        NoReadings { cell: Some(cell), ..NoReadings::of_line(line, reason) }
+    }
+
+    /// The same, where characters seem to be lost.
+    fn cut(self) -> NoReadings {
+        NoReadings { cut: true, ..self }
     }
 
     /// `file, line 3, value 2: reason`, with what is known.

@@ -5,10 +5,14 @@ use serde_json::Value;
 
 use super::layout::has_numbers;
 use super::time::TimeUnit;
+use crate::plain_words::JsonError;
+
 use super::{Form, Layout, Line, NoReadings, Separator, Stated};
 
 /// Lines of another layout in a row after which a stream is taken to have it.
 const CHANGES_AFTER: usize = 3;
+/// Lines after one that has lost characters in which one more may be lost where it does not show.
+const DOUBTED: usize = 100;
 
 /// A frame of a text.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +97,10 @@ pub struct Reader {
     time_ns: Option<i64>,
     /// Number of the last line that was not blank.
     last: usize,
+    /// Number of the last line that has lost characters.
+    cut: Option<usize>,
+    /// Whether numbers of the lines so far are written so that a lost digit does not show.
+    hides: bool,
 }
 
 /// Reads all frames of a text of an array of `[rows, cols]`.
@@ -163,7 +171,7 @@ impl TextFrames {
 impl Reader {
     /// Before the first line; the layout is found from the first line with readings.
     pub fn new(shape: [usize; 2], stated: Stated) -> Reader {
-        let (layout, other, blocks, time_ns) = (None, None, None, None);
+        let (layout, other, blocks, time_ns, cut) = (None, None, None, None, None);
         Reader {
             shape,
             stated,
@@ -175,6 +183,8 @@ impl Reader {
             first_line: 0,
             time_ns,
             last: 0,
+            cut,
+            hides: false,
         }
     }
 
@@ -183,8 +193,37 @@ impl Reader {
         self.layout.as_ref()
     }
 
+    /// Whether the readings of the last line may be others than those that were sent: one of the last hundred lines has lost
+    /// characters, and a digit that is lost from these numbers does not show. Written with a fixed number of decimals, or filled
+    /// with zeros, they are not in doubt.
+    ///
+    /// ```
+    /// use dermis_golden::data::text::{Line, Reader, Stated};
+    ///
+    /// let doubtful = |lines: [&str; 3]| {
+    ///     let mut reader = Reader::new([2, 2], Stated::default());
+    ///     lines.into_iter().enumerate().for_each(|(k, text)| drop(reader.push(Line { number: k + 1, text })));
+    ///     reader.is_doubtful()
+    /// };
+    /// // The second line has lost a separator; the third may have lost a digit of 12.
+    /// assert!(doubtful(["12,3,4,5", "12,34,5", "2,3,4,5"]));
+    /// assert!(!doubtful(["12,3,4,5", "12,3,4,5", "2,3,4,5"]));
+    /// assert!(!doubtful(["0012,0003,0004,0005", "0012,00030004,0005", "0002,0003,0004,0005"]));
+    /// ```
+    pub fn is_doubtful(&self) -> bool {
+        self.hides && self.cut.is_some_and(|line| self.last - line <= DOUBTED)
+    }
+
     /// The next line; a blank line or a part of a frame brings nothing.
     pub fn push(&mut self, line: Line) -> Vec<Read> {
+        let read = self.take(line);
+        if read.iter().any(|read| matches!(read, Read::LeftOut(left_out) if left_out.reason.cut)) {
+            self.cut = Some(self.last);
+        }
+        read
+    }
+
+    fn take(&mut self, line: Line) -> Vec<Read> {
         let line = Line { text: line.text.trim_start_matches('\u{feff}'), ..line };
         if line.number <= self.stated.skip_rows || !line.may_hold_readings() {
             return Vec::new();
@@ -192,6 +231,7 @@ impl Reader {
         let is_apart = self.last > 0 && line.number > self.last + 1;
         let before = std::mem::replace(&mut self.last, line.number);
         if line.text.trim_start().starts_with('{') {
+            self.hides = true;
             return vec![json_frame(&line, self.shape[0] * self.shape[1])];
         }
         if self.layout.is_none() {
@@ -223,6 +263,7 @@ impl Reader {
         match layout.readings_of(line, &cells) {
             Ok(readings) => {
                 self.other = None;
+                self.hides |= layout.hides_a_lost_digit(&cells);
                 Read::Frame(TextFrame {
                     first_line: line.number,
                     line: line.number,
@@ -247,6 +288,8 @@ impl Reader {
         let count = like.map_or(1, |(_, count)| count + 1);
         if count >= CHANGES_AFTER && !self.decided {
             self.layout = Some(own.clone());
+            // Those before were whole.
+            self.cut = None;
             return self.line(&own, line);
         }
         if own.separator != layout.separator {
@@ -275,7 +318,9 @@ impl Reader {
             self.first_line = line.number;
             self.time_ns = layout.time.and_then(|(column, unit)| unit.ns(cells.get(column)?));
         }
-        self.rows.push(layout.readings_of(line, &cells));
+        let row = layout.readings_of(line, &cells);
+        self.hides |= row.is_ok() && layout.hides_a_lost_digit(&cells);
+        self.rows.push(row);
         if self.rows.len() == layout.lines {
             let rows = std::mem::take(&mut self.rows);
             read.push(match rows.into_iter().collect::<Result<Vec<_>, _>>() {
@@ -300,11 +345,8 @@ impl Reader {
             return Vec::new();
         }
         let got = rows.len();
-        let short = NoReadings {
-            line: Some(before),
-            cell: None,
-            reason: format!("the frame ends after {got} of {wanted} rows"),
-        };
+        let reason = format!("the frame ends after {got} of {wanted} rows");
+        let short = NoReadings { line: Some(before), cell: None, reason, cut: true };
         vec![Read::LeftOut(LeftOut {
             id: Value::Null,
             reason: rows.into_iter().find_map(Result::err).unwrap_or(short),
@@ -319,18 +361,19 @@ fn holds_numbers(line: &Line) -> bool {
 
 /// The frame in a line of JSON.
 fn json_frame(line: &Line, taxels: usize) -> Read {
-    let left_out = |id: Value, reason: String| Read::LeftOut(LeftOut { id, reason: NoReadings::of_line(line, reason) });
+    let left_out = |id: Value, reason: String, cut: bool| {
+        Read::LeftOut(LeftOut { id, reason: NoReadings { cut, ..NoReadings::of_line(line, reason) } })
+    };
     let request: Request = match serde_json::from_str(&without_nan(line.text)) {
         Ok(request) => request,
         Err(error) => {
-            let text = error.to_string();
-            let message = text.split(" at line ").next().unwrap_or(&text);
-            return left_out(Value::Null, format!("column {}: {message}", error.column()));
+            let JsonError { column, message, .. } = JsonError::new(&error);
+            return left_out(Value::Null, format!("column {column}: {message}"), !error.is_data());
         }
     };
     let got = request.stress_MPa.len();
     if got != taxels {
-        return left_out(request.id, format!("stress_MPa has {got} values, wanted {taxels}"));
+        return left_out(request.id, format!("stress_MPa has {got} values, wanted {taxels}"), true);
     }
     let cell = match &request.timestamp {
         Value::String(text) => text.clone(),

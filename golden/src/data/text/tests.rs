@@ -91,6 +91,11 @@ fn what_does_not_fit_is_left_out_and_named() {
             "line 2, value 4: \"4.0\" has 1 decimals, the others 2",
         ),
         ("1.5,2,3,4\n1,015,3,4\n2,3,4,5\n", "line 2, value 2: \"015\" begins with a zero"),
+        ("1.5,2,3,4\n1,.15,3,4\n2,3,4,5\n", "line 2, value 2: \".15\" has no digit before its decimal mark"),
+        (
+            "0012,0003,-004,0005\n0012,0003,-004,0005\n0002,003,-004,0005\n0002,0003,-004,0005\n0002,0003,-004,0005\n",
+            "line 3, value 2: \"003\" has 3 digits, the others 4",
+        ),
         (
             "1.0e-01,2.0e-01,0.0e+00,4.0e-01\n1.0e-01,2.0e-01,0.0e+00,4.0e-0\n1.0e-01,2.0e-01,0.0e+00,4.0e-01\n",
             "line 2, value 4: \"4.0e-0\" has an exponent that is cut",
@@ -98,7 +103,10 @@ fn what_does_not_fit_is_left_out_and_named() {
         ("1,2\n3,4\n5,x\n7,8\n9,10\n11,12\n", "line 3, value 2: \"x\" is not a finite number"),
         ("1,2\n3,4\n\n5,6\n\n7,8\n9,10\n", "line 4: the frame ends after 1 of 2 rows"),
         ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress_MPa\":[1,2,3]}\n", "line 2: stress_MPa has 3 values, wanted 4"),
-        ("{\"stress_MPa\":[1,2,3,4]}\n{\"stress\":[1,2,3,4]}\n", "line 2: column 9: unknown field `stress`"),
+        (
+            "{\"stress_MPa\":[1,2,3,4]}\n{\"stress\":[1,2,3,4]}\n",
+            "line 2: column 9: unknown field stress; there are id, stress_MPa",
+        ),
     ];
     for (text, wanted) in cases {
         let read = read(text, [2, 2]);

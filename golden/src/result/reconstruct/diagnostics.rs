@@ -19,7 +19,12 @@ impl Diagnostics<'_> {
     /// Takes `checks` as the figures, and adds the flags that they raise.
     pub fn add_checks(&mut self, scene: &Scene, checks: Checks) {
         *self.checks = checks;
-        self.flags.extend(checks.flags(scene));
+        self.raise(checks.flags(scene));
+    }
+
+    /// Adds flags.
+    pub fn raise(&mut self, flags: impl IntoIterator<Item = Flag>) {
+        self.flags.extend(flags);
         self.flags.sort();
         self.flags.dedup();
     }

@@ -154,7 +154,7 @@ fn a_wrong_field_is_told_with_its_line_value_and_what_is_right() {
         (file("100.0", "\"fast\""), not(5, "clock_MHz = \"fast\" is not allowed; it must be a number above 0")),
         (file("clock_MHz", "clock_Mhz"), not(5, "unknown field clock_Mhz; did you mean clock_MHz?")),
         (with("colour = \"red\""), not(6, "unknown field colour; there are: description, engine, device, ")),
-        (file("= 100.0", "100.0"), not(5, "key with no value, expected `=`")),
+        (file("= 100.0", "100.0"), not(5, "key with no value where = is wanted")),
         (file("LFE5U-25F", "LFE5U-12F"), not(1, "device = \"LFE5U-12F\" is not allowed; it must be \"LFE5U-25F\", ")),
         (file("device = \"LFE5U-25F\"\n", ""), of_device("device")),
         (

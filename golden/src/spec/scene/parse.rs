@@ -7,6 +7,7 @@ use super::{
     Condition, FixedSpec, HardwareSpec, InputSpec, InverseKind, InverseSpec, MeanKind, Medium, OutputSpec,
     PartitionSpec, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, MAX_CONTACTS, SHORTEST_AVERAGE,
 };
+use crate::plain_words::plain;
 use crate::spec::partition::{subarrays, Case, Grid};
 use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use serde_json::{json, Value as Json};
@@ -79,11 +80,7 @@ fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
     SceneError::Syntax {
         file: origin.to_string(),
         line: 1 + text.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count(),
-        message: match error.message() {
-            // The reader names a type of its own.
-            wide if wide.contains("as i128") => "an integer has more than 64 bits".to_string(),
-            message => message.to_string(),
-        },
+        message: plain(error.message()),
     }
 }
 

@@ -1,20 +1,27 @@
-//! The readers of files and packets, and the seeds of each.
+//! The readers of files, streams, packets and requests, and the seeds of each: fuzzed by mutation in `tests/tests/fuzz`, by coverage in
+//! `tests/fuzz-targets`.
 
+use std::fmt::Display;
+use std::io::Cursor;
 use std::path::Path;
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::import::{import, Correction, Format, Settings, Unit};
 use dermis_golden::data::input::calibration::Calibration;
+use dermis_golden::data::recording::{FrameOptions, Frames};
+use dermis_golden::data::text::{frames, Form, Line, NoReadings, Read, Reader, Stated};
+use dermis_golden::plain_words::REFUSED;
 use dermis_golden::spec::board::Board;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_golden::wire::link::Decoder;
 use dermis_hdl::manifest;
+use dermis_sim::live::request;
 
-/// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
-type Target = (&'static str, fn(&[u8]) -> bool);
-/// All readers.
-pub const TARGETS: [Target; 15] = [
+/// A reader, which returns whether it accepted the bytes.
+pub type Target = fn(&[u8]) -> bool;
+/// All readers, by the folder of their seeds.
+pub const TARGETS: [(&str, Target); 18] = [
     ("scene", scene),
     ("board", board),
     ("frame.json", json),
@@ -30,15 +37,43 @@ pub const TARGETS: [Target; 15] = [
     ("import.paxini", |bytes| recording("fuzz.csv", Format::Paxini, bytes)),
     ("import.xela", |bytes| recording("fuzz.log", Format::Xela, bytes)),
     ("import.csv", |bytes| recording("fuzz.csv", Format::Csv, bytes)),
+    ("lines", lines),
+    ("recording.mcap", recorded),
+    ("http", http),
 ];
 
+/// The reader of a name.
+///
+/// # Panics
+/// If there is none.
+pub fn named(name: &str) -> Target {
+    let target = TARGETS.iter().find(|(own, _)| *own == name);
+    target.unwrap_or_else(|| panic!("{name:?} is none of {:?}", TARGETS.map(|(own, _)| own))).1
+}
+
 /// The seeds of a target, in the order of their names.
+///
+/// # Panics
+/// If it has none.
 pub fn corpus(target: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert!(!files.is_empty(), "{target} has no seeds");
     files.iter().map(|path| std::fs::read(path).unwrap()).collect()
+}
+
+/// Checks an error: it begins with the file's name, and has no words of the program.
+fn check_error(file: &str, error: impl Display, bytes: &[u8]) {
+    let text = error.to_string();
+    assert!(text.starts_with(file), "{text}");
+    check_words(&text, bytes);
+}
+
+/// Checks that a message has no words of the program but those that it quotes from `bytes`.
+fn check_words(text: &str, bytes: &[u8]) {
+    let input = String::from_utf8_lossy(bytes);
+    assert!(!REFUSED.iter().any(|words| text.contains(words) && !input.contains(words)), "{text}");
 }
 
 fn sensor() -> Sensor {
@@ -55,7 +90,7 @@ fn scene(bytes: &[u8]) -> bool {
             true
         }
         Err(error) => {
-            assert!(error.to_string().starts_with("fuzz.toml"), "{error}");
+            check_error("fuzz.toml", error, bytes);
             false
         }
     }
@@ -68,7 +103,7 @@ fn board(bytes: &[u8]) -> bool {
             true
         }
         Err(error) => {
-            assert!(error.to_string().starts_with("fuzz.toml"), "{error}");
+            check_error("fuzz.toml", error, bytes);
             false
         }
     }
@@ -84,7 +119,7 @@ fn frame(name: &str, bytes: &[u8]) -> Option<Frame> {
             Some(frame)
         }
         Err(error) => {
-            assert!(error.to_string().contains(name), "{error}");
+            check_error(name, error, bytes);
             None
         }
     }
@@ -107,7 +142,7 @@ fn calibration(bytes: &[u8]) -> bool {
             true
         }
         Err(error) => {
-            assert!(error.to_string().starts_with("fuzz.csv"), "{error}");
+            check_error("fuzz.csv", error, bytes);
             false
         }
     }
@@ -115,8 +150,7 @@ fn calibration(bytes: &[u8]) -> bool {
 
 fn manifests(bytes: &[u8]) -> bool {
     let read = manifest::parse(&String::from_utf8_lossy(bytes), "manifest.json");
-    assert!(read.as_ref().err().is_none_or(|error| error.to_string().starts_with("manifest.json")), "{read:?}");
-    read.is_ok()
+    read.map_err(|error| check_error("manifest.json", error, bytes)).is_ok()
 }
 
 fn packets(bytes: &[u8]) -> bool {
@@ -165,8 +199,70 @@ fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
             true
         }
         Err(error) => {
-            assert!(error.to_string().contains("fuzz"), "{error}");
+            check_error("fuzz", error, bytes);
             false
         }
+    }
+}
+
+/// The frames of the lines of 3×4 sensels, as a stream and as a whole text.
+fn lines(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    let shape = [sensor().rows, sensor().cols];
+    let mut reader = Reader::new(shape, Stated { form: Some(Form::Line), ..Stated::default() });
+    let mut read: Vec<Read> =
+        text.lines().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+    read.extend(reader.finish());
+    let whole =
+        frames(&text, shape, &Stated::default()).map_err(|error: NoReadings| check_words(&error.to_string(), bytes));
+    let mut any = false;
+    for read in read {
+        match read {
+            Read::Frame(frame) => {
+                assert_eq!(frame.readings.len(), sensor().taxels());
+                assert!(frame.readings.iter().all(|reading| !reading.is_infinite()));
+                any = true;
+            }
+            Read::LeftOut(left_out) => check_words(&left_out.reason.to_string(), bytes),
+            Read::Header => (),
+        }
+    }
+    for frame in whole.iter().flat_map(|whole| &whole.frames) {
+        assert!(frame.readings.len() == sensor().taxels() && frame.first_line <= frame.line);
+    }
+    any
+}
+
+/// The frames of an MCAP file up to its end or to what is wrong.
+fn recorded(bytes: &[u8]) -> bool {
+    let options = FrameOptions { MPa_per_count: Some(1e-3), ..FrameOptions::default() };
+    let mut frames = Frames::of(Cursor::new(bytes.to_vec()), options);
+    let mut any = false;
+    loop {
+        match frames.next_frame() {
+            Ok(Some(frame)) => assert_eq!(frame.stress_MPa.len(), frame.shape[0] * frame.shape[1]),
+            Ok(None) => return any,
+            Err(error) => {
+                check_words(&error.to_string(), bytes);
+                return any;
+            }
+        }
+        any = true;
+    }
+}
+
+/// A request of a browser.
+fn http(bytes: &[u8]) -> bool {
+    match request::read(&mut &*bytes) {
+        Ok(Some(Ok(request))) => {
+            assert!(request.body.len() <= bytes.len() && !request.method.is_empty() && !request.path.is_empty());
+            true
+        }
+        Ok(Some(Err((status, text)))) => {
+            assert!(status.starts_with('4'), "{status}");
+            check_words(&text, bytes);
+            false
+        }
+        Ok(None) | Err(_) => false,
     }
 }

@@ -1,0 +1,120 @@
+//! Lines of a link that loses a byte of each, in the formats in which sensors write numbers: what is read wrong is flagged.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use dermis_golden::data::generator::draws::{DrawOptions, Draws};
+use dermis_golden::result::errors::Errors;
+use dermis_golden::result::flags::Flag;
+use dermis_golden::spec::scene::Scene;
+use fastrand::Rng;
+use serde_json::Value;
+
+/// Largest e_t and e_n of a result that is right.
+const RIGHT: [f64; 2] = [0.2, 0.1];
+/// Largest stress of a frame in MPa.
+const PEAK_MPA: f64 = 0.45;
+/// Of the frames and of the bytes that are lost.
+const SEED: u64 = 1;
+/// An array whose taxels stand far apart for its cover: a reading says little of the next one. Its noise is not stated.
+const SENSOR: &str = "rows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+
+/// A format of the numbers: its name, the unit in MPa, lines, and a number in that unit as text.
+type Format = (&'static str, f64, usize, fn(f64) -> String);
+const FORMATS: [Format; 4] = [
+    ("whole kPa", 1e-3, 400, |b| format!("{b:.0}")),
+    ("four decimals", 1.0, 100, |b| format!("{b:.4}")),
+    ("exponents of two digits", 1.0, 100, |b| {
+        let text = format!("{b:.6e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap();
+        format!("{mantissa}e{:+03}", exponent.parse::<i32>().unwrap())
+    }),
+    ("as short as it is exact", 1.0, 100, |b| (b as f32).to_string()),
+];
+
+/// What became of the lines of a stream.
+#[derive(Debug, Default)]
+struct Outcome {
+    refused: usize,
+    flagged: usize,
+    right: usize,
+    /// Wrong and without a flag.
+    silent: usize,
+    /// Wrong and flagged for the lines before alone.
+    by_lines_before: usize,
+}
+
+/// The scene, whose readings are in a `unit` in MPa, as a file in `folder`.
+fn scene(folder: &Path, unit: f64) -> String {
+    let taxels = (0..64).map(|k| format!("{},{},0,{unit}\n", k / 8, k % 8)).collect::<String>();
+    std::fs::write(folder.join("gains.csv"), format!("row,col,offset,gain\n{taxels}")).unwrap();
+    let path = folder.join("pad.toml");
+    std::fs::write(&path, format!("[sensor]\n{SENSOR}[input]\ncalibration = \"gains.csv\"\n")).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// Drawn frames as lines of a format, each without one of its bytes, as a stream.
+fn run((_, unit, lines, text): Format, random: &mut Rng) -> Outcome {
+    let folder = tempfile::tempdir().unwrap();
+    let path = scene(folder.path(), unit);
+    let options = DrawOptions { seed: SEED, peak_MPa: Some(PEAK_MPA), ..DrawOptions::default() };
+    let draws = Draws::new(&Scene::load(&path).unwrap(), options).unwrap();
+    let frames: Vec<_> = (0..lines as u64).map(|number| draws.frame(number).unwrap()).collect();
+    let mut sent = String::new();
+    for frame in &frames {
+        let numbers: Vec<String> = frame.exact_MPa.iter().map(|b| text(b / unit)).collect();
+        let mut line = numbers.join(",");
+        line.remove(random.usize(..line.len()));
+        sent += &(line + "\n");
+    }
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
+        .args(["reconstruct", &path, "--stream", "--brief"])
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || input.write_all(sent.as_bytes()).unwrap());
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    let mut outcome = Outcome::default();
+    for answer in String::from_utf8(output.stdout).unwrap().lines() {
+        let answer: Value = serde_json::from_str(answer).unwrap();
+        let Some(found) = answer.get("resultant_N") else {
+            outcome.refused += 1;
+            continue;
+        };
+        let found: [f64; 3] = serde_json::from_value(found.clone()).unwrap();
+        let errors = Errors::new(frames[answer["line"].as_u64().unwrap() as usize - 1].total_N, found);
+        let wrong = [errors.tangential, errors.normal].iter().zip(RIGHT).any(|(e, right)| e.is_some_and(|e| e > right));
+        let flags: Vec<&str> = answer["flags"].as_array().unwrap().iter().map(|flag| flag.as_str().unwrap()).collect();
+        match flags[..] {
+            [] if wrong => outcome.silent += 1,
+            [] => outcome.right += 1,
+            [only] if wrong && only == Flag::TornFrame.name() => outcome.by_lines_before += 1,
+            _ => outcome.flagged += 1,
+        }
+    }
+    let all = outcome.refused + outcome.flagged + outcome.right + outcome.silent + outcome.by_lines_before;
+    assert_eq!(all, lines, "{outcome:?}");
+    outcome
+}
+
+/// 400 lines of whole numbers and 300 of others: no force that is wrong is without a flag. Without that of lines that lost characters
+/// there would be one, of whole numbers: beside the peak of such an array nothing else tells 291 kPa from 91.
+#[test]
+fn a_link_that_loses_a_byte_of_each_line_makes_no_silent_error() {
+    let mut random = Rng::with_seed(SEED);
+    let outcomes = FORMATS.map(|format| {
+        let outcome = run(format, &mut random);
+        println!("{}: {outcome:?}", format.0);
+        outcome
+    });
+    assert_eq!(outcomes.each_ref().map(|outcome| outcome.silent), [0; 4]);
+    assert!(outcomes[0].by_lines_before > 0);
+    // Numbers that show what they lose are not in doubt for it.
+    assert!(outcomes[1].right > 0, "{outcomes:?}");
+}
