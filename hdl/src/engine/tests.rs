@@ -139,7 +139,7 @@ fn with_a_network_beats_leave_in_the_cycles_of_the_model() {
         let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
         let defects = [
             Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
-            Change::value("", "operand_source__images_valid", |k| k.constant(1, 0)),
+            Change::value("", "pass__vector_valid", |k| k.constant(1, 0)),
         ];
         check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
     }

@@ -504,10 +504,10 @@ mod tests {
             let subject = |changes: &[Change]| subject_of!(block.clone(), changes, inputs [rst, accept, code, tlast], outputs [faults]);
             let mut defects = vec![
                 Change::value("", "equal", |k| k.constant(1, 0)),
-                Change::value("", "row_is_image", |k| k.constant(1, 0)),
-                Change::value("", "col_is_image", |k| k.constant(1, 0)),
-                Change::value("", "row_change", |k| k.constant(BITS, 1)),
-                Change::value("", "col_change", |k| k.constant(BITS, 0)),
+                Change::value("", "row___is_image", |k| k.constant(1, 0)),
+                Change::value("", "col___is_image", |k| k.constant(1, 0)),
+                Change::value("", "row___change", |k| k.constant(BITS, 1)),
+                Change::value("", "col___change", |k| k.constant(BITS, 0)),
             ];
             // What the first frame of a block raises is forgotten.
             defects.extend((power > 0).then(|| Change::value("", "before_in_block", |k| k.constant(FAULT_BITS, 0))));
