@@ -454,10 +454,18 @@ mod tests {
                 false => (0..rows).for_each(|i| codes[i * cols + col] = codes[i * cols + col - 1]),
             }
         }
-        if random.u8(..4) == 0 {
-            let axis = random.usize(1..rows);
-            let pairs = (0..rows).filter(|&i| i >= axis && 2 * axis > i);
-            pairs.for_each(|i| codes.copy_within((2 * axis - 1 - i) * cols..(2 * axis - i) * cols, i * cols));
+        if random.bool() {
+            // Symmetric about a line between two rows or two columns.
+            let of_rows = random.bool();
+            let lines = if of_rows { rows } else { cols };
+            let axis = random.usize(1..lines);
+            for line in (axis..lines).take(axis) {
+                let image = 2 * axis - 1 - line;
+                match of_rows {
+                    true => codes.copy_within(image * cols..(image + 1) * cols, line * cols),
+                    false => (0..rows).for_each(|i| codes[i * cols + line] = codes[i * cols + image]),
+                }
+            }
         }
         if random.u8(..4) == 0 {
             codes.iter_mut().for_each(|code| *code = !*code);
