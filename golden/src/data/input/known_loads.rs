@@ -11,7 +11,7 @@
 //! residual. The smallest and the largest load are extrapolated then.
 //!
 //! Where a line leaves more than the taxels' scatter, the characteristic is curved: b = c(gain · (reading − offset)) with one monotone
-//! curve c for all taxels, [`fit`].
+//! curve c for all taxels, `fit`.
 //!
 //! A taxel counts in the frames that have its reading, and a load for the taxels that have one under it; a taxel with a reading
 //! under fewer than two different loads is dead.
