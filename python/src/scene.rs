@@ -234,7 +234,7 @@ impl Scene {
         let engine = py.detach(|| self.engines.engine(name, &self.spec, &frames)).map_err(model)?;
         if single {
             let result = py.detach(|| engine::result(&engine, &frames, cross_check > 0)).map_err(model)?;
-            let time_ns = frames.last().and_then(|last| last.time_ns);
+            let time_ns = Stress::time_of_result(&frames);
             return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), time_ns, self.lengths()))?.into_any());
         }
         let engine = engine.engine();
@@ -245,7 +245,7 @@ impl Scene {
         };
         let (mut results, mut times_ns) = (Vec::new(), Vec::new());
         for frames in self.spec.input.frames_of_results(&frames) {
-            times_ns.push(frames.last().and_then(|last| last.time_ns));
+            times_ns.push(Stress::time_of_result(frames));
             results.push(py.detach(|| next(self.spec.input.newest(frames))).map_err(model)?);
             // Ctrl-C ends a long call.
             py.check_signals()?;

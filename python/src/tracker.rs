@@ -70,7 +70,7 @@ impl Tracker {
         })?;
         let lengths = [self.scene.sensor.rows, self.scene.sensor.cols];
         let timed = |(frames, result): (Vec<Stress>, _)| {
-            Reconstruction::new(Arc::new(result), frames.last().and_then(|last| last.time_ns), lengths)
+            Reconstruction::new(Arc::new(result), Stress::time_of_result(&frames), lengths)
         };
         Ok(result.map(timed))
     }

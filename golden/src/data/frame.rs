@@ -112,6 +112,11 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The time of a result of these frames in ns, that of the last one, if it is known.
+    pub fn time_of_result(frames: &[Frame]) -> Option<i64> {
+        frames.last()?.time_ns
+    }
+
     /// A frame of stress alone, e.g. from a running sensor; `stress_MPa` is row-major, NaN where a reading is missing; `id`
     /// is the name in reports and errors.
     ///

@@ -254,13 +254,14 @@ fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Resu
         return Err(ImportError::Hdf5 { file: file.to_string() });
     }
     let format = settings.format.or_else(|| Format::of(file, bytes));
+    let wanted = triaxial::Wanted { size: settings.size, sensor: settings.sensor.as_deref() };
     match format.ok_or_else(|| ImportError::Unrecognised { file: file.to_string() })? {
         Format::Tekscan => tekscan::parse(&decoded(bytes), source),
         Format::Lst => lst::parse(&decoded(bytes), source),
         Format::Xsensor => xsensor::parse(&decoded(bytes), source),
         Format::Flexitac => flexitac::parse(bytes, settings.size, source),
-        Format::Paxini => paxini::parse(&decoded(bytes), settings.size, settings.sensor.as_deref(), source),
-        Format::Xela => xela::parse(&decoded(bytes), settings.size, settings.sensor.as_deref(), source),
+        Format::Paxini => paxini::parse(&decoded(bytes), &wanted, source),
+        Format::Xela => xela::parse(&decoded(bytes), &wanted, source),
         Format::Npy => npy::parse(bytes, settings.size, source),
         Format::Csv => csv::parse(&decoded(bytes), settings.size, &settings.layout, source),
     }

@@ -185,7 +185,7 @@ impl Input {
         averaged
     }
 
-    /// The mean that slides, with one more frame, and this frame as [`Input::complete_after`] has it.
+    /// The mean that slides, with one more frame, and this frame without drift and gaps.
     fn slide(&self, memory: &mut Memory, frame: &Frame) -> (Averaged, Frame) {
         let own = self.without_drift(&mut memory.drift, std::slice::from_ref(frame))[0].clone();
         let complete = self.continued(memory, &own);
@@ -204,12 +204,7 @@ impl Input {
         let mean = Frame { stress_MPa: means.mean(&window), missing: means.never_read(), ..own };
         let frames_held = if adapts { Some(window.frames_held()) } else { self.spec.frames_held(means.frames()) };
         let lag_frames = adapts.then_some(window.age);
-        let mut device = frame.clone();
-        for &taxel in &frame.missing {
-            let moved = memory.drift.moved.get(taxel).unwrap_or(&0.0);
-            device.stress_MPa[taxel] = complete.stress_MPa[taxel] + moved;
-        }
-        (Averaged { mean, variance: window.variance, frames_held, lag_frames }, device)
+        (Averaged { mean, variance: window.variance, frames_held, lag_frames }, complete)
     }
 
     /// A frame with a value for each missing reading: the mean so far, else what the other taxels predict.
@@ -228,7 +223,17 @@ impl Input {
             return results.flat_map(|frames| self.complete(frames).into_owned()).collect();
         }
         let mut memory = memory.clone();
-        frames.iter().map(|frame| self.slide(&mut memory, frame).1).collect()
+        let next = |frame: &Frame| {
+            let (_, complete) = self.slide(&mut memory, frame);
+            let mut own = frame.clone();
+            for &taxel in &frame.missing {
+                // The zero of a taxel without a reading has not moved in this frame.
+                let moved = memory.drift.moved.get(taxel).unwrap_or(&0.0);
+                own.stress_MPa[taxel] = complete.stress_MPa[taxel] + moved;
+            }
+            own
+        };
+        frames.iter().map(next).collect()
     }
 
     /// The frames of a block, of the scene's sensor, with a value for each missing reading: the mean of the frames that have it;

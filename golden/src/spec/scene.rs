@@ -42,6 +42,7 @@ use crate::spec::sliding;
 use adc_scan::ScanFields;
 use estimator::FORMER_NAMES;
 use field::{choice, nested, table, whole, File, Flag, Kind as _, Limits, Listed, Number};
+pub(crate) use kinds::rise;
 use kinds::{BoardName, DeadTaxels, Knots};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

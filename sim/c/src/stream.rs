@@ -113,7 +113,7 @@ unsafe fn push(
             Error::input(format!("count = {count} is not allowed; a stream takes one frame at a time"))
         })?;
         if let Some((frames, found)) = checks.push(&**engine, Frame { time_ns, ..frame }).map_err(typed)? {
-            let time_ns = frames.last().and_then(|last| last.time_ns);
+            let time_ns = Frame::time_of_result(&frames);
             result.write(dermis_result::of_model(found).at(time_ns).into_raw());
         }
         Ok(())

@@ -128,7 +128,7 @@ fn answer<P: Read + Write>(
     let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
     let Some(line) = frame else { return Ok(None) };
     let sent = SystemTime::now();
-    let time_ns = times.time_ns(line.time_ns, nanoseconds(sent));
+    let time_ns = times.time_ns(line.frame.time_ns, nanoseconds(sent));
     match reply(session, checks, &line.id, (time_ns, sent), &line.frame) {
         Ok(mut reply) => {
             reply.answer.diagnostics().raise(line.flag());

@@ -202,9 +202,9 @@ pub fn run_until(
         })
     };
     stop.add(&queue);
-    let (times_ns, flags, counts) = (Vec::new(), Vec::new(), Counts::default());
+    let (flags, counts) = (Vec::new(), Counts::default());
     let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
-    let mut stream = Stream { estimators, frames, change: None, times_ns, flags, counts };
+    let mut stream = Stream { estimators, frames, change: None, flags, counts };
     stream.choice(output).map_err(|error| anyhow!("standard output: {error}"))?;
     loop {
         if stop.stopped() {
@@ -259,9 +259,7 @@ struct Stream<'a> {
     frames: line::Frames,
     /// Why the next result has another estimator than the last one.
     change: Option<String>,
-    /// Nanoseconds since 1970 when each frame of a block that is not complete was acquired.
-    times_ns: Vec<i64>,
-    /// Flags that its lines raise.
+    /// Flags that the lines of a block that is not complete raise.
     flags: Vec<Flag>,
     counts: Counts,
 }
@@ -281,10 +279,9 @@ impl Stream<'_> {
         }
         let result = frame.and_then(|frame| {
             let Some(line) = frame else { return Ok(None) };
-            self.times_ns.push(self.counts.acquisition.time_ns(line.time_ns, nanoseconds(received.time)));
+            let time_ns = self.counts.acquisition.time_ns(line.frame.time_ns, nanoseconds(received.time));
             self.flags.extend(line.flag());
-            self.estimators.push(line.frame).map_err(|error| {
-                self.times_ns.clear();
+            self.estimators.push(Frame { time_ns: Some(time_ns), ..line.frame }).map_err(|error| {
                 self.flags.clear();
                 typed(error).to_string()
             })
@@ -299,7 +296,8 @@ impl Stream<'_> {
             }
         };
         result.diagnostics().raise(self.flags.drain(..));
-        let (times_ns, change) = (std::mem::take(&mut self.times_ns), self.change.take());
+        let times_ns: Vec<i64> = frames.iter().filter_map(|frame| frame.time_ns).collect();
+        let change = self.change.take();
         let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
         let estimator = self.estimators.name();
         self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(received.at));

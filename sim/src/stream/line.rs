@@ -16,9 +16,8 @@ pub const LONGEST_LINE: u64 = 4 << 20;
 pub(crate) struct LineFrame {
     /// Null if the line has none.
     pub(crate) id: Value,
+    /// With the time that the line states.
     pub(crate) frame: Frame,
-    /// Time that the line states, in ns since 1970 or another moment.
-    pub(crate) time_ns: Option<i64>,
     /// Whether a digit may be lost, [`Reader::is_doubtful`].
     pub(crate) doubtful: bool,
 }
@@ -109,8 +108,8 @@ impl Frames {
                 };
                 match Frame::from_stress(&name, &self.sensor, readings) {
                     Ok(frame) => {
-                        let (frame, doubtful) = (Frame { resultant_N, ..frame }, self.reader.is_doubtful());
-                        Ok(Some(LineFrame { id, frame, time_ns, doubtful }))
+                        let frame = Frame { resultant_N, time_ns, ..frame };
+                        Ok(Some(LineFrame { id, frame, doubtful: self.reader.is_doubtful() }))
                     }
                     Err(error) => Err(NoFrame { id, reason: error.to_string() }),
                 }

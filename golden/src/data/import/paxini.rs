@@ -11,7 +11,7 @@
 use super::error::{ImportError, Source};
 use super::format::{is_paxini_header, Format};
 use super::recording::{sensel, DeviceFigure, RawFrame, Recording};
-use super::triaxial;
+use super::triaxial::Wanted;
 use super::units::Unit;
 use crate::data::text::Separator;
 
@@ -53,13 +53,8 @@ impl Columns {
     }
 }
 
-/// Reads a recording of the stated size, of the named sensor or the only one.
-pub(super) fn parse(
-    text: &str,
-    size: Option<[usize; 2]>,
-    sensor: Option<&str>,
-    source: &Source,
-) -> Result<Recording, ImportError> {
+/// Reads a recording of the wanted sensor.
+pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Recording, ImportError> {
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line));
     let header = lines.by_ref().find(|(_, line)| is_paxini_header(line));
     let (number, header) = header.ok_or_else(|| source.missing("the header", "a line Timestamp, C-S-NxN-Z[0], …"))?;
@@ -73,8 +68,8 @@ pub(super) fn parse(
     if names.is_empty() {
         return Err(source.line(number, &header.join(","), "a header with columns C-S-NxN-Z[0], …"));
     }
-    let own = &all[triaxial::choose(&names, sensor, source)?];
-    let shape = triaxial::size(own.taxels.len(), size, "PaXini sensor", source)?;
+    let own = &all[wanted.choose(&names, source)?];
+    let shape = wanted.size(own.taxels.len(), "PaXini sensor", source)?;
     let (mut frames, mut left_out) = (Vec::new(), Vec::new());
     let (mut start_s, mut last_s, mut days) = (None, f64::NEG_INFINITY, 0.0);
     for (line, text) in lines.filter(|(_, text)| !text.trim().is_empty()) {

@@ -5,30 +5,35 @@
 
 use super::error::{ImportError, Source};
 
-/// The index of the sensor that the user names, or of the only one.
-pub(super) fn choose(names: &[String], wanted: Option<&str>, source: &Source) -> Result<usize, ImportError> {
-    let allowed = || format!("one of {}", names.join(", "));
-    match (wanted, names) {
-        (Some(wanted), _) => {
-            names.iter().position(|name| name == wanted).ok_or_else(|| source.field("--sensor", wanted, allowed()))
-        }
-        (None, [_]) => Ok(0),
-        (None, _) => Err(source.missing("the sensor", format!("name it with --sensor, {}", allowed()))),
-    }
+/// What the user states of a file of such sensors.
+pub(super) struct Wanted<'a> {
+    /// Rows and columns of the sensor.
+    pub size: Option<[usize; 2]>,
+    /// Its name.
+    pub sensor: Option<&'a str>,
 }
 
-/// Checks that the sensor's taxels make up the stated size.
-pub(super) fn size(
-    taxels: usize,
-    size: Option<[usize; 2]>,
-    device: &str,
-    source: &Source,
-) -> Result<[usize; 2], ImportError> {
-    let has = || format!("this {device} has {taxels} taxels");
-    let [rows, cols] =
-        size.ok_or_else(|| source.missing("the size", format!("give it with --size ROWSxCOLS; {}", has())))?;
-    match rows * cols == taxels {
-        true => Ok([rows, cols]),
-        false => Err(source.field("--size", format!("{rows}x{cols}"), format!("that of the taxels; {}", has()))),
+impl Wanted<'_> {
+    /// The index of the sensor that the user names, or of the only one.
+    pub(super) fn choose(&self, names: &[String], source: &Source) -> Result<usize, ImportError> {
+        let allowed = || format!("one of {}", names.join(", "));
+        match (self.sensor, names) {
+            (Some(wanted), _) => {
+                names.iter().position(|name| name == wanted).ok_or_else(|| source.field("--sensor", wanted, allowed()))
+            }
+            (None, [_]) => Ok(0),
+            (None, _) => Err(source.missing("the sensor", format!("name it with --sensor, {}", allowed()))),
+        }
+    }
+
+    /// The stated size, which the sensor's taxels must make up.
+    pub(super) fn size(&self, taxels: usize, device: &str, source: &Source) -> Result<[usize; 2], ImportError> {
+        let has = || format!("this {device} has {taxels} taxels");
+        let open = || source.missing("the size", format!("give it with --size ROWSxCOLS; {}", has()));
+        let [rows, cols] = self.size.ok_or_else(open)?;
+        match rows * cols == taxels {
+            true => Ok([rows, cols]),
+            false => Err(source.field("--size", format!("{rows}x{cols}"), format!("that of the taxels; {}", has()))),
+        }
     }
 }

@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::recording::{is_reading, RawFrame, Recording};
-use super::triaxial;
+use super::triaxial::Wanted;
 use super::units::Unit;
 
 /// Values of a taxel: x, y, z.
@@ -40,13 +40,8 @@ struct First {
     calibrated: bool,
 }
 
-/// Reads a recording of the stated size, of the named sensor or the only one.
-pub(super) fn parse(
-    text: &str,
-    size: Option<[usize; 2]>,
-    sensor: Option<&str>,
-    source: &Source,
-) -> Result<Recording, ImportError> {
+/// Reads a recording of the wanted sensor.
+pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Recording, ImportError> {
     let (mut frames, mut left_out, mut start_s) = (Vec::new(), Vec::new(), None);
     let mut first: Option<First> = None;
     for (index, text) in text.lines().enumerate().filter(|(_, text)| !text.trim().is_empty()) {
@@ -64,7 +59,7 @@ pub(super) fn parse(
         }
         let name = match &first {
             Some(first) => first.name.clone(),
-            None => names[triaxial::choose(&names, sensor, source)?].clone(),
+            None => names[wanted.choose(&names, source)?].clone(),
         };
         let wrong = |reason: &str| source.line(line, text, format!("a message whose sensor {name} has {reason}"));
         let Some(own) = message.get(&name) else {
@@ -75,7 +70,7 @@ pub(super) fn parse(
         let calibrated = match &first {
             Some(first) => first.calibrated,
             None => {
-                let shape = triaxial::size(own.taxels, size, "XELA sensor", source)?;
+                let shape = wanted.size(own.taxels, "XELA sensor", source)?;
                 let (model, calibrated) = (own.model.clone(), own.calibrated.is_some());
                 first.insert(First { name: name.clone(), model, shape, calibrated }).calibrated
             }

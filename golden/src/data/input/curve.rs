@@ -13,6 +13,8 @@
 //! | b | MPa | finite |
 //! | slope | – | above 0 |
 
+use crate::spec::scene::rise;
+
 /// Smallest slope at an end, over that of the line to the next knot.
 const LEAST_END_SLOPE: f64 = 0.1;
 /// Largest, so that the cubic is monotone.
@@ -41,8 +43,7 @@ impl Curve {
     /// assert_eq!(Curve::new(&[[0.0, 0.0], [0.0, 0.1]]), None);
     /// ```
     pub fn new(knots: &[[f64; 2]]) -> Option<Curve> {
-        let rise = knots.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]);
-        (knots.len() > 1 && rise).then(|| Curve { knots: knots.to_vec(), slopes: slopes(knots) })
+        (knots.len() > 1 && rise(knots)).then(|| Curve { knots: knots.to_vec(), slopes: slopes(knots) })
     }
 
     /// b in MPa of the straight value u.

@@ -70,6 +70,11 @@ impl Kind for DeadTaxels {
 /// Most knots of a curve.
 const MOST_KNOTS: usize = 64;
 
+/// Whether both values of the knots of a curve rise from one to the next.
+pub(crate) fn rise(knots: &[[f64; 2]]) -> bool {
+    knots.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1])
+}
+
 /// Knots of a curve, [u, b] each, both rising, with [0, 0]; or none.
 pub(super) struct Knots;
 
@@ -82,8 +87,7 @@ impl Kind for Knots {
             _ => None,
         };
         let knots = value.as_array()?.iter().map(knot).collect::<Option<Vec<_>>>()?;
-        let rise = knots.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]);
-        let fits = (2..=MOST_KNOTS).contains(&knots.len()) && rise && knots.contains(&[0.0, 0.0]);
+        let fits = (2..=MOST_KNOTS).contains(&knots.len()) && rise(&knots) && knots.contains(&[0.0, 0.0]);
         (knots.is_empty() || fits).then_some(knots)
     }
 

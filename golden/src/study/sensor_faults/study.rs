@@ -160,7 +160,6 @@ impl Serialize for Kind {
 }
 
 /// A drawn press.
-#[derive(Clone)]
 pub(super) struct Press {
     pub exact_MPa: Vec<f64>,
     /// Stress of another press.

@@ -67,11 +67,8 @@ pub(super) struct Characteristic {
 impl Characteristic {
     /// Of at least two different loads: curved where that explains more, else straight.
     pub(super) fn of(means: &[&Mean], taxels: usize) -> Characteristic {
-        let straight = Characteristic::straight(means, taxels);
-        match Characteristic::curved(means, taxels) {
-            Some(curved) if curved.is_worth_it(means) => curved,
-            _ => straight,
-        }
+        let curved = (different(means) >= FEWEST_FOR_CURVE).then(|| Characteristic::curved(means, taxels)).flatten();
+        curved.filter(Characteristic::is_worth_it).unwrap_or_else(|| Characteristic::straight(means, taxels))
     }
 
     /// Straight lines.
@@ -122,9 +119,8 @@ impl Characteristic {
     }
 
     /// Whether a curve is more than the scatter of the taxels.
-    fn is_worth_it(&self, means: &[&Mean]) -> bool {
-        let worth = |own: &Curvature| own.line_share > WORTH && own.ratio > CURVED;
-        different(means) >= FEWEST_FOR_CURVE && self.curvature.as_ref().is_some_and(worth)
+    fn is_worth_it(&self) -> bool {
+        self.curvature.as_ref().is_some_and(|own| own.line_share > WORTH && own.ratio > CURVED)
     }
 
     /// The stress of a taxel's reading in MPa.
