@@ -5,10 +5,12 @@
 //! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
 //! | [`gauss`] | Gauss–Legendre quadrature |
 //! | [`matrices`] | Cz⁺, Ax, Ay of a subarray |
+//! | `smooth` | the smooth terms of a baseline |
 //! | [`symmetry`] | the basis of parities, in which matrices are computed and stored |
 
 pub mod bonded;
 pub mod gauss;
 pub mod influence;
 pub mod matrices;
+pub(crate) mod smooth;
 pub mod symmetry;

@@ -23,7 +23,7 @@ use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
-use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Surrounding, Usage};
+use crate::usage::{by_stage, total, PlacedMemory, StageUsage, WrapperUsage, Usage};
 use crate::waivers::WAIVERS;
 
 /// The generated hardware of one scene.
@@ -126,7 +126,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
 const ENGINE: &str = "engine";
 
 /// A module around the engine: a board's top, or a core for a SoC.
-pub(crate) struct Around {
+pub(crate) struct Wrapper {
     /// Its name.
     pub top: String,
     /// All its modules.
@@ -139,13 +139,13 @@ pub(crate) struct Around {
     pub is_board: bool,
 }
 
-impl Around {
+impl Wrapper {
     /// The files of `engine`, those of its top module under this module's name and with its Verilog, without taps; not sealed.
     ///
     /// # Errors
     /// [`HdlError::Check`] if a planned memory is missing.
     pub(crate) fn generated(self, model: &Model, mut engine: Generated) -> Result<Generated, HdlError> {
-        let Around { top, hierarchy, header, row, is_board } = self;
+        let Wrapper { top, hierarchy, header, row, is_board } = self;
         let memories = placed(&hierarchy, model)?;
         let styles = (is_board || names_family(model)).then(|| ram_styles(&memories));
         let text = header + &hierarchy.verilog(&top, styles.as_ref());
@@ -157,7 +157,7 @@ impl Around {
                 file.name = format!("{top}{rest}");
             }
         }
-        let usage = by_stage(model, &hierarchy, &memories, Some(Surrounding { engine: ENGINE, row }));
+        let usage = by_stage(model, &hierarchy, &memories, Some(WrapperUsage { engine: ENGINE, row }));
         engine.manifest["top"] = json!(top);
         engine.manifest["resources"] = resources(&usage, &memories);
         Ok(Generated { top, memories, taps: Vec::new(), usage, ..engine })

@@ -80,7 +80,7 @@ pub(crate) fn stage(stages: &[Stage], block: &str) -> &'static str {
 
 /// A module around an engine: the instance of the engine in it, and the row of all other blocks.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Surrounding {
+pub(crate) struct WrapperUsage {
     pub engine: &'static str,
     pub row: &'static str,
 }
@@ -90,12 +90,12 @@ pub(crate) fn by_stage(
     model: &Model,
     hierarchy: &Hierarchy,
     memories: &[PlacedMemory],
-    around: Option<Surrounding>,
+    wrapper: Option<WrapperUsage>,
 ) -> StageUsage {
     let list = stages(model.board.engine);
-    let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(around.map(|around| around.row));
+    let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(wrapper.map(|wrapper| wrapper.row));
     let mut all: StageUsage = names.map(|name| (name, Usage::default())).collect();
-    let row_of = |block: &str| match around.map(|around| (block.strip_prefix(around.engine), around.row)) {
+    let row_of = |block: &str| match wrapper.map(|wrapper| (block.strip_prefix(wrapper.engine), wrapper.row)) {
         None => stage(list, block),
         Some((Some(inside), _)) => stage(list, inside.strip_prefix(SEPARATOR).unwrap_or_default()),
         Some((None, row)) => row,

@@ -157,6 +157,10 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     let source = Source { file };
     settings.check(&source)?;
     let mut recording = parse(file, bytes, settings, &source)?;
+    if let Some(name) = settings.sensor.as_ref().filter(|_| !recording.format.has_sensors()) {
+        let allowed = format!("left out: a recording of format {} is of one array", recording.format.name());
+        return Err(source.field("--sensor", name, allowed));
+    }
     if let Some(words) = recording.cut.as_ref().filter(|_| !settings.partial || recording.frames.is_empty()) {
         return Err(source.cut(words, recording.frames.len()));
     }

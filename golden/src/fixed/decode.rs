@@ -163,7 +163,7 @@ impl Model {
         }
         let searched = all.iter().filter(|_| regions.is_none());
         for (part, status) in case.parts.iter().zip(searched) {
-            let StatusMu { condition, found, mu, estimate } = self.told(status);
+            let StatusMu { condition, found, mu, estimate } = self.mu_of(status);
             let received = Received { condition_met: condition, ..received(part) };
             shear_spread = shear_spread.or(estimate.and_then(|estimate| estimate.shear_spread()));
             let score = match estimate {
@@ -232,7 +232,7 @@ impl Model {
     }
 
     /// What a status says of μ.
-    fn told(&self, status: &Status) -> StatusMu {
+    fn mu_of(&self, status: &Status) -> StatusMu {
         let Status { condition, found, .. } = *status;
         let unit = 1.0 / MU_STEPS as f64;
         let mu = status.position().map(|x| f64::from(x) * unit * self.scene.search.mu_max);
@@ -243,7 +243,7 @@ impl Model {
 
     /// A contact with what its status says.
     fn with_status(&self, own: Region, status: &Status) -> Region {
-        let StatusMu { condition, mu, estimate, .. } = self.told(status);
+        let StatusMu { condition, mu, estimate, .. } = self.mu_of(status);
         let objective_value = estimate.map(|estimate| estimate.found.objective);
         let own = Region { centroid_condition: condition, mu, objective_value, ..own };
         own.with_sigma(estimate.and_then(|told| told.sigma))

@@ -6,7 +6,7 @@
 
 use super::contacts::Contacts;
 use super::model::Model;
-use super::plan::contact_cycles::Course;
+use super::plan::contact_cycles::ContactTiming;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
 use super::stages::forces::{pulls, Force};
@@ -16,7 +16,7 @@ use super::stages::receive::mask;
 use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
 use super::stages::send::{labels_to_beats, Status};
-use super::subarray::{SubarrayTrace, Told};
+use super::subarray::{SubarrayTrace, MuStatus};
 use crate::result::flags::{Flag, FlagSet};
 use crate::spec::board::EngineKind;
 use crate::spec::partition::Subarray;
@@ -44,7 +44,7 @@ pub struct Trace {
     /// Cycles from the last input beat to each output beat, status included, at full speed.
     pub beat_cycles: Vec<u64>,
     /// What the cycles depend on where each contact has a μ of its own; else `None`.
-    pub course: Option<Course>,
+    pub timing: Option<ContactTiming>,
 }
 
 /// Stages that pass on single words, not quads, in the serial engine.
@@ -77,9 +77,9 @@ impl Model {
         let solve = |part: &Subarray| SubarrayTrace::new(self, case, &part.gather(sensor, codes));
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
-        let course = |contacts: &Contacts| Course { segment: contacts.segment_cycles, contacts: contacts.all.len() };
-        let course = solved.iter().find_map(|solved| solved.contacts.as_ref()).map(course);
-        let sending = BeatCycles::new(self, case, &searched, course);
+        let timing = |contacts: &Contacts| ContactTiming { segment: contacts.segment_cycles, contacts: contacts.all.len() };
+        let timing = solved.iter().find_map(|solved| solved.contacts.as_ref()).map(timing);
+        let sending = BeatCycles::new(self, case, &searched, timing);
         let cycles = Cycles::of_beats(self, &sending);
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
@@ -91,26 +91,26 @@ impl Model {
         let contact = forces.iter().any(|f| f.words[2] != 0);
         let negative = self.push_limit.is_some_and(|push| pulls(&forces, push));
         let force_saturations = forces.iter().map(|f| f.saturations).sum();
-        let beats_of = |s: &SubarrayTrace, told: Told| {
+        let beats_of = |s: &SubarrayTrace, mu: MuStatus| {
             let status = Status {
-                position_x: told.position[0],
-                position_y: told.position[1],
-                condition: told.condition,
-                found: told.score.is_some(),
+                position_x: mu.position[0],
+                position_y: mu.position[1],
+                condition: mu.condition,
+                found: mu.score.is_some(),
                 framing: false,
                 case: number,
                 frames,
                 raised: prepared.raised
                     | FlagSet::raised([
                         (Flag::NoContact, !contact),
-                        (Flag::TooManyContacts, told.more_contacts),
-                        (Flag::ScoreLow, told.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
+                        (Flag::TooManyContacts, mu.more_contacts),
+                        (Flag::ScoreLow, mu.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
                         (Flag::NegativePressure, negative),
                         (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
                         (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
                         (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),
                     ]),
-                score: told.score.unwrap_or(0),
+                score: mu.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,
                 tables_version: self.tables_version.into(),
@@ -121,7 +121,7 @@ impl Model {
             status.beats()
         };
         let most = self.scene.partition.max_contacts;
-        let status = solved.iter().flat_map(|s| s.told(most).into_iter().flat_map(|told| beats_of(s, told)));
+        let status = solved.iter().flat_map(|s| s.mu_statuses(most).into_iter().flat_map(|mu| beats_of(s, mu)));
         let status = status.collect();
         let labels: Vec<usize> =
             solved.iter().filter_map(|s| s.contacts.as_ref()).flat_map(|c| c.labels.iter().copied()).collect();
@@ -170,7 +170,7 @@ impl Model {
             stages: as_engine_streams(self.board.engine, stages),
             cycles: cycles.after_choice(self),
             beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
-            course,
+            timing,
         }
     }
 }

@@ -34,9 +34,9 @@ pub struct SubarrayTrace {
     pub streams: Streams,
 }
 
-/// What a status says of μ.
+/// Content of a status that concerns μ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Told {
+pub struct MuStatus {
     /// Position of μ in mu_max/384, [x, y].
     pub position: [i32; 2],
     /// Whether the scene's condition is met.
@@ -49,20 +49,20 @@ pub struct Told {
 
 impl SubarrayTrace {
     /// What the statuses say: of the subarray, or of each of its `most` contacts, nothing of those beyond the last.
-    pub fn told(&self, most: usize) -> Vec<Told> {
+    pub fn mu_statuses(&self, most: usize) -> Vec<MuStatus> {
         let Some(contacts) = &self.contacts else {
             let score = self.found.score.map(|score| score as i32);
             let (position, condition) = (self.found.position, self.condition);
-            return vec![Told { position, condition, score, ..Told::default() }];
+            return vec![MuStatus { position, condition, score, ..MuStatus::default() }];
         };
-        let of = |contact: &Contact| Told {
+        let of = |contact: &Contact| MuStatus {
             position: contact.position,
             condition: contact.condition,
             score: contact.condition.then(|| ln_sigma_word(contact.ln_sigma)),
-            ..Told::default()
+            ..MuStatus::default()
         };
         let slot = |slot| contacts.all.get(slot).map(of).unwrap_or_default();
-        (0..most).map(|at| Told { more_contacts: contacts.overflow, ..slot(at) }).collect()
+        (0..most).map(|at| MuStatus { more_contacts: contacts.overflow, ..slot(at) }).collect()
     }
 
     /// Computes the subarray with these `codes`, row-major in it.

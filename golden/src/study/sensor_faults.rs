@@ -25,4 +25,4 @@ mod study;
 mod tests;
 
 pub use faults::{Fault, Kind, FAULTS};
-pub use study::{sensor_faults, Counts, FaultRow, Path, SensorFaults, ENGINES};
+pub use study::{sensor_faults, spoiled_frames, Counts, FaultRow, Path, SensorFaults, Spoiled, ENGINES};

@@ -10,7 +10,7 @@ use super::core::hierarchy;
 use super::testbench::testbench;
 use super::{Bus, CoreShape};
 use crate::error::HdlError;
-use crate::generate::{top_name, Around, Generated};
+use crate::generate::{top_name, Wrapper, Generated};
 use crate::language::Change;
 use crate::manifest::GeneratedFile;
 
@@ -69,8 +69,8 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
         ("registers.rdl", system_rdl()),
     ];
     let own = own.map(|(name, text)| GeneratedFile { name: name.to_owned(), text });
-    let around = Around { top, hierarchy, header, row: "bus", is_board: false };
-    let mut core = around.generated(model, engine)?;
+    let wrapper = Wrapper { top, hierarchy, header, row: "bus", is_board: false };
+    let mut core = wrapper.generated(model, engine)?;
     core.files.extend(own);
     core.add_core_file(model, testbench(model, &core, shape, command));
     core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });

@@ -6,7 +6,7 @@ use dermis_golden::wire::link::slip::IDLE;
 
 use super::board_top::board_top;
 use crate::error::HdlError;
-use crate::generate::{top_name, Around, Generated};
+use crate::generate::{top_name, Wrapper, Generated};
 use crate::language::Change;
 use crate::scan::pins_text;
 
@@ -71,8 +71,8 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         clock = model.board.clock_MHz,
         scan = pins_text(model),
     );
-    let around = Around { top, hierarchy, header, row: "link", is_board: true };
-    let mut board = around.generated(model, engine)?;
+    let wrapper = Wrapper { top, hierarchy, header, row: "link", is_board: true };
+    let mut board = wrapper.generated(model, engine)?;
     board.seal();
     Ok(board)
 }

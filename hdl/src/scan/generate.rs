@@ -6,7 +6,7 @@ use serde_json::json;
 use super::core::scanner;
 use super::Shape;
 use crate::error::HdlError;
-use crate::generate::{top_name, Around, Generated};
+use crate::generate::{top_name, Wrapper, Generated};
 use crate::language::Change;
 
 /// The stream of images in the header comment of the top module.
@@ -72,8 +72,8 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
         scan = us(timing.scan),
         period = us(timing.period),
     );
-    let around = Around { top, hierarchy, header, row: "scan", is_board: false };
-    let mut generated = around.generated(model, engine)?;
+    let wrapper = Wrapper { top, hierarchy, header, row: "scan", is_board: false };
+    let mut generated = wrapper.generated(model, engine)?;
     generated.manifest["scan"] = json!({
         "converter": scan.converter.name,
         "converters": scan.converters,

@@ -66,7 +66,7 @@ impl Block for Relax {
         let last = k.wire("last", quad.is(self.quads as u64 - 1));
         k.when(valid, || quad.set(last.mux(k.constant(quad.bits(), 0), quad.plus(1))));
         k.when(valid & last, || adds.set(k.constant(1, 1)));
-        let memory = k.memory("first", self.quads, 4 * self.word, Contents::Undefined).holds(Holds::First);
+        let memory = k.memory("first", self.quads, 4 * self.word, Contents::Undefined).holds(Holds::FirstProduct);
         memory.write(valid & !*adds, *quad, words);
         let first = k.delay("first_out", k.delay("first_read", memory.read(*quad)));
 

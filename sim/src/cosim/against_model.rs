@@ -42,7 +42,7 @@ impl Vector {
         if model.board.engine == EngineKind::Parallel {
             let chosen = expected.stages.iter().find(|stage| stage.name == "choose");
             let case = chosen.and_then(|stage| stage.words.first()).map_or(0, |word| word[0] as usize);
-            let contacts = expected.course.map_or(0, |course| course.contacts);
+            let contacts = expected.timing.map_or(0, |timing| timing.contacts);
             let words = issued(model, case, contacts).into_iter().map(|word| word.map(|index| index as i64).to_vec());
             // Before its rows, so that a wrong program is the first mismatch.
             let rows = expected.stages.iter().position(|stage| stage.name == "pass").unwrap_or_default();

@@ -14,7 +14,7 @@ use std::path::Path;
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
-use dermis_golden::fixed::plan::contact_cycles::Course;
+use dermis_golden::fixed::plan::contact_cycles::ContactTiming;
 use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
@@ -174,8 +174,8 @@ fn simulate(
 
 /// The interval of the model for these vectors.
 fn planned_interval(model: &Model, vectors: &[Vector]) -> u64 {
-    let courses: Option<Vec<Course>> = vectors.iter().map(|vector| vector.expected.course).collect();
-    let own = courses.and_then(|courses| interval::longest_interval(model, &courses));
+    let timings: Option<Vec<ContactTiming>> = vectors.iter().map(|vector| vector.expected.timing).collect();
+    let own = timings.and_then(|timings| interval::longest_interval(model, &timings));
     own.unwrap_or_else(|| frame_interval(model, model.first()))
 }
 

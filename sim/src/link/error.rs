@@ -33,7 +33,7 @@ pub enum HostError {
     Identity {
         /// The port.
         port: String,
-        /// What is another.
+        /// The field of the identity that differs.
         reason: IdentityError,
     },
     /// The board's tables are not those that were written.

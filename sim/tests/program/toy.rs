@@ -67,7 +67,7 @@ fn vectors() -> Vec<Vector> {
                 ],
                 cycles: CYCLES,
                 beat_cycles: (1..=7).collect(),
-                course: None,
+                timing: None,
             },
         }
     };

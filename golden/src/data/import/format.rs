@@ -54,6 +54,11 @@ impl Format {
         Format::ALL.map(|(name, _)| name)
     }
 
+    /// Whether a file may have several sensors, each with a name.
+    pub(super) fn has_sensors(self) -> bool {
+        matches!(self, Format::Paxini | Format::Xela)
+    }
+
     /// Name in options and summaries.
     pub fn name(self) -> &'static str {
         Format::ALL.iter().find(|(_, format)| *format == self).map_or("", |(name, _)| name)

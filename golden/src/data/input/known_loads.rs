@@ -14,7 +14,8 @@
 //! curve c for all taxels, `fit`.
 //!
 //! A taxel counts in the frames that have its reading, and a load for the taxels that have one under it; a taxel with a reading
-//! under fewer than two different loads is dead.
+//! under fewer than two different loads is dead. So is one that under a load is far from the line of its other loads though most taxels
+//! are near theirs, as one whose own amplifier ends early.
 //!
 //! A load is saturated, and left out, where a tenth of the taxels read one value at an end of all readings in each of its frames,
 //! though readings under another load have noise. The load of the smallest stress may stand at an end.
@@ -45,6 +46,9 @@ const FEWEST_FOR_RESIDUALS: usize = 3;
 
 /// Share of taxels at an end of the readings from which on a load is saturated.
 const SATURATED_SHARE: f64 = 0.1;
+/// Residual of a taxel from which on it does not follow the load: over the largest stress, and over the median of all taxels.
+const ASTRAY_SHARE: f64 = 0.025;
+const ASTRAY: f64 = 5.0;
 /// Largest residual, root mean square over the largest stress, of a straight characteristic.
 const STRAIGHT: f64 = 0.05;
 
@@ -170,45 +174,39 @@ impl LoadFit {
         if different(&all) < 2 {
             return Err(LoadError::TooFew { different: different(&all) });
         }
-        let whole = Characteristic::of(&all, taxels);
-        let Characteristic { table, live, .. } = &whole;
-        if live.iter().filter(|live| **live).count() * 2 < taxels {
+        let mut whole = Characteristic::of(&all, taxels);
+        if whole.live.iter().filter(|live| **live).count() * 2 < taxels {
             let stresses = || loads.iter().map(|load| load.stress_MPa);
             let (low, high) = (stresses().fold(f64::INFINITY, f64::min), stresses().fold(f64::NEG_INFINITY, f64::max));
             return Err(LoadError::NoChange { low, high });
         }
+        let table = &whole.table;
         let finite = |k: &usize| table.gain[*k].is_finite() && table.offset[*k].is_finite() && table.gain[*k] != 0.0;
         if let Some(k) = (0..taxels).find(|k| !finite(k)) {
             let [row, col] = place(k);
             return Err(LoadError::NotFinite { row, col });
         }
-        let residual = |left_out: usize| -> Option<Residual> {
-            let others: Vec<&Mean> =
-                means.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, mean)| mean).collect();
-            let (stress_MPa, readings) = &means[left_out];
-            let within = others.iter().any(|own| own.0 < *stress_MPa) && others.iter().any(|own| own.0 > *stress_MPa);
-            let enough = if whole.curvature.is_some() { within } else { different(&others) >= 2 };
-            let of_others = enough.then(|| match whole.curvature.is_some() {
-                true => Characteristic::curved(&others, taxels),
-                false => Some(Characteristic::straight(&others, taxels)),
-            })??;
-            let off = |k: usize| of_others.stress_MPa(k, readings[k].unwrap_or(0.0)) - stress_MPa;
-            let with_reading = |k: usize| others.iter().filter(|(_, readings)| readings[k].is_some()).count();
-            let there = |k: &usize| live[*k] && readings[*k].is_some() && with_reading(*k) >= 2;
-            let live: Vec<usize> = (0..taxels).filter(there).collect();
-            let sum = |of: fn(f64) -> f64| live.iter().map(|&k| of(off(k))).sum::<f64>() / live.len() as f64;
-            let largest = live.iter().copied().max_by(|&a, &b| off(a).abs().total_cmp(&off(b).abs()))?;
+        let enough = different(&all) >= FEWEST_FOR_RESIDUALS;
+        let left_out: Vec<LeftOut> =
+            (0..loads.len()).filter(|_| enough).filter_map(|load| LeftOut::new(&means, load, &whole, taxels)).collect();
+        for k in astray(&left_out, &means, taxels) {
+            whole.declare_dead(k, &all);
+        }
+        let Characteristic { table, live, .. } = &whole;
+        let residual = |own: &LeftOut| -> Option<Residual> {
+            let off: Vec<(usize, f64)> = own.off_MPa.iter().copied().filter(|(k, _)| live[*k]).collect();
+            let sum = |of: fn(f64) -> f64| off.iter().map(|(_, off)| of(*off)).sum::<f64>() / off.len() as f64;
+            let (taxel, largest_MPa) = off.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
             Some(Residual {
-                stress_MPa: *stress_MPa,
-                frames: loads[left_out].frames.len(),
+                stress_MPa: means[own.load].0,
+                frames: loads[own.load].frames.len(),
                 mean_MPa: sum(|off| off),
                 rms_MPa: sum(|off| off * off).sqrt(),
-                largest_MPa: off(largest),
-                taxel: place(largest),
+                largest_MPa,
+                taxel: place(taxel),
             })
         };
-        let enough = different(&all) >= FEWEST_FOR_RESIDUALS;
-        let residuals = (0..loads.len()).filter(|_| enough).filter_map(residual).collect();
+        let residuals = left_out.iter().filter_map(residual).collect();
         let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
         let live_taxels = (0..taxels).filter(|&k| live[k]);
         let readings = &mut live_taxels.flat_map(|k| loads.iter().flat_map(move |load| readings(&load.frames, k)));
@@ -232,6 +230,50 @@ impl LoadFit {
         let share = largest(|own| own.rms_MPa) / largest(|own| own.stress_MPa.abs());
         (share > STRAIGHT).then_some(share)
     }
+}
+
+/// A load that has no part in the table that it is compared with.
+struct LeftOut {
+    /// Its place among the loads.
+    load: usize,
+    /// Each taxel that has a reading, live by `whole`, and how far its stress by the table is from the load's, in MPa.
+    off_MPa: Vec<(usize, f64)>,
+}
+
+impl LeftOut {
+    /// `None` where the others give no table, or no curve that reaches the load where `whole` is curved.
+    fn new(means: &[Mean], load: usize, whole: &Characteristic, taxels: usize) -> Option<LeftOut> {
+        let others: Vec<&Mean> = means.iter().enumerate().filter(|(k, _)| *k != load).map(|(_, mean)| mean).collect();
+        let (stress_MPa, readings) = &means[load];
+        let within = others.iter().any(|own| own.0 < *stress_MPa) && others.iter().any(|own| own.0 > *stress_MPa);
+        let of_others = match whole.curvature.is_some() {
+            true => within.then(|| Characteristic::curved(&others, taxels))??,
+            false => (different(&others) >= 2).then(|| Characteristic::straight(&others, taxels))?,
+        };
+        let with_reading = |k: usize| others.iter().filter(|(_, readings)| readings[k].is_some()).count();
+        let off = |k: usize| {
+            let reading = readings[k].filter(|_| whole.live[k] && with_reading(k) >= 2)?;
+            Some((k, of_others.stress_MPa(k, reading) - stress_MPa))
+        };
+        Some(LeftOut { load, off_MPa: (0..taxels).filter_map(off).collect() })
+    }
+}
+
+/// Taxels whose reading under a load is far from the line of the others, where most taxels are near theirs: one that ends early.
+fn astray(left_out: &[LeftOut], means: &[Mean], taxels: usize) -> Vec<usize> {
+    let range = means.iter().map(|(stress, _)| stress.abs()).fold(0.0, f64::max);
+    let far = |own: &LeftOut| -> Vec<usize> {
+        let mut sizes: Vec<f64> = own.off_MPa.iter().map(|(_, off)| off.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let middle = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        let limit = (ASTRAY_SHARE * range).max(ASTRAY * middle);
+        own.off_MPa.iter().filter(|(_, off)| off.abs() > limit).map(|(k, _)| *k).collect()
+    };
+    let mut all: Vec<usize> = left_out.iter().flat_map(far).collect();
+    all.sort_unstable();
+    all.dedup();
+    // More of them are the characteristic of the sensor.
+    if (all.len() as f64) < SATURATED_SHARE * taxels as f64 { all } else { Vec::new() }
 }
 
 /// Whether a load's readings stand at an end of those of all `loads`.
@@ -339,6 +381,42 @@ mod tests {
         // Readings that hardly rise beyond 190 counts: no straight line.
         let curved = loads(&scene, 2e-4, |k, stress| linear(k, stress).min(190.0 + 0.1 * stress));
         assert!(LoadFit::new(&scene, &curved).unwrap().curved_share() > Some(STRAIGHT));
+    }
+
+    /// A converter that ends anywhere, at either end, for all taxels or some: where gains are off, the fit says so.
+    #[test]
+    fn an_end_of_the_readings_is_never_silent() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let (mut said, mut silent) = (0, Vec::new());
+        for end in (120..=560).step_by(20) {
+            for every in [1, 2, 7, 32] {
+                for (sign, noise_MPa) in [(1.0, 2e-4), (-1.0, 2e-4), (1.0, 0.0)] {
+                    let ends = |k: usize| if k % every == 0 { f64::from(end) } else { f64::INFINITY };
+                    let read = |k: usize, stress: f64| linear(k, stress);
+                    let mut clipped = loads(&scene, noise_MPa, read);
+                    for frame in clipped.iter_mut().flat_map(|load| &mut load.frames) {
+                        let readings = frame.stress_MPa.iter_mut().enumerate();
+                        readings.for_each(|(k, reading)| *reading = sign * reading.round().min(ends(k)));
+                    }
+                    let Ok(fit) = LoadFit::new(&scene, &clipped) else {
+                        said += 1;
+                        continue;
+                    };
+                    let wrong = |k: &usize| {
+                        let dead = fit.dead.contains(&[k / 8, k % 8]);
+                        !dead && (sign * fit.table.gain[*k] / truth(*k).1 - 1.0).abs() > 0.03
+                    };
+                    let told = !fit.saturated_MPa.is_empty() || fit.curved_share().is_some() || fit.curvature.is_some() || !fit.dead.is_empty();
+                    match (0..64).find(wrong) {
+                        Some(k) if !told => silent.push((end, every, sign, noise_MPa, k)),
+                        Some(_) => said += 1,
+                        None => {}
+                    }
+                }
+            }
+        }
+        assert!(silent.is_empty(), "{silent:?}");
+        assert!(said > 20, "{said}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A drifted zero, a warm side, a bent base add the same few smooth terms to every frame:
 //!
 //! ```text
-//! b = H(μ) w + B S c + noise        c ~ N(0, 1)        B: 1 | x, y | x² − ⅓, xy, y² − ⅓     x, y from −1 to 1
+//! b = H(μ) w + B S c + noise        c ~ N(0, 1)        B: the smooth terms of [`crate::physics::smooth`]
 //! ```
 //!
 //! S holds one size for the offset, one for the slopes, one for the bends, and each is the one that makes the stress most
@@ -28,14 +28,13 @@
 //! | out: sizes | 3 | of the peak |
 
 use super::cholesky::Cholesky;
+use crate::physics::smooth::{terms, TERMS};
 use crate::spec::sensor::Sensor;
 use faer::Mat;
 use std::cmp::Ordering;
 
 /// The group of each term: offset, slopes, bends.
 const GROUPS: [usize; TERMS] = [0, 1, 1, 2, 2, 2];
-/// Number of terms.
-pub(super) const TERMS: usize = 6;
 /// Terms of the first plane.
 const PLANE: usize = 3;
 /// z² above which a baseline is no noise. With 4 the medians are the same, but what noise alone leaves of neighbours is alike
@@ -53,13 +52,6 @@ const STEPS: usize = 12;
 /// Sizes of offset, slopes and bends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sizes([f64; 3]);
-
-/// The terms of B on a taxel.
-pub(super) fn terms(sensor: &Sensor, taxel: usize) -> [f64; TERMS] {
-    let along = |index: usize, count: usize| 2.0 * index as f64 / (count - 1) as f64 - 1.0;
-    let (x, y) = (along(taxel % sensor.cols, sensor.cols), along(taxel / sensor.cols, sensor.rows));
-    [1.0, x, y, x * x - 1.0 / 3.0, x * y, y * y - 1.0 / 3.0]
-}
 
 impl Sizes {
     /// The sizes that agree with a first plane.

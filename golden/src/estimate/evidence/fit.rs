@@ -13,7 +13,8 @@ mod outcome;
 mod regions;
 
 use super::ascent::{ascend, Top};
-use super::baseline::{plane, terms, Sizes};
+use super::baseline::{plane, Sizes};
+use crate::physics::smooth::terms;
 use super::estimate::Estimate;
 use super::estimator::Evidence;
 use super::model::{Design, Readings};

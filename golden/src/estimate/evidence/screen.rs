@@ -15,7 +15,8 @@
 //! | in: b | taxels | of the peak |
 //! | out: taxels | as many as there are | indices |
 
-use super::baseline::{terms, LARGEST};
+use super::baseline::LARGEST;
+use crate::physics::smooth::terms;
 use crate::physics::influence::table;
 use crate::spec::scene::Medium;
 use crate::spec::sensor::Sensor;

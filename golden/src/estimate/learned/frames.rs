@@ -13,6 +13,7 @@
 //! | share of the others' stress that is left | 1 in half of the frames, −0.1 … 0.1 in the other half |
 //! | σ of the noise | 0.005 … 2 % of max \|b\|, its logarithm evenly |
 //! | gain spread | none in half of the frames, 0.2 … 3 % in the other half |
+//! | baseline | none in three of four frames, else [`crate::physics::smooth`], at most 0.1 … 3 % of max \|b\|, its logarithm evenly |
 //! | dead taxels | the scene's, and in one frame of eight one to three more |
 //! | tension | reads 0 where the scene is unipolar |
 //!
@@ -27,6 +28,7 @@ use crate::data::generator::draws::{DrawOptions, Draws, Shape};
 use crate::data::generator::support::Support;
 use crate::data::generator::GeneratorError;
 use crate::estimate::float::objective::taxels::Taxels;
+use crate::physics::smooth::{terms, TERMS};
 use crate::random::Random;
 use crate::spec::scene::{Medium, Scene};
 use crate::spec::sensor::Sensor;
@@ -41,6 +43,10 @@ pub(crate) const RATIO: f64 = 0.85;
 pub(crate) const NOISE: [f64; 2] = [5e-5, 2e-2];
 /// Range of the gain spread where there is one.
 pub(crate) const GAINS: [f64; 2] = [2e-3, 3e-2];
+/// Share of the frames with a baseline.
+const DRIFTED: f64 = 0.25;
+/// Range of the largest entry of a baseline in units of the peak.
+const BASELINE: [f64; 2] = [1e-3, 3e-2];
 /// Share of the frames with more dead taxels than the scene has.
 const DEAD: f64 = 0.125;
 /// Largest share of the others' stress that a second round leaves.
@@ -80,6 +86,8 @@ pub(super) struct Frames {
     /// Contacts drawn so far.
     drawn: usize,
     items: Vec<Item>,
+    /// The smooth terms on each taxel of the window.
+    smooth: Vec<[f32; TERMS]>,
     /// Normally distributed; the noise of a frame begins anywhere in it.
     normals: Vec<f32>,
 }
@@ -105,7 +113,10 @@ impl Frames {
         let mut random = Random::new(seed.wrapping_mul(SPREAD));
         let normals = (0..NORMALS).map(|_| random.normal() as f32).collect();
         let covers = covers(scene, window, training, &mut random);
-        Ok(Frames { scene: scene.clone(), window, seed, draws, covers, next: 0, drawn: 0, items: Vec::new(), normals })
+        let sensor = window.sensor(&scene.sensor);
+        let smooth = (0..window.taxels()).map(|taxel| terms(&sensor, taxel).map(|term| term as f32)).collect();
+        let scene = scene.clone();
+        Ok(Frames { scene, window, seed, draws, covers, next: 0, drawn: 0, items: Vec::new(), smooth, normals })
     }
 
     /// Draws until at least `count` contacts have been drawn; the last [`KEPT`] of them are mixed.
@@ -182,6 +193,9 @@ impl Frames {
         for ((b, gain), noise) in b.iter_mut().zip(first).zip(second) {
             *b = (1.0 + gains * gain) * *b + sigma * noise;
         }
+        if random.between(0.0, 1.0) < DRIFTED {
+            self.add_baseline(b, peak * log(BASELINE, random), random);
+        }
         masked.iter_mut().zip(&item.masked).for_each(|(own, masked)| *own = f32::from(u8::from(*masked)));
         if random.between(0.0, 1.0) < DEAD {
             for _ in 0..=(random.between(0.0, 3.0) as usize) {
@@ -190,6 +204,14 @@ impl Frames {
         }
         let least = if self.scene.input.unipolar { 0.0 } else { f32::NEG_INFINITY };
         b.iter_mut().zip(masked.iter()).for_each(|(b, masked)| *b = if *masked > 0.0 { 0.0 } else { b.max(least) });
+    }
+
+    /// Adds smooth terms of random sizes, the largest entry of whose sum is `largest`.
+    fn add_baseline(&self, b: &mut [f32], largest: f32, random: &mut Random) {
+        let sizes: [f32; TERMS] = std::array::from_fn(|_| random.normal() as f32);
+        let at = |terms: &[f32; TERMS]| -> f32 { terms.iter().zip(sizes).map(|(term, size)| term * size).sum() };
+        let most = self.smooth.iter().map(|terms| at(terms).abs()).fold(f32::MIN_POSITIVE, f32::max);
+        b.iter_mut().zip(&self.smooth).for_each(|(b, terms)| *b += largest / most * at(terms));
     }
 
     /// `count` of the normally distributed numbers, from anywhere.

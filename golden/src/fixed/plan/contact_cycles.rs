@@ -16,9 +16,9 @@ const PLACE: u64 = 2;
 /// Cycles from the last μ, or from the end of the segmentation without a contact, to the start of the first step.
 const STEP: u64 = 1;
 
-/// What the cycles of a frame depend on.
+/// Data-dependent quantities that determine the cycles of a frame with contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Course {
+pub struct ContactTiming {
     /// Cycles of the segmentation.
     pub segment: u64,
     /// Number of contacts with a μ of their own.
@@ -34,17 +34,17 @@ pub(super) struct ContactCycles {
     pub complete: u64,
 }
 
-impl Course {
-    /// The course with most cycles: as many contacts as there may be, and the longest segmentation. `None` where there is one μ.
-    pub fn longest(plan: &Plan) -> Option<Course> {
+impl ContactTiming {
+    /// The one with most cycles: as many contacts as there may be, and the longest segmentation. `None` where there is one μ.
+    pub fn longest(plan: &Plan) -> Option<ContactTiming> {
         let segment = plan.by_contact.as_ref()?.segmentation(&plan.scene).longest();
-        Some(Course { segment, contacts: plan.contacts() })
+        Some(ContactTiming { segment, contacts: plan.contacts() })
     }
 }
 
 impl ContactCycles {
-    /// Of a frame of this course.
-    pub fn new(case: &CasePlan, contacts: &ContactPlan, course: Course) -> ContactCycles {
+    /// Of a frame of this timing.
+    pub fn new(case: &CasePlan, contacts: &ContactPlan, timing: ContactTiming) -> ContactCycles {
         let CasePlan { formats, storage, .. } = case;
         let quads = formats.quads as u64;
         let all = sections(formats);
@@ -57,7 +57,7 @@ impl ContactCycles {
         let mu = timeline(formats, storage, &all[1], Begins { issue: 1, given }).known - 1;
         let read = shear::cycles(formats.quads) + 1;
         let step = unfolded(&all[2], Begins { issue: 1, given: [read - quads, read] });
-        let known = first + course.segment + course.contacts as u64 * (PLACE + mu);
+        let known = first + timing.segment + timing.contacts as u64 * (PLACE + mu);
         let free = known + STEP;
         ContactCycles { free, complete: free + formats.degree as u64 * step }
     }

@@ -24,7 +24,7 @@
 
 use serde::Serialize;
 
-use super::contact_cycles::{ContactCycles, Course};
+use super::contact_cycles::{ContactCycles, ContactTiming};
 use super::contents::{CasePlan, Plan};
 use super::serial;
 use super::timeline::{whole, Timeline, RELAX, UNFOLD};
@@ -118,7 +118,7 @@ impl Cycles {
     /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
     /// is searched; of contacts the largest counts.
     pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
-        Cycles::of_beats(plan, &BeatCycles::new(plan, case, searched, Course::longest(plan)))
+        Cycles::of_beats(plan, &BeatCycles::new(plan, case, searched, ContactTiming::longest(plan)))
     }
 
     /// The counts of a frame whose beats leave in these cycles, without the choice of the case.
@@ -152,8 +152,8 @@ pub(in crate::fixed) struct BeatCycles {
 }
 
 impl BeatCycles {
-    /// Of a frame that `case` solves; `searched[k]` says whether subarray k is searched, `course` what was found of contacts.
-    pub fn new(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>) -> Self {
+    /// Of a frame that `case` solves; `searched[k]` says whether subarray k is searched, `timing` what was found of contacts.
+    pub fn new(plan: &Plan, case: &CasePlan, searched: &[bool], timing: Option<ContactTiming>) -> Self {
         let count = plan.force_beats() + plan.status_beats_of(case);
         if plan.board.engine == EngineKind::Serial {
             let first = serial::first_output(&case.formats, searched.contains(&true));
@@ -161,7 +161,7 @@ impl BeatCycles {
             return BeatCycles { counted: first - plan.prepare.latency(), beats };
         }
         let after_begin = plan.codes_after_begin() as u64;
-        let values_of = |received: u64| values(plan, case, searched, course, received);
+        let values_of = |received: u64| values(plan, case, searched, timing, received);
         // The first force is requested with the first value.
         let counted = values_of(0).first().copied().unwrap_or(0) + ACCEPT + SEND;
         let before = plan.prepare.latency();
@@ -187,8 +187,8 @@ impl BeatCycles {
 
 /// Cycles from the start of a frame to the first value of each subarray, where the frame is complete `received` cycles after
 /// what its passes begin with.
-fn values(plan: &Plan, case: &CasePlan, searched: &[bool], course: Option<Course>, received: u64) -> Vec<u64> {
-    let passes = passes(plan, case, course);
+fn values(plan: &Plan, case: &CasePlan, searched: &[bool], timing: Option<ContactTiming>, received: u64) -> Vec<u64> {
+    let passes = passes(plan, case, timing);
     let early = early_values(plan, case);
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
     let (mut complete, mut searched_at) = (0, received);
@@ -225,10 +225,10 @@ pub(super) fn forces(plan: &Plan, case: &CasePlan, values: &[u64]) -> Vec<u64> {
 }
 
 /// Cycles from the start of a subarray until its passes are complete.
-pub(super) fn passes(plan: &Plan, case: &CasePlan, course: Option<Course>) -> u64 {
+pub(super) fn passes(plan: &Plan, case: &CasePlan, timing: Option<ContactTiming>) -> u64 {
     let CasePlan { formats, storage, .. } = case;
-    match (&plan.by_contact, course) {
-        (Some(contacts), Some(course)) => ContactCycles::new(case, contacts, course).complete,
+    match (&plan.by_contact, timing) {
+        (Some(contacts), Some(timing)) => ContactCycles::new(case, contacts, timing).complete,
         _ => whole(formats, storage).last_row + if formats.has_network() { RELAX } else { 0 } + UNFOLD,
     }
 }

@@ -13,7 +13,7 @@
 //! ```
 //! The timing follows the hardware cycle by cycle; the co-simulation compares.
 
-use super::contact_cycles::{ContactCycles, Course};
+use super::contact_cycles::{ContactCycles, ContactTiming};
 use super::contents::{CasePlan, Plan};
 use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
@@ -33,20 +33,20 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
             serial::frame_interval(&case.formats, beats as u64)
         }
         EngineKind::Parallel => {
-            parallel(plan, case, &[Course::longest(plan); SETTLED]).last().copied().unwrap_or_default()
+            parallel(plan, case, &[ContactTiming::longest(plan); SETTLED]).last().copied().unwrap_or_default()
         }
     }
 }
 
 /// The longest of the intervals before the third and each later one of frames that follow one another, each with the contacts
-/// of its course; `None` with fewer than three.
-pub fn longest_interval(plan: &Plan, courses: &[Course]) -> Option<u64> {
-    let courses: Vec<Option<Course>> = courses.iter().copied().map(Some).collect();
-    parallel(plan, plan.first(), &courses).into_iter().skip(2).max()
+/// of its timing; `None` with fewer than three.
+pub fn longest_interval(plan: &Plan, timings: &[ContactTiming]) -> Option<u64> {
+    let timings: Vec<Option<ContactTiming>> = timings.iter().copied().map(Some).collect();
+    parallel(plan, plan.first(), &timings).into_iter().skip(2).max()
 }
 
 /// Cycles between the last output beats of each frame and the one before, from an idle engine on.
-fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64> {
+fn parallel(plan: &Plan, case: &CasePlan, timings: &[Option<ContactTiming>]) -> Vec<u64> {
     let taxels = plan.scene.sensor.taxels() as u64;
     let search = search(plan, case, true);
     let (quads, parts) = (case.formats.quads as u64, case.parts.len());
@@ -67,10 +67,10 @@ fn parallel(plan: &Plan, case: &CasePlan, courses: &[Option<Course>]) -> Vec<u64
     // When a frame whose passes began with its first row of subarrays is complete.
     let after_begin = plan.codes_after_begin() as u64;
     let mut complete = after_begin;
-    let mut intervals = Vec::with_capacity(courses.len());
-    for &course in courses {
-        let passes = passes(plan, case, course);
-        let contacts = plan.by_contact.as_ref().zip(course).map(|(own, course)| ContactCycles::new(case, own, course));
+    let mut intervals = Vec::with_capacity(timings.len());
+    for &timing in timings {
+        let passes = passes(plan, case, timing);
+        let contacts = plan.by_contact.as_ref().zip(timing).map(|(own, timing)| ContactCycles::new(case, own, timing));
         let (mut start, mut handed_over) = (begin, 0);
         let mut values = Vec::with_capacity(parts);
         for part in 0..parts {

@@ -67,7 +67,7 @@ pub enum Holds {
     /// Accumulators that wait for their shift.
     Raw,
     /// v_00 in parities, for `relax`.
-    First,
+    FirstProduct,
     /// p in parities, for `shear`.
     Sheared,
     /// Coefficient of this index of the polynomials, in the buffers of the search.
@@ -91,15 +91,15 @@ pub enum Holds {
     /// Its words smoothed along the rows, then the step or the basin of each taxel.
     Steps,
     /// Its weights in the order of the smoothing.
-    Windows,
+    SmoothingWeights,
     /// Saddles of its basins.
     Saddles,
     /// The basin after each, or the one it is part of, or its contact.
-    Chain,
+    BasinLinks,
     /// Loads of the basins, then sums of the contacts.
     Loads,
     /// Smallest saddle of each basin that is high.
-    Bars,
+    SaddleThresholds,
     /// Contacts of the taxels, as quads.
     Labels,
     /// Middles of the contacts: rows 0, columns 1.
@@ -111,7 +111,7 @@ impl Holds {
     fn is_rom(self) -> bool {
         matches!(
             self,
-            Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns | Holds::Windows
+            Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns | Holds::SmoothingWeights
         )
     }
 }
@@ -130,7 +130,7 @@ impl std::fmt::Display for Holds {
             Holds::LowCoefficients => write!(f, "low coefficients"),
             Holds::Columns => write!(f, "columns"),
             Holds::Raw => write!(f, "raw words"),
-            Holds::First => write!(f, "v_00"),
+            Holds::FirstProduct => write!(f, "v_00"),
             Holds::Sheared => write!(f, "p"),
             Holds::Polynomials(index) => write!(f, "polynomials, coefficient {index}"),
             Holds::Start(index) => write!(f, "polynomials at the start, coefficient {index}"),
@@ -142,11 +142,11 @@ impl std::fmt::Display for Holds {
             Holds::SegmentQuads => write!(f, "segment, quads"),
             Holds::Smoothed => write!(f, "segment, smoothed words"),
             Holds::Steps => write!(f, "segment, steps"),
-            Holds::Windows => write!(f, "segment, windows"),
+            Holds::SmoothingWeights => write!(f, "segment, smoothing weights"),
             Holds::Saddles => write!(f, "segment, saddles"),
-            Holds::Chain => write!(f, "segment, chain"),
+            Holds::BasinLinks => write!(f, "segment, basin links"),
             Holds::Loads => write!(f, "segment, loads"),
-            Holds::Bars => write!(f, "segment, bars"),
+            Holds::SaddleThresholds => write!(f, "segment, saddle thresholds"),
             Holds::Labels => write!(f, "segment, labels"),
             Holds::Middles(axis) => write!(f, "segment, middles, axis {axis}"),
         }
@@ -275,7 +275,7 @@ impl Resources {
         }
         memories.push(memory(Holds::Raw, quads, quad(f.acc_bits)));
         if f.has_network() {
-            memories.push(memory(Holds::First, quads, quad(f.vector_bits)));
+            memories.push(memory(Holds::FirstProduct, quads, quad(f.vector_bits)));
         }
         let segmenter = f.by_contact().then(|| Segmenter::new(&scene.sensor, WIDTH));
         if let Some(own) = &segmenter {
@@ -388,11 +388,11 @@ pub fn segment_memories(segmentation: &Segmentation, board: &Board, shallow: usi
         (Holds::SegmentQuads, quads, 4 * lane),
         (Holds::Smoothed, taxels, smoothed),
         (Holds::Steps, taxels, smoothed.max(basin + 1)),
-        (Holds::Windows, taps.iter().sum(), TAP_BITS),
+        (Holds::SmoothingWeights, taps.iter().sum(), TAP_BITS),
         (Holds::Saddles, table * table, smoothed),
         (Holds::Labels, quads, 4 * label),
     ];
-    let tables = [(Holds::Chain, basin + 1), (Holds::Loads, sum), (Holds::Bars, smoothed)];
+    let tables = [(Holds::BasinLinks, basin + 1), (Holds::Loads, sum), (Holds::SaddleThresholds, smoothed)];
     let axes = [segmentation.sensor.rows, segmentation.sensor.cols].map(count_bits);
     let middles = axes.into_iter().enumerate().map(|(axis, bits)| (Holds::Middles(axis), segmentation.most, bits));
     let distributed = tables.into_iter().map(|(holds, bits)| (holds, table, bits)).chain(middles);

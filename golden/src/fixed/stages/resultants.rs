@@ -25,7 +25,7 @@ pub const SUM_BITS: u32 = 32 + 16 + POSITION_BITS;
 /// Cycles from the last force to the first beat.
 pub const LATENCY: u64 = 4;
 
-/// Whose taxels a record sums.
+/// The group of taxels that a record sums: a subarray, or a contact's label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Summed {
     /// Those of a subarray.

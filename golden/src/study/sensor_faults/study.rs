@@ -394,7 +394,7 @@ pub fn sensor_faults(
     asked: &SensorFaults,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<FaultRow>, StudyError> {
-    let faults = chosen(asked)?;
+    let lines = lines(asked)?;
     let engines = scenes.iter().map(Engines::new).collect::<Result<Vec<_>, _>>()?;
     let presses = scenes.iter().map(|scene| presses(scene, asked)).collect::<Result<Vec<_>, _>>()?;
     let tasks_of = |fault: &'static Fault, size: f64| {
@@ -402,11 +402,6 @@ pub fn sensor_faults(
         let all = (0..scenes.len()).flat_map(move |scene| (0..most.min(asked.frames)).map(move |press| (scene, press)));
         all.map(move |(scene, press)| Task { scene, fault, size, press })
     };
-    let mut lines: Vec<(&Fault, f64)> = Vec::new();
-    for fault in faults {
-        let sizes = if asked.quick { &fault.sizes[fault.sizes.len() / 2..][..1] } else { fault.sizes };
-        lines.extend(sizes.iter().map(|size| (fault, *size)));
-    }
     // Clean frames with the noise of each engine, whose flags say nothing of a fault.
     let clean = &FAULTS[0];
     let noises = if asked.noise == 0.0 { vec![0.0, STATED] } else { vec![asked.noise] };
@@ -439,6 +434,34 @@ pub fn sensor_faults(
         FaultRow { fault: fault.name, size: fault.unit.text(*size), kind: fault.kind, engines: counts }
     };
     Ok(lines.iter().map(row).collect())
+}
+
+/// A spoiled frame: the fault, its size in words, the readings.
+pub type Spoiled = (&'static str, String, Frame);
+
+/// The last frame of every press, spoiled by every fault of every size that `asked` names, as the engines without stated noise get it.
+///
+/// # Errors
+/// As [`sensor_faults`].
+pub fn spoiled_frames(scene: &Scene, asked: &SensorFaults) -> Result<Vec<Spoiled>, StudyError> {
+    let (lines, presses) = (lines(asked)?, presses(scene, asked)?);
+    let all = lines.iter().flat_map(|line| presses.iter().map(move |press| (*line, press)));
+    let spoiled = |((fault, size), press): ((&'static Fault, f64), &Press)| {
+        let noise = if fault.kind == Kind::Clean { size } else { asked.noise };
+        let last = press.spoiled(&scene.sensor, fault, size, noise).pop().unwrap_or_default();
+        Ok((fault.name, fault.unit.text(size), Frame::from_stress("spoiled", &scene.sensor, last)?))
+    };
+    all.map(spoiled).collect()
+}
+
+/// The faults that are asked for, with the sizes that are measured.
+fn lines(asked: &SensorFaults) -> Result<Vec<(&'static Fault, f64)>, StudyError> {
+    let sizes = |fault: &'static Fault| match asked.quick {
+        true => &fault.sizes[fault.sizes.len() / 2..][..1],
+        false => fault.sizes,
+    };
+    let with_sizes = |fault: &'static Fault| sizes(fault).iter().map(move |size| (fault, *size));
+    Ok(chosen(asked)?.into_iter().flat_map(with_sizes).collect())
 }
 
 /// The faults that are asked for.

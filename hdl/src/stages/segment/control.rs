@@ -198,7 +198,7 @@ impl<'k> Circuit<'k> {
         let tap = register("tap", count_bits(weights.len()));
         let contents = Contents::Words(weights.iter().copied().enumerate().collect());
         let windows = k.memory("windows", weights.len(), TAP_BITS, contents).style("block");
-        let tap_out = later("tap", windows.holds(Holds::Windows).read(*tap));
+        let tap_out = later("tap", windows.holds(Holds::SmoothingWeights).read(*tap));
         // In logic: a block RAM may be far from what the flags decide in the same cycle.
         flags.resize(1 << tap.bits(), 0);
         let tap_flags = later("tap_flags", tap.table(3, &flags));
@@ -232,7 +232,7 @@ impl<'k> Circuit<'k> {
         let line_ends = k.delay("line_ends", flags.at(2));
 
         let table = |name: &str, bits: usize, holds: Holds| memory(name, TABLE, bits, holds);
-        let chain = table("chain", BASIN + 1, Holds::Chain);
+        let chain = table("chain", BASIN + 1, Holds::BasinLinks);
         let cursor = register("cursor", BASIN);
         let chain_out = k.wire("chain_out", chain.read(*cursor));
         Circuit {
@@ -282,7 +282,7 @@ impl<'k> Circuit<'k> {
             chain,
             chain_out,
             loads: table("loads", shape.sum, Holds::Loads),
-            bars: table("bars", shape.smoothed, Holds::Bars),
+            bars: table("bars", shape.smoothed, Holds::SaddleThresholds),
             io,
         }
     }

@@ -123,6 +123,16 @@ impl Characteristic {
         self.curvature.as_ref().is_some_and(|own| own.line_share > WORTH && own.ratio > CURVED)
     }
 
+    /// Takes a taxel out: it has the median gain of the live ones.
+    pub(super) fn declare_dead(&mut self, k: usize, means: &[&Mean]) {
+        self.live[k] = false;
+        let mut gains: Vec<f64> = (0..self.live.len()).filter(|k| self.live[*k]).map(|k| self.table.gain[k]).collect();
+        gains.sort_by(f64::total_cmp);
+        let readings: Vec<f64> = means.iter().filter_map(|(_, readings)| readings[k]).collect();
+        self.table.gain[k] = gains.get(gains.len() / 2).copied().unwrap_or(self.table.gain[k]);
+        self.table.offset[k] = readings.iter().sum::<f64>() / readings.len().max(1) as f64;
+    }
+
     /// The stress of a taxel's reading in MPa.
     pub(super) fn stress_MPa(&self, k: usize, reading: f64) -> f64 {
         let straight = self.table.gain[k] * (reading - self.table.offset[k]);

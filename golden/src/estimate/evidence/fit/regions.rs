@@ -6,7 +6,7 @@
 //! | out: cells of each contact, F, S | – | –, N, MPa |
 
 use super::Fit;
-use crate::estimate::evidence::baseline::{terms, TERMS};
+use crate::physics::smooth::{terms, TERMS};
 use crate::estimate::evidence::model::Design;
 use crate::estimate::evidence::prior::remainder;
 use crate::estimate::evidence::regions::Regions;

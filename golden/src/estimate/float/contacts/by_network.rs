@@ -22,7 +22,7 @@ use crate::estimate::segment::{basins, WIDTH};
 use crate::result::reconstruct::Resultant;
 
 /// Contacts with the standard deviations of their μ.
-pub(crate) struct Told {
+pub(crate) struct NetworkContacts {
     /// Regions, μ and p.
     pub contacts: Contacts,
     /// Standard deviation of the μ of each region, [x, y]; `None` where it was not asked.
@@ -34,7 +34,7 @@ pub(crate) struct Told {
 impl Solver<'_> {
     /// Finds the contacts of the stress `b` in MPa; `alive` says which taxels are not dead. The network is asked for at most
     /// `most` of them, those with the largest loads.
-    pub(crate) fn by_network(&self, network: &Learned, b: &[f64], alive: &[bool], most: usize) -> Told {
+    pub(crate) fn by_network(&self, network: &Learned, b: &[f64], alive: &[bool], most: usize) -> NetworkContacts {
         let found = basins(&self.matrices.sensor, self.p0, WIDTH);
         let (largest, overflow) = (found.by_load(), found.overflow);
         let segments = found.segments;
@@ -52,7 +52,7 @@ impl Solver<'_> {
         contacts.found = told.iter().map(|told| told.as_ref().map(found)).collect();
         self.relax(&mut contacts);
         let sigma = told.iter().map(|told| told.map(|told| told.sigma)).collect();
-        Told { too_many: overflow || contacts.segments.count > most, contacts, sigma }
+        NetworkContacts { too_many: overflow || contacts.segments.count > most, contacts, sigma }
     }
 
     /// Centre of the compressive forces on a region in mm from the array's centre, which stands for that of none.
