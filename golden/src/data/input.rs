@@ -279,6 +279,11 @@ impl Input {
         self.scale.as_ref().map(|(zero, _)| zero.as_slice())
     }
 
+    /// Zero and gain of each taxel, where the scene has a table or tare frames.
+    pub(crate) fn table(&self) -> Option<Calibration> {
+        self.scale.as_ref().map(|(offset, gain)| Calibration { offset: offset.clone(), gain: gain.clone() })
+    }
+
     /// Limit of a running zero in readings; `None` where zeros are fixed.
     fn zero_limit(&self) -> Option<f64> {
         let per_reading = self.largest_gain * self.slope_without_load();

@@ -40,9 +40,9 @@
 //! | out: per contact centre, μ, force, σ | – | mm, –, N |
 
 mod ascent;
-mod baseline;
+pub(super) mod baseline;
 pub(crate) mod cells;
-mod cholesky;
+pub(super) mod cholesky;
 mod clipped;
 mod contact;
 mod envelope;
@@ -53,7 +53,7 @@ mod fit;
 mod follow;
 mod model;
 mod noise;
-mod prior;
+pub(super) mod prior;
 mod regions;
 mod residual;
 mod screen;

@@ -35,7 +35,7 @@ use std::cmp::Ordering;
 /// The group of each term: offset, slopes, bends.
 const GROUPS: [usize; TERMS] = [0, 1, 1, 2, 2, 2];
 /// Number of terms.
-pub(super) const TERMS: usize = 6;
+pub(in crate::estimate) const TERMS: usize = 6;
 /// Terms of the first plane.
 const PLANE: usize = 3;
 /// z² above which a baseline is no noise. With 4 the medians are the same, but what noise alone leaves of neighbours is alike
@@ -55,7 +55,7 @@ const STEPS: usize = 12;
 pub(super) struct Sizes([f64; 3]);
 
 /// The terms of B on a taxel.
-pub(super) fn terms(sensor: &Sensor, taxel: usize) -> [f64; TERMS] {
+pub(in crate::estimate) fn terms(sensor: &Sensor, taxel: usize) -> [f64; TERMS] {
     let along = |index: usize, count: usize| 2.0 * index as f64 / (count - 1) as f64 - 1.0;
     let (x, y) = (along(taxel % sensor.cols, sensor.cols), along(taxel / sensor.cols, sensor.rows));
     [1.0, x, y, x * x - 1.0 / 3.0, x * y, y * y - 1.0 / 3.0]
