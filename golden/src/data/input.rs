@@ -19,7 +19,8 @@
 //!
 //! A reading that a frame lacks is described in [`missing`].
 //!
-//! The table is made from recordings under known loads by [`known_loads`], the noise from frames without load by [`unloaded`].
+//! The table is made from recordings under known loads by [`known_loads`], or of ordinary presses by
+//! [`blind_gains`](crate::estimate::blind_gains), the noise from frames without load by [`unloaded`].
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 

@@ -61,11 +61,16 @@ const LOADED: f64 = 0.2;
 /// Fewest presses that load a taxel whose gain is looked for.
 const FEWEST_LOADED: usize = 10;
 /// Times that the fields are found anew with the gains.
-const REFRESHES: usize = 3;
+const REFRESHES: usize = 4;
 /// Steps of an ascent under the same fields.
 const STEPS: usize = 4;
 /// Standard deviation of the gains that the first fields allow for, and the others.
 const UNKNOWN: [f64; 2] = [0.05, 0.02];
+/// σ, noise of a reading over the peak of its press, before a press is looked at, and its range. The readings tell it, with what no
+/// smooth field describes of a press.
+const NOISE: (f64, [f64; 2]) = (0.01, [0.002, 0.05]);
+/// τ, spread of the gains before a press is looked at, and its range.
+const PRIOR: (f64, [f64; 2]) = (0.05, [0.01, 0.2]);
 /// Rise of the log likelihood of presses that had no part, over its standard error, from which on it is none of chance.
 const SIGNIFICANT: f64 = 4.0;
 
@@ -91,6 +96,8 @@ pub struct BlindGains {
     pub spread_before: f64,
     /// What the presses leave open of it, as a fraction.
     pub spread_after: f64,
+    /// What pressure and shear leave of a reading, over the peak of its press.
+    pub noise: f64,
     /// Rise of the log likelihood of a press by the gains of other presses, and its standard error.
     pub rise: [f64; 2],
     /// Largest gain times largest reading in MPa: the least `input.full_scale_MPa`.
@@ -113,7 +120,9 @@ pub enum BlindError {
     #[error(transparent)]
     Array(#[from] MatricesError),
     /// The scene has a characteristic that is no straight line.
-    #[error("scene {scene}: input.curve is stated, and gains behind a curve are not found; calibrate under known loads")]
+    #[error(
+        "scene {scene}: input.curve is stated, and gains behind a curve are not found; calibrate under known loads"
+    )]
     Curve {
         /// The scene's name.
         scene: String,
@@ -169,13 +178,12 @@ impl BlindGains {
         }
         let (seen, unseen) = covered(scene, &found.presses)?;
         let smooth = Smooth::new(&scene.sensor, &seen, ORDER);
-        let search = Search::new(scene, &found.presses, Ascent { taxels: &seen, smooth: &smooth }, progress)?;
-        let (top, modelled) = search.run().ok_or_else(|| not_finite(scene))?;
-        let rise = search.rise(&modelled)?;
-        let mean = |of: &dyn Fn(usize) -> f64| (0..seen.len()).map(of).sum::<f64>() / seen.len() as f64;
-        let open = mean(&|i| top.sigma[i].powi(2));
-        let spread = mean(&|i| top.theta[seen[i]].powi(2));
-        let table = table(&input, &found, &top.theta);
+        let search = Search::new(scene, &found.presses, (&seen, &smooth), progress)?;
+        let gains = search.run().ok_or_else(|| not_finite(scene))?;
+        let rise = search.rise(&gains)?;
+        let [spread_before, spread_after] = search.spread(&gains.top);
+        let theta = gains.top.theta;
+        let table = table(&input, &found, &theta);
         let largest = frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
         Ok(BlindGains {
             full_scale_MPa: largest * table.gain.iter().map(|gain| gain.abs()).fold(0.0, f64::max),
@@ -185,10 +193,11 @@ impl BlindGains {
             spoiled,
             unseen: unseen.iter().map(|&taxel| [taxel / scene.sensor.cols, taxel % scene.sensor.cols]).collect(),
             smooth: smooth.count(),
-            spread_before: (spread + open).sqrt(),
-            spread_after: open.sqrt(),
+            spread_before,
+            spread_after,
+            noise: gains.noise,
             rise,
-            log_gain: top.theta,
+            log_gain: theta,
         })
     }
 }
@@ -234,10 +243,8 @@ fn covered(scene: &Scene, presses: &[Press]) -> Result<(Vec<usize>, Vec<usize>),
 
 /// The table with the gains: readings of a taxel that reads too much count for less. Zeros are the scene's, else those found.
 fn table(input: &Input, found: &Presses, theta: &[f64]) -> Calibration {
-    let Calibration { offset, gain } = input.table().unwrap_or_else(|| Calibration {
-        offset: found.zero.clone(),
-        gain: vec![1.0; theta.len()],
-    });
+    let Calibration { offset, gain } =
+        input.table().unwrap_or_else(|| Calibration { offset: found.zero.clone(), gain: vec![1.0; theta.len()] });
     Calibration { offset, gain: gain.iter().zip(theta).map(|(gain, theta)| gain / theta.exp()).collect() }
 }
 
@@ -245,18 +252,30 @@ fn table(input: &Input, found: &Presses, theta: &[f64]) -> Calibration {
 struct Search<'a> {
     fields: Fields,
     presses: &'a [Press],
-    ascent: Ascent<'a>,
+    seen: &'a [usize],
+    smooth: &'a Smooth,
     taxels: usize,
     progress: &'a (dyn Fn(usize, usize) + Sync),
     done: AtomicUsize,
     total: usize,
 }
 
+/// Where a search ended.
+struct Found {
+    top: Top,
+    /// The presses under the last fields.
+    modelled: Vec<Modelled>,
+    /// σ of these fields.
+    noise: f64,
+    /// τ.
+    prior: f64,
+}
+
 impl<'a> Search<'a> {
     fn new(
         scene: &Scene,
         presses: &'a [Press],
-        ascent: Ascent<'a>,
+        (seen, smooth): (&'a [usize], &'a Smooth),
         progress: &'a (dyn Fn(usize, usize) + Sync),
     ) -> Result<Search<'a>, BlindError> {
         let fields = Fields::new(scene);
@@ -265,7 +284,8 @@ impl<'a> Search<'a> {
         }
         // Fields and sums of each round, then the sums of the halves.
         let total = presses.len() * ((REFRESHES + 1) * (STEPS + 2) + STEPS + 1);
-        Ok(Search { fields, presses, ascent, taxels: scene.sensor.taxels(), progress, done: AtomicUsize::new(0), total })
+        let (taxels, done) = (scene.sensor.taxels(), AtomicUsize::new(0));
+        Ok(Search { fields, presses, seen, smooth, taxels, progress, done, total })
     }
 
     fn step(&self) {
@@ -273,37 +293,54 @@ impl<'a> Search<'a> {
         (self.progress)(done.min(self.total), self.total);
     }
 
-    /// The gains, and the presses under the last fields; `None` where the model is not representable.
-    fn run(&self) -> Option<(Top, Vec<Modelled>)> {
+    fn climb(&self, modelled: &[&Modelled], theta: Vec<f64>, prior: f64) -> Option<Top> {
+        Ascent { taxels: self.seen, smooth: self.smooth, prior }.climb(modelled, theta, STEPS, &|| self.step())
+    }
+
+    /// The gains, with noise and spread that go with them; `None` where the model is not representable.
+    fn run(&self) -> Option<Found> {
+        let ((mut noise, noises), (mut prior, priors)) = (NOISE, PRIOR);
         let mut theta = vec![0.0; self.taxels];
         let mut last = None;
         for round in 0..=REFRESHES {
             let model = |press: &Press| {
-                let modelled = self.fields.model(press, &theta, UNKNOWN[round.min(1)]);
+                let modelled = self.fields.model(press, &theta, UNKNOWN[round.min(1)], noise);
                 self.step();
                 modelled
             };
             let modelled: Vec<Modelled> = self.presses.par_iter().map(model).collect();
-            let top = self.ascent.climb(&modelled.iter().collect::<Vec<_>>(), theta.clone(), STEPS, &|| self.step())?;
+            let top = self.climb(&modelled.iter().collect::<Vec<_>>(), theta.clone(), prior)?;
             theta.clone_from(&top.theta);
-            last = Some((top, modelled));
+            let [spread, _] = self.spread(&top);
+            let ratio = top.noise_ratio;
+            last = Some(Found { top, modelled, noise, prior });
+            noise = (noise * ratio).clamp(noises[0], noises[1]);
+            prior = spread.clamp(priors[0], priors[1]);
         }
         last
+    }
+
+    /// Root mean square of the rough part of the log gains, and of what is open of it. The smooth part is no part of either.
+    fn spread(&self, top: &Top) -> [f64; 2] {
+        let rough = self.seen.len().saturating_sub(self.smooth.count()).max(1) as f64;
+        let open = top.sigma.iter().map(|sigma| sigma * sigma).sum::<f64>() / rough;
+        let found = self.seen.iter().map(|&taxel| top.theta[taxel].powi(2)).sum::<f64>() / rough;
+        [(found + open).sqrt(), open.sqrt()]
     }
 
     /// Rise of the log likelihood of a press by the gains of the other half, and its standard error.
     ///
     /// # Errors
     /// [`BlindError::NoRise`]
-    fn rise(&self, modelled: &[Modelled]) -> Result<[f64; 2], BlindError> {
+    fn rise(&self, found: &Found) -> Result<[f64; 2], BlindError> {
         let none = vec![0.0; self.taxels];
-        let mut rises = Vec::with_capacity(modelled.len());
+        let mut rises = Vec::with_capacity(found.modelled.len());
         for half in 0..2 {
-            let of = |own: bool| modelled.iter().enumerate().filter(move |(k, _)| (k % 2 == half) == own).map(|(_, press)| press);
-            let top = self.ascent.climb(&of(true).collect::<Vec<_>>(), none.clone(), STEPS, &|| self.step());
-            let theta = top.map_or(none.clone(), |top| top.theta);
-            let others: Vec<&Modelled> = of(false).collect();
-            rises.par_extend(others.par_iter().map(|press| press.value(&theta) - press.value(&none)));
+            let own = |k: &usize| k % 2 == half;
+            let (ours, others): (Vec<usize>, Vec<usize>) = (0..found.modelled.len()).partition(own);
+            let of = |which: Vec<usize>| which.into_iter().map(|k| &found.modelled[k]).collect::<Vec<_>>();
+            let theta = self.climb(&of(ours), none.clone(), found.prior).map_or(none.clone(), |top| top.theta);
+            rises.par_extend(of(others).par_iter().map(|press| press.value(&theta) - press.value(&none)));
         }
         let count = rises.len() as f64;
         let rise = rises.iter().sum::<f64>() / count;

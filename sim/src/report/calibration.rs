@@ -50,7 +50,9 @@ pub fn blind_gains(gains: &BlindGains, stand: &str, fields: &str) -> String {
     let BlindGains { presses, flagged, spoiled, unseen, smooth, spread_before, spread_after, rise, .. } = gains;
     let mut text = format!("{presses} presses");
     if *flagged > 0 {
-        text += &format!("; left out: {flagged} frames that are saturated, clipped or have a faulty line, {spoiled} presses");
+        text += &format!(
+            "; left out: {flagged} frames that are saturated, clipped or have a faulty line, {spoiled} presses"
+        );
     }
     let [before, after] = [spread_before, spread_after].map(|spread| percent_text(*spread));
     text += &format!("\nspread of the gains: {before} before, {after} left open by these presses\n");

@@ -11,7 +11,7 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: modelled presses, first θ | –, taxels | – |
-//! | out: θ, log L of each press, standard deviations of θ | taxels, presses, taxels | – |
+//! | out: θ, its standard deviations, noise found over noise assumed | taxels, taxels, 1 | – |
 
 use super::likelihood::{Modelled, Sums};
 use super::smooth::Smooth;
@@ -19,8 +19,6 @@ use crate::estimate::evidence::cholesky::Cholesky;
 use faer::Mat;
 use rayon::prelude::*;
 
-/// τ, standard deviation of a log gain before a press is looked at.
-pub(super) const PRIOR: f64 = 0.1;
 /// κ over the largest information of a taxel.
 const FROZEN: f64 = 1e3;
 /// Halvings of a step before the ascent ends.
@@ -36,16 +34,18 @@ pub(super) struct Ascent<'a> {
     pub taxels: &'a [usize],
     /// The patterns over them that stay.
     pub smooth: &'a Smooth,
+    /// τ, standard deviation of a log gain before a press is looked at.
+    pub prior: f64,
 }
 
 /// Where an ascent ended.
 pub(super) struct Top {
     /// Log gain of each taxel of the array.
     pub theta: Vec<f64>,
-    /// log L of each press.
-    pub values: Vec<f64>,
     /// Standard deviation of the rough part of each log gain that is looked for.
     pub sigma: Vec<f64>,
+    /// Noise that the readings leave over that of the models.
+    pub noise_ratio: f64,
 }
 
 impl Ascent<'_> {
@@ -83,13 +83,13 @@ impl Ascent<'_> {
         }
         let covariance = self.precision(&now)?.inverse();
         let sigma = (0..self.taxels.len()).map(|i| covariance[(i, i)].sqrt()).collect();
-        Some(Top { theta, values: now.values, sigma })
+        Some(Top { theta, sigma, noise_ratio: (now.left[0] / now.left[1]).sqrt() })
     }
 
     /// The log posterior.
     fn height(&self, values: &[f64], theta: &[f64]) -> f64 {
         let square: f64 = self.taxels.iter().map(|&taxel| theta[taxel].powi(2)).sum();
-        values.iter().sum::<f64>() - square / (2.0 * PRIOR * PRIOR)
+        values.iter().sum::<f64>() - square / (2.0 * self.prior.powi(2))
     }
 
     /// J + 1/τ² + κ U Uᵀ, factored.
@@ -97,15 +97,13 @@ impl Ascent<'_> {
         let own = |i: usize, j: usize| now.information[(self.taxels[i], self.taxels[j])];
         let largest = (0..self.taxels.len()).map(|i| own(i, i)).fold(0.0, f64::max);
         let n = self.taxels.len();
-        let prior = |i: usize, j: usize| if i == j { PRIOR.powi(-2) } else { 0.0 };
-        Cholesky::new(Mat::from_fn(n, n, |i, j| {
-            own(i, j) + prior(i, j) + FROZEN * largest * self.smooth.product(i, j)
-        }))
+        let prior = |i: usize, j: usize| if i == j { self.prior.powi(-2) } else { 0.0 };
+        Cholesky::new(Mat::from_fn(n, n, |i, j| own(i, j) + prior(i, j) + FROZEN * largest * self.smooth.product(i, j)))
     }
 
     /// The whole step of the rough part.
     fn step(&self, now: &Sums, theta: &[f64]) -> Option<Vec<f64>> {
-        let uphill = |&taxel: &usize| now.slope[taxel] - theta[taxel] / (PRIOR * PRIOR);
+        let uphill = |&taxel: &usize| now.slope[taxel] - theta[taxel] / self.prior.powi(2);
         let mut step: Vec<f64> = self.taxels.iter().map(uphill).collect();
         self.smooth.take_off(&mut step);
         self.precision(now)?.solve(&mut step);

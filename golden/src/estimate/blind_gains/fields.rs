@@ -1,16 +1,17 @@
 //! Fields: the stress that a press may have, from what it reads.
 //!
-//! Pressure and shear are random fields under an envelope, with the prior of [`crate::estimate::evidence`]: p = F w. The shear
-//! along each axis is such a field too, independent of the pressure and a share of it in size; so the covariance of the readings
-//! needs no search of μ:
+//! Pressure and shear are random fields under an envelope, with the smooth shapes of the prior of [`crate::estimate::evidence`]:
+//! p = F w. The shear along each axis is such a field too, independent of the pressure and a share of it in size; so the covariance
+//! of the readings needs no search of μ:
 //!
 //! ```text
 //! S = [Gz F | s Gx F | s Gy F]        s = 0.3 mu_max
-//! Σ = σ² 1 + B (0.01)² Bᵀ             B offset, slopes and bends over the array
+//! Σ = σ² 1 + B (0.002)² Bᵀ            B offset, slopes and bends over the array
 //! ```
 //!
-//! The envelope follows from the readings: the mean pressure under the last one, in turn. The noise there is smaller than σ, which
-//! holds what the prior does not describe of a real press: edges sharper than its fields, a shear that follows the pressure.
+//! The envelope follows from the readings: the mean pressure under the last one, in turn. It has the gains in it, as ripples. So the
+//! prior's free load is left out, which is a pressure in the very shape of the envelope: with it a pressure explains most of what
+//! the gains do, and 300 presses find a third of them.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -25,16 +26,16 @@ use crate::estimate::evidence::prior::remainder;
 use crate::estimate::evidence::Evidence;
 use crate::spec::scene::Scene;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
+use faer::{Accum, Mat, Par, Scale};
 
-/// σ: what pressure and shear leave of a reading, of the peak.
-const SIGMA: f64 = 0.03;
-/// The same for the envelope, which must not lose the rim of a press.
+/// Standard deviation of a reading for the envelope, of the peak.
 const ENVELOPE_SIGMA: f64 = 0.01;
 /// Size of a shear field over that of the pressure, in units of mu_max.
 const SHEAR: f64 = 0.3;
 /// Size of each term of the baseline, of the peak.
-const BASELINE: f64 = 0.01;
+const BASELINE: f64 = 0.002;
+/// Size of the shapes over that of the prior: on drawn presses the gains come out best.
+const SHAPES: f64 = 0.75;
 /// Times that a pressure gives the envelope of the next one.
 const ROUNDS: usize = 4;
 
@@ -65,8 +66,9 @@ impl Fields {
         self.evidence.is_representable()
     }
 
-    /// The model of a press, whose envelope is that of the readings over the gains exp `theta`, which are uncertain by `spread`.
-    pub fn model(&self, press: &Press, theta: &[f64], spread: f64) -> Modelled {
+    /// The model of a press, whose envelope is that of the readings over the gains exp `theta`, which are uncertain by `spread`;
+    /// `sigma` is what pressure and shear leave of a reading, of the peak.
+    pub fn model(&self, press: &Press, theta: &[f64], spread: f64, sigma: f64) -> Modelled {
         let Evidence { cells, envelopes, .. } = &self.evidence;
         let mut corrected = vec![0.0; theta.len()];
         let mut counts = vec![false; theta.len()];
@@ -97,7 +99,7 @@ impl Fields {
         }
         let s = self.under(&p, &offsets).s;
         let read = |taxel: &usize| press.y[press.taxels.partition_point(|own| own < taxel)];
-        Modelled { y: taxels.iter().map(read).collect(), s, rest: self.rest(&taxels, |_| SIGMA), taxels }
+        Modelled { y: taxels.iter().map(read).collect(), s, rest: self.rest(&taxels, |_| sigma), taxels }
     }
 
     /// The fields under the envelope of the pressure `p`.
@@ -106,7 +108,9 @@ impl Fields {
         let cells: Vec<usize> = (0..envelope.len()).filter(|&cell| envelope[cell] > 0.0).collect();
         let own: Vec<f64> = cells.iter().map(|&cell| envelope[cell]).collect();
         let n = offsets.len();
-        let (factor, _) = self.evidence.shape.factor(&cells, &own, remainder(ENVELOPE_SIGMA), n);
+        let (all, _) = self.evidence.shape.factor(&cells, &own, remainder(ENVELOPE_SIGMA), n);
+        // The first column is the load.
+        let factor = Scale(SHAPES) * all.subcols(1, all.ncols() - 1);
         let mut influence = Mat::zeros(3 * n, cells.len());
         for (column, &cell) in cells.iter().enumerate() {
             self.evidence.cells.influence(offsets, cell, influence.col_as_slice_mut(column));

@@ -42,6 +42,8 @@ pub(super) struct Sums {
     pub slope: Vec<f64>,
     /// Information of θ, of the taxels of the array squared.
     pub information: Mat<f64>,
+    /// Σ αᵀα and Σ tr C⁻¹, which are equal where the readings leave as much noise as Σ has.
+    pub left: [f64; 2],
 }
 
 /// Cholesky factor of C, M and α of a press; `None` where C is not positive definite.
@@ -80,6 +82,8 @@ impl Modelled {
         };
         sums.values.push(self.value_of(&own));
         let (inverse, m) = (own.factor.inverse(), own.m.as_ref());
+        sums.left[0] += own.alpha.iter().map(|alpha| alpha * alpha).sum::<f64>();
+        sums.left[1] += (0..self.y.len()).map(|i| inverse[(i, i)]).sum::<f64>();
         let by = product(inverse.as_ref(), m);
         let both = product(m, by.as_ref());
         for (i, &t) in self.taxels.iter().enumerate() {
@@ -95,7 +99,7 @@ impl Modelled {
 impl Sums {
     /// No press yet, of an array of so many taxels.
     pub fn none(taxels: usize) -> Sums {
-        Sums { values: Vec::new(), slope: vec![0.0; taxels], information: Mat::zeros(taxels, taxels) }
+        Sums { values: Vec::new(), slope: vec![0.0; taxels], information: Mat::zeros(taxels, taxels), left: [0.0; 2] }
     }
 
     /// With the sums over further presses.
@@ -103,6 +107,7 @@ impl Sums {
         self.values.extend(other.values);
         self.slope.iter_mut().zip(&other.slope).for_each(|(sum, own)| *sum += own);
         self.information += &other.information;
+        self.left = [0, 1].map(|k| self.left[k] + other.left[k]);
         self
     }
 }
@@ -134,7 +139,8 @@ mod tests {
         own.add_to(&theta, &mut sums);
         assert!((sums.values[0] - own.value(&theta)).abs() < 1e-12);
         for t in 0..5 {
-            let moved = |by: f64| own.value(&std::array::from_fn::<f64, 5, _>(|k| theta[k] + if k == t { by } else { 0.0 }));
+            let moved =
+                |by: f64| own.value(&std::array::from_fn::<f64, 5, _>(|k| theta[k] + if k == t { by } else { 0.0 }));
             let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             assert!((sums.slope[t] - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{t}: {} {slope}", sums.slope[t]);
         }

@@ -138,3 +138,67 @@ fn mean(frames: &[Frame], which: &[usize], taxel: usize) -> Option<f64> {
     let count = own().count() as f64;
     (count > 0.0).then(|| own().map(|frame| frame.stress_MPa[taxel] / count).sum())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::frame::Frame;
+
+    /// Loads of frames of a 3 × 3 array whose zeros are k/100 and drift by 0.01 from press to press.
+    fn recording(loads: &[f64]) -> (Scene, Vec<Frame>) {
+        let sensor =
+            crate::spec::sensor::Sensor { rows: 3, cols: 3, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
+        let scene = Scene::of_sensor(&sensor, "small");
+        let mut pressed = 0.0;
+        let mut last = 0.0;
+        let mut frame = |load: &f64| {
+            if last > 0.0 && *load == 0.0 {
+                pressed += 1.0;
+            }
+            last = *load;
+            let reading = |k: usize| 0.01 * k as f64 + 0.01 * pressed + load * (1.0 + 0.1 * k as f64);
+            Frame::from_stress("frame", &sensor, (0..9).map(reading).collect()).unwrap()
+        };
+        let frames = loads.iter().map(&mut frame).collect();
+        (scene, frames)
+    }
+
+    fn found(scene: &Scene, frames: &[Frame]) -> Presses {
+        presses(scene, &Input::new(scene).unwrap(), frames)
+    }
+
+    #[test]
+    fn a_press_is_what_lies_between_frames_without_load() {
+        // A touch of 7 % is none; the frames at 0.97 and 1 are averaged; the last press has no end.
+        let (scene, frames) = recording(&[0.0, 0.5, 1.0, 0.97, 0.3, 0.0, 0.07, 0.0, 0.4, 0.9, 0.2, 0.0, 0.0, 0.8]);
+        let found = found(&scene, &frames);
+        assert_eq!((found.presses.len(), found.flagged, found.spoiled), (3, 0, 0));
+        for press in &found.presses {
+            assert_eq!(press.taxels, (0..9).collect::<Vec<_>>());
+            let wanted = |k: usize| (1.0 + 0.1 * k as f64) / 1.8;
+            assert!((0..9).all(|k| (press.y[k] - wanted(k)).abs() < 0.02), "{press:?}");
+        }
+    }
+
+    #[test]
+    fn without_frames_without_load_there_is_no_press() {
+        let (scene, frames) = recording(&[1.0, 1.0, 1.0]);
+        assert_eq!(found(&scene, &frames).presses, []);
+        assert_eq!(found(&scene, &[]).presses, []);
+    }
+
+    /// Clipped frames are left out and counted; a press that has no other is none. A missing reading is no taxel of its press.
+    #[test]
+    fn what_is_spoiled_is_left_out() {
+        let (mut scene, mut frames) = recording(&[0.0, 0.5, 1.0, 0.0, 0.6, 0.0, 1.1, 0.0]);
+        scene.input.full_scale_MPa = Some(1.9);
+        frames[4].missing = vec![7];
+        let found = found(&scene, &frames);
+        assert_eq!((found.presses.len(), found.flagged, found.spoiled), (2, 1, 1));
+        assert_eq!(found.presses[1].taxels, [0, 1, 2, 3, 4, 5, 6, 8]);
+        // A clipped taxel of an array that reads no tension is none either.
+        scene.input.unipolar = true;
+        frames[1..3].iter_mut().for_each(|frame| frame.stress_MPa[0] = 0.0);
+        assert!(!self::found(&scene, &frames).presses[0].taxels.contains(&0));
+    }
+}

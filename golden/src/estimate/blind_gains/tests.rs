@@ -84,3 +84,34 @@ fn unrelated_readings_are_refused() {
     let found = shuffled.found();
     assert!(matches!(found, Err(BlindError::NoRise { .. })), "{found:?}");
 }
+
+/// Seeded fault: smooth patterns that are not held run away.
+#[test]
+fn smooth_patterns_that_are_free_run_away() {
+    let drawn = drawn(200, 3);
+    let input = prepared(&drawn.scene).unwrap();
+    let found = presses(&drawn.scene, &input, &drawn.recording());
+    let all: Vec<usize> = (0..64).collect();
+    let left = |order: i32| {
+        let smooth = Smooth::new(&drawn.scene.sensor, &all, order);
+        let search = Search::new(&drawn.scene, &found.presses, (&all, &smooth), &|_, _| ()).unwrap();
+        drawn.left(&search.run().unwrap().top.theta)[1]
+    };
+    let (before, held, free) = (drawn.left(&[0.0; 64])[1], left(ORDER), left(-1));
+    println!("smooth part {before:.4}, held {held:.4}, free {free:.4}");
+    assert!((held - before).abs() < 1e-3 && free > 1.5 * before);
+}
+
+#[test]
+fn recordings_that_tell_no_gains_are_refused() {
+    let few = drawn(60, 4);
+    let found = few.found();
+    assert!(matches!(found, Err(BlindError::Few { presses: 60, frames: 120, .. })), "{found:?}");
+    // One press 200 times covers too few taxels.
+    let narrow = Drawn { presses: vec![few.presses[0].clone(); 200], ..few };
+    let found = narrow.found();
+    assert!(matches!(found, Err(BlindError::NotCovered { live: 64, .. })), "{found:?}");
+    let mut curved = narrow.scene.clone();
+    curved.input.curve = vec![[0.0, 0.0], [0.1, 0.2]];
+    assert!(matches!(BlindGains::new(&curved, &[], &|_, _| ()), Err(BlindError::Curve { .. })));
+}

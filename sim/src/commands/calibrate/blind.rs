@@ -31,10 +31,12 @@ pub(super) fn run(arguments: &Arguments, scene: &Scene, presses: &Path) -> Resul
     let frames = Frame::load_all_as(presses, Some(scene), &arguments.layout.stated())?;
     let bar = Progress::share("gains");
     let share = |done: usize, all: usize| bar.set((Progress::SHARES * done as f64 / all as f64) as u64);
-    let gains = BlindGains::new(scene, &frames, &share).map_err(|error| anyhow!("--blind {}: {error}", presses.display()))?;
+    let gains =
+        BlindGains::new(scene, &frames, &share).map_err(|error| anyhow!("--blind {}: {error}", presses.display()))?;
     drop(bar);
     let full_scale = full_scale_field(gains.full_scale_MPa, scene, "at least; covers these presses")?;
-    let fields: Vec<_> = table_field(arguments, "from presses of unknown load")?.into_iter().chain([full_scale]).collect();
+    let fields: Vec<_> =
+        table_field(arguments, "from presses of unknown load")?.into_iter().chain([full_scale]).collect();
     let stand = save(arguments, scene, &gains.table, &fields)?;
     if !arguments.json {
         return Ok(report::blind_gains(&gains, &stand, &lines(&fields)));

@@ -27,14 +27,17 @@ pub fn run(scene: &str, asked: &BlindStudy, json: bool) -> Result<String> {
         return Ok(serde_json::to_string(&rows)? + "\n");
     }
     let head = ["spread", "presses", "rough", "smooth", "told", "e_t, exact gains", "no table", "table found"];
-    let refused = rows.iter().filter_map(|row| Some(format!("spread {}: {}\n", percent(Some(row.spread)), row.refused.as_ref()?)));
+    let refused = rows
+        .iter()
+        .filter_map(|row| Some(format!("spread {}: {}\n", percent(Some(row.spread)), row.refused.as_ref()?)));
     let refused: String = refused.collect();
     Ok(format!("{}\n{LEGEND}\n{refused}", aligned(2, &head, rows.iter().map(line).collect())))
 }
 
 fn line(row: &BlindRow) -> Vec<String> {
     let share = |value: f64| percent(Some(value));
-    let parts = |k: usize| format!("{} → {}", share(row.before[k]), row.after.map_or("-".to_owned(), |after| share(after[k])));
+    let parts =
+        |k: usize| format!("{} → {}", share(row.before[k]), row.after.map_or("-".to_owned(), |after| share(after[k])));
     let errors = |summary: &Summary| {
         format!("{} / {}", share(summary.tangential.median.value), share(summary.tangential.ninety.value))
     };
