@@ -18,10 +18,9 @@
 //! | in: press, log gains | taxels | of the peak, – |
 //! | out: S, Σ | taxels × coefficients, taxels² | of the peak |
 
-use super::likelihood::Modelled;
+use super::likelihood::{product, Modelled, Rest};
 use super::presses::Press;
 use crate::estimate::evidence::baseline::{terms, TERMS};
-use crate::estimate::evidence::cholesky::Cholesky;
 use crate::estimate::evidence::prior::remainder;
 use crate::estimate::evidence::Evidence;
 use crate::spec::scene::Scene;
@@ -83,9 +82,9 @@ impl Fields {
         let offsets = cells.offsets(&taxels);
         for _ in 0..ROUNDS {
             let under = self.under(&p, &offsets);
-            let mut covariance = self.rest(&taxels, |i| ENVELOPE_SIGMA.hypot(spread * y[i]));
-            matmul(covariance.as_mut(), Accum::Add, &under.s, under.s.transpose(), 1.0, Par::Seq);
-            let Some(factor) = Cholesky::new(covariance) else { break };
+            let sigma = y.iter().map(|y| ENVELOPE_SIGMA.hypot(spread * y)).collect();
+            let covariance = product(under.s.as_ref(), under.s.transpose());
+            let Some(factor) = self.rest(&taxels, sigma).and(&covariance) else { break };
             let mut alpha = y.clone();
             factor.solve(&mut alpha);
             // The mean of w is Sᵀ C⁻¹ y, of which the first columns are those of the pressure.
@@ -99,7 +98,12 @@ impl Fields {
         }
         let s = self.under(&p, &offsets).s;
         let read = |taxel: &usize| press.y[press.taxels.partition_point(|own| own < taxel)];
-        Modelled { y: taxels.iter().map(read).collect(), s, rest: self.rest(&taxels, |_| sigma), taxels }
+        Modelled {
+            y: taxels.iter().map(read).collect(),
+            s,
+            rest: self.rest(&taxels, vec![sigma; taxels.len()]),
+            taxels,
+        }
     }
 
     /// The fields under the envelope of the pressure `p`.
@@ -124,12 +128,9 @@ impl Fields {
         Under { cells, factor, s }
     }
 
-    /// Σ, with this standard deviation of each reading.
-    fn rest(&self, taxels: &[usize], sigma: impl Fn(usize) -> f64) -> Mat<f64> {
+    /// Σ, with the standard deviation of each reading.
+    fn rest(&self, taxels: &[usize], sigma: Vec<f64>) -> Rest {
         let of: Vec<[f64; TERMS]> = taxels.iter().map(|&taxel| terms(&self.evidence.cells.sensor, taxel)).collect();
-        Mat::from_fn(taxels.len(), taxels.len(), |i, j| {
-            let smooth: f64 = of[i].iter().zip(&of[j]).map(|(a, b)| a * b).sum();
-            BASELINE * BASELINE * smooth + if i == j { sigma(i).powi(2) } else { 0.0 }
-        })
+        Rest { sigma, baseline: Mat::from_fn(taxels.len(), TERMS, |i, k| BASELINE * of[i][k]) }
     }
 }

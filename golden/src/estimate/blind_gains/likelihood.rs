@@ -31,7 +31,15 @@ pub(super) struct Modelled {
     /// S.
     pub s: Mat<f64>,
     /// Σ.
-    pub rest: Mat<f64>,
+    pub rest: Rest,
+}
+
+/// Σ = σ² 1 + B Bᵀ, what a press has beside pressure and shear.
+pub(super) struct Rest {
+    /// σ of each reading, of the peak.
+    pub sigma: Vec<f64>,
+    /// B, taxels × terms of a baseline, of the peak.
+    pub baseline: Mat<f64>,
 }
 
 /// Sums over presses at one θ.
@@ -58,7 +66,7 @@ impl Modelled {
         let gains: Vec<f64> = self.taxels.iter().map(|&t| theta[t].exp()).collect();
         let scaled = Mat::from_fn(self.s.nrows(), self.s.ncols(), |i, j| gains[i] * self.s[(i, j)]);
         let m = product(scaled.as_ref(), scaled.transpose());
-        let factor = Cholesky::new(&m + &self.rest)?;
+        let factor = self.rest.and(&m)?;
         let mut alpha = self.y.clone();
         factor.solve(&mut alpha);
         Some(Factored { m, factor, alpha })
@@ -96,6 +104,16 @@ impl Modelled {
     }
 }
 
+impl Rest {
+    /// M + Σ, factored; `None` where it is not positive definite.
+    pub fn and(&self, m: &Mat<f64>) -> Option<Cholesky> {
+        let mut sum = m.clone();
+        matmul(sum.as_mut(), Accum::Add, &self.baseline, self.baseline.transpose(), 1.0, Par::Seq);
+        self.sigma.iter().enumerate().for_each(|(i, sigma)| sum[(i, i)] += sigma * sigma);
+        Cholesky::new(sum)
+    }
+}
+
 impl Sums {
     /// No press yet, of an array of so many taxels.
     pub fn none(taxels: usize) -> Sums {
@@ -113,7 +131,7 @@ impl Sums {
 }
 
 /// A B on one core: presses share the cores.
-fn product(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
+pub(super) fn product(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.nrows(), b.ncols());
     matmul(product.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
     product
@@ -126,7 +144,7 @@ mod tests {
 
     fn modelled(random: &mut Random) -> Modelled {
         let s = Mat::from_fn(4, 3, |_, _| random.normal());
-        let rest = Mat::from_fn(4, 4, |i, j| if i == j { 0.09 } else { 0.01 });
+        let rest = Rest { sigma: vec![0.08f64.sqrt(); 4], baseline: Mat::from_fn(4, 1, |_, _| 0.1) };
         Modelled { taxels: vec![0, 2, 3, 4], y: (0..4).map(|_| random.normal()).collect(), s, rest }
     }
 
