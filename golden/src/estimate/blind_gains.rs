@@ -57,7 +57,7 @@ pub const FEWEST: usize = 200;
 /// Most taxels of an array.
 const MOST_TAXELS: usize = 48 * 48;
 /// Share of a press's peak from which on a taxel is loaded.
-const LOADED: f64 = 0.2;
+const LOADED: f64 = 0.05;
 /// Fewest presses that load a taxel whose gain is looked for.
 const FEWEST_LOADED: usize = 10;
 /// Times that the fields are found anew with the gains.

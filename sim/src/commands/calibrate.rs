@@ -96,7 +96,7 @@ struct Answer<'a> {
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
     if let Some(presses) = &arguments.blind {
-        return blind::run(arguments, &scene, presses);
+        return arguments.gains_of_presses(&scene, presses);
     }
     let load = |LoadFile { stress_MPa, path }: &LoadFile| -> Result<KnownLoad> {
         Ok(KnownLoad {
