@@ -57,7 +57,7 @@ pub const FEWEST: usize = 200;
 /// Most taxels of an array.
 const MOST_TAXELS: usize = 48 * 48;
 /// Share of a press's peak from which on a taxel is loaded.
-const LOADED: f64 = 0.05;
+const LOADED: f64 = 0.02;
 /// Fewest presses that load a taxel whose gain is looked for.
 const FEWEST_LOADED: usize = 10;
 /// Times that the fields are found anew with the gains.
@@ -94,7 +94,8 @@ pub struct BlindGains {
     pub smooth: usize,
     /// Standard deviation of the rough part of the gains before, as a fraction.
     pub spread_before: f64,
-    /// What the presses leave open of it, as a fraction.
+    /// The least that is left of it, as a fraction: what noise leaves open. Pressures that smooth fields do not describe add to it; on
+    /// drawn presses two to three times as much is left.
     pub spread_after: f64,
     /// What pressure and shear leave of a reading, over the peak of its press.
     pub noise: f64,

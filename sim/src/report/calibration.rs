@@ -55,7 +55,7 @@ pub fn blind_gains(gains: &BlindGains, stand: &str, fields: &str) -> String {
         );
     }
     let [before, after] = [spread_before, spread_after].map(|spread| percent_text(*spread));
-    text += &format!("\nspread of the gains: {before} before, {after} left open by these presses\n");
+    text += &format!("\nspread of the gains: {before} before, at least {after} after\n");
     text += &format!(
         "gains of one half raise the log likelihood of a press of the other by {:.2}, standard error {:.2}\n",
         rise[0], rise[1]

@@ -70,7 +70,7 @@ pub struct BlindRow {
     pub before: [f64; 2],
     /// What is left of them with the table; `None` where the presses give none.
     pub after: Option<[f64; 2]>,
-    /// Rough spread before and left open, as the recording tells it.
+    /// Rough spread before and the least that is left, as the recording tells it.
     pub told: Option<[f64; 2]>,
     /// Why the presses give no table.
     pub refused: Option<String>,

@@ -10,7 +10,7 @@ use crate::progress::Progress;
 
 /// Explanation of the cells.
 const LEGEND: &str = "rough, smooth: root mean square of the part of the log gains that presses show, and of the one that they do \
-                      not, before → with the table; told: the rough part and what is left of it by the recording alone; e_t: median / \
+                      not, before → with the table; told: the rough part and the least that is left of it, by the recording alone; e_t: median / \
                       nine of ten of frames of the same array";
 
 /// The table of a scene, or JSON.
