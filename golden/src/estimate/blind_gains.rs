@@ -95,7 +95,7 @@ pub struct BlindGains {
     /// Standard deviation of the rough part of the gains before, as a fraction.
     pub spread_before: f64,
     /// The least that is left of it, as a fraction: what noise leaves open. Pressures that smooth fields do not describe add to it; on
-    /// drawn presses two to three times as much is left.
+    /// drawn presses about twice as much is left.
     pub spread_after: f64,
     /// What pressure and shear leave of a reading, over the peak of its press.
     pub noise: f64,

@@ -34,7 +34,8 @@ which the hardware does not take. These fields and those of full scale, dead tax
 stays.
 
 With --blind a recording of 200 ordinary presses or more, 300 are better, takes the place of known loads: press all over the array, with anything, and
-lift in between. It tells how the gains of neighbours differ; the common scale and what changes slowly over the array stay as they are. Recordings of other programs become MCAP files by dermis import.")]
+lift in between. It tells how the gains of neighbours differ; the common scale and what changes slowly over the array stay as they are.
+Recordings of other programs become MCAP files by dermis import.")]
 pub struct Arguments {
     /// Built-in name or path of the scene that defines the sensor.
     scene: String,
