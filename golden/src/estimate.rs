@@ -9,7 +9,9 @@
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`deviations`] | standard deviations of forces that a search found |
 //! | [`misfit`] | how far a frame is from those of a network's training |
+//! | [`blind_gains`] | gains of the taxels from presses whose loads nobody knows |
 
+pub mod blind_gains;
 pub mod degree;
 pub mod deviations;
 pub mod evidence;

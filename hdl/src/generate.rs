@@ -23,7 +23,7 @@ use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
-use crate::usage::{by_stage, total, PlacedMemory, StageUsage, WrapperUsage, Usage};
+use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Usage, WrapperUsage};
 use crate::waivers::WAIVERS;
 
 /// The generated hardware of one scene.

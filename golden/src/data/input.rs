@@ -19,7 +19,8 @@
 //!
 //! A reading that a frame lacks is described in [`missing`].
 //!
-//! The table is made from recordings under known loads by [`known_loads`], the noise from frames without load by [`unloaded`].
+//! The table is made from recordings under known loads by [`known_loads`], or of ordinary presses by
+//! [`blind_gains`](crate::estimate::blind_gains), the noise from frames without load by [`unloaded`].
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
@@ -277,6 +278,11 @@ impl Input {
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
     pub fn zero(&self) -> Option<&[f64]> {
         self.scale.as_ref().map(|(zero, _)| zero.as_slice())
+    }
+
+    /// Zero and gain of each taxel, where the scene has a table or tare frames.
+    pub(crate) fn table(&self) -> Option<Calibration> {
+        self.scale.as_ref().map(|(offset, gain)| Calibration { offset: offset.clone(), gain: gain.clone() })
     }
 
     /// Limit of a running zero in readings; `None` where zeros are fixed.

@@ -42,7 +42,7 @@
 mod ascent;
 mod baseline;
 pub(crate) mod cells;
-mod cholesky;
+pub(super) mod cholesky;
 mod clipped;
 mod contact;
 mod envelope;
@@ -53,7 +53,7 @@ mod fit;
 mod follow;
 mod model;
 mod noise;
-mod prior;
+pub(super) mod prior;
 mod regions;
 mod residual;
 mod screen;

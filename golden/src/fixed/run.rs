@@ -16,7 +16,7 @@ use super::stages::receive::mask;
 use super::stages::resultants::{Record, Summed};
 use super::stages::search::Best;
 use super::stages::send::{labels_to_beats, Status};
-use super::subarray::{SubarrayTrace, MuStatus};
+use super::subarray::{MuStatus, SubarrayTrace};
 use crate::result::flags::{Flag, FlagSet};
 use crate::spec::board::EngineKind;
 use crate::spec::partition::Subarray;
@@ -77,7 +77,8 @@ impl Model {
         let solve = |part: &Subarray| SubarrayTrace::new(self, case, &part.gather(sensor, codes));
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
-        let timing = |contacts: &Contacts| ContactTiming { segment: contacts.segment_cycles, contacts: contacts.all.len() };
+        let timing =
+            |contacts: &Contacts| ContactTiming { segment: contacts.segment_cycles, contacts: contacts.all.len() };
         let timing = solved.iter().find_map(|solved| solved.contacts.as_ref()).map(timing);
         let sending = BeatCycles::new(self, case, &searched, timing);
         let cycles = Cycles::of_beats(self, &sending);

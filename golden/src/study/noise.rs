@@ -13,11 +13,12 @@
 //! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
 //! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
 //! [`slip_study`] measures the bias of the shear in partial slip, [`press_study`] errors and lag over whole presses. [`sensitivities`] measures scenes that state something wrongly, [`unlike_study`] frames unlike those of a network's training,
-//! [`measure_deviations`] the standard deviations of a search.
+//! [`measure_deviations`] the standard deviations of a search, [`blind_study`] gains found from presses of unknown load.
 //!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
 //! below the bound where it is wide.
 
+mod blind;
 pub mod bound;
 pub mod contact;
 pub mod coverage;
@@ -36,6 +37,7 @@ pub mod support_bound;
 mod tests;
 mod unlike;
 
+pub use blind::{blind_study, BlindRow, BlindStudy};
 pub use deviations::{deviations_coverage, measure_deviations};
 pub use presses::{press_study, Averaged, PressEngine, PressRow, PressStudy};
 pub use sensitivity::{other_medium, sensitivities, SensitivityRow};

@@ -10,7 +10,7 @@ use super::core::hierarchy;
 use super::testbench::testbench;
 use super::{Bus, CoreShape};
 use crate::error::HdlError;
-use crate::generate::{top_name, Wrapper, Generated};
+use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::Change;
 use crate::manifest::GeneratedFile;
 

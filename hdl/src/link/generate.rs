@@ -6,7 +6,7 @@ use dermis_golden::wire::link::slip::IDLE;
 
 use super::board_top::board_top;
 use crate::error::HdlError;
-use crate::generate::{top_name, Wrapper, Generated};
+use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::Change;
 use crate::scan::pins_text;
 

@@ -6,7 +6,7 @@ use serde_json::json;
 use super::core::scanner;
 use super::Shape;
 use crate::error::HdlError;
-use crate::generate::{top_name, Wrapper, Generated};
+use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::Change;
 
 /// The stream of images in the header comment of the top module.

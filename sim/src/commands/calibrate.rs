@@ -1,4 +1,6 @@
-//! `dermis calibrate`: the calibration table of a sensor, from recordings under known uniform stresses.
+//! `dermis calibrate`: the calibration table of a sensor, from recordings under known uniform stresses, or from ordinary presses.
+
+mod blind;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -6,6 +8,7 @@ use std::str::FromStr;
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::data::input::known_loads::{Curvature, KnownLoad, LoadFit, Residual};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
@@ -21,19 +24,27 @@ use crate::report;
 #[command(after_help = "Examples:
   dermis calibrate mat.toml --load 0=zero.csv --load 0.05=half.csv --load 0.1=full.csv --out table.csv
   dermis calibrate mat.toml --load 0=zero.csv --load 0.1=full.csv --json
+  dermis calibrate mat.toml --blind presses.mcap --out table.csv
 
 A recording is a text with one frame per line or one row per line, as a stream has them, an MCAP file, a JSON frame, or a folder of such files,
 in the unit of the readings. Each must be taken under the same stress on every taxel, as air pressure on a foil applies it. With three loads
 or more each is left out once, and the table of the others is compared with it. The table is what `input.calibration`
 reads. Where the readings are no straight lines, and four loads or more, one of them 0, show it, `input.curve` has their characteristic,
 which the hardware does not take. These fields and those of full scale, dead taxels and noise are written into the file of the scene, where all else
-stays.")]
+stays.
+
+With --blind a recording of 200 ordinary presses or more, 300 are better, takes the place of known loads: press all over the array, with anything, and
+lift in between. It tells how the gains of neighbours differ; the common scale and what changes slowly over the array stay as they are.
+Recordings of other programs become MCAP files by dermis import.")]
 pub struct Arguments {
     /// Built-in name or path of the scene that defines the sensor.
     scene: String,
     /// Stress in MPa and the recording under it, a file or a folder; repeatable, at least two.
-    #[arg(long = "load", value_name = "MPA=FILE", required = true)]
+    #[arg(long = "load", value_name = "MPA=FILE", required_unless_present = "blind", conflicts_with = "blind")]
     loads: Vec<LoadFile>,
+    /// Recording of presses whose loads are not known, a file or a folder: gains of the taxels from what no press explains.
+    #[arg(long, value_name = "FILE")]
+    blind: Option<PathBuf>,
     #[command(flatten)]
     layout: LayoutArguments,
     /// File for the table.
@@ -85,6 +96,9 @@ struct Answer<'a> {
 /// A scene or recording that cannot be read, loads that give no table, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
+    if let Some(presses) = &arguments.blind {
+        return arguments.gains_of_presses(&scene, presses);
+    }
     let load = |LoadFile { stress_MPa, path }: &LoadFile| -> Result<KnownLoad> {
         Ok(KnownLoad {
             stress_MPa: *stress_MPa,
@@ -95,19 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     let fit = LoadFit::new(&scene, &loads).map_err(|error| anyhow!("--load: {error}"))?;
     let table = arguments.out.as_ref().map(|out| out.display().to_string());
     let fields = fields(&fit, &scene, arguments)?;
-    if let Some(out) = &arguments.out {
-        write(out, fit.table.to_csv(&scene.sensor).as_bytes())?;
-        if has_file(&arguments.scene) {
-            state(Path::new(&arguments.scene), &fields)?;
-        }
-    }
+    let stand = save(arguments, &scene, &fit.table, &fields)?;
     if !arguments.json {
-        let whither = match has_file(&arguments.scene) {
-            true => format!("written into {}", arguments.scene),
-            false => "for the scene".to_owned(),
-        };
-        let (table, taxels) = (table.unwrap_or_default(), fit.table.gain.len());
-        let stand = format!("{table}: offset and gain of {taxels} taxels; {whither}");
         return Ok(report::calibration(&fit, &stand, &lines(&fields)));
     }
     let answer = Answer {
@@ -127,6 +130,23 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     Ok(serde_json::to_string(&answer)? + "\n")
 }
 
+/// Writes table and fields where they belong; where they stand, in words.
+///
+/// # Errors
+/// A file that cannot be written.
+fn save(arguments: &Arguments, scene: &Scene, table: &Calibration, fields: &[Measured]) -> Result<String> {
+    let Some(out) = &arguments.out else { return Ok(String::new()) };
+    write(out, table.to_csv(&scene.sensor).as_bytes())?;
+    let whither = match has_file(&arguments.scene) {
+        true => {
+            state(Path::new(&arguments.scene), fields)?;
+            format!("written into {}", arguments.scene)
+        }
+        false => "for the scene".to_owned(),
+    };
+    Ok(format!("{}: offset and gain of {} taxels; {whither}", out.display(), table.gain.len()))
+}
+
 /// Step of the full scale in MPa.
 const STEP: f64 = 1e-3;
 /// Share of a full scale that the arithmetic may add.
@@ -135,22 +155,11 @@ const ROUNDING: f64 = 1e-12;
 /// The fields of the scene that follow from a calibration.
 fn fields(fit: &LoadFit, scene: &Scene, arguments: &Arguments) -> Result<Vec<Measured>> {
     let mut fields = Vec::new();
-    if let Some(out) = &arguments.out {
-        let table = beside_scene(out, Path::new(&arguments.scene))?;
-        fields.push(Measured::new("input", "calibration", table, "from readings under known loads"));
-    }
+    fields.extend(table_field(arguments, "from readings under known loads")?);
     if let Some(curve) = curve(fit, scene)? {
         fields.push(Measured::new("input", "curve", curve, "the characteristic behind the table, [MPa by it, MPa]"));
     }
-    // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
-    let least = (fit.full_scale_MPa * (1.0 - ROUNDING) / STEP).ceil() * STEP;
-    let full_scale_MPa = rounded(&format!("{:.3}", least.max(scene.input.full_scale_MPa.unwrap_or(0.0))))?;
-    fields.push(Measured::new(
-        "input",
-        "full_scale_MPa",
-        full_scale_MPa,
-        "at least; covers the readings of these loads",
-    ));
+    fields.push(full_scale_field(fit.full_scale_MPa, scene, "at least; covers the readings of these loads")?);
     let mut dead = [&scene.input.dead[..], &fit.dead].concat();
     dead.sort_unstable();
     dead.dedup();
@@ -165,6 +174,21 @@ fn fields(fit: &LoadFit, scene: &Scene, arguments: &Arguments) -> Result<Vec<Mea
         fields.push(Measured::new("search", "noise_floor_MPa", noise_MPa, "of one frame, as these loads show it"));
     }
     Ok(fields)
+}
+
+/// The field that names the table; none without a file for it.
+fn table_field(arguments: &Arguments, remark: &str) -> Result<Option<Measured>> {
+    let Some(out) = &arguments.out else { return Ok(None) };
+    let table = beside_scene(out, Path::new(&arguments.scene))?;
+    Ok(Some(Measured::new("input", "calibration", table, remark)))
+}
+
+/// The full scale that covers `least_MPa` and what the scene states.
+fn full_scale_field(least_MPa: f64, scene: &Scene, remark: &str) -> Result<Measured> {
+    // Rounded up, so that no reading is beyond it, but for the last bits of the arithmetic.
+    let least = (least_MPa * (1.0 - ROUNDING) / STEP).ceil() * STEP;
+    let full_scale_MPa = rounded(&format!("{:.3}", least.max(scene.input.full_scale_MPa.unwrap_or(0.0))))?;
+    Ok(Measured::new("input", "full_scale_MPa", full_scale_MPa, remark))
 }
 
 /// The knots of a curved characteristic; none in place of an older curve.
@@ -198,7 +222,6 @@ fn beside_scene(table: &Path, scene: &Path) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::data::input::calibration::Calibration;
     use std::fs;
 
     const SENSOR: &str =
@@ -237,6 +260,7 @@ mod tests {
         let arguments = Arguments {
             scene: at("pad.toml"),
             loads,
+            blind: None,
             out: Some(at(out).into()),
             layout: LayoutArguments::default(),
             json: false,

@@ -4,10 +4,11 @@
 //! | module | does |
 //! |---|---|
 //! | [`bitstream`] | `dermis bitstream`: synthesis, place and route, compared with committed baselines |
+//! | `blind_gains` | `dermis study blind-gains`: gains found from presses of unknown load |
 //! | [`block`] | `dermis block`: ports, Verilog and drawn timing of the blocks |
 //! | [`boards`] | `dermis boards`: built-in boards and known devices, or every field of one board |
 //! | [`build`] | `dermis build`: generates the Verilog of a scene |
-//! | [`calibrate`] | `dermis calibrate`: a calibration table from recordings under known stresses |
+//! | [`calibrate`] | `dermis calibrate`: a calibration table from recordings under known stresses, or of ordinary presses |
 //! | [`check`] | `dermis check`: what to expect of a scene; whether a generated folder is intact |
 //! | [`cosim`] | `dermis cosim`: compares simulated hardware with the bit-true model |
 //! | [`deviations`] | `dermis deviations`: standard deviations of a search |
@@ -38,6 +39,7 @@
 //! | [`train`] | `dermis train`: a network for the estimators that have one |
 
 pub mod bitstream;
+mod blind_gains;
 pub mod block;
 pub mod boards;
 pub mod build;

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use super::sensor_faults;
+use super::{blind_gains, sensor_faults};
 use crate::report::study::{contacts, dead_taxels, input_bits, link_times};
 
 /// What to compare.
@@ -14,7 +14,8 @@ use crate::report::study::{contacts, dead_taxels, input_bits, link_times};
   dermis study dead-taxels eight-by-eight
   dermis study contacts ellipses                     lines of the table by their first word
   dermis study link-times sensor-1 eight-by-eight
-  dermis study sensor-faults                         flagged and silently wrong frames of faulty sensors")]
+  dermis study sensor-faults                         flagged and silently wrong frames of faulty sensors
+  dermis study blind-gains                           gains found from presses of unknown load")]
 pub struct Arguments {
     #[command(subcommand)]
     study: Study,
@@ -41,6 +42,8 @@ enum Study {
     LinkTimes(Lines),
     /// Frames of faulty sensors, by every engine: flagged, silently wrong, right.
     SensorFaults(sensor_faults::Arguments),
+    /// Shear error without gains and with those that dermis calibrate --blind finds.
+    BlindGains(blind_gains::Arguments),
 }
 
 /// The study's table.
@@ -54,5 +57,6 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         Study::Contacts(Lines { lines }) => contacts::run(lines),
         Study::LinkTimes(Lines { lines }) => link_times::run(lines),
         Study::SensorFaults(arguments) => sensor_faults::run(arguments),
+        Study::BlindGains(arguments) => blind_gains::run(arguments),
     }
 }

@@ -1,6 +1,7 @@
-//! What `dermis calibrate` prints: the fields of the scene, and the residuals of the loads.
+//! What `dermis calibrate` prints: the fields of the scene, and the residuals of the loads or what presses tell of the gains.
 
 use dermis_golden::data::input::known_loads::{Curvature, LoadFit};
+use dermis_golden::estimate::blind_gains::BlindGains;
 
 use super::document::percent_text;
 use super::table::{markdown, significant_digits};
@@ -42,4 +43,33 @@ pub fn calibration(fit: &LoadFit, stand: &str, fields: &str) -> String {
         vec![load, residual.frames.to_string(), mean, rms.replace('+', ""), largest, format!("{row},{col}")]
     });
     text + "\nEach load compared with the table of the others:\n\n" + &markdown(&head, rows.collect())
+}
+
+/// What presses of unknown load found: the `fields` of the scene that follow, with where they stand in words.
+pub fn blind_gains(gains: &BlindGains, stand: &str, fields: &str) -> String {
+    let BlindGains { presses, flagged, spoiled, unseen, smooth, spread_before, spread_after, rise, .. } = gains;
+    let mut text = format!("{presses} presses");
+    if *flagged > 0 {
+        text += &format!(
+            "; left out: {flagged} frames that are saturated, clipped or have a faulty line, {spoiled} presses"
+        );
+    }
+    let [before, after] = [spread_before, spread_after].map(|spread| percent_text(*spread));
+    text += &format!("\nspread of the gains: {before} before, at least {after} after\n");
+    text += &format!(
+        "gains of one half raise the log likelihood of a press of the other by {:.2}, standard error {:.2}\n",
+        rise[0], rise[1]
+    );
+    if !unseen.is_empty() {
+        let places: Vec<String> = unseen.iter().map(|[row, col]| format!("{row},{col}")).collect();
+        text += &format!("keep their gain, too few presses load them: {}\n", places.join(" "));
+    }
+    text += &format!(
+        "unknown: the common scale and {} patterns that change slowly over the array, which stay as they are\n",
+        smooth - 1
+    );
+    if stand.is_empty() {
+        return text + "\n" + fields;
+    }
+    text + &format!("{stand}:\n\n{fields}")
 }

@@ -53,7 +53,7 @@ pub mod tabulate;
 
 pub use bitstream_report::{bitstream, summaries, BitstreamReport, Summary};
 pub use board_list::{boards, BoardList, NamedBoard};
-pub use calibration::calibration;
+pub use calibration::{blind_gains, calibration};
 pub use cases::cases;
 pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, RateRow, SceneCheck, NOISE_NOT_STATED};
 pub use converters::converters;

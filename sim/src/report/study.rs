@@ -7,7 +7,9 @@
 //! | [`contacts`] | case 0, `adaptive` and `contacts` on frames of several contacts |
 //! | [`link_times`] | time of a frame's packets on each link |
 //! | [`sensor_faults`] | engines on frames that a sensor's faults spoil |
+//! | [`blind_gains`] | errors without gains and with those found from presses of unknown load |
 
+pub mod blind_gains;
 pub mod contacts;
 pub mod dead_taxels;
 mod drawn;

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::boards::write_example;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 70] = [
+const NOT_RUN: [(&str, &str); 73] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis replay press.mcap --rate 100 | dermis live sensor-1 --stream", PAGE),
     ("dermis replay glove.mcap --topic /tactile/left --mpa-per-count 0.0001", "python/tests/test_recording.py"),
@@ -71,6 +71,12 @@ const NOT_RUN: [(&str, &str); 70] = [
     ("dermis study sensor-faults", "minutes; guide.rs"),
     ("dermis study sensor-faults my-scene.toml --quick", "a minute; golden/src/study/sensor_faults/tests.rs"),
     ("dermis study sensor-faults sensor-1-noisy --noise 0.002 --json", "minutes"),
+    ("dermis study blind-gains", "a minute; golden/src/estimate/blind_gains/tests.rs"),
+    ("dermis study blind-gains my-scene.toml --spread 0.03 --spread 0.1 --presses 600", "minutes"),
+    (
+        "dermis calibrate mat.toml --blind presses.mcap --out table.csv",
+        "needs 200 presses; golden/src/estimate/blind_gains/tests.rs",
+    ),
     ("dermis guide", PAGES),
     ("dermis guide --only stability", PAGES),
     ("dermis guide --check", PAGES),
@@ -132,7 +138,11 @@ fn all_examples() -> BTreeSet<String> {
     let overview = help(&[]);
     let listed = overview.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let commands = listed.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
-    let texts = commands.map(|name| help(&[name])).chain([overview.clone(), help(&["study", "sensor-faults"])]);
+    let texts = commands.map(|name| help(&[name])).chain([
+        overview.clone(),
+        help(&["study", "sensor-faults"]),
+        help(&["study", "blind-gains"]),
+    ]);
     texts.flat_map(|text| examples(&text)).collect()
 }
 

@@ -5,7 +5,7 @@ use faer::linalg::cholesky::llt;
 use faer::{Mat, MatMut, Par};
 
 /// L of A = L Lᵀ.
-pub(super) struct Cholesky(Mat<f64>);
+pub(in crate::estimate) struct Cholesky(Mat<f64>);
 
 impl Cholesky {
     /// Factors a matrix of which the lower half is filled; `None` if it is not positive definite.

@@ -41,7 +41,7 @@ struct Band {
 }
 
 /// What makes envelopes on the cells of an array.
-pub(super) struct Envelopes {
+pub(in crate::estimate) struct Envelopes {
     grid: Sensor,
     /// Weights of the smoothing for each column and each row of cells.
     smoothing: [Vec<Band>; 2],

@@ -27,9 +27,9 @@ const ADVISED: u64 = 2;
 
 /// The estimator of one scene.
 pub struct Evidence {
-    pub(super) cells: Cells,
-    pub(super) envelopes: Envelopes,
-    pub(super) shape: Shape,
+    pub(in crate::estimate) cells: Cells,
+    pub(in crate::estimate) envelopes: Envelopes,
+    pub(in crate::estimate) shape: Shape,
     pub(super) segmenter: Segmenter,
     pub(super) prior: Prior,
     pub(super) spreads: SpreadPrior,
@@ -103,7 +103,7 @@ impl Evidence {
     }
 
     /// The taxels that are read: all of a small array, those near the pressure `p` (N per cell) of a large one.
-    pub(super) fn window(&self, p: &[f64], sigma: f64) -> Vec<usize> {
+    pub(in crate::estimate) fn window(&self, p: &[f64], sigma: f64) -> Vec<usize> {
         let all = (0..self.alive.len()).filter(|&taxel| self.alive[taxel]);
         if self.alive.len() <= WINDOW_FROM {
             return all.collect();

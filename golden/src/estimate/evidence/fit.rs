@@ -14,7 +14,6 @@ mod regions;
 
 use super::ascent::{ascend, Top};
 use super::baseline::{plane, Sizes};
-use crate::physics::smooth::terms;
 use super::estimate::Estimate;
 use super::estimator::Evidence;
 use super::model::{Design, Readings};
@@ -22,6 +21,7 @@ use super::regions::Regions;
 use super::slip::Quadratic;
 use super::{clipped, noise};
 use crate::estimate::segment::neighbours;
+use crate::physics::smooth::terms;
 use faer::{Mat, Scale};
 
 /// Smallest standard deviation of a reading.

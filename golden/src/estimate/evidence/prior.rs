@@ -29,12 +29,12 @@ const REMAINDER_RANGE: [f64; 2] = [1e-4, 0.05];
 
 /// Largest variance that F leaves out, in units of the largest variance of the shape; `sigma` is the noise in units of the
 /// stress' peak.
-pub(super) fn remainder(sigma: f64) -> f64 {
+pub(in crate::estimate) fn remainder(sigma: f64) -> f64 {
     (REMAINDER * sigma).clamp(REMAINDER_RANGE[0], REMAINDER_RANGE[1])
 }
 
 /// The correlation k of the shape: for each number of cells along x and along y the factor of it.
-pub(super) struct Shape([Vec<f64>; 2]);
+pub(in crate::estimate) struct Shape([Vec<f64>; 2]);
 
 impl Shape {
     /// The shape on the cells of `grid`, smooth over `length_mm`.

@@ -16,8 +16,8 @@
 //! | out: taxels | as many as there are | indices |
 
 use super::baseline::LARGEST;
-use crate::physics::smooth::terms;
 use crate::physics::influence::table;
+use crate::physics::smooth::terms;
 use crate::spec::scene::Medium;
 use crate::spec::sensor::Sensor;
 use faer::linalg::solvers::DenseSolveCore;

@@ -123,7 +123,8 @@ pub(super) fn by_network(array: &Array, input: &EngineInput, network: &Learned, 
     let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
     let searched = |segments: &Segments, region: usize| input.meets_condition(segments, region);
     let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
-    let NetworkContacts { contacts, sigma, too_many } = solver.by_network(network, b, alive, scene.partition.max_contacts);
+    let NetworkContacts { contacts, sigma, too_many } =
+        solver.by_network(network, b, alive, scene.partition.max_contacts);
     let flags = too_many.then_some(Flag::TooManyContacts).into_iter().collect();
     array.by_region(input, CaseOutcome { flags, ..CaseOutcome::default() }, &contacts, Some(sigma))
 }

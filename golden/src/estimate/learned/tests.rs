@@ -120,7 +120,7 @@ fn tolerances_are_trained() {
 #[test]
 fn answers_follow_the_symmetries() {
     let scene = scene("sensor-1");
-    let learned = trained(&scene, 20).learned;
+    let learned = trained(&scene, 60).learned;
     let drawn = Draws::new(&scene, DrawOptions::default()).unwrap().frame(4).unwrap();
     let b = &drawn.exact_MPa;
     let found = ask(&learned, b, &[true; 100], [0.0; 2]);

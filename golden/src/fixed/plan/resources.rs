@@ -111,7 +111,11 @@ impl Holds {
     fn is_rom(self) -> bool {
         matches!(
             self,
-            Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns | Holds::SmoothingWeights
+            Holds::Calibration
+                | Holds::Coefficients
+                | Holds::LowCoefficients
+                | Holds::Columns
+                | Holds::SmoothingWeights
         )
     }
 }

@@ -6,6 +6,7 @@ use super::statistic::quantile;
 use crate::data::frame::{Frame, FrameError};
 use crate::data::generator::GeneratorError;
 use crate::engine::EngineError;
+use crate::estimate::blind_gains::BlindError;
 use crate::estimate::float::{Golden, GoldenError};
 use crate::fixed::FixedError;
 use crate::random::Random;
@@ -89,6 +90,9 @@ pub enum StudyError {
     /// Contacts cannot be drawn.
     #[error(transparent)]
     Generator(#[from] GeneratorError),
+    /// Presses give no gains.
+    #[error(transparent)]
+    Blind(#[from] BlindError),
     /// A parameter of the study is out of range.
     #[error("{field} = {value} is not allowed; it must be {allowed}")]
     Parameter {

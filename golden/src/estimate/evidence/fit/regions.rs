@@ -6,11 +6,11 @@
 //! | out: cells of each contact, F, S | – | –, N, MPa |
 
 use super::Fit;
-use crate::physics::smooth::{terms, TERMS};
 use crate::estimate::evidence::model::Design;
 use crate::estimate::evidence::prior::remainder;
 use crate::estimate::evidence::regions::Regions;
 use crate::estimate::evidence::slip::spread;
+use crate::physics::smooth::{terms, TERMS};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
