@@ -14,9 +14,11 @@
 //! | [`exceptions`] | errors of the crates as Python exceptions |
 //! | [`frame`] | frames with known forces, and frames from arrays |
 //! | [`contact`] | contacts as dictionaries |
+//! | [`datasets`] | results and frames as datasets of xarray |
 //! | [`reconstruction`] | results |
 //! | [`scene`] | scenes, and what is computed of them |
 //! | [`tracker`] | frames in the order of time, one by one |
+//! | [`stress`] | stress of forces on the surface |
 //! | [`trace`] | the stages of a frame, integers beside floating point |
 //! | [`noise`] | errors under noise |
 //! | [`board`] | a board on a serial port |
@@ -29,12 +31,14 @@
 pub mod arrays;
 pub mod board;
 pub mod contact;
+pub mod datasets;
 pub mod errors;
 pub mod exceptions;
 pub mod frame;
 pub mod noise;
 pub mod reconstruction;
 pub mod scene;
+pub mod stress;
 pub mod trace;
 pub mod tracker;
 
@@ -43,6 +47,8 @@ pub mod tracker;
 mod _dermis {
     #[pymodule_export]
     use crate::board::{Answers, Board, BoardError};
+    #[pymodule_export]
+    use crate::datasets::frames_to_xarray;
     #[pymodule_export]
     use crate::errors::{errors, Errors};
     #[pymodule_export]
