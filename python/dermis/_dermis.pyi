@@ -9,6 +9,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "FLAGS",
     "Answers",
     "Board",
     "BoardError",
@@ -24,6 +25,8 @@ __all__ = [
     "errors",
     "frames_to_xarray",
 ]
+
+FLAGS: tuple[str, ...]
 
 _Engine = Literal["golden", "fixed"]
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._dermis import FLAGS
+
 if TYPE_CHECKING:
     import xarray
 
@@ -90,7 +92,7 @@ def _contacts(all_contacts: Sequence[list[Contact] | None]) -> Iterable[_Variabl
         yield name, ("contact", *dimensions), values, units, meaning
 
 
-def of_results(results: Reconstructions, x_mm: _Floats, y_mm: _Floats, flags: Sequence[str]) -> xarray.Dataset:
+def of_results(results: Reconstructions, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
     """The dataset of results in the order of time."""
     every = list(results)
 
@@ -103,13 +105,13 @@ def of_results(results: Reconstructions, x_mm: _Floats, y_mm: _Floats, flags: Se
         if every and all(moment is not None for moment in moments):
             yield "moment", _FORCE, np.array(moments), "N mm", "moment of the forces about the centre of the array"
         yield from _contacts(results.contacts)
-        raised = [[flag in own for flag in flags] for own in results.flags]
-        yield "flags", ("flag",), np.array(raised, dtype=bool).reshape(-1, len(flags)), "", "limitations of the result"
+        raised = [[flag in own for flag in FLAGS] for own in results.flags]
+        yield "flags", ("flag",), np.array(raised, dtype=bool).reshape(-1, len(FLAGS)), "", "limitations of the result"
 
     names, times = [result.frame for result in every], [result.time_ns for result in every]
     attributes = {"scene": every[0].scene, "engine": every[0].engine} if every else {}
     dataset = _dataset(variables(), times, names, x_mm, y_mm, attributes)
-    return dataset.assign_coords(flag=("flag", list(flags), {"long_name": "name of the flag"}))
+    return dataset.assign_coords(flag=("flag", list(FLAGS), {"long_name": "name of the flag"}))
 
 
 class _One:
@@ -127,13 +129,13 @@ class _One:
         return iter([self.result])
 
 
-def of_result(result: Reconstruction, x_mm: _Floats, y_mm: _Floats, flags: Sequence[str]) -> xarray.Dataset:
+def of_result(result: Reconstruction, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
     """The dataset of one result, without an axis of time."""
     one: Any = _One(result)
-    return of_results(one, x_mm, y_mm, flags).isel(time=0)
+    return of_results(one, x_mm, y_mm).isel(time=0)
 
 
-def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats, _flags: Sequence[str]) -> xarray.Dataset:
+def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
     """The dataset of frames of one array."""
 
     def variables() -> Iterable[_Variable]:
@@ -152,6 +154,6 @@ def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats, _flags: Seq
     return _dataset(variables(), [frame.time_ns for frame in frames], [frame.id for frame in frames], x_mm, y_mm, {})
 
 
-def of_frame(frame: Frame, x_mm: _Floats, y_mm: _Floats, flags: Sequence[str]) -> xarray.Dataset:
+def of_frame(frame: Frame, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
     """The dataset of one frame, without an axis of time."""
-    return of_frames([frame], x_mm, y_mm, flags).isel(time=0)
+    return of_frames([frame], x_mm, y_mm).isel(time=0)

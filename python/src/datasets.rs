@@ -1,6 +1,5 @@
 //! Results and frames as datasets of xarray, which `python/dermis/_xarray.py` makes.
 
-use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::sensor::Sensor;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -17,8 +16,7 @@ pub fn made<'py>(function: &str, own: &Bound<'py, PyAny>, sensor: &Sensor) -> Py
     let py = own.py();
     let x_mm = PyArray1::from_iter(py, (0..sensor.cols).map(|col| sensor.position_mm(0, col)[0]));
     let y_mm = PyArray1::from_iter(py, (0..sensor.rows).map(|row| sensor.position_mm(row, 0)[1]));
-    let flags = Flag::ALL.map(Flag::name);
-    py.import("dermis._xarray")?.call_method1(function, (own, x_mm, y_mm, flags))
+    py.import("dermis._xarray")?.call_method1(function, (own, x_mm, y_mm))
 }
 
 /// Make one dataset of xarray of frames of one sensor, with an axis of time, as Frame.to_xarray has it of one.

@@ -45,6 +45,16 @@ pub mod tracker;
 /// What Python imports as `dermis._dermis`; the package `dermis` hands it on.
 #[pyo3::pymodule]
 mod _dermis {
+    use dermis_golden::result::flags::Flag;
+    use pyo3::prelude::*;
+    use pyo3::types::PyTuple;
+
+    /// `FLAGS`: the names of all flags, in the order of their numbers.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("FLAGS", PyTuple::new(module.py(), Flag::ALL.map(Flag::name))?)
+    }
+
     #[pymodule_export]
     use crate::board::{Answers, Board, BoardError};
     #[pymodule_export]
