@@ -13,6 +13,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -196,12 +197,10 @@ class _Dataset:
 
     def __init__(self, folder: Path, fps: int, task: str) -> None:
         try:
-            import pandas
-            import pyarrow
-            import pyarrow.parquet
+            # By name: they have no types.
+            self.pandas, self.arrow, self.parquet = map(import_module, ("pandas", "pyarrow", "pyarrow.parquet"))
         except ImportError as error:
             raise ImportError(f"dermis.lerobot needs {error.name}, which is not installed: pip install pandas pyarrow") from error
-        self.pandas, self.arrow, self.parquet = pandas, pyarrow, pyarrow.parquet
         self.folder, self.fps, self.task = folder, fps, task
         self.rows = 0
         self.episodes: list[dict[str, Any]] = []

@@ -56,11 +56,11 @@ impl Scene {
             }
             Some(at_mm) => {
                 let at = numbers("at_mm", at_mm)?;
-                let (leading, frames) = points([found, at.shape()], forces.as_slice()?, at.as_slice()?)?;
+                let (leading, frames) = points(found, at.shape(), forces.as_slice()?, at.as_slice()?)?;
                 if frames.is_empty() {
                     // NumPy refuses more frames than memory has, which arrays without points may claim.
                     let zeros = py.import("numpy")?.call_method1("zeros", ([leading, &[rows, cols]].concat(),))?;
-                    return Ok(zeros.cast_into()?);
+                    return Ok(zeros.cast_into::<PyArrayDyn<f64>>()?);
                 }
                 (leading, py.detach(|| self.forward().of_points(&frames)))
             }
@@ -70,12 +70,14 @@ impl Scene {
     }
 }
 
-/// The leading lengths of forces at points, and the points of each frame; no frames where there are no points. Shapes and values are those of forces_N and at_mm.
+/// The leading lengths of forces at points, and the points of each frame; no frames where there are no points. Shapes and values are
+/// those of forces_N and at_mm.
 ///
 /// # Errors
 /// `InputError` for shapes that do not belong together.
 fn points<'a>(
-    [forces, at]: [&'a [usize]; 2],
+    forces: &'a [usize],
+    at: &[usize],
     force_N: &[f64],
     at_mm: &[f64],
 ) -> PyResult<(&'a [usize], Vec<Vec<PointForce>>)> {
@@ -94,7 +96,7 @@ fn points<'a>(
             force_N: std::array::from_fn(|axis| force_N[AXES * force + axis]),
         }
     };
-    let frames = 0..if *points > 0 { leading.iter().product() } else { 0 };
+    let frames = 0..if *points > 0 { leading.iter().product::<usize>() } else { 0 };
     Ok((leading, frames.map(|frame| (0..*points).map(|own| point(frame, own)).collect()).collect()))
 }
 
