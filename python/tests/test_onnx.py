@@ -87,7 +87,7 @@ def test_the_power_of_two_is_that_above_the_peak(tmp_path: Path) -> None:
 
 
 def test_masked_taxels_are_not_read(tmp_path: Path) -> None:
-    scene = scene_of("sensor-1", "[input]\ndead_taxels = [[2, 3], [7, 7]]\n")
+    scene = scene_of("sensor-1", "[input]\ndead = [[2, 3], [7, 7]]\n")
     frames = [scene.generate(random=1, seed=k) for k in range(5)]
     stress, mask = np.stack([frame.stress_MPa for frame in frames]), np.zeros((5, 10, 10))
     mask[:, [2, 7], [3, 7]] = 1
