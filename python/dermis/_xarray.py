@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,6 @@ from numpy.typing import NDArray
 from ._dermis import FLAGS
 
 if TYPE_CHECKING:
-    import xarray
-
     from ._dermis import Contact, Frame, Reconstruction, Reconstructions
 
 _Floats = NDArray[np.float64]
@@ -36,10 +35,10 @@ _PLANE = _AXES[:2]
 def _module() -> Any:
     """xarray, which nothing else of the package needs."""
     try:
-        import xarray
+        # By name: reading its types takes a checker longer than all else.
+        return import_module("xarray")
     except ImportError as error:
         raise ImportError("to_xarray needs xarray, which is not installed: pip install xarray") from error
-    return xarray
 
 
 def _dataset(
@@ -49,7 +48,7 @@ def _dataset(
     x_mm: _Floats,
     y_mm: _Floats,
     attributes: dict[str, str],
-) -> xarray.Dataset:
+) -> Any:
     """A dataset with an axis of time; its coordinate is left out where a time is not known."""
     coordinates: dict[str, Any] = {
         "row": ("row", np.arange(len(y_mm)), {"long_name": "row of the array"}),
@@ -69,7 +68,7 @@ def _dataset(
             coordinates["axis"] = ("axis", _AXES, {"long_name": "component: x, y, normal"})
         if "plane" in dimensions:
             coordinates["plane"] = ("plane", _PLANE, {"long_name": "component: x, y"})
-    return _module().Dataset(arrays, coordinates, attributes)  # type: ignore[no-any-return]
+    return _module().Dataset(arrays, coordinates, attributes)
 
 
 def _contacts(all_contacts: Sequence[list[Contact] | None]) -> Iterable[_Variable]:
@@ -92,7 +91,7 @@ def _contacts(all_contacts: Sequence[list[Contact] | None]) -> Iterable[_Variabl
         yield name, ("contact", *dimensions), values, units, meaning
 
 
-def of_results(results: Reconstructions, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
+def of_results(results: Reconstructions, x_mm: _Floats, y_mm: _Floats) -> Any:
     """The dataset of results in the order of time."""
     every = list(results)
 
@@ -129,13 +128,13 @@ class _One:
         return iter([self.result])
 
 
-def of_result(result: Reconstruction, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
+def of_result(result: Reconstruction, x_mm: _Floats, y_mm: _Floats) -> Any:
     """The dataset of one result, without an axis of time."""
     one: Any = _One(result)
     return of_results(one, x_mm, y_mm).isel(time=0)
 
 
-def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
+def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats) -> Any:
     """The dataset of frames of one array."""
 
     def variables() -> Iterable[_Variable]:
@@ -154,6 +153,6 @@ def of_frames(frames: Sequence[Frame], x_mm: _Floats, y_mm: _Floats) -> xarray.D
     return _dataset(variables(), [frame.time_ns for frame in frames], [frame.id for frame in frames], x_mm, y_mm, {})
 
 
-def of_frame(frame: Frame, x_mm: _Floats, y_mm: _Floats) -> xarray.Dataset:
+def of_frame(frame: Frame, x_mm: _Floats, y_mm: _Floats) -> Any:
     """The dataset of one frame, without an axis of time."""
     return of_frames([frame], x_mm, y_mm).isel(time=0)

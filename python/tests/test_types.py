@@ -41,8 +41,7 @@ def run(*arguments: str, folder: Path) -> tuple[int, str]:
 
 def test_the_stubs_are_those_of_the_module(tmp_path: Path) -> None:
     # The stubs of NumPy take longer to read than everything else, and are not compared.
-    skipped = "".join(f"[mypy-{name}.*]\nfollow_imports = skip\n" for name in ("numpy", "xarray"))
-    (tmp_path / "mypy.ini").write_text("[mypy]\n" + skipped)
+    (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-numpy.*]\nfollow_imports = skip\n")
     stubtest = ("mypy.stubtest", "--mypy-config-file", "mypy.ini", "dermis")
     code, text = run(*stubtest, folder=tmp_path)
     assert code == 0, text
