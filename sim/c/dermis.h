@@ -450,7 +450,10 @@ dermis_status dermis_reconstruct_many(const dermis_scene *scene,
  * compression positive, of the medium, without the noise and codes of a sensor. After an error what stress_MPa holds is not
  * defined. The first call for a scene builds the model, which takes longer than the others.
  */
-dermis_status dermis_stress(const dermis_scene *scene, const double *forces_N, size_t count, double *stress_MPa);
+dermis_status dermis_stress(const dermis_scene *scene,
+                            const double *forces_N,
+                            size_t count,
+                            double *stress_MPa);
 
 /**
  * Compute the stress that forces on points of the surface cause in the scene's medium.
