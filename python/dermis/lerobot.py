@@ -25,7 +25,7 @@ from ._dermis import FLAGS, Frame, InputError, Reconstruction, Scene
 
 __all__ = ["export"]
 
-Resampling = Literal["newest", "mean"]
+_Resampling = Literal["newest", "mean"]
 _Columns = dict[str, NDArray[Any]]
 
 _VERSION = "v3.0"
@@ -57,7 +57,7 @@ def export(
     *,
     fps: int = 30,
     task: str = "touch",
-    resampling: Resampling = "newest",
+    resampling: _Resampling = "newest",
     engine: Literal["golden", "fixed"] = "golden",
     rate_hz: float | None = None,
     start_ns: Sequence[int] | None = None,
@@ -145,7 +145,7 @@ def _wrench(found: Reconstruction) -> NDArray[np.float64]:
     return np.concatenate([found.resultant_N, moment])
 
 
-def _resampled(results: list[_Result], name: str, fps: int, start_ns: int | None, resampling: Resampling) -> _Columns:
+def _resampled(results: list[_Result], name: str, fps: int, start_ns: int | None, resampling: _Resampling) -> _Columns:
     """The features of an episode at every tick."""
     times = np.array([result.time_ns for result in results])
     start = int(times[0]) if start_ns is None else start_ns
