@@ -91,7 +91,7 @@ impl Board {
             let result = answer.decode(&session.model, &readings).map_err(fixed)?;
             let mut result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
             checks.add(std::slice::from_ref(&readings), result.resultant_N, &mut result.diagnostics());
-            Ok(Reconstruction::new(Arc::new(result), frame.time_ns, scene.lengths()))
+            Ok(Reconstruction::new(Arc::new(result), frame.time_ns, &scene.spec().sensor))
         })
     }
 }

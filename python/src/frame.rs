@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::arrays::{array, cube, grid, interleaved, readings, shape};
+use crate::datasets;
 use crate::exceptions::input;
 
 /// The stress on every taxel at one moment, with its true forces where they are known.
@@ -76,6 +77,16 @@ impl Frame {
     /// The frame as the text of a .json file.
     fn to_json(&self) -> String {
         self.0.to_json()
+    }
+
+    /// The frame as a dataset of xarray, which must be installed; the package's guide lists its variables.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     xarray is not installed.
+    fn to_xarray<'py>(own: &Bound<'py, Frame>) -> PyResult<Bound<'py, PyAny>> {
+        datasets::made("of_frame", own, &own.get().0.sensor)
     }
 
     fn __repr__(&self) -> String {

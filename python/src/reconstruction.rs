@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::{FoundContact, Reconstruction as Solved};
+use dermis_golden::spec::sensor::Sensor;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -11,6 +12,7 @@ use pyo3::types::{PyAny, PyDict, PyList};
 use serde::Serialize;
 
 use crate::arrays::{array, cube, grid, interleaved};
+use crate::datasets;
 use crate::errors::Errors;
 
 /// JSON of a value.
@@ -100,14 +102,13 @@ impl Contact {
 pub struct Reconstruction {
     result: Arc<Solved>,
     time_ns: Option<i64>,
-    rows: usize,
-    cols: usize,
+    sensor: Sensor,
 }
 
 impl Reconstruction {
-    /// A result on an array of `rows` by `cols` taxels, whose last frame was acquired at `time_ns`.
-    pub fn new(result: Arc<Solved>, time_ns: Option<i64>, [rows, cols]: [usize; 2]) -> Reconstruction {
-        Reconstruction { result, time_ns, rows, cols }
+    /// A result on an array, whose last frame was acquired at `time_ns`.
+    pub fn new(result: Arc<Solved>, time_ns: Option<i64>, sensor: &Sensor) -> Reconstruction {
+        Reconstruction { result, time_ns, sensor: sensor.clone() }
     }
 }
 
@@ -147,7 +148,7 @@ impl Reconstruction {
     fn forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let forces = &self.result.forces_N;
         let given = !forces.fz.is_empty();
-        given.then(|| cube(py, interleaved(forces).collect(), [self.rows, self.cols, 3])).transpose()
+        given.then(|| cube(py, interleaved(forces).collect(), [self.sensor.rows, self.sensor.cols, 3])).transpose()
     }
 
     /// Sum of the forces in N, shape (3,): x, y, normal.
@@ -205,6 +206,16 @@ impl Reconstruction {
         Ok(plain(py, &*self.result)?.cast_into::<PyDict>()?)
     }
 
+    /// The result as a dataset of xarray, which must be installed; the package's guide lists its variables.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     xarray is not installed.
+    fn to_xarray<'py>(own: &Bound<'py, Reconstruction>) -> PyResult<Bound<'py, PyAny>> {
+        datasets::made("of_result", own, &own.get().sensor)
+    }
+
     fn __repr__(&self) -> PyResult<String> {
         let [x, y, normal] = self.result.resultant_N;
         let flags = json(&self.result.flags)?;
@@ -218,18 +229,17 @@ pub struct Reconstructions {
     results: Vec<Arc<Solved>>,
     /// When the last frame of each was acquired.
     times_ns: Vec<Option<i64>>,
-    rows: usize,
-    cols: usize,
+    sensor: Sensor,
 }
 
 impl Reconstructions {
-    /// Results on an array of `rows` by `cols` taxels, and when the last frame of each was acquired.
-    pub fn new(results: Vec<Arc<Solved>>, times_ns: Vec<Option<i64>>, [rows, cols]: [usize; 2]) -> Reconstructions {
-        Reconstructions { results, times_ns, rows, cols }
+    /// Results on an array, and when the last frame of each was acquired.
+    pub fn new(results: Vec<Arc<Solved>>, times_ns: Vec<Option<i64>>, sensor: &Sensor) -> Reconstructions {
+        Reconstructions { results, times_ns, sensor: sensor.clone() }
     }
 
     fn one(&self, (result, time_ns): (&Arc<Solved>, &Option<i64>)) -> Reconstruction {
-        Reconstruction::new(Arc::clone(result), *time_ns, [self.rows, self.cols])
+        Reconstruction::new(Arc::clone(result), *time_ns, &self.sensor)
     }
 
     fn timed(&self) -> impl Iterator<Item = (&Arc<Solved>, &Option<i64>)> {
@@ -271,7 +281,7 @@ impl Reconstructions {
             return Ok(None);
         }
         let forces: Vec<f64> = self.results.iter().flat_map(|result| interleaved(&result.forces_N)).collect();
-        let lengths = [self.results.len(), self.rows, self.cols, 3];
+        let lengths = [self.results.len(), self.sensor.rows, self.sensor.cols, 3];
         PyArray1::from_vec(py, forces).reshape(lengths).map(Some)
     }
 
@@ -302,7 +312,17 @@ impl Reconstructions {
         plain(py, &self.results.iter().map(|result| &result.flags).collect::<Vec<_>>())
     }
 
+    /// The results as a dataset of xarray with an axis of time, as Reconstruction has it.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     xarray is not installed.
+    fn to_xarray<'py>(own: &Bound<'py, Reconstructions>) -> PyResult<Bound<'py, PyAny>> {
+        datasets::made("of_results", own, &own.get().sensor)
+    }
+
     fn __repr__(&self) -> String {
-        format!("Reconstructions({} of {}×{} taxels)", self.results.len(), self.rows, self.cols)
+        format!("Reconstructions({} of {}×{} taxels)", self.results.len(), self.sensor.rows, self.sensor.cols)
     }
 }

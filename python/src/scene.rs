@@ -1,12 +1,13 @@
 //! Scenes, and what is computed of them.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use dermis_golden::data::frame::{Frame as Stress, FrameError};
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::engine::{CheckPace, StreamChecks};
+use dermis_golden::physics::forward::ForwardModel;
 use dermis_golden::spec::scene::Scene as Spec;
 use dermis_sim::batch::Batch;
 use dermis_sim::engine::{self, EngineName, Engines};
@@ -26,11 +27,12 @@ use crate::tracker::Tracker;
 pub struct Scene {
     spec: Spec,
     engines: Engines,
+    pub(crate) forward_model: OnceLock<ForwardModel>,
 }
 
 impl Scene {
     fn new(spec: Spec) -> Scene {
-        Scene { spec, engines: Engines::default() }
+        Scene { spec, engines: Engines::default(), forward_model: OnceLock::new() }
     }
 
     /// The scene itself.
@@ -106,7 +108,7 @@ impl Scene {
 
     /// Name of the scene.
     #[getter]
-    fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.spec.name
     }
 
@@ -235,7 +237,7 @@ impl Scene {
         if single {
             let result = py.detach(|| engine::result(&engine, &frames, cross_check > 0)).map_err(model)?;
             let time_ns = Stress::time_of_result(&frames);
-            return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), time_ns, self.lengths()))?.into_any());
+            return Ok(Bound::new(py, Reconstruction::new(Arc::new(result), time_ns, &self.spec.sensor))?.into_any());
         }
         let engine = engine.engine();
         let mut checks = StreamChecks::new(engine, CheckPace::Every(cross_check));
@@ -250,7 +252,7 @@ impl Scene {
             // Ctrl-C ends a long call.
             py.check_signals()?;
         }
-        Ok(Bound::new(py, Reconstructions::new(results, times_ns, self.lengths()))?.into_any())
+        Ok(Bound::new(py, Reconstructions::new(results, times_ns, &self.spec.sensor))?.into_any())
     }
 
     /// Reconstruct frames that do not depend on each other, on all cores.
@@ -300,7 +302,7 @@ impl Scene {
             py.check_signals()?;
         }
         let times_ns = vec![None; results.len()];
-        Ok(Reconstructions::new(results, times_ns, self.lengths()))
+        Ok(Reconstructions::new(results, times_ns, &self.spec.sensor))
     }
 
     /// Begin to reconstruct the frames of a sensor in the order of time, one by one.

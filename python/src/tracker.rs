@@ -68,9 +68,8 @@ impl Tracker {
             let checks = checks.as_mut().ok_or_else(|| input("the tracker is closed"))?;
             checks.push(self.engine.engine(), frame).map_err(|error| model(typed(error)))
         })?;
-        let lengths = [self.scene.sensor.rows, self.scene.sensor.cols];
         let timed = |(frames, result): (Vec<Stress>, _)| {
-            Reconstruction::new(Arc::new(result), Stress::time_of_result(&frames), lengths)
+            Reconstruction::new(Arc::new(result), Stress::time_of_result(&frames), &self.scene.sensor)
         };
         Ok(result.map(timed))
     }

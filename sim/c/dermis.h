@@ -443,6 +443,31 @@ dermis_status dermis_reconstruct_many(const dermis_scene *scene,
                                       const dermis_batch *batch);
 
 /**
+ * Compute the stress that forces on the surface cause in the scene's medium, for any number of frames, on all cores.
+ *
+ * forces_N has count values, frame after frame of rows * cols * 3: x, y and normal force on each taxel's cell in N, over which
+ * it is spread evenly. stress_MPa has room for count / 3 values, frame after frame of rows * cols: normal stress in MPa,
+ * compression positive, of the medium, without the noise and codes of a sensor. After an error what stress_MPa holds is not
+ * defined. The first call for a scene builds the model, which takes longer than the others.
+ */
+dermis_status dermis_stress(const dermis_scene *scene,
+                            const double *forces_N,
+                            size_t count,
+                            double *stress_MPa);
+
+/**
+ * Compute the stress that forces on points of the surface cause in the scene's medium.
+ *
+ * at_mm has points * 2 values, x and y of each point in mm from the array's centre, also beside the array; forces_N has
+ * points * 3 values, x, y and normal force in N. stress_MPa has room for rows * cols values, as dermis_stress has them.
+ */
+dermis_status dermis_stress_of_points(const dermis_scene *scene,
+                                      const double *at_mm,
+                                      const double *forces_N,
+                                      size_t points,
+                                      double *stress_MPa);
+
+/**
  * Begin a stream of frames of a scene. It belongs to the caller: dermis_stream_free; the scene may be freed before it. After
  * an error *stream is NULL; DERMIS_STATUS_INPUT for a scene that the engine refuses.
  *

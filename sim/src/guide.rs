@@ -34,6 +34,7 @@ pages! {
     "files.md" files,
     "python.md" python,
     "c.md" c,
+    "learning.md" learning,
     "accuracy.md" accuracy,
     "limits.md" limits,
     "over-time.md" over_time,

@@ -46,9 +46,9 @@ pub use error::GeneratorError;
 pub use random::{random_contacts, Draw, Shapes, MOST_RANDOM};
 
 use crate::data::frame::{Contact, Frame};
+use crate::physics::body::Body;
 use crate::spec::scene::Medium;
 use crate::spec::sensor::Sensor;
-use stress::Body;
 
 /// Computes the frame of `contacts` on a `medium`: stress on each taxel in MPa, force on each cell in N, resultant in
 /// N.

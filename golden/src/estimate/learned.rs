@@ -17,6 +17,7 @@
 //! | `options`, `frames`, `training`, `adam` | drawn frames, loss, steps |
 //! | `file` | bytes, signature |
 //! | `trial` | a network of a few steps, for tests |
+//! | `onnx` | the network as a file for other programs |
 //! | `composed` | the layers as plain matrices of the stress, for the hardware |
 //!
 //! A mirrored frame has the mirrored μ because no layer can do otherwise; in parities that costs a quarter of the products.
@@ -33,6 +34,7 @@ mod features;
 mod file;
 mod frames;
 mod network;
+mod onnx;
 mod options;
 #[cfg(test)]
 mod tests;

@@ -178,6 +178,12 @@ pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
     (0..sensor.taxels()).map(|index| cell.at([(index % cols) as f64 * a, (index / cols) as f64 * b])).collect()
 }
 
+/// The influence at a distance taxel − cell in rows and columns of either sign, from a [`table`] of an array of `cols` columns.
+pub(crate) fn at_distance(table: &[[f64; 3]], cols: usize, [down, right]: [isize; 2]) -> [f64; 3] {
+    let [x, y, z] = table[down.unsigned_abs() * cols + right.unsigned_abs()];
+    [if right < 0 { -x } else { x }, if down < 0 { -y } else { y }, z]
+}
+
 /// Influence matrices of an array, taxels × cells; row t, column f is the stress in MPa on taxel t per N on cell f.
 pub struct Influence {
     /// Stress per force along x, MPa/N.
@@ -198,19 +204,14 @@ impl Influence {
     pub fn through(sensor: &Sensor, medium: Medium) -> Influence {
         let Sensor { rows, cols, .. } = *sensor;
         let table = table(sensor, medium);
-        let fill = |axis: usize, odd_x: bool, odd_y: bool| {
+        let fill = |axis: usize| {
             Mat::from_fn(rows * cols, rows * cols, |taxel, force| {
-                let (r, c) = (taxel / cols, taxel % cols);
-                let (s, d) = (force / cols, force % cols);
-                let value = table[r.abs_diff(s) * cols + c.abs_diff(d)][axis];
-                if (odd_x && c < d) != (odd_y && r < s) {
-                    -value
-                } else {
-                    value
-                }
+                let place = |index: usize| [(index / cols) as isize, (index % cols) as isize];
+                let ([row, col], [from_row, from_col]) = (place(taxel), place(force));
+                at_distance(&table, cols, [row - from_row, col - from_col])[axis]
             })
         };
-        Influence { cx: fill(0, true, false), cy: fill(1, false, true), cz: fill(2, false, false) }
+        Influence { cx: fill(0), cy: fill(1), cz: fill(2) }
     }
 }
 

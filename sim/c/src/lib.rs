@@ -16,6 +16,7 @@
 //! | [`scene`] | scenes, and reconstruction of their frames |
 //! | [`result`] | results: forces, contacts with error bars, flags |
 //! | [`batch`] | frames that do not depend on each other |
+//! | [`stress`] | the stress that forces on the surface cause |
 //! | [`mod@stream`] | frames in the order of time |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
 // Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
@@ -35,3 +36,4 @@ pub mod link;
 pub mod result;
 pub mod scene;
 pub mod stream;
+pub mod stress;

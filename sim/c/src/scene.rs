@@ -1,8 +1,10 @@
 //! Scenes, and reconstruction of their frames.
 
 use std::ffi::c_char;
+use std::sync::OnceLock;
 
 use dermis_golden::data::frame::Frame;
+use dermis_golden::physics::forward::ForwardModel;
 use dermis_golden::spec::scene::Scene;
 use dermis_sim::engine::{self, EngineName, Engines};
 
@@ -13,11 +15,12 @@ use crate::result::dermis_result;
 pub struct dermis_scene {
     pub(crate) spec: Scene,
     pub(crate) engines: Engines,
+    pub(crate) forward_model: OnceLock<ForwardModel>,
 }
 
 impl dermis_scene {
     fn into_raw(spec: Scene) -> *mut dermis_scene {
-        Box::into_raw(Box::new(dermis_scene { spec, engines: Engines::default() }))
+        Box::into_raw(Box::new(dermis_scene { spec, engines: Engines::default(), forward_model: OnceLock::new() }))
     }
 }
 

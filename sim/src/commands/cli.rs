@@ -55,6 +55,7 @@ const EXAMPLES: &str = "Examples:
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
   dermis train sensor-1                              a network for search.estimator = \"evidence+network\"
+  dermis export onnx sensor-1 sensor-1.onnx          its network, for ONNX Runtime and other programs
   dermis deviations my-scene.toml                    how far shear and normal force of a search may be off
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
@@ -147,6 +148,8 @@ enum Command {
     },
     /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
     Table(super::table::Arguments),
+    /// Write the network of a scene into a file that other programs read.
+    Export(super::export::Arguments),
     /// Train a network for the estimators that have one on frames drawn from the scene's own physics.
     Train(super::train::Arguments),
     /// Measure the standard deviations of a search on frames drawn from the scene's own physics.
@@ -269,6 +272,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
         Command::Table(arguments) => super::table::run(arguments, build_dir),
         Command::Train(arguments) => super::train::run(arguments),
+        Command::Export(arguments) => Ok((super::export::run(arguments)?, true)),
         Command::Deviations(arguments) => super::deviations::run(arguments),
         Command::Noise(arguments) => Ok((super::noise::run(arguments)?, true)),
     }

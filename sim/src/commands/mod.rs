@@ -12,6 +12,7 @@
 //! | [`check`] | `dermis check`: what to expect of a scene; whether a generated folder is intact |
 //! | [`cosim`] | `dermis cosim`: compares simulated hardware with the bit-true model |
 //! | [`deviations`] | `dermis deviations`: standard deviations of a search |
+//! | [`export`] | `dermis export`: the network of a scene as a file for other programs |
 //! | [`mod@faults`] | `dermis faults`: flips single bits and counts the outcomes |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, made by the commands named there |
@@ -51,6 +52,7 @@ mod cli;
 pub mod converters;
 pub mod cosim;
 pub mod deviations;
+pub mod export;
 pub mod faults;
 pub mod generate;
 mod generate_press;

@@ -15,10 +15,10 @@
 //! nodes is E^(−2N), E = 2 + √5: with ten nodes 3e-13 of the largest integrand. Squares far away take fewer nodes.
 
 use super::traction::{Piece, PressureShape};
-use crate::physics::bonded::kernel::{Kernel, REACH};
+use crate::physics::body::Body;
+use crate::physics::bonded::kernel::REACH;
 use crate::physics::gauss::rule;
-use crate::spec::scene::Medium;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Maximum number of nodes of a patch along each side.
 const NODES: usize = 10;
@@ -28,22 +28,6 @@ const LONGEST: f64 = 0.5;
 const LONGEST_ON_LAYER: f64 = 1.5;
 /// Natural logarithm of the allowed error.
 const LN_ERROR: f64 = -30.0;
-
-/// The elastic body; h in mm.
-pub(super) enum Body {
-    /// Infinitely deep.
-    HalfSpace {
-        /// Depth of the taxels.
-        h: f64,
-    },
-    /// A layer bonded to a rigid base.
-    Layer {
-        /// Thickness.
-        h: f64,
-        /// Kernels for its Poisson ratio.
-        kernel: Kernel,
-    },
-}
 
 /// A rectangle in the parameters of a piece: [middle, half length] of each.
 #[derive(Clone, Copy)]
@@ -106,14 +90,6 @@ impl Piece {
 }
 
 impl Body {
-    /// The body of a medium; `h` in mm.
-    pub(super) fn new(medium: Medium, h: f64) -> Body {
-        match medium {
-            Medium::HalfSpace => Body::HalfSpace { h },
-            Medium::BondedLayer { poisson } => Body::Layer { h, kernel: Kernel::new(poisson) },
-        }
-    }
-
     /// Stress in MPa on a taxel at a position in mm, from all pieces.
     pub(super) fn stress_MPa(&self, taxel: [f64; 2], pieces: &[Piece]) -> f64 {
         let mut left = Vec::new();
@@ -158,23 +134,9 @@ impl Body {
             for &(u, wu) in along_u {
                 let (place, density) = piece.map(patch.u[0] + u * patch.u[1], patch.v[0] + v * patch.v[1]);
                 let offset = [taxel[0] - place[0], taxel[1] - place[1]];
-                sum += wu * wv * density * self.point(offset, piece.force_N);
+                sum += wu * wv * density * self.point_MPa(offset, piece.force_N);
             }
         }
         sum * patch.u[1] * patch.v[1]
-    }
-
-    /// Stress in MPa of a point force at an offset, taxel − force.
-    pub(super) fn point(&self, [dx, dy]: [f64; 2], [fx, fy, fz]: [f64; 3]) -> f64 {
-        match self {
-            Body::HalfSpace { h } => {
-                let square = dx * dx + dy * dy + h * h;
-                3.0 * h * h * (fx * dx + fy * dy + fz * h) / (TAU * square * square * square.sqrt())
-            }
-            Body::Layer { h, kernel } => {
-                let [normal, shear] = kernel.at(dx.hypot(dy) / h);
-                (fz * normal + (fx * dx + fy * dy) / h * shear) / (h * h)
-            }
-        }
     }
 }

@@ -9,10 +9,10 @@
 //! | out: place, share of the load and of the shear of each node | m | mm, – |
 //! | out: stress per unit force at a place | taxels | MPa/N |
 
-use super::stress::Body;
 use super::traction::{pieces, total_N, Piece, PressureShape};
 use super::GeneratorError;
 use crate::data::frame::Contact;
+use crate::physics::body::Body;
 use crate::physics::gauss::rule;
 use crate::spec::scene::Medium;
 use crate::spec::sensor::Sensor;
@@ -97,7 +97,7 @@ impl Kernels {
     /// Stress in MPa on taxel `taxel` of a point force in N at a place in mm.
     pub fn stress_MPa(&self, taxel: usize, [x, y]: [f64; 2], force_N: [f64; 3]) -> f64 {
         let [tx, ty] = self.taxels_mm[taxel];
-        self.body.point([tx - x, ty - y], force_N)
+        self.body.point_MPa([tx - x, ty - y], force_N)
     }
 
     /// Number of taxels.

@@ -9,3 +9,4 @@ mod header;
 mod input;
 mod link;
 mod stream;
+mod stress;
