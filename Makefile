@@ -114,12 +114,15 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --exclude dermis-ros --no-deps
 
-bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, and the drawing of the live page
+bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, the drawing of the live page, and how many patches dermis-ros holds
 	$(CARGO) bench --locked --package dermis-golden
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
 	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
 	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --locked --package dermis-python
+	$(CARGO) build --locked --release --bin dermis
+	$(CARGO) build --locked --release --package dermis-ros
+	DERMIS=$(DERMIS) DERMIS_ROS=$(CARGO_TARGET_DIR)/release/dermis-ros python3 ros/tests/bench.py
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)

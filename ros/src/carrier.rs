@@ -26,11 +26,17 @@ use crate::topics::Topic;
 /// Root of the tokens.
 const TOKENS: &str = "@ros2_lv";
 /// Kinds of what has a token: node, publisher, subscription.
-const [NODE, PUBLISHER, SUBSCRIPTION]: [&str; 3] = ["NN", "MP", "MS"];
+const NODE: &str = "NN";
+const PUBLISHER: &str = "MP";
+const SUBSCRIPTION: &str = "MS";
 /// Period in which the number of the last latched message is sent, where it has changed; that of rmw_zenoh.
 const HEARTBEAT: Duration = Duration::from_millis(500);
-/// Numbers of qualities in tokens, those of the interface rmw.
-const [RELIABLE, BEST_EFFORT, TRANSIENT_LOCAL, VOLATILE, KEEP_LAST]: [u8; 5] = [1, 2, 1, 2, 1];
+/// Numbers of qualities in tokens, those of the interface rmw: reliable and best effort.
+const RELIABILITY: [u8; 2] = [1, 2];
+/// Latched, which rmw calls transient local, and volatile.
+const DURABILITY: [u8; 2] = [1, 2];
+/// The last messages are kept.
+const KEEP_LAST: u8 = 1;
 
 /// A node of ROS 2.
 pub struct Carrier {
@@ -77,8 +83,8 @@ fn key(domain: u32, topic: &Topic) -> String {
 
 /// The quality of a topic in its token; the fields without a value are deadline, lifespan and liveliness, which are those of rmw.
 fn quality(topic: &Topic) -> String {
-    let reliability = if topic.quality.reliable { RELIABLE } else { BEST_EFFORT };
-    let durability = if topic.quality.latched { TRANSIENT_LOCAL } else { VOLATILE };
+    let reliability = RELIABILITY[usize::from(!topic.quality.reliable)];
+    let durability = DURABILITY[usize::from(!topic.quality.latched)];
     format!("{reliability}:{durability}:{KEEP_LAST},{}:,:,:,,", topic.quality.depth)
 }
 
@@ -146,7 +152,8 @@ impl Carrier {
         let publisher = publisher.map_err(failed(&topic.name))?;
         let wanted = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&wanted);
-        let listener = publisher.matching_listener().callback(move |status| seen.store(status.matching(), Ordering::Relaxed));
+        let listener =
+            publisher.matching_listener().callback(move |status| seen.store(status.matching(), Ordering::Relaxed));
         listener.background().wait().map_err(failed(&topic.name))?;
         let matching = publisher.matching_status().wait().map_err(failed(&topic.name))?.matching();
         wanted.fetch_or(matching, Ordering::Relaxed);
@@ -190,7 +197,11 @@ impl Publisher {
         let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);
         let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as u64);
         let attachment = attachment(sequence, now, &self.identity);
-        self.publisher.put(cdr).attachment(attachment).wait().map_err(|error| anyhow!("{}: {error}", self.publisher.key_expr()))
+        self.publisher
+            .put(cdr)
+            .attachment(attachment)
+            .wait()
+            .map_err(|error| anyhow!("{}: {error}", self.publisher.key_expr()))
     }
 }
 

@@ -84,6 +84,8 @@ struct Figures {
     estimator: String,
     flags: Vec<Flag>,
     last: Option<Instant>,
+    /// Time from each frame to its result, where that is measured.
+    lags: Option<Vec<Duration>>,
 }
 
 /// The state of a patch.
@@ -109,6 +111,7 @@ impl PatchState {
             estimator: String::new(),
             flags: Vec::new(),
             last: None,
+            lags: None,
         };
         PatchState { index, name: name.into(), scene: scene.into(), late, figures: Mutex::new(figures), changes }
     }
@@ -141,6 +144,9 @@ impl PatchState {
         figures.counters.late += u64::from(lag > self.late);
         figures.largest_lag = figures.largest_lag.max(lag);
         figures.last = Some(Instant::now());
+        if let Some(lags) = &mut figures.lags {
+            lags.push(lag);
+        }
         let changed = figures.flags != answer.result.flags || figures.estimator != answer.estimator;
         if changed {
             figures.flags.clone_from(&answer.result.flags);
@@ -148,6 +154,18 @@ impl PatchState {
             drop(figures);
             self.changes.add(self.index);
         }
+    }
+
+    /// Keeps the time from each frame to its result from now on.
+    pub fn measure(&self) {
+        self.figures().lags = Some(Vec::new());
+    }
+
+    /// What was measured, without the times before [`PatchState::measure`].
+    pub fn measured(&self) -> Measured {
+        let mut figures = self.figures();
+        let Counters { dropped, late, .. } = figures.counters;
+        Measured { lags: figures.lags.take().unwrap_or_default(), dropped, late }
     }
 
     /// Counts a line without a result; whether it is the first one.
@@ -181,7 +199,46 @@ impl PatchState {
             figures.reported = figures.counters;
             figures.largest_lag = Duration::ZERO;
         }
-        DiagnosticStatus { level, name: format!("dermis: {}", self.name), message, hardware_id: self.scene.clone(), values }
+        DiagnosticStatus {
+            level,
+            name: format!("dermis: {}", self.name),
+            message,
+            hardware_id: self.scene.clone(),
+            values,
+        }
+    }
+}
+
+/// Results of patches over a time.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Time from each frame to its result.
+    pub lags: Vec<Duration>,
+    /// Frames that were dropped, since the start.
+    pub dropped: u64,
+    /// Results that were late, since the start.
+    pub late: u64,
+}
+
+impl Measured {
+    /// Adds those of another patch.
+    pub fn add(&mut self, other: Measured) {
+        self.lags.extend(other.lags);
+        self.dropped += other.dropped;
+        self.late += other.late;
+    }
+
+    /// A line: results per second, frames lost, latency.
+    pub fn line(mut self, name: &str, seconds: f64) -> String {
+        self.lags.sort_unstable();
+        let at = |share: f64| {
+            let index = (share * self.lags.len().saturating_sub(1) as f64).round() as usize;
+            self.lags.get(index).map_or(0.0, |lag| 1e3 * lag.as_secs_f64())
+        };
+        let results = self.lags.len() as f64;
+        let lost = 100.0 * self.dropped as f64 / (results + self.dropped as f64).max(1.0);
+        let (rate, late, median, last) = (results / seconds, self.late, at(0.5), at(0.999));
+        format!("{name:16}  {rate:9.1} results/s  {lost:7.3} % lost  {late:7} late  median {median:8.3} ms  99.9 % {last:8.3} ms\n")
     }
 }
 

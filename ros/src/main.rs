@@ -29,9 +29,10 @@ mod topics;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anyhow::Result;
-use clap::Parser;
+use clap::{value_parser, Parser};
 use dermis_sim::{output, say};
 
 use patches::PatchFile;
@@ -46,6 +47,9 @@ struct Arguments {
     /// Check the file and its scenes, print the topics, and end.
     #[arg(long, visible_alias = "dry-run")]
     check: bool,
+    /// Publish for so many seconds, print for each patch results per second, frames lost and late, latency, and end.
+    #[arg(long, value_name = "SECONDS", conflicts_with = "check", value_parser = value_parser!(u64).range(1..=86_400))]
+    measure: Option<u64>,
     /// Write the definitions of all messages into a folder, as PACKAGE/msg/TYPE.msg, and end.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["file", "check"])]
     messages: Option<PathBuf>,
@@ -54,6 +58,7 @@ struct Arguments {
 const EXAMPLES: &str = "Examples:
   dermis-ros hand.toml --check      check the file, print the topics
   dermis-ros hand.toml              publish until interrupted
+  dermis-ros hand.toml --measure 10 whether the computer keeps up with the patches
   dermis-ros --messages messages    dermis_msgs/msg/Contacts.msg and all that the topics use
 
 A file for one sensor that sends a frame per line:
@@ -80,7 +85,7 @@ fn run(arguments: &Arguments) -> Result<String> {
         // Engines are built too: a scene may be refused by its estimator.
         return node::Engines::build(&file).and_then(|_| topics::table(&file));
     }
-    node::run(&file).map(|()| String::new())
+    node::run(&file, arguments.measure.map(Duration::from_secs))
 }
 
 fn main() -> ExitCode {

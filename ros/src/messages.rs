@@ -190,8 +190,11 @@ pub fn write_definitions(folder: &Path) -> Result<String> {
         definitions::<DiagnosticArray>(),
         definitions::<Empty>(),
     ];
-    let mut all: Vec<(String, &str)> =
-        all.concat().into_iter().map(|(name, text)| (name.replace("/msg/", "/").replacen('/', "/msg/", 1), text)).collect();
+    let mut all: Vec<(String, &str)> = all
+        .concat()
+        .into_iter()
+        .map(|(name, text)| (name.replace("/msg/", "/").replacen('/', "/msg/", 1), text))
+        .collect();
     all.sort();
     all.dedup();
     let mut said = String::new();

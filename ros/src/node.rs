@@ -19,7 +19,7 @@ use dermis_sim::stream::{
 };
 
 use crate::carrier::{Carrier, Publisher, Subscription};
-use crate::diagnostics::{Changes, PatchState, PERIOD};
+use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
 use crate::messages::{self, Messages};
 use crate::patches::{Patch, PatchFile};
 use crate::source::Reopened;
@@ -125,11 +125,12 @@ fn now_ns() -> i64 {
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// Publishes the patches of a file until their sources have ended, or the program is interrupted.
+/// Publishes the patches of a file until their sources have ended, or the program is interrupted; or for the time `measure`, of which
+/// the text says how the patches did.
 ///
 /// # Errors
 /// A scene that its engine refuses, an address that cannot be used.
-pub fn run(file: &PatchFile) -> Result<()> {
+pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let engines = Engines::build(file)?;
     let carrier = Carrier::open(&file.node)?;
     let changes = Arc::new(Changes::default());
@@ -154,12 +155,21 @@ pub fn run(file: &PatchFile) -> Result<()> {
     let (patches, threads) = (file.patches.len(), file.threads());
     say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.addresses().join(", "));
     let running = AtomicBool::new(true);
+    let begun = Instant::now();
+    if let Some(time) = measure {
+        outlets.iter().for_each(|outlet| outlet.state.measure());
+        let stop = stop.clone();
+        std::thread::spawn(move || {
+            std::thread::sleep(time);
+            stop.now();
+        });
+    }
+    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
+        .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
+        .collect();
+    let share = (threads as f64 / patches as f64).min(1.0);
     std::thread::scope(|scope| {
         let reporting = scope.spawn(|| report(&outlets, &changes, &reports, &running));
-        let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
-            .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
-            .collect();
-        let share = (threads as f64 / patches as f64).min(1.0);
         let workers: Vec<_> = (0..threads)
             .map(|worker| {
                 let own: Vec<&Own> = all.iter().skip(worker).step_by(threads).collect();
@@ -170,10 +180,26 @@ pub fn run(file: &PatchFile) -> Result<()> {
         let failed = workers.into_iter().filter_map(|worker| worker.join().err()).count();
         running.store(false, Ordering::Release);
         let reported = reporting.join().map_err(|_| anyhow!("the thread of the diagnostics has ended"));
-        reported.and_then(|done| done).and(if failed == 0 { Ok(()) } else { Err(anyhow!("{failed} workers have ended")) })
+        reported.and_then(|done| done).and(if failed == 0 {
+            Ok(())
+        } else {
+            Err(anyhow!("{failed} workers have ended"))
+        })
     })?;
+    let said = measure.map_or_else(String::new, |_| measured(file, &outlets, begun.elapsed()));
     drop((outlets, places, reports));
-    carrier.close()
+    carrier.close().map(|()| said)
+}
+
+/// A line per patch, then one of all.
+fn measured(file: &PatchFile, outlets: &[Outlet], time: Duration) -> String {
+    let (mut all, mut text) = (Measured::default(), String::new());
+    for (patch, outlet) in std::iter::zip(&file.patches, outlets) {
+        let own = outlet.state.measured();
+        all.add(own.clone());
+        text += &own.line(&patch.fields.name, time.as_secs_f64());
+    }
+    text + &all.line("all", time.as_secs_f64())
 }
 
 /// Answers the streams of a worker until they have ended.

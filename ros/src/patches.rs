@@ -240,13 +240,19 @@ impl NodeFields {
             return Err(wrong("node.name", quoted(name), NAME));
         }
         if namespace != "/" && !namespace.strip_prefix('/').is_some_and(|path| path.split('/').all(is_name)) {
-            return Err(wrong("node.namespace", quoted(namespace), "\"/\" or names behind slashes, as \"/robot/hand\""));
+            return Err(wrong(
+                "node.namespace",
+                quoted(namespace),
+                "\"/\" or names behind slashes, as \"/robot/hand\"",
+            ));
         }
         if *domain > LAST_DOMAIN {
             return Err(wrong("node.domain", domain, "0 to 232"));
         }
         for (field, addresses) in [("node.connect", connect), ("node.listen", listen)] {
-            let is_address = |own: &&String| zenoh::config::EndPoint::from_str(own).is_ok_and(|own| own.protocol().as_str() == "tcp");
+            let is_address = |own: &&String| {
+                zenoh::config::EndPoint::from_str(own).is_ok_and(|own| own.protocol().as_str() == "tcp")
+            };
             if let Some(own) = addresses.iter().find(|own| !is_address(own)) {
                 return Err(wrong(field, quoted(own), "a list of addresses as \"tcp/192.168.1.7:7447\""));
             }

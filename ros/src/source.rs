@@ -139,3 +139,75 @@ impl Read for Reopened {
         read
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::Changes;
+    use crate::patches::PatchFile;
+    use std::io::{BufRead, BufReader};
+    use std::net::UdpSocket;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    fn patch(source: &str) -> Patch {
+        let text = format!("[[patch]]\nname = \"a\"\nscene = \"sensor-1\"\nsource = \"{source}\"\n");
+        PatchFile::parse(&text, Path::new("")).unwrap().patches.remove(0)
+    }
+
+    fn reopened(source: &str) -> Reopened {
+        let state = PatchState::new(0, "a", "b", Duration::from_secs(1), Arc::new(Changes::default()));
+        Reopened::new(&patch(source), Arc::new(state))
+    }
+
+    /// A line that its writer did not end is not taken for a whole one, and what the next writer sends is read.
+    #[test]
+    fn a_pipe_whose_writer_ends_is_opened_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("lines");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        let mut lines = BufReader::new(reopened(&pipe.display().to_string()));
+        let named = pipe.clone();
+        let writer = std::thread::spawn(move || {
+            std::fs::write(&named, "1,2\n3,").unwrap();
+            // The reader has seen the end once it opens the pipe again.
+            std::thread::sleep(Duration::from_millis(300));
+            std::fs::write(&named, "5,6\n").unwrap();
+        });
+        let read: Vec<String> = lines.by_ref().lines().take(3).map(Result::unwrap).collect();
+        writer.join().unwrap();
+        assert_eq!(read, ["1,2", "3, cut off", "5,6"]);
+    }
+
+    #[test]
+    fn a_port_that_is_taken_is_tried_again() {
+        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap();
+        let mut source = reopened(&format!("udp://{address}"));
+        let read = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(200));
+                drop(taken);
+                let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+                while !read.load(Ordering::Relaxed) {
+                    sender.send_to(b"1,2", address).unwrap();
+                    std::thread::sleep(Duration::from_millis(50));
+                }
+            });
+            let mut bytes = [0; 4];
+            source.read_exact(&mut bytes).unwrap();
+            read.store(true, Ordering::Relaxed);
+            assert_eq!(&bytes, b"1,2\n");
+        });
+    }
+
+    #[test]
+    fn a_recording_that_is_none_ends_with_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("press.mcap");
+        std::fs::write(&path, "no recording").unwrap();
+        let error = reopened(&path.display().to_string()).read(&mut [0; 8]).unwrap_err().to_string();
+        assert!(error.contains("press.mcap: is no MCAP file"), "{error}");
+    }
+}

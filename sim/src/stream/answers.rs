@@ -136,7 +136,7 @@ pub struct Refusal<'a> {
     pub error: &'a str,
 }
 
-/// What takes the outcomes, in the order of the lines; the error [`ErrorKind::BrokenPipe`] ends a stream without error.
+/// What takes the outcomes, in the order of the lines; the error [`BrokenPipe`](std::io::ErrorKind::BrokenPipe) ends a stream without error.
 pub type Output<'a> = dyn FnMut(&Outcome) -> std::io::Result<()> + 'a;
 
 /// Writes each outcome as a line of JSON; if `brief` without the forces of taxels.
@@ -195,7 +195,8 @@ impl<'a> Stream<'a> {
     /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
     pub(super) fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
         let frame = self.frame(received);
-        let notes = [self.frames.note(), frame.as_ref().ok().and_then(Option::as_ref).and_then(|own| self.zero(&own.frame))];
+        let notes =
+            [self.frames.note(), frame.as_ref().ok().and_then(Option::as_ref).and_then(|own| self.zero(&own.frame))];
         for note in notes.iter().flatten() {
             output(&Outcome::Note(note))?;
         }
@@ -278,15 +279,17 @@ pub fn seconds(time: SystemTime) -> f64 {
 mod tests {
     use super::*;
     use crate::engine::EngineName;
-    use crate::stream::Faster;
+    use crate::stream::{run, run_until, Clock, Faster, Stop};
     use dermis_golden::data::input::Input;
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
     use serde_json::Value;
+    use std::io::Read;
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::mpsc::{channel, Receiver, Sender};
+    use std::sync::Arc;
 
     fn engine_of(scene: &Scene, name: EngineName) -> Box<dyn Engine> {
         name.engine(scene, None, Path::new("")).unwrap()

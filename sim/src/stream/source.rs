@@ -70,7 +70,7 @@ impl Source {
             Source::Path(path) => {
                 let kind = std::fs::metadata(path).map_err(|error| named(path, error))?.file_type();
                 let opened: Box<dyn Read + Send> = if kind.is_char_device() {
-                    let unknown = "a serial port needs --baud, because the scene's board has no uart_baud";
+                    let unknown = "a serial port needs a bit rate, --baud, because the scene's board has no uart_baud";
                     let baud = baud.ok_or_else(|| named(path, Error::new(ErrorKind::InvalidInput, unknown)))?;
                     let port = serialport::new(path, baud).timeout(SERIAL_WAIT).open();
                     Box::new(Serial { port: port.map_err(|error| named(path, error.into()))?, begun: false })

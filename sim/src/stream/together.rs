@@ -143,3 +143,122 @@ enum Next {
     Failed(Error),
 }
 
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::data::frame::Frame;
+    use dermis_golden::data::text::Stated;
+    use dermis_golden::engine::CheckPace;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::{EstimatorKind, Scene};
+    use std::io::Cursor;
+
+    const OPTIONS: StreamOptions = StreamOptions {
+        queue: 2,
+        policy: Policy::All,
+        live: false,
+        layout: Stated { columns: None, time_column: None, skip_rows: 0, form: None },
+    };
+
+    /// Forces of the results and number of refused lines, of each stream.
+    type Seen = Vec<(Vec<[f64; 3]>, u64)>;
+
+    /// What streams of these inputs give together, and how each ends.
+    fn together(engine: &Golden, inputs: Vec<Box<dyn Read + Send>>) -> (Seen, Vec<Result<Counts>>) {
+        let mut seen: Seen = vec![Default::default(); inputs.len()];
+        let member = |input| Member {
+            estimators: Estimators::only(engine, CheckPace::Never),
+            input: (input, "memory".to_owned()),
+            options: OPTIONS,
+            zero: ZeroRequest::default(),
+        };
+        let members = inputs.into_iter().map(member).collect();
+        let ends = run_together(&Stop::default(), members, &mut |index, outcome| {
+            match outcome {
+                Outcome::Answer(answer) => seen[index].0.push(answer.result.resultant_N),
+                Outcome::Refusal(_) => seen[index].1 += 1,
+                Outcome::Note(_) => (),
+            }
+            Ok(())
+        });
+        (seen, ends)
+    }
+
+    fn lines(frames: &[Frame]) -> String {
+        let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+        frames.iter().map(line).collect()
+    }
+
+    fn memory(text: String) -> Box<dyn Read + Send> {
+        Box::new(Cursor::new(text.into_bytes()))
+    }
+
+    /// Fails after its lines.
+    struct Failing(Cursor<Vec<u8>>);
+
+    impl Read for Failing {
+        fn read(&mut self, buffer: &mut [u8]) -> IoResult<usize> {
+            match self.0.read(buffer)? {
+                0 => Err(IoError::other("unplugged")),
+                bytes => Ok(bytes),
+            }
+        }
+    }
+
+    #[test]
+    fn each_stream_has_its_own_results_and_its_own_end() {
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene));
+        let alone = |frames: &[Frame]| together(&engine, vec![memory(lines(frames))]).0.remove(0).0;
+        let failing = Failing(Cursor::new(lines(&frames[..1]).into_bytes()));
+        let rubbish = memory("x\n".repeat(1000));
+        let inputs = vec![
+            memory(lines(&frames)),
+            memory(lines(&frames[1..])),
+            rubbish,
+            Box::new(failing),
+            memory(String::new()),
+        ];
+        let (seen, ends) = together(&engine, inputs);
+        assert_eq!(seen[0], (alone(&frames), 0));
+        assert_eq!(seen[1], (alone(&frames[1..]), 0));
+        assert_eq!(seen[2], (vec![], 1000));
+        assert_eq!(seen[3].0, alone(&frames[..1]));
+        let answered: Vec<Option<u64>> =
+            ends.iter().map(|end| end.as_ref().ok().map(|counts| counts.answered)).collect();
+        let all = frames.len() as u64;
+        assert_eq!(answered, [Some(all), Some(all - 1), Some(0), None, Some(0)]);
+        assert_eq!(ends[3].as_ref().unwrap_err().to_string(), "memory: unplugged");
+    }
+
+    /// A stream with many lines is answered in turn: between two results of the other one there is a bounded number of its own.
+    #[test]
+    fn a_flood_is_answered_in_turn() {
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene)[..1].to_vec());
+        let options = StreamOptions { policy: Policy::Latest, live: true, ..OPTIONS };
+        let member = |lines: String, options| Member {
+            estimators: Estimators::only(&engine, CheckPace::Never),
+            input: (memory(lines), "memory".to_owned()),
+            options,
+            zero: ZeroRequest::default(),
+        };
+        let line = lines(&frames);
+        let members = vec![member(line.repeat(100_000), options), member(line.repeat(50), OPTIONS)];
+        let (mut order, stop) = (Vec::new(), Stop::default());
+        let stopping = stop.clone();
+        let ends = run_together(&stop, members, &mut |index, outcome| {
+            if let Outcome::Answer(_) = outcome {
+                order.push(index);
+            }
+            if order.iter().filter(|own| **own == 1).count() == 50 {
+                stopping.now();
+            }
+            Ok(())
+        });
+        let last = order.iter().rposition(|own| *own == 1).unwrap();
+        let flooded = order[..last].iter().filter(|own| **own == 0).count();
+        assert!(flooded <= 200, "{flooded} results of the flood before the last of 50");
+        assert_eq!(ends[1].as_ref().unwrap().answered, 50);
+    }
+}

@@ -198,8 +198,7 @@ pub struct PointCloud2<'a> {
 impl Message for PointCloud2<'_> {
     const NAME: &'static str = "sensor_msgs/msg/PointCloud2";
     const TEXT: &'static str = include_str!("msg/PointCloud2.msg");
-    const USES: &'static [Definition] =
-        &[HEADER, TIME, ("sensor_msgs/PointField", include_str!("msg/PointField.msg"))];
+    const USES: &'static [Definition] = &[HEADER, TIME, ("sensor_msgs/PointField", include_str!("msg/PointField.msg"))];
 }
 
 const VECTOR3: Definition = ("geometry_msgs/Vector3", include_str!("msg/Vector3.msg"));
@@ -230,12 +229,8 @@ pub struct WrenchStamped {
 impl Message for WrenchStamped {
     const NAME: &'static str = "geometry_msgs/msg/WrenchStamped";
     const TEXT: &'static str = include_str!("msg/WrenchStamped.msg");
-    const USES: &'static [Definition] = &[
-        HEADER,
-        TIME,
-        ("geometry_msgs/Wrench", include_str!("msg/Wrench.msg")),
-        VECTOR3,
-    ];
+    const USES: &'static [Definition] =
+        &[HEADER, TIME, ("geometry_msgs/Wrench", include_str!("msg/Wrench.msg")), VECTOR3];
 }
 
 /// `std_msgs/msg/Empty`.
@@ -340,6 +335,10 @@ mod tests {
             (WrenchStamped::schema(), WrenchStamped::USES),
             (Text::schema(), Text::USES),
             (MarkerArray::schema(), MarkerArray::USES),
+            (Contacts::schema(), Contacts::USES),
+            (DiagnosticArray::schema(), DiagnosticArray::USES),
+            (TfMessage::schema(), TfMessage::USES),
+            (Empty::schema(), Empty::USES),
         ] {
             let words =
                 text.lines().filter(|line| !line.starts_with("MSG")).filter_map(|line| line.split([' ', '[']).next());

@@ -48,8 +48,7 @@ pub fn type_hash(name: &str, text: &str, uses: &[Definition]) -> String {
     used.sort();
     let used: Vec<String> = used.into_iter().map(|(_, description)| description).collect();
     let own = description(name, text);
-    let json =
-        format!("{{\"type_description\": {own}, \"referenced_type_descriptions\": [{}]}}", used.join(", "));
+    let json = format!("{{\"type_description\": {own}, \"referenced_type_descriptions\": [{}]}}", used.join(", "));
     Sha256::digest(json).iter().fold("RIHS01_".to_owned(), |hash, byte| hash + &format!("{byte:02x}"))
 }
 
@@ -117,7 +116,14 @@ mod tests {
         let hash = |text: &str| type_hash("a/msg/B", text, &[]);
         let own = hash("float64[2] shear\n");
         assert_eq!(own, hash("# Shear in N.\nuint8 LARGEST=9\n\nfloat64[2]  shear   # x, y\n"));
-        for other in ["float64[2] sheer", "float32[2] shear", "float64[3] shear", "float64[] shear", "float64[<=2] shear", "float64 shear"] {
+        for other in [
+            "float64[2] sheer",
+            "float32[2] shear",
+            "float64[3] shear",
+            "float64[] shear",
+            "float64[<=2] shear",
+            "float64 shear",
+        ] {
             assert_ne!(own, hash(other), "{other}");
         }
         assert_ne!(own, type_hash("a/msg/C", "float64[2] shear", &[]));
