@@ -397,7 +397,6 @@ mod tests {
             ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]),
             ([right, 0.0, 0.0], [half, 0.0, 0.0, half]),
             ([0.0, right, 0.0], [0.0, half, 0.0, half]),
-            // x first: it turns z to −y, which stays; then z turns y and x.
             ([right, 0.0, right], [0.5, 0.5, 0.5, 0.5]),
         ] {
             assert!(turned(rpy).iter().zip(wanted).all(|(own, wanted)| (own - wanted).abs() < 1e-12), "{rpy:?}");

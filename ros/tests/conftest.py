@@ -7,7 +7,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ thickness_mm = 3.0
 estimator = "search"
 """
 # A result that comes so late after its frame is lost.
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def run(program: str, *arguments: str, text: str = "", code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -116,12 +116,16 @@ def node(folder: Path, patches: str, fields: str = "") -> Iterator[Node]:
         own.process.kill()
 
 
-def feed(pipe: Path, lines: list[str], rate_Hz: float) -> None:
-    """Writes lines into a pipe, as far apart as the rate says."""
+def feed(pipe: Path, lines: list[str], rate_Hz: float, answered: Callable[[], int] | None = None, window: int = 1) -> None:
+    """Writes lines into a pipe, no faster than the rate; of a patch of which `answered` counts the results at most `window` are on the
+    way, so that a slow computer drops none, unless a result is lost for a second."""
     with pipe.open("w") as file:
-        begun = time.monotonic()
+        begun, before = time.monotonic(), answered() if answered else 0
         for number, own in enumerate(lines):
             time.sleep(max(0.0, begun + number / rate_Hz - time.monotonic()))
+            until = time.monotonic() + 1.0
+            while answered and number - (answered() - before) >= window and time.monotonic() < until:
+                time.sleep(0.001)
             file.write(own)
             file.flush()
         # The end of the pipe is no frame.

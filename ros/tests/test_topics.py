@@ -3,6 +3,7 @@ messages decoded by rosbags; every field against what `dermis reconstruct` says 
 
 import math
 import struct
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,7 @@ def store(messages: Path) -> Any:
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory, messages: Path) -> Iterator[Node]:
     """A node, and the session of zenoh-ros2-sdk, of which a program has one."""
-    with node(tmp_path_factory.mktemp("node"), PATCH, 'namespace = "/hand"\ndomain = 7') as own:
+    with node(tmp_path_factory.mktemp("node"), PATCH, 'namespace = "/hand"\ndomain = 7\nqueue = 64') as own:
         ZenohSession.get_instance("127.0.0.1", own.port)
         # Else it takes them from the network.
         get_registry().messages_dir = messages
@@ -184,6 +185,22 @@ def check(topic: str, message: Any, results: dict[int, dict[str, Any]]) -> int:
     return number
 
 
+def change(topic: str, message: Any) -> None:
+    """Changes one value by little."""
+    if topic == "wrench":
+        message.wrench.torque.x += 1e-9
+    elif topic == "contacts":
+        message.contacts[0].normal_force += 1e-9
+    elif topic == "arrows":
+        message.markers[-1].points[-1].z += 1e-4
+    else:
+        taxel, changed = 20, bytearray(message.data)
+        inside = {"forces": lambda: next(own.offset for own in message.fields if own.name == "fz"), "stress": lambda: 0}
+        step = message.point_step if topic == "forces" else 4
+        changed[taxel * step + inside[topic]()] ^= 1
+        message.data = np.frombuffer(bytes(changed), np.uint8)
+
+
 def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: Node, store: Any) -> None:
     received: dict[str, list[Any]] = {topic: [] for topic in TYPES}
     own = session(running)
@@ -199,9 +216,9 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
         sdk.append(subscriber)
     lines = [line(number) for number in range(MESSAGES)]
     # The first frames bring the node and its subscribers together.
-    feed(running.folder / "thumb.pipe", [line(-number) for number in range(40, 0, -1)], 100.0)
+    feed(running.folder / "thumb.pipe", [line(-number) for number in range(40, 0, -1)], 20.0)
     wait(lambda: all(any(check_number(topic, own) < 0 for own in received[topic]) for topic in TYPES if topic != "scene"))
-    feed(running.folder / "thumb.pipe", lines, 60.0)
+    feed(running.folder / "thumb.pipe", lines, 60.0, lambda: len(raw["wrench"].samples), 32)
     results = expected(running.folder / "scene.toml", "".join(line(number) for number in range(-40, MESSAGES)))
     wait(lambda: len(raw["wrench"].samples) >= MESSAGES)
     for topic, kind in TYPES.items():
@@ -213,6 +230,11 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
             numbers = [check(topic, message, results) for message in messages]
             counted = [number for number in numbers if number >= 0]
             assert len(set(counted)) == len(counted) >= 0.999 * MESSAGES, topic
+            # The comparison finds one wrong value.
+            pressed = next(message for message in messages if check_number(topic, message) == 500)
+            change(topic, pressed)
+            with pytest.raises(AssertionError):
+                check(topic, pressed, results)
         assert len({gid for _, _, gid in raw[topic].attachments()}) == 1
     # Every second frame changes a flag: reliable ones have no gap.
     sequence = [number for number, _, _ in state.attachments()]
@@ -220,7 +242,7 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
     statuses = [store.deserialize_cdr(own.payload.to_bytes(), "diagnostic_msgs/msg/DiagnosticArray").status for own in state.samples]
     values = [{pair.key: pair.value for pair in own.values} for (own,) in statuses]
     assert {own["flags"] for own in values} >= {"no-contact"} and {own.name for (own,) in statuses} == {"dermis: thumb"}
-    assert int(values[-1]["results"]) + int(values[-1]["dropped"]) == MESSAGES + 40
+    assert values[-1]["dropped"] == "0" and int(values[-1]["results"]) > MESSAGES
     for subscriber in sdk:
         subscriber.close()
     own.close()
@@ -229,34 +251,6 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
 def check_number(topic: str, message: Any) -> int:
     header = message.markers[0].header if topic == "arrows" else message.header
     return (stamp_ns(header) - 1_700_000_000_000_000_000) // 10_000_000
-
-
-def test_a_wrong_field_is_found(running: Node, store: Any) -> None:
-    own = session(running)
-    raw = {topic: Raw(own, key(store, f"/hand/thumb/{topic}", kind)) for topic, kind in TYPES.items() if topic != "scene"}
-    feed(running.folder / "thumb.pipe", [line(2)] * 30, 50.0)
-    wait(lambda: all(one.samples for one in raw.values()))
-    results = expected(running.folder / "scene.toml", line(2))
-    # The tracks count the frames of the node.
-    skipped = {"contacts"}
-    for topic, one in raw.items():
-        data = one.samples[-1].payload.to_bytes()
-        message = store.deserialize_cdr(data, TYPES[topic])
-        if topic not in skipped:
-            assert check(topic, message, results) == 2
-        if topic == "wrench":
-            message.wrench.torque.x += 1e-9
-        elif topic == "contacts":
-            message.contacts[0].normal_force += 1e-9
-        elif topic == "arrows":
-            message.markers[-1].points[-1].z += 1e-4
-        else:
-            changed = bytearray(message.data)
-            changed[-1] ^= 1
-            message.data = np.frombuffer(bytes(changed), np.uint8)
-        with pytest.raises(AssertionError):
-            check(topic, message, results)
-    own.close()
 
 
 def test_latched_topics_are_there_for_whoever_comes_later(running: Node, store: Any) -> None:
@@ -328,8 +322,6 @@ def test_tare_takes_the_zero_anew(running: Node, store: Any) -> None:
     wait(lambda: tare.pub.matching_status.matching)
     tare.publish(structure_needs_at_least_one_member=0)
     # The message is there before the frames of the new zero.
-    import time
-
     time.sleep(0.5)
     feed(running.folder / "thumb.pipe", [line(2, moved)] * 40, 100.0)
     running.wait_for("zero taken from 16 frames")

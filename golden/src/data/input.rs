@@ -118,12 +118,6 @@ impl Input {
         Ok(Input { taxel_noise_MPa, scale: Some((zero, gain)), ..input })
     }
 
-    /// The stored zero of each taxel, row-major, in the readings' unit: that of the tare frames, else the table's offset; `None` where
-    /// it is 0.
-    pub fn zero(&self) -> Option<&[f64]> {
-        self.scale.as_ref().map(|(zero, _)| zero.as_slice())
-    }
-
     /// Standard deviation in MPa of a taxel of a calibrated mean, of a sliding one of many frames: as the scene states it,
     /// else as the tare frames show it, the root mean square over the taxels; 0 if neither does.
     pub fn noise_MPa(&self) -> f64 {
