@@ -203,10 +203,10 @@ fn measured(file: &PatchFile, outlets: &[Outlet], time: Duration) -> String {
 }
 
 /// Answers the streams of a worker until they have ended.
-fn work(stop: &Stop, file: &PatchFile, all: &[&Own], share: f64) {
+fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
     let options =
         StreamOptions { queue: file.node.queue, policy: Policy::Latest, live: true, layout: Stated::default() };
-    let member = |own: &&Own<'_>| {
+    let member = |own: &&'a Own<'a>| {
         let (patch, engine) = (own.patch, own.engine.engine());
         let pace = match patch.fields.check_every {
             Some(period) => CheckPace::Every(period),

@@ -280,6 +280,7 @@ mod tests {
     use super::*;
     use crate::engine::EngineName;
     use crate::stream::{run, run_until, Clock, Faster, Stop};
+    use anyhow::bail;
     use dermis_golden::data::input::Input;
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;

@@ -63,7 +63,7 @@ mod tests {
         let (stop, queue) = (Stop::default(), Arc::new(Queue::<u8>::new(1, Policy::All, Bell::new(3, ring))));
         stop.add(&queue);
         std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| rung.recv());
+            let waiting = scope.spawn(move || rung.recv());
             stop.now();
             assert_eq!(waiting.join().unwrap(), Ok(3));
         });

@@ -211,7 +211,7 @@ mod tests {
         let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene));
         let alone = |frames: &[Frame]| together(&engine, vec![memory(lines(frames))]).0.remove(0).0;
         let failing = Failing(Cursor::new(lines(&frames[..1]).into_bytes()));
-        let rubbish = memory("x\n".repeat(1000));
+        let rubbish = memory("1,2\n".repeat(1000));
         let inputs = vec![
             memory(lines(&frames)),
             memory(lines(&frames[1..])),

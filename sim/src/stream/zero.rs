@@ -95,7 +95,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let table = folder.path().join("table.csv");
         let calibration = Calibration { offset: vec![0.5; 64], gain: vec![2.0; 64] };
-        std::fs::write(&table, calibration.to_csv(8)).unwrap();
+        std::fs::write(&table, calibration.to_csv(&scene.sensor)).unwrap();
         scene.input.calibration = Some(table);
         let input = Input::new(&scene).unwrap();
         let frame = |value: f64| Frame::from_stress("f", &scene.sensor, vec![value; 64]).unwrap();
