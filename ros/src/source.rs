@@ -71,7 +71,8 @@ impl Reopened {
         let options = FrameOptions { shape: Some(self.shape), ..FrameOptions::default() };
         match Lines::open(path.to_owned(), options, Pace::Recorded, [self.repeat, true]) {
             Ok(lines) => Ok(Box::new(lines)),
-            Err(error) => Err(Error::other(format!("{}: {error}", path.display()))),
+            // Who reads the lines names the source.
+            Err(error) => Err(Error::other(error.to_string())),
         }
     }
 
@@ -203,11 +204,11 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_is_none_ends_with_its_name() {
+    fn a_recording_that_is_none_ends_with_a_word() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("press.mcap");
         std::fs::write(&path, "no recording").unwrap();
         let error = reopened(&path.display().to_string()).read(&mut [0; 8]).unwrap_err().to_string();
-        assert!(error.contains("press.mcap: is no MCAP file"), "{error}");
+        assert_eq!(error, "is no MCAP file");
     }
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from conftest import COLS, ROWS, feed, line, node, run, wait
 from rosbags.typesys import Stores, get_typestore
-from test_topics import TYPES, Raw, key, session
+from test_topics import STATE, TYPES, Raw, key, session
 
 PATCHES = "".join(
     f'[[patch]]\nname = "{name}"\nscene = "scene.toml"\nsource = "{source}"\ncheck_every = 0\n'
@@ -31,7 +31,7 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
     with node(tmp_path, PATCHES, "domain = 7\nqueue = 8") as own:
         zenoh_session = session(own)
         wrench = {name: Raw(zenoh_session, key(store, f"/{name}/wrench", TYPES["wrench"])) for name in ("good", "flood", "again")}
-        state = Raw(zenoh_session, key(store, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"))
+        state = Raw(zenoh_session, key(store, "/diagnostics", STATE))
         feed(tmp_path / "good.pipe", [line(0)] * 20, 50.0)
         wait(lambda: wrench["good"].samples)
         before = len(wrench["good"].samples)
@@ -71,7 +71,7 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
         done.set()
 
         def newest() -> dict[str, object]:
-            array = store.deserialize_cdr(state.samples[-1].payload.to_bytes(), "diagnostic_msgs/msg/DiagnosticArray")
+            array = store.deserialize_cdr(state.samples[-1].payload.to_bytes(), STATE)
             return {one.name.removeprefix("dermis: "): one for one in array.status}
 
         wait(lambda: len(newest()) == 6)
