@@ -238,7 +238,8 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
     assert len(sequence) >= MESSAGES * 0.6 and sequence == list(range(sequence[0], sequence[0] + len(sequence)))
     statuses = [store.deserialize_cdr(own.payload.to_bytes(), STATE).status for own in state.samples]
     values = [{pair.key: pair.value for pair in own.values} for (own,) in statuses]
-    assert {own["flags"] for own in values} >= {"no-contact"} and {own.name for (own,) in statuses} == {"dermis: thumb"}
+    touched = ["no-contact" not in own["flags"] for own in values]
+    assert any(touched) and not all(touched) and {own.name for (own,) in statuses} == {"dermis: thumb"}
     assert values[-1]["dropped"] == "0" and int(values[-1]["results"]) > MESSAGES
     for subscriber in sdk:
         subscriber.close()
