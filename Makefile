@@ -25,7 +25,7 @@ MINUTES   ?= 5
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python wheel buses c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python wheel buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -60,11 +60,11 @@ spelling: ## check the spelling of code and pages
 
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
-	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
+	$(CARGO) clippy --locked --workspace --exclude dermis-ros --all-targets -- -D warnings
 
 unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
-	$(CARGO) test --locked --workspace --no-fail-fast
+	$(CARGO) test --locked --workspace --exclude dermis-ros --no-fail-fast
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
@@ -95,20 +95,34 @@ buses: setup ## test the cores for a SoC with cocotb's models of the buses, unde
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
 	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
+ros: setup ## build dermis-ros, lint it, and test it against other programs that speak ROS 2 over Zenoh, in build/ros
+	@echo '== ros'
+	$(CARGO) clippy --locked --package dermis-ros --all-targets -- -D warnings
+	$(CARGO) build --locked --quiet --bin dermis
+	$(CARGO) test --locked --package dermis-ros
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --package dermis-ros --no-deps --document-private-items
+	python3 -m venv --clear $(BUILD)/ros
+	$(BUILD)/ros/bin/pip install -q --disable-pip-version-check -r ros/tests/requirements.txt
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_ROS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis-ros \
+	    $(BUILD)/ros/bin/python -m pytest -q ros/tests
+
 c: setup ## build the C library, libdermis_c.a and .so, and run the tests of dermis.h
 	$(CARGO) build --locked --release --package dermis-c
 	$(CARGO) test --locked --release --package dermis-c
 
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --exclude dermis-ros --no-deps
 
-bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, and the drawing of the live page
+bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, the drawing of the live page, and how many patches dermis-ros holds
 	$(CARGO) bench --locked --package dermis-golden
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
 	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
 	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --locked --package dermis-python
+	$(CARGO) build --locked --release --bin dermis
+	$(CARGO) build --locked --release --package dermis-ros
+	DERMIS=$(DERMIS) DERMIS_ROS=$(CARGO_TARGET_DIR)/release/dermis-ros python3 ros/tests/bench.py
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)
@@ -156,7 +170,7 @@ stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and res
 # out by name, since --lib links a test program of it even with `test = false`.
 nightly: fuzz program tools ## run all variants of the tests, those too that `make test` leaves out (70 minutes)
 	@echo '== all tests'
-	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release --workspace --exclude dermis-python --lib --bins --examples --tests --no-fail-fast -- --include-ignored
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release --workspace --exclude dermis-python --exclude dermis-ros --lib --bins --examples --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check

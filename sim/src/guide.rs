@@ -31,6 +31,7 @@ pages! {
     "your-sensor.md" your_sensor,
     "recordings.md" recordings,
     "live.md" live,
+    "ros.md" ros,
     "files.md" files,
     "python.md" python,
     "c.md" c,

@@ -22,7 +22,7 @@
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
-//! | `output` | standard output and standard error, where either is closed or full |
+//! | [`output`] | standard output and standard error, where either is closed or full |
 //! | [`mod@run_log`] | counts of long test runs, saved for the report |
 // Field names end in their SI unit: `full_scale_MPa`.
 #![allow(non_snake_case)]
@@ -30,7 +30,7 @@
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 
 #[macro_use]
-mod output;
+pub mod output;
 
 mod artifact_cache;
 pub mod batch;

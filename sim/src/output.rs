@@ -16,7 +16,7 @@ use anyhow::{anyhow, Result};
 ///
 /// # Errors
 /// Standard output takes no more, as on a full disk.
-pub(crate) fn write(output: &mut dyn Write, bytes: &[u8]) -> Result<bool> {
+pub fn write(output: &mut dyn Write, bytes: &[u8]) -> Result<bool> {
     match output.write_all(bytes).and_then(|()| output.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
         Err(error) => Err(anyhow!("standard output: {error}")),
@@ -25,12 +25,13 @@ pub(crate) fn write(output: &mut dyn Write, bytes: &[u8]) -> Result<bool> {
 }
 
 /// Writes a line to standard error, if that takes it.
-pub(crate) fn line(text: Arguments) {
+pub fn line(text: Arguments) {
     // In one piece, so that the lines of threads do not mix.
     let _ = std::io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
 /// Writes a line to standard error, if that takes it; takes what `format!` takes.
+#[macro_export]
 macro_rules! say {
     ($($text:tt)*) => {
         $crate::output::line(format_args!($($text)*))

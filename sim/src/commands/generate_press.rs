@@ -20,7 +20,7 @@ use serde_json::json;
 
 use super::noise::motion;
 use crate::progress::Progress;
-use crate::recording::header;
+use crate::recording::{header, FRAME_ID};
 
 /// Channel of the known force.
 const KNOWN_FORCE: &str = "/dermis/known_force";
@@ -93,7 +93,7 @@ fn record(path: &Path, scene: &Scene, frames: &[Frame], time_ns: impl Fn(usize) 
     for (k, frame) in frames.iter().enumerate() {
         let ns = time_ns(k);
         let stamp = Stamp { sequence: k as u64, logged: ns as u64 };
-        let header = header(ns);
+        let header = header(FRAME_ID, ns);
         for (topic, bytes) in frame_messages([scene.sensor.rows, scene.sensor.cols], &header, &frame.stress_MPa)? {
             file.message(topic, Kind::of::<Image>(), stamp, &bytes)?;
         }

@@ -16,13 +16,13 @@ use dermis_golden::spec::scene::Scene;
 
 use super::inputs::{note_hardware, BoardOverride};
 use super::layout::LayoutArguments;
-use super::reconstruct_stream::{faster, open, rate_Hz, software_engine, stream_engine};
+use super::reconstruct_stream::{open, rate_Hz, software_engine, stream_engine};
 use crate::engine::EngineName;
 use crate::link::{open_board, BoardEngine, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
 use crate::recording::{Lines, Pace};
-use crate::stream::{run as run_stream, Clock, Estimators, Outcome, Policy, Source, StreamOptions};
+use crate::stream::{run as run_stream, Clock, Estimators, Faster, Outcome, Policy, Source, StreamOptions};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]
@@ -165,7 +165,7 @@ pub fn run(arguments: &Arguments, print: fn(&str) -> Result<()>) -> Result<Strin
         show.outcome(outcome)
     };
     let chosen = board.is_none() && (hand.is_none() || rate.is_some());
-    let faster = if chosen { faster(&scene, arguments.engine, *rate) } else { Vec::new() };
+    let faster = if chosen { Faster::of_stream(&scene, arguments.engine, *rate) } else { Vec::new() };
     let estimators = Estimators::new(&*engine, faster, CheckPace::Beside, *rate, Clock::default());
     match (hand, input) {
         (Some(hand), _) => {

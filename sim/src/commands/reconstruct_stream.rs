@@ -91,7 +91,7 @@ impl StreamArguments {
             (None, true) => CheckPace::Beside,
             (None, false) => CheckPace::Every(1),
         };
-        let faster = if latest || self.rate.is_some() { faster(scene, name, self.rate) } else { Vec::new() };
+        let faster = if latest || self.rate.is_some() { Faster::of_stream(scene, name, self.rate) } else { Vec::new() };
         let estimators = Estimators::new(&*engine, faster, pace, self.rate, Clock::default());
         let (input, name) = open(source, scene, self.baud)?;
         let mut recorder = self.record.as_deref().map(|path| Recorder::create(path, scene)).transpose()?;
@@ -147,16 +147,6 @@ pub(super) fn stream_engine(scene: &Scene, name: EngineName) -> Result<Box<dyn E
         note_hardware(scene)?;
     }
     name.engine(scene, None, Path::new(""))
-}
-
-/// The estimators that a stream takes where the scene's one does not keep up. What the scene states holds, unless a rate is wanted.
-pub(super) fn faster(scene: &Scene, name: EngineName, wanted_Hz: Option<f64>) -> Vec<Faster<'_>> {
-    let free = scene.search.estimator.is_none() || wanted_Hz.is_some();
-    if free && name == EngineName::Golden {
-        Faster::of_scene(scene)
-    } else {
-        Vec::new()
-    }
 }
 
 /// Parses a number of frames per second.

@@ -19,7 +19,7 @@ const ORANGE: [f32; 4] = [1.0, 0.45, 0.0, 1.0];
 const BLUE: [f32; 4] = [0.2, 0.6, 1.0, 1.0];
 
 /// How large forces are drawn: the same in all results of a scene.
-pub(super) struct Arrows {
+pub struct Arrows {
     metres_per_N: f64,
     /// The smaller one in m.
     pitch: f64,
@@ -27,7 +27,7 @@ pub(super) struct Arrows {
 
 impl Arrows {
     /// The force of a taxel at full scale is half a pitch long.
-    pub(super) fn of(scene: &Scene) -> Arrows {
+    pub fn of(scene: &Scene) -> Arrows {
         let Sensor { pitch_x_mm, pitch_y_mm, .. } = scene.sensor;
         let pitch = pitch_x_mm.min(pitch_y_mm) * METRES;
         // MPa times mm².
@@ -36,7 +36,7 @@ impl Arrows {
     }
 
     /// An arrow per contact, from its centre of pressure, and a line per taxel; those of the result before are removed.
-    pub(super) fn markers(
+    pub fn markers(
         &self,
         sensor: &Sensor,
         result: &Reconstruction,

@@ -1,11 +1,9 @@
 //! Reconstruction of a stream: one result or refusal per line, in the order of the lines.
 
 use std::fmt;
-use std::io::{BufReader, ErrorKind, Read, Write};
-use std::sync::Arc;
+use std::io::Write;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
 use dermis_golden::result::flags::Flag;
@@ -15,9 +13,9 @@ use serde::{Serialize, Serializer};
 use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
 use super::line::{self, LineFrame};
-use super::queue::{Policy, Queue};
-use super::rate::Clock;
-use super::stop::Stop;
+use super::queue::Policy;
+use super::reader::Received;
+use super::zero::{ZeroRequest, Zeros, ZERO_FRAMES};
 use crate::engine::typed;
 
 /// How a stream is read and answered.
@@ -73,16 +71,6 @@ impl fmt::Display for Counts {
         }
         write!(f, "{acquisition}")
     }
-}
-
-/// A line as it was received.
-struct Received {
-    number: u64,
-    time: SystemTime,
-    /// The same by the stream's clock.
-    at: Duration,
-    /// `None` if it is too long.
-    bytes: Option<Vec<u8>>,
 }
 
 /// What a line gave; as JSON an output line.
@@ -148,7 +136,7 @@ pub struct Refusal<'a> {
     pub error: &'a str,
 }
 
-/// What takes the outcomes, in the order of the lines; the error [`ErrorKind::BrokenPipe`] ends a stream without error.
+/// What takes the outcomes, in the order of the lines; the error [`BrokenPipe`](std::io::ErrorKind::BrokenPipe) ends a stream without error.
 pub type Output<'a> = dyn FnMut(&Outcome) -> std::io::Result<()> + 'a;
 
 /// Writes each outcome as a line of JSON; if `brief` without the forces of taxels.
@@ -167,93 +155,8 @@ pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> 
     }
 }
 
-/// Answers every line of `input`, called `name` in errors, until it ends or `output` is closed.
-///
-/// # Errors
-/// Input or output that fails; a bad line is none.
-pub fn run(
-    estimators: Estimators,
-    input: (Box<dyn Read + Send>, &str),
-    options: StreamOptions,
-    output: &mut Output,
-) -> Result<Counts> {
-    run_until(&Stop::default(), estimators, input, options, output)
-}
-
-/// As [`run`], or until `stop`.
-///
-/// # Errors
-/// As [`run`].
-pub fn run_until(
-    stop: &Stop,
-    estimators: Estimators,
-    (input, name): (Box<dyn Read + Send>, &str),
-    options: StreamOptions,
-    output: &mut Output,
-) -> Result<Counts> {
-    let queue = Arc::new(Queue::new(options.queue, options.policy));
-    let reader = {
-        let (queue, clock) = (Arc::clone(&queue), estimators.clock().clone());
-        // Not joined where the output is closed first: the read may never return.
-        std::thread::spawn(move || {
-            let outcome = read_all(input, &clock, &queue);
-            queue.close();
-            outcome
-        })
-    };
-    stop.add(&queue);
-    let (flags, counts) = (Vec::new(), Counts::default());
-    let frames = line::Frames::new(&estimators.scene().sensor, options.layout);
-    let mut stream = Stream { estimators, frames, change: None, flags, counts };
-    stream.choice(output).map_err(|error| anyhow!("standard output: {error}"))?;
-    loop {
-        if stop.stopped() {
-            queue.close();
-            return Ok(stream.counts);
-        }
-        let (received, full) = queue.pop();
-        stream.counts.dropped = if options.policy == Policy::Latest { full } else { 0 };
-        let Some(received) = received else {
-            // A reader that was stopped may never return.
-            if stop.stopped() {
-                return Ok(stream.counts);
-            }
-            break;
-        };
-        match stream.answer(&received, if options.live { full } else { 0 }, output) {
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => {
-                queue.close();
-                return Ok(stream.counts);
-            }
-            Err(error) => return Err(anyhow!("standard output: {error}")),
-            Ok(()) => (),
-        }
-    }
-    match reader.join() {
-        Ok(outcome) => outcome.map_err(|error| anyhow!("{name}: {error}"))?,
-        Err(_) => bail!("{name}: the thread that reads it has ended"),
-    }
-    Ok(stream.counts)
-}
-
-/// Reads all lines into the queue; blank ones only count.
-fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>) -> std::io::Result<()> {
-    let (mut input, mut line) = (BufReader::new(input), Vec::new());
-    for number in 1.. {
-        let Some(complete) = line::read(&mut input, &mut line)? else { break };
-        if complete && line.iter().all(u8::is_ascii_whitespace) {
-            continue;
-        }
-        let bytes = complete.then(|| std::mem::take(&mut line));
-        if !queue.push(Received { number, time: SystemTime::now(), at: clock.now(), bytes }) {
-            break;
-        }
-    }
-    Ok(())
-}
-
 /// The state of a stream.
-struct Stream<'a> {
+pub(super) struct Stream<'a> {
     estimators: Estimators<'a>,
     /// Frames of the lines.
     frames: line::Frames,
@@ -261,27 +164,48 @@ struct Stream<'a> {
     change: Option<String>,
     /// Flags that the lines of a block that is not complete raise.
     flags: Vec<Flag>,
+    zeros: Zeros,
     counts: Counts,
 }
 
-impl Stream<'_> {
+impl<'a> Stream<'a> {
+    /// A stream without a line so far, whose layout is `stated`; `zero` asks for a new zero.
+    pub(super) fn new(estimators: Estimators<'a>, stated: Stated, zero: ZeroRequest) -> Stream<'a> {
+        let frames = line::Frames::new(&estimators.scene().sensor, stated);
+        let (flags, zeros, counts) = (Vec::new(), Zeros::new(zero), Counts::default());
+        Stream { estimators, frames, change: None, flags, zeros, counts }
+    }
+
+    /// Sets the number of lines dropped so far.
+    pub(super) fn dropped(&mut self, lines: u64) {
+        self.counts.dropped = lines;
+    }
+
+    /// What it had.
+    pub(super) fn counts(self) -> Counts {
+        self.counts
+    }
+
     /// Says between which estimators is chosen.
-    fn choice(&self, output: &mut Output) -> std::io::Result<()> {
+    pub(super) fn choice(&self, output: &mut Output) -> std::io::Result<()> {
         let Some(all) = self.estimators.choice() else { return Ok(()) };
         output(&Outcome::Note(&format!("the best estimator that keeps up, of {all}")))
     }
 
     /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
-    fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
+    pub(super) fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
         let frame = self.frame(received);
-        if let Some(note) = self.frames.note() {
-            output(&Outcome::Note(&note))?;
+        let notes =
+            [self.frames.note(), frame.as_ref().ok().and_then(Option::as_ref).and_then(|own| self.zero(&own.frame))];
+        for note in notes.iter().flatten() {
+            output(&Outcome::Note(note))?;
         }
         let result = frame.and_then(|frame| {
             let Some(line) = frame else { return Ok(None) };
             let time_ns = self.counts.acquisition.time_ns(line.frame.time_ns, nanoseconds(received.time));
             self.flags.extend(line.flag());
-            self.estimators.push(Frame { time_ns: Some(time_ns), ..line.frame }).map_err(|error| {
+            let frame = self.zeros.apply(Frame { time_ns: Some(time_ns), ..line.frame });
+            self.estimators.push(frame).map_err(|error| {
                 self.flags.clear();
                 typed(error).to_string()
             })
@@ -320,6 +244,20 @@ impl Stream<'_> {
         Ok(())
     }
 
+    /// What is to be said of the zero after a frame as it was read.
+    fn zero(&mut self, frame: &Frame) -> Option<String> {
+        match self.zeros.add(frame, self.estimators.scene(), self.estimators.input()) {
+            Ok(false) => None,
+            Ok(true) => {
+                // What frames with another zero show is not true of these.
+                self.estimators.restart();
+                self.flags.clear();
+                Some(format!("zero taken from {ZERO_FRAMES} frames"))
+            }
+            Err(error) => Some(format!("the zero stays: {error}")),
+        }
+    }
+
     /// The frame in a line; `None` for a comment and a header.
     fn frame(&mut self, received: &Received) -> Result<Option<LineFrame>, String> {
         let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
@@ -341,15 +279,18 @@ pub fn seconds(time: SystemTime) -> f64 {
 mod tests {
     use super::*;
     use crate::engine::EngineName;
-    use crate::stream::Faster;
+    use crate::stream::{run, run_until, Clock, Faster, Stop};
+    use anyhow::bail;
     use dermis_golden::data::input::Input;
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
     use serde_json::Value;
+    use std::io::Read;
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::mpsc::{channel, Receiver, Sender};
+    use std::sync::Arc;
 
     fn engine_of(scene: &Scene, name: EngineName) -> Box<dyn Engine> {
         name.engine(scene, None, Path::new("")).unwrap()

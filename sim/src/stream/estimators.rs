@@ -10,12 +10,14 @@ use std::time::Duration;
 
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
+use dermis_golden::data::input::Input;
 use dermis_golden::engine::{CheckPace, Engine, EngineError, StreamChecks};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 
 use super::rate::{Clock, Keeper, Progress, Verdict};
+use crate::engine::EngineName;
 
 /// An estimator that is taken where a better one does not keep up; its engine is built when that is so.
 pub struct Faster<'a> {
@@ -41,6 +43,17 @@ impl<'a> Faster<'a> {
     /// A scene that the engine refuses.
     pub fn build(&self) -> Result<Box<dyn Engine>> {
         (self.build)()
+    }
+
+    /// Those that a stream takes where the scene's one does not keep up: none with another engine than `golden`, nor where the scene
+    /// states its estimator, unless frames are `wanted_Hz` at this rate.
+    pub fn of_stream(scene: &'a Scene, name: EngineName, wanted_Hz: Option<f64>) -> Vec<Faster<'a>> {
+        let free = scene.search.estimator.is_none() || wanted_Hz.is_some();
+        if free && name == EngineName::Golden {
+            Faster::of_scene(scene)
+        } else {
+            Vec::new()
+        }
     }
 
     /// Those of a scene in floating point, the best first: after one with evidence the network, where the scene names one, and the
@@ -69,6 +82,7 @@ pub struct Estimators<'a> {
     first: &'a dyn Engine,
     faster: Vec<Faster<'a>>,
     checks: StreamChecks,
+    pace: CheckPace,
     keeper: Keeper,
     clock: Clock,
     /// Time that the frames of a block have taken.
@@ -89,12 +103,28 @@ impl<'a> Estimators<'a> {
         let names: Vec<&'static str> = std::iter::once(own).chain(faster.iter().map(|own| own.name)).collect();
         let keeper = Keeper::new(wanted_Hz, first.scene().input.frames_per_result(), &names);
         let checks = StreamChecks::new(first, pace);
-        Estimators { first, faster, checks, keeper, clock, busy: Duration::ZERO }
+        Estimators { first, faster, checks, pace, keeper, clock, busy: Duration::ZERO }
     }
 
     /// The same estimator for every frame.
     pub fn only(engine: &'a dyn Engine, pace: CheckPace) -> Estimators<'a> {
         Estimators::new(engine, Vec::new(), pace, None, Clock::default())
+    }
+
+    /// The same with this share of a core, above 0 and at most 1: the others are for other streams.
+    #[must_use]
+    pub fn with_share(self, share: f64) -> Estimators<'a> {
+        Estimators { keeper: self.keeper.with_share(share), ..self }
+    }
+
+    /// Forgets the frames so far.
+    pub(super) fn restart(&mut self) {
+        self.checks = StreamChecks::new(engine(self.first, &self.faster, self.keeper.taken()), self.pace);
+    }
+
+    /// The scene's input options.
+    pub(super) fn input(&self) -> &'a Input {
+        self.first.input()
     }
 
     /// The clock of the stream.

@@ -27,6 +27,8 @@
 //! | [`rate`] | whether results keep up with the frames, and which estimator does |
 //! | [`estimators`] | the estimator that is taken, and its results |
 //! | [`answers`] | results and refusals |
+//! | [`zero`] | a zero that is taken anew while a stream runs |
+//! | [`together`] | several streams in one thread, or one |
 
 pub mod acquisition;
 pub mod answers;
@@ -34,14 +36,19 @@ pub mod estimators;
 pub(crate) mod line;
 pub mod queue;
 pub mod rate;
+mod reader;
 pub mod source;
 pub mod stop;
+pub mod together;
+pub mod zero;
 
 pub(crate) use answers::nanoseconds;
-pub use answers::{as_lines, run, run_until, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions};
+pub use answers::{as_lines, seconds, Answer, Counts, Outcome, Output, Refusal, StreamOptions};
 pub use estimators::{Estimators, Faster, Note};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use rate::Clock;
 pub use source::Source;
 pub use stop::Stop;
+pub use together::{run, run_together, run_until, Member, Outputs};
+pub use zero::{ZeroRequest, ZERO_FRAMES};

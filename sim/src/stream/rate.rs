@@ -1,7 +1,7 @@
 //! Rate: whether the results of a stream keep up with its frames, and the fastest estimator that is needed for it.
 //!
 //! ```text
-//! load = time of a result · frames per second / frames per result        mean over half a second or more
+//! load = time of a result · frames per second / frames per result / share of a core        mean over half a second or more
 //!
 //! load > 1                                   the next faster estimator
 //! load of a better one ≤ 0.7, as measured    back to it
@@ -113,6 +113,8 @@ struct Window {
 pub(super) struct Keeper {
     wanted_Hz: Option<f64>,
     frames_per_result: f64,
+    /// Of a core that the stream has.
+    share: f64,
     candidates: Vec<Candidate>,
     taken: usize,
     window: Option<Window>,
@@ -127,11 +129,17 @@ impl Keeper {
         Keeper {
             wanted_Hz,
             frames_per_result: frames_per_result as f64,
+            share: 1.0,
             candidates: names.iter().map(candidate).collect(),
             taken: 0,
             window: None,
             behind: None,
         }
+    }
+
+    /// The same with this share of a core.
+    pub(super) fn with_share(self, share: f64) -> Keeper {
+        Keeper { share, ..self }
     }
 
     /// Number of the estimator that is taken.
@@ -185,7 +193,7 @@ impl Keeper {
 
     /// What follows from a rate of frames; `full` says whether lines found the queue full, `often` whether many did.
     fn verdict(&mut self, now: Duration, rate_Hz: f64, full: bool, often: bool) -> Verdict {
-        let left = self.frames_per_result / rate_Hz;
+        let left = self.share * self.frames_per_result / rate_Hz;
         let load = |cost: Option<Duration>| cost.map_or(0.0, |cost| cost.as_secs_f64() / left);
         let own = self.candidates[self.taken];
         let why = |name: &str, cost: Option<Duration>| {

@@ -3,8 +3,8 @@
 //! | written | source | ends | while nothing reads it |
 //! |---|---|---|---|
 //! | `-` | standard input | with it | waits |
-//! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never | loses lines |
-//! | a character device | a serial port, from its first end of a line on | with an error, when it is unplugged | loses lines |
+//! | `udp:HOST:PORT`, `udp://HOST:PORT` | datagrams of one or more whole lines, sent to this address | never | loses lines |
+//! | a character device, perhaps as `serial:PATH` | a serial port, from its first end of a line on | with an error, when it is unplugged | loses lines |
 //! | a regular file | the file from its start, then what is added; from the start again, with a word, if it becomes shorter or another file takes its name | never | waits |
 //! | a pipe | the pipe | with it | waits |
 
@@ -39,7 +39,10 @@ impl FromStr for Source {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Source, String> {
-        match text.strip_prefix("udp:") {
+        if let Some(path) = text.strip_prefix("serial:") {
+            return Ok(Source::Path(path.to_owned()));
+        }
+        match text.strip_prefix("udp:").map(|address| address.strip_prefix("//").unwrap_or(address)) {
             Some(address) if address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok()) => {
                 Ok(Source::Udp(address.to_owned()))
             }
@@ -67,7 +70,7 @@ impl Source {
             Source::Path(path) => {
                 let kind = std::fs::metadata(path).map_err(|error| named(path, error))?.file_type();
                 let opened: Box<dyn Read + Send> = if kind.is_char_device() {
-                    let unknown = "a serial port needs --baud, because the scene's board has no uart_baud";
+                    let unknown = "a serial port needs a bit rate, --baud, because the scene's board has no uart_baud";
                     let baud = baud.ok_or_else(|| named(path, Error::new(ErrorKind::InvalidInput, unknown)))?;
                     let port = serialport::new(path, baud).timeout(SERIAL_WAIT).open();
                     Box::new(Serial { port: port.map_err(|error| named(path, error.into()))?, begun: false })
@@ -227,7 +230,10 @@ mod tests {
         assert_eq!(source("-"), Ok(Source::StandardInput));
         assert_eq!(source("udp:[::1]:9000"), Ok(Source::Udp("[::1]:9000".into())));
         assert_eq!(source("udp:9000"), Err("udp:9000: wanted udp:HOST:PORT".into()));
-        assert_eq!(source("/dev/ttyUSB0"), Ok(Source::Path("/dev/ttyUSB0".into())));
+        assert_eq!(source("udp://0.0.0.0:9000"), Ok(Source::Udp("0.0.0.0:9000".into())));
+        for text in ["/dev/ttyUSB0", "serial:/dev/ttyUSB0"] {
+            assert_eq!(source(text), Ok(Source::Path("/dev/ttyUSB0".into())));
+        }
         // A character device and datagrams do not wait.
         let loses = ["-", "udp:9000:1", "/dev/null", "/"].map(|text| source(text).unwrap().loses_lines());
         assert_eq!(loses, [false, true, true, false]);

@@ -53,17 +53,20 @@ impl Stop {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stream::queue::Bell;
     use crate::stream::Policy;
+    use std::sync::mpsc::channel;
 
     #[test]
     fn a_stream_that_waits_for_a_line_is_freed() {
-        let (stop, queue) = (Stop::default(), Arc::new(Queue::<u8>::new(1, Policy::All)));
+        let (ring, rung) = channel();
+        let (stop, queue) = (Stop::default(), Arc::new(Queue::<u8>::new(1, Policy::All, Bell::new(3, ring))));
         stop.add(&queue);
         std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| queue.pop());
+            let waiting = scope.spawn(move || rung.recv());
             stop.now();
-            assert_eq!(waiting.join().unwrap(), (None, 0));
+            assert_eq!(waiting.join().unwrap(), Ok(3));
         });
-        assert!(stop.stopped());
+        assert!(stop.stopped() && queue.take().ended);
     }
 }

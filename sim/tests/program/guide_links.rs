@@ -5,7 +5,7 @@
 //! |---|---|
 //! | `[text](file)`, `[label]: file`, relative | be a file or folder beside the page |
 //! | `[text][label]` | have a definition on the page |
-//! | `` `golden/…` ``, `` `hdl/…` ``, `` `sim/…` ``, `` `python/…` ``, `` `constraints/…` ``, `` `tests/…` `` | be a file or folder of the repository |
+//! | `` `golden/…` ``, `` `hdl/…` ``, `` `sim/…` ``, `` `python/…` ``, `` `ros/…` ``, `` `constraints/…` ``, `` `tests/…` `` | be a file or folder of the repository |
 //! | a line that begins with `dermis` in an `sh` block | be accepted by the command line |
 //! | a fence | name its language |
 //!
@@ -21,7 +21,7 @@ use dermis_sim::commands::guide_pages::markdown::tables;
 /// Longest README in lines: one page.
 const README_LINES: usize = 140;
 /// Folders whose files pages name in backticks.
-const FOLDERS: [&str; 6] = ["golden", "hdl", "sim", "python", "constraints", "tests"];
+const FOLDERS: [&str; 7] = ["golden", "hdl", "sim", "python", "ros", "constraints", "tests"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")

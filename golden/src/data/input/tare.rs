@@ -63,7 +63,7 @@ impl Tare {
     }
 
     /// Of frames of the scene's sensor, at least one.
-    pub(super) fn of(frames: &[Frame], scene: &Scene) -> Tare {
+    pub fn of(frames: &[Frame], scene: &Scene) -> Tare {
         let (taxels, count) = (scene.sensor.taxels(), frames.len());
         let zero: Vec<f64> = (0..taxels).map(|k| mean_reading(frames, k).unwrap_or(0.0)).collect();
         let square = |k: usize| readings(frames, k).map(|reading| (reading - zero[k]).powi(2)).sum::<f64>();

@@ -52,14 +52,14 @@ const OFFERED_QOS: &str = "\
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
     name: &'static str,
-    hash: &'static str,
+    hash: fn() -> String,
     schema: fn() -> String,
 }
 
 impl Kind {
     /// That of `M`.
     pub fn of<M: Message>() -> Kind {
-        Kind { name: M::NAME, hash: M::HASH, schema: M::schema }
+        Kind { name: M::NAME, hash: M::hash, schema: M::schema }
     }
 }
 
@@ -133,8 +133,8 @@ impl RecordingFile {
             return Ok(*channel);
         }
         let schema = self.writer.add_schema(name, "ros2msg", schema().as_bytes())?;
-        let metadata = [("offered_qos_profiles", OFFERED_QOS), ("topic_type_hash", hash)];
-        let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+        let metadata = [("offered_qos_profiles", OFFERED_QOS.to_owned()), ("topic_type_hash", hash())];
+        let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
         let channel = self.writer.add_channel(schema, topic, "cdr", &metadata)?;
         self.channels.insert(topic.to_owned(), channel);
         Ok(channel)

@@ -2,6 +2,26 @@
 //!
 //! Structures have the fields of the `.msg` files beside this module, in their order; a schema is a file's text followed by
 //! those of the types that it uses, as rosbag2 writes it.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`contacts`] | the contacts of a result, a type of Dermis |
+//! | [`diagnostics`] | the state of a program's parts |
+//! | [`markers`] | arrows and lines that viewers draw |
+//! | [`transforms`] | where coordinate systems are |
+//! | [`type_hash`](mod@type_hash) | the hash of a type, from its text |
+
+pub mod contacts;
+pub mod diagnostics;
+pub mod markers;
+pub mod transforms;
+pub mod type_hash;
+
+pub use contacts::{Contact, Contacts};
+pub use diagnostics::{DiagnosticArray, DiagnosticStatus, KeyValue};
+pub use markers::{Marker, MarkerArray, NoTexture, Pose};
+pub use transforms::{TfMessage, Transform, TransformStamped};
+use type_hash::type_hash;
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::{Deserialize, Serialize, Serializer};
@@ -17,18 +37,21 @@ const NANOSECONDS: u64 = 1_000_000_000;
 pub trait Message: Serialize + Sized {
     /// Its name, as ROS 2 has it.
     const NAME: &'static str;
-    /// Its type hash, RIHS01, as ROS 2 computes it from the type's fields.
-    const HASH: &'static str;
     /// Text of its `.msg` file.
     const TEXT: &'static str;
     /// Name and text of each type that it uses.
-    const USES: &'static [(&'static str, &'static str)];
+    const USES: &'static [Definition];
 
     /// The schema: the text of the type and of all that it uses.
     fn schema() -> String {
         let rule = "=".repeat(80);
         let used = Self::USES.iter().map(|(name, text)| format!("{rule}\nMSG: {name}\n{text}"));
         Self::TEXT.to_owned() + &used.collect::<String>()
+    }
+
+    /// Its type hash, RIHS01, which ROS 2 has in the names of its channels.
+    fn hash() -> String {
+        type_hash(Self::NAME, Self::TEXT, Self::USES)
     }
 
     /// The message in CDR.
@@ -42,8 +65,11 @@ pub trait Message: Serialize + Sized {
     }
 }
 
-const TIME: (&str, &str) = ("builtin_interfaces/Time", include_str!("msg/Time.msg"));
-const HEADER: (&str, &str) = ("std_msgs/Header", include_str!("msg/Header.msg"));
+/// Name and text of a type.
+pub type Definition = (&'static str, &'static str);
+
+const TIME: Definition = ("builtin_interfaces/Time", include_str!("msg/Time.msg"));
+const HEADER: Definition = ("std_msgs/Header", include_str!("msg/Header.msg"));
 
 /// A message from its CDR.
 ///
@@ -121,9 +147,8 @@ pub struct Image<'a> {
 
 impl Message for Image<'_> {
     const NAME: &'static str = "sensor_msgs/msg/Image";
-    const HASH: &'static str = "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47";
     const TEXT: &'static str = include_str!("msg/Image.msg");
-    const USES: &'static [(&'static str, &'static str)] = &[HEADER, TIME];
+    const USES: &'static [Definition] = &[HEADER, TIME];
 }
 
 /// `sensor_msgs/msg/PointField`.
@@ -172,11 +197,13 @@ pub struct PointCloud2<'a> {
 
 impl Message for PointCloud2<'_> {
     const NAME: &'static str = "sensor_msgs/msg/PointCloud2";
-    const HASH: &'static str = "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5";
     const TEXT: &'static str = include_str!("msg/PointCloud2.msg");
-    const USES: &'static [(&'static str, &'static str)] =
-        &[HEADER, TIME, ("sensor_msgs/PointField", include_str!("msg/PointField.msg"))];
+    const USES: &'static [Definition] = &[HEADER, TIME, ("sensor_msgs/PointField", include_str!("msg/PointField.msg"))];
 }
+
+const VECTOR3: Definition = ("geometry_msgs/Vector3", include_str!("msg/Vector3.msg"));
+const POINT: Definition = ("geometry_msgs/Point", include_str!("msg/Point.msg"));
+const QUATERNION: Definition = ("geometry_msgs/Quaternion", include_str!("msg/Quaternion.msg"));
 
 /// `geometry_msgs/msg/Vector3`: x, y, z.
 pub type Vector3 = [f64; 3];
@@ -201,14 +228,22 @@ pub struct WrenchStamped {
 
 impl Message for WrenchStamped {
     const NAME: &'static str = "geometry_msgs/msg/WrenchStamped";
-    const HASH: &'static str = "RIHS01_8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77";
     const TEXT: &'static str = include_str!("msg/WrenchStamped.msg");
-    const USES: &'static [(&'static str, &'static str)] = &[
-        HEADER,
-        TIME,
-        ("geometry_msgs/Wrench", include_str!("msg/Wrench.msg")),
-        ("geometry_msgs/Vector3", include_str!("msg/Vector3.msg")),
-    ];
+    const USES: &'static [Definition] =
+        &[HEADER, TIME, ("geometry_msgs/Wrench", include_str!("msg/Wrench.msg")), VECTOR3];
+}
+
+/// `std_msgs/msg/Empty`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Empty {
+    /// A structure of IDL has at least one member.
+    structure_needs_at_least_one_member: u8,
+}
+
+impl Message for Empty {
+    const NAME: &'static str = "std_msgs/msg/Empty";
+    const TEXT: &'static str = include_str!("msg/Empty.msg");
+    const USES: &'static [Definition] = &[];
 }
 
 /// `std_msgs/msg/String`.
@@ -220,108 +255,8 @@ pub struct Text {
 
 impl Message for Text {
     const NAME: &'static str = "std_msgs/msg/String";
-    const HASH: &'static str = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18";
     const TEXT: &'static str = include_str!("msg/String.msg");
-    const USES: &'static [(&'static str, &'static str)] = &[];
-}
-
-/// `geometry_msgs/msg/Pose`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// Place in m: x, y, z.
-    pub position: [f64; 3],
-    /// Rotation as a unit quaternion: x, y, z, w.
-    pub orientation: [f64; 4],
-}
-
-impl Default for Pose {
-    /// No translation, no rotation.
-    fn default() -> Pose {
-        Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] }
-    }
-}
-
-/// The fields of a marker that belong to textures, texts and meshes, which lines and arrows have none of.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct NoTexture {
-    texture_resource: String,
-    /// Header (time, name of the coordinate system), format, bytes of a `sensor_msgs/msg/CompressedImage`.
-    texture: (i32, u32, String, String, Vec<u8>),
-    uv_coordinates: Vec<[f32; 2]>,
-    text: String,
-    mesh_resource: String,
-    /// Name and bytes of a `visualization_msgs/msg/MeshFile`.
-    mesh_file: (String, Vec<u8>),
-    mesh_use_embedded_materials: bool,
-}
-
-/// `visualization_msgs/msg/Marker`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Marker {
-    /// Time and coordinate system.
-    pub header: Header,
-    /// Namespace of the number.
-    pub ns: String,
-    /// Number, by which a later marker replaces this one.
-    pub id: i32,
-    /// What is drawn: [`Marker::ARROW`] or [`Marker::LINE_LIST`].
-    pub r#type: i32,
-    /// [`Marker::ADD`] or [`Marker::DELETEALL`].
-    pub action: i32,
-    /// Coordinate system of the points.
-    pub pose: Pose,
-    /// In m; of an arrow the diameters of shaft and head and the head's length, of lines their width.
-    pub scale: Vector3,
-    /// Red, green, blue, opacity, each 0 to 1.
-    pub color: [f32; 4],
-    /// Seconds and nanoseconds for which it is shown; 0: until it is replaced.
-    pub lifetime: (i32, u32),
-    /// Whether it moves with its coordinate system.
-    pub frame_locked: bool,
-    /// Points in m: start and end of an arrow, or of each line.
-    pub points: Vec<Vector3>,
-    /// Colour of each point; empty: all have the marker's.
-    pub colors: Vec<[f32; 4]>,
-    /// Textures, texts, meshes.
-    pub unused: NoTexture,
-}
-
-impl Marker {
-    /// An arrow from the first point to the second one.
-    pub const ARROW: i32 = 0;
-    /// A line from each point of even index to the next one.
-    pub const LINE_LIST: i32 = 5;
-    /// Draw.
-    pub const ADD: i32 = 0;
-    /// Remove all markers of the channel.
-    pub const DELETEALL: i32 = 3;
-}
-
-/// `visualization_msgs/msg/MarkerArray`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MarkerArray {
-    /// The markers, carried out in their order.
-    pub markers: Vec<Marker>,
-}
-
-impl Message for MarkerArray {
-    const NAME: &'static str = "visualization_msgs/msg/MarkerArray";
-    const HASH: &'static str = "RIHS01_86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf";
-    const TEXT: &'static str = include_str!("msg/MarkerArray.msg");
-    const USES: &'static [(&'static str, &'static str)] = &[
-        ("visualization_msgs/Marker", include_str!("msg/Marker.msg")),
-        HEADER,
-        TIME,
-        ("geometry_msgs/Pose", include_str!("msg/Pose.msg")),
-        ("geometry_msgs/Point", include_str!("msg/Point.msg")),
-        ("geometry_msgs/Quaternion", include_str!("msg/Quaternion.msg")),
-        ("geometry_msgs/Vector3", include_str!("msg/Vector3.msg")),
-        ("std_msgs/ColorRGBA", include_str!("msg/ColorRGBA.msg")),
-        ("builtin_interfaces/Duration", include_str!("msg/Duration.msg")),
-        ("sensor_msgs/CompressedImage", include_str!("msg/CompressedImage.msg")),
-        ("visualization_msgs/UVCoordinate", include_str!("msg/UVCoordinate.msg")),
-        ("visualization_msgs/MeshFile", include_str!("msg/MeshFile.msg")),
-    ];
+    const USES: &'static [Definition] = &[];
 }
 
 #[cfg(test)]
@@ -400,6 +335,10 @@ mod tests {
             (WrenchStamped::schema(), WrenchStamped::USES),
             (Text::schema(), Text::USES),
             (MarkerArray::schema(), MarkerArray::USES),
+            (Contacts::schema(), Contacts::USES),
+            (DiagnosticArray::schema(), DiagnosticArray::USES),
+            (TfMessage::schema(), TfMessage::USES),
+            (Empty::schema(), Empty::USES),
         ] {
             let words =
                 text.lines().filter(|line| !line.starts_with("MSG")).filter_map(|line| line.split([' ', '[']).next());

@@ -43,10 +43,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NotFound`], which suggests the most similar name.
     pub fn builtin(name: &str) -> Result<Scene, SceneError> {
-        match BUILTINS.iter().find(|(builtin, _)| *builtin == name) {
-            Some((name, text)) => Scene::parse(text, name),
-            None => Err(not_found(name)),
-        }
+        builtin(name).ok_or_else(|| not_found(name)).and_then(|text| Scene::parse(text, name))
     }
 
     /// Loads a scene by built-in name or by path; a built-in name takes precedence over a file of that name.
@@ -54,9 +51,19 @@ impl Scene {
     /// # Errors
     /// Any [`SceneError`] except `NotAvailable`.
     pub fn load(name_or_path: &str) -> Result<Scene, SceneError> {
-        let builtin = BUILTINS.iter().any(|(name, _)| *name == name_or_path);
-        if builtin || !std::path::Path::new(name_or_path).exists() {
-            return Scene::builtin(name_or_path);
+        Scene::parse(&Scene::text(name_or_path)?, name_or_path)
+    }
+
+    /// The text of a scene that [`Scene::load`] loads.
+    ///
+    /// # Errors
+    /// [`SceneError::NotFound`], `Unreadable` or `TooLarge`.
+    pub fn text(name_or_path: &str) -> Result<String, SceneError> {
+        if let Some(text) = builtin(name_or_path) {
+            return Ok(text.to_owned());
+        }
+        if !std::path::Path::new(name_or_path).exists() {
+            return Err(not_found(name_or_path));
         }
         let text = read(name_or_path).map_err(|source| {
             let file = name_or_path.to_string();
@@ -66,8 +73,13 @@ impl Scene {
             let file = name_or_path.to_string();
             return Err(SceneError::TooLarge { file, limit: LARGEST_FILE });
         }
-        Scene::parse(&text, name_or_path)
+        Ok(text)
     }
+}
+
+/// The text of a built-in scene.
+fn builtin(name: &str) -> Option<&'static str> {
+    BUILTINS.iter().find(|(builtin, _)| *builtin == name).map(|(_, text)| *text)
 }
 
 /// The file's text, read up to one byte beyond the limit so that the caller can tell it is too large.

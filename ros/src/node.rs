@@ -1,0 +1,281 @@
+//! The node: a worker per core answers the streams of its patches, and publishes their results.
+
+use std::collections::BTreeMap;
+use std::io::Error;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::{anyhow, Context, Result};
+use dermis_golden::data::recording::message::DiagnosticArray;
+use dermis_golden::data::text::Stated;
+use dermis_golden::engine::{CheckPace, CheckedEngine};
+use dermis_sim::engine::{EngineName, SharedEngine};
+use dermis_sim::jobs::Interrupt;
+use dermis_sim::recording::header;
+use dermis_sim::say;
+use dermis_sim::stream::{
+    run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
+};
+
+use crate::carrier::{Carrier, Publisher, Subscription};
+use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
+use crate::messages::{self, Messages};
+use crate::patches::{Patch, PatchFile};
+use crate::source::Reopened;
+use crate::topics::{self, PatchTopics};
+
+/// An engine that several patches may have.
+type Engine = Arc<CheckedEngine<SharedEngine>>;
+
+/// The engines of the patches; patches with the same scene and estimator have one.
+pub struct Engines(Vec<Engine>);
+
+impl Engines {
+    /// Builds them, one for each patch.
+    ///
+    /// # Errors
+    /// A scene that its engine refuses, with the patch.
+    pub fn build(file: &PatchFile) -> Result<Engines> {
+        let mut built: BTreeMap<(String, Option<String>, EngineName), Engine> = BTreeMap::new();
+        let mut all = Vec::new();
+        for (index, patch) in file.patches.iter().enumerate() {
+            let key = (patch.path.clone(), patch.fields.estimator.clone(), patch.engine);
+            let engine = match built.get(&key) {
+                Some(engine) => Arc::clone(engine),
+                None => dermis_sim::engine::Engines::default()
+                    .of_stream(patch.engine, &patch.scene)
+                    .with_context(|| format!("patch[{index}].scene"))?,
+            };
+            all.push(Arc::clone(built.entry(key).or_insert(engine)));
+        }
+        Ok(Engines(all))
+    }
+}
+
+/// What a patch publishes.
+struct Outlet {
+    messages: Messages,
+    state: Arc<PatchState>,
+    wrench: Publisher,
+    contacts: Publisher,
+    arrows: Publisher,
+    forces: Option<Publisher>,
+    stress: Option<Publisher>,
+    /// Kept as long as it is published.
+    _scene: Publisher,
+    _tare: Subscription,
+    zero: ZeroRequest,
+    /// Least time between results that are published.
+    period: Duration,
+}
+
+impl Outlet {
+    fn open(carrier: &Carrier, file: &PatchFile, patch: &Patch, state: Arc<PatchState>) -> Result<Outlet> {
+        let topics = PatchTopics::new(&file.node.namespace, patch);
+        let optional = |topic: &Option<topics::Topic>| topic.as_ref().map(|own| carrier.publisher(own)).transpose();
+        let zero = ZeroRequest::default();
+        let asked = zero.clone();
+        let scene = carrier.publisher(&topics.scene)?;
+        scene.put(messages::scene(patch)?)?;
+        Ok(Outlet {
+            messages: Messages::new(patch),
+            state,
+            wrench: carrier.publisher(&topics.wrench)?,
+            contacts: carrier.publisher(&topics.contacts)?,
+            arrows: carrier.publisher(&topics.arrows)?,
+            forces: optional(&topics.forces)?,
+            stress: optional(&topics.stress)?,
+            _scene: scene,
+            _tare: carrier.subscription(&topics.tare, move |_| asked.now())?,
+            zero,
+            period: file.node.rate_Hz.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate)),
+        })
+    }
+
+    /// Publishes a result; what is large only while there is a subscriber.
+    fn publish(&self, answer: &Answer) -> Result<()> {
+        self.wrench.put(self.messages.wrench(answer)?)?;
+        self.contacts.put(self.messages.contacts(answer)?)?;
+        if self.arrows.is_wanted() {
+            self.arrows.put(self.messages.arrows(answer)?)?;
+        }
+        let wanted = |publisher: &'_ Option<Publisher>| publisher.as_ref().is_some_and(Publisher::is_wanted);
+        let forces = if wanted(&self.forces) { self.messages.forces(answer)? } else { None };
+        let stress = if wanted(&self.stress) { self.messages.stress(answer)? } else { None };
+        for (publisher, message) in [(&self.forces, forces), (&self.stress, stress)] {
+            if let (Some(publisher), Some(message)) = (publisher, message) {
+                publisher.put(message)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A patch of a worker.
+struct Own<'a> {
+    patch: &'a Patch,
+    engine: &'a Engine,
+    outlet: &'a Outlet,
+}
+
+/// Nanoseconds since 1970.
+fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// Publishes the patches of a file until their sources have ended, or the program is interrupted; or for the time `measure`, of which
+/// the text says how the patches did.
+///
+/// # Errors
+/// A scene that its engine refuses, an address that cannot be used.
+pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
+    let engines = Engines::build(file)?;
+    let carrier = Carrier::open(&file.node)?;
+    let changes = Arc::new(Changes::default());
+    let late = Duration::from_secs_f64(file.node.late_ms / 1e3);
+    let mut outlets = Vec::new();
+    for (index, patch) in file.patches.iter().enumerate() {
+        let state = PatchState::new(index, &patch.fields.name, &patch.scene.name, late, Arc::clone(&changes));
+        outlets.push(Outlet::open(&carrier, file, patch, Arc::new(state))?);
+    }
+    let places = match messages::places(&file.patches, now_ns())? {
+        Some(message) => {
+            let publisher = carrier.publisher(&topics::tf_static())?;
+            publisher.put(message)?;
+            Some(publisher)
+        }
+        None => None,
+    };
+    let reports = carrier.publisher(&topics::diagnostics())?;
+    let stop = Stop::default();
+    let stopping = stop.clone();
+    Interrupt::with(move || stopping.now())?;
+    let (patches, threads) = (file.patches.len(), file.threads());
+    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.addresses().join(", "));
+    let running = AtomicBool::new(true);
+    let begun = Instant::now();
+    if let Some(time) = measure {
+        outlets.iter().for_each(|outlet| outlet.state.measure());
+        let stop = stop.clone();
+        std::thread::spawn(move || {
+            std::thread::sleep(time);
+            stop.now();
+        });
+    }
+    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
+        .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
+        .collect();
+    let share = (threads as f64 / patches as f64).min(1.0);
+    std::thread::scope(|scope| {
+        let reporting = scope.spawn(|| report(&outlets, &changes, &reports, &running));
+        let workers: Vec<_> = (0..threads)
+            .map(|worker| {
+                let own: Vec<&Own> = all.iter().skip(worker).step_by(threads).collect();
+                let stop = &stop;
+                scope.spawn(move || work(stop, file, &own, share))
+            })
+            .collect();
+        let failed = workers.into_iter().filter_map(|worker| worker.join().err()).count();
+        running.store(false, Ordering::Release);
+        let reported = reporting.join().map_err(|_| anyhow!("the thread of the diagnostics has ended"));
+        reported.and_then(|done| done).and(if failed == 0 {
+            Ok(())
+        } else {
+            Err(anyhow!("{failed} workers have ended"))
+        })
+    })?;
+    let said = measure.map_or_else(String::new, |_| measured(file, &outlets, begun.elapsed()));
+    drop((outlets, places, reports));
+    carrier.close().map(|()| said)
+}
+
+/// A line per patch, then one of all.
+fn measured(file: &PatchFile, outlets: &[Outlet], time: Duration) -> String {
+    let (mut all, mut text) = (Measured::default(), String::new());
+    for (patch, outlet) in std::iter::zip(&file.patches, outlets) {
+        let own = outlet.state.measured();
+        all.add(own.clone());
+        text += &own.line(&patch.fields.name, time.as_secs_f64());
+    }
+    text + &all.line("all", time.as_secs_f64())
+}
+
+/// Answers the streams of a worker until they have ended.
+fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
+    let options =
+        StreamOptions { queue: file.node.queue, policy: Policy::Latest, live: true, layout: Stated::default() };
+    let member = |own: &&'a Own<'a>| {
+        let (patch, engine) = (own.patch, own.engine.engine());
+        let pace = match patch.fields.check_every {
+            Some(period) => CheckPace::Every(period),
+            // A core of its own, beside which there is time.
+            None if share >= 1.0 => CheckPace::Beside,
+            None => CheckPace::Never,
+        };
+        let faster = Faster::of_stream(&patch.scene, patch.engine, None);
+        let estimators = Estimators::new(engine, faster, pace, None, Clock::default()).with_share(share);
+        let source = Reopened::new(patch, Arc::clone(&own.outlet.state));
+        let input = (Box::new(source) as Box<dyn std::io::Read + Send>, patch.fields.source.clone());
+        Member { estimators, input, options, zero: own.outlet.zero.clone() }
+    };
+    let members: Vec<Member> = all.iter().map(member).collect();
+    let mut published: Vec<Option<Instant>> = vec![None; all.len()];
+    let ends = run_together(stop, members, &mut |index, outcome| {
+        let Own { patch, outlet, .. } = all[index];
+        let name = &patch.fields.name;
+        match outcome {
+            Outcome::Note(text) => say!("{name}: {text}"),
+            // Only the first one: a source may send nothing else. The diagnostics count them.
+            Outcome::Refusal(refusal) => {
+                if outlet.state.refused(refusal.error) {
+                    say!("{name}: line {}: {}", refusal.line, refusal.error);
+                }
+            }
+            Outcome::Answer(answer) => {
+                outlet.state.answer(answer);
+                if published[index].is_some_and(|before| before.elapsed() < outlet.period) {
+                    return Ok(());
+                }
+                published[index] = Some(Instant::now());
+                outlet.publish(answer).map_err(|error| Error::other(format!("{error:#}")))?;
+            }
+        }
+        Ok(())
+    });
+    for (own, end) in std::iter::zip(all, ends) {
+        let name = &own.patch.fields.name;
+        match end {
+            Ok(counts) => say!("{name}: {} results; {counts}", counts.answered),
+            Err(error) => {
+                say!("{name}: {error:#}");
+                own.outlet.state.ended(Some(format!("{error:#}")));
+            }
+        }
+    }
+}
+
+/// Publishes the states until the workers have ended: all once per second, those that change at once.
+fn report(outlets: &[Outlet], changes: &Changes, reports: &Publisher, running: &AtomicBool) -> Result<()> {
+    let mut due = Instant::now() + PERIOD;
+    loop {
+        let last = !running.load(Ordering::Acquire);
+        let changed = changes.within(due.saturating_duration_since(Instant::now()).min(PERIOD / 10));
+        let all = Instant::now() >= due || last;
+        let status = match all {
+            true => outlets.iter().map(|outlet| outlet.state.status(true)).collect::<Vec<_>>(),
+            false => changed.into_iter().map(|index| outlets[index].state.status(false)).collect(),
+        };
+        if all {
+            due += PERIOD;
+        }
+        if !status.is_empty() {
+            reports.put(messages::diagnostics(&DiagnosticArray { header: header("", now_ns()), status })?)?;
+        }
+        if last {
+            return Ok(());
+        }
+        Changes::gather();
+    }
+}

@@ -1,0 +1,405 @@
+//! The patch file: a node of ROS 2, and the sensors that it publishes.
+//!
+//! Fields, their defaults and ranges are in the guide's page `sim/guide/ros.md`. Paths are relative to the file.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{anyhow, bail, Context, Result};
+use dermis_golden::plain_words::plain;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
+use dermis_sim::engine::EngineName;
+use dermis_sim::stream::Source;
+use serde::Deserialize;
+
+/// Largest patch file in bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+/// Most patches of a file.
+const MOST_PATCHES: usize = 1024;
+/// Domains that ROS 2 has.
+const LAST_DOMAIN: u32 = 232;
+/// Address of the router of rmw_zenoh.
+const ROUTER: &str = "tcp/127.0.0.1:7447";
+/// Any port of the loopback.
+const LOOPBACK: &str = "tcp/127.0.0.1:0";
+
+/// What a file states of the node.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NodeFields {
+    /// Its name.
+    pub name: String,
+    /// Where its name and its topics are: `/` or `/hand`.
+    pub namespace: String,
+    /// Domain of ROS 2, 0 to 232.
+    pub domain: u32,
+    /// Addresses of routers and other nodes to connect to, as Zenoh writes them.
+    pub connect: Vec<String>,
+    /// Addresses to listen on.
+    pub listen: Vec<String>,
+    /// Most messages per second of a topic of a patch; every result if not stated.
+    pub rate_Hz: Option<f64>,
+    /// Results later than this after their frame count as late.
+    pub late_ms: f64,
+    /// Frames of a patch that may wait; the oldest one is dropped.
+    pub queue: usize,
+    /// Workers; if not stated as many as the computer has cores.
+    pub threads: Option<usize>,
+}
+
+impl Default for NodeFields {
+    fn default() -> NodeFields {
+        NodeFields {
+            name: "dermis".into(),
+            namespace: "/".into(),
+            domain: 0,
+            connect: vec![ROUTER.into()],
+            listen: vec![LOOPBACK.into()],
+            rate_Hz: None,
+            late_ms: 20.0,
+            queue: 2,
+            threads: None,
+        }
+    }
+}
+
+/// Where a patch is.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// The coordinate system in which the patch is placed.
+    #[serde(default = "base")]
+    pub parent: String,
+    /// Centre of the array in m.
+    #[serde(default)]
+    pub xyz_m: [f64; 3],
+    /// Rotation about the fixed x, then y, then z axis, in rad.
+    #[serde(default)]
+    pub rpy_rad: [f64; 3],
+}
+
+fn base() -> String {
+    "base_link".into()
+}
+
+impl Pose {
+    /// The rotation as a unit quaternion: x, y, z, w.
+    pub fn quaternion(&self) -> [f64; 4] {
+        let [(sr, cr), (sp, cp), (sy, cy)] = self.rpy_rad.map(|angle| (angle / 2.0).sin_cos());
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    }
+}
+
+/// What a file states of a patch.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PatchFields {
+    /// Its name, that of its topics.
+    pub name: String,
+    /// Built-in name or path of its scene.
+    pub scene: String,
+    /// Where its frames come from.
+    pub source: String,
+    /// Bit rate of a serial port, in bit/s.
+    pub baud: Option<u32>,
+    /// Whether a recording begins again at its end.
+    #[serde(default)]
+    pub repeat: bool,
+    /// Coordinate system of its messages; if not stated its name.
+    pub frame_id: Option<String>,
+    /// Where it is.
+    pub pose: Option<Pose>,
+    /// Name of the estimator; if not stated the best one that keeps up.
+    pub estimator: Option<String>,
+    /// Name of the engine.
+    #[serde(default = "golden")]
+    pub engine: String,
+    /// Every so many results is cross-checked, 0: none.
+    pub check_every: Option<u64>,
+    /// Whether the forces of the taxels are published.
+    #[serde(default)]
+    pub forces: bool,
+    /// Whether the stress of the taxels is published.
+    #[serde(default)]
+    pub stress: bool,
+}
+
+fn golden() -> String {
+    "golden".into()
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fields {
+    #[serde(default)]
+    node: NodeFields,
+    #[serde(default)]
+    patch: Vec<PatchFields>,
+}
+
+/// Where the frames of a patch come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Lines, as `dermis reconstruct --stream` takes them.
+    Lines(Source),
+    /// A recording, at its pace.
+    Recording(PathBuf),
+}
+
+/// A patch whose scene is loaded.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// What the file states.
+    pub fields: PatchFields,
+    /// Its scene, with the estimator that the file states.
+    pub scene: Scene,
+    /// Text of the scene's file.
+    pub text: String,
+    /// Built-in name or path of the scene, which scenes have in common.
+    pub path: String,
+    /// Where its frames come from.
+    pub origin: Origin,
+    /// What computes its forces.
+    pub engine: EngineName,
+    /// Coordinate system of its messages.
+    pub frame_id: String,
+}
+
+/// A patch file.
+#[derive(Clone, Debug)]
+pub struct PatchFile {
+    /// The node.
+    pub node: NodeFields,
+    /// Its patches, at least one.
+    pub patches: Vec<Patch>,
+}
+
+impl PatchFile {
+    /// Reads a file and the scenes that it names.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no patch file: with the file, the field, its value and what is allowed.
+    pub fn load(path: &Path) -> Result<PatchFile> {
+        let file = path.display().to_string();
+        let size = std::fs::metadata(path).with_context(|| file.clone())?.len();
+        if size > LARGEST_FILE {
+            bail!("{file}: has {size} bytes; at most {LARGEST_FILE} are read");
+        }
+        let text = std::fs::read_to_string(path).with_context(|| file.clone())?;
+        PatchFile::parse(&text, path.parent().unwrap_or(Path::new("."))).map_err(|error| anyhow!("{file}: {error:#}"))
+    }
+
+    /// The file with this text, with paths relative to `folder`; errors have no file's name.
+    pub(crate) fn parse(text: &str, folder: &Path) -> Result<PatchFile> {
+        let line = |at: usize| 1 + text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count();
+        let read = toml::Deserializer::parse(text).map_err(|error| {
+            let at = error.span().map_or(1, |span| line(span.start));
+            anyhow!("line {at}: {}", plain(error.message()))
+        })?;
+        let Fields { node, patch } = serde_path_to_error::deserialize(read).map_err(|error| {
+            let at = error.inner().span().map_or(1, |span| line(span.start));
+            match error.path().to_string().as_str() {
+                "." => anyhow!("line {at}: {}", plain(error.inner().message())),
+                path => anyhow!("line {at}, {path}: {}", plain(error.inner().message())),
+            }
+        })?;
+        node.check()?;
+        if patch.is_empty() || patch.len() > MOST_PATCHES {
+            return Err(wrong("patch", format!("{} patches", patch.len()), "1 to 1024 of [[patch]]"));
+        }
+        let load = |(index, own)| Patch::load(own, &format!("patch[{index}]"), folder);
+        let patches = patch.into_iter().enumerate().map(load).collect::<Result<Vec<Patch>>>()?;
+        unique(&patches, "name", |patch| Some(patch.fields.name.clone()))?;
+        unique(&patches, "frame_id", |patch| Some(patch.frame_id.clone()))?;
+        unique(&patches, "source", |patch| match &patch.origin {
+            Origin::Lines(_) => Some(patch.fields.source.clone()),
+            // Several patches may show the same one.
+            Origin::Recording(_) => None,
+        })?;
+        Ok(PatchFile { node, patches })
+    }
+
+    /// Number of workers.
+    pub fn threads(&self) -> usize {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.node.threads.unwrap_or_else(cores).min(self.patches.len())
+    }
+}
+
+impl NodeFields {
+    fn check(&self) -> Result<()> {
+        let NodeFields { name, namespace, domain, connect, listen, rate_Hz, late_ms, queue, threads } = self;
+        if !is_name(name) {
+            return Err(wrong("node.name", quoted(name), NAME));
+        }
+        if namespace != "/" && !namespace.strip_prefix('/').is_some_and(|path| path.split('/').all(is_name)) {
+            return Err(wrong(
+                "node.namespace",
+                quoted(namespace),
+                "\"/\" or names behind slashes, as \"/robot/hand\"",
+            ));
+        }
+        if *domain > LAST_DOMAIN {
+            return Err(wrong("node.domain", domain, "0 to 232"));
+        }
+        for (field, addresses) in [("node.connect", connect), ("node.listen", listen)] {
+            let is_address = |own: &&String| {
+                zenoh::config::EndPoint::from_str(own).is_ok_and(|own| own.protocol().as_str() == "tcp")
+            };
+            if let Some(own) = addresses.iter().find(|own| !is_address(own)) {
+                return Err(wrong(field, quoted(own), "a list of addresses as \"tcp/192.168.1.7:7447\""));
+            }
+        }
+        if let Some(rate) = rate_Hz.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
+            return Err(wrong("node.rate_Hz", rate, "a number above 0"));
+        }
+        if !(*late_ms > 0.0 && late_ms.is_finite()) {
+            return Err(wrong("node.late_ms", late_ms, "a number above 0"));
+        }
+        if !(1..=4096).contains(queue) {
+            return Err(wrong("node.queue", queue, "a whole number from 1 to 4096"));
+        }
+        if let Some(threads) = threads.filter(|threads| !(1..=256).contains(threads)) {
+            return Err(wrong("node.threads", threads, "a whole number from 1 to 256"));
+        }
+        Ok(())
+    }
+}
+
+impl Patch {
+    fn load(fields: PatchFields, at: &str, folder: &Path) -> Result<Patch> {
+        let field = |name: &str| format!("{at}.{name}");
+        if !is_name(&fields.name) {
+            return Err(wrong(&field("name"), quoted(&fields.name), NAME));
+        }
+        let frame_id = fields.frame_id.clone().unwrap_or_else(|| fields.name.clone());
+        let parent = fields.pose.as_ref().map(|pose| pose.parent.clone());
+        for (name, id) in [("frame_id", Some(frame_id.clone())), ("pose.parent", parent)] {
+            if let Some(id) = id.filter(|id| id.is_empty() || id.starts_with('/') || id.contains(char::is_whitespace)) {
+                return Err(wrong(&field(name), quoted(&id), "a name without spaces that begins with no slash"));
+            }
+        }
+        let numbers = fields.pose.iter().flat_map(|pose| pose.xyz_m.into_iter().chain(pose.rpy_rad));
+        if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
+            return Err(wrong(&field("pose"), number, "finite numbers"));
+        }
+        let builtin = Scene::builtin_names().contains(&fields.scene.as_str());
+        let path = if builtin { fields.scene.clone() } else { folder.join(&fields.scene).display().to_string() };
+        let text = Scene::text(&path).with_context(|| field("scene"))?;
+        let mut scene = Scene::parse(&text, &path).with_context(|| field("scene"))?;
+        if let Some(name) = &fields.estimator {
+            let names = EstimatorKind::NAMES;
+            let found = names.iter().find(|(own, _)| own == name);
+            let allowed = || names.map(|(name, _)| quoted(name)).join(", ");
+            let (_, kind) = found.ok_or_else(|| wrong(&field("estimator"), quoted(name), &allowed()))?;
+            scene = scene.estimated_by(*kind);
+        }
+        let engine = EngineName::software(&fields.engine).with_context(|| at.to_owned())?;
+        let origin = match Path::new(&fields.source).extension().is_some_and(|extension| extension == "mcap") {
+            true => Origin::Recording(folder.join(&fields.source)),
+            false => match fields.source.parse().map_err(|error: String| wrong(&field("source"), error, SOURCE))? {
+                Source::Path(path) => Origin::Lines(Source::Path(folder.join(path).display().to_string())),
+                other => Origin::Lines(other),
+            },
+        };
+        Ok(Patch { fields, scene, text, path, origin, engine, frame_id })
+    }
+}
+
+const NAME: &str = "letters, digits and underscores, and begins with no digit";
+const SOURCE: &str = "\"-\", \"udp://HOST:PORT\", \"serial:PORT\", or a path";
+
+/// Whether ROS 2 takes it as a name.
+fn is_name(text: &str) -> bool {
+    let all = text.chars().all(|own| own.is_ascii_alphanumeric() || own == '_');
+    all && text.starts_with(|own: char| own.is_ascii_alphabetic() || own == '_')
+}
+
+fn quoted(text: &str) -> String {
+    format!("{text:?}")
+}
+
+fn wrong(field: &str, value: impl Display, allowed: &str) -> anyhow::Error {
+    anyhow!("{field} = {value} is not allowed; it must be {allowed}")
+}
+
+/// Checks that no two patches have the same value of a field.
+fn unique(patches: &[Patch], field: &str, of: impl Fn(&Patch) -> Option<String>) -> Result<()> {
+    let mut seen = BTreeMap::new();
+    for (index, patch) in patches.iter().enumerate() {
+        let Some(value) = of(patch) else { continue };
+        if let Some(before) = seen.insert(value.clone(), index) {
+            let allowed = format!("another one than that of patch[{before}]");
+            return Err(wrong(&format!("patch[{index}].{field}"), quoted(&value), &allowed));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PATCH: &str = "[[patch]]\nname = \"thumb\"\nscene = \"sensor-1\"\nsource = \"udp://0.0.0.0:9000\"\n";
+
+    #[test]
+    fn what_a_file_leaves_out_has_defaults() {
+        let PatchFile { node, patches } = PatchFile::parse(PATCH, Path::new("folder")).unwrap();
+        assert_eq!((node.name.as_str(), node.namespace.as_str(), node.domain, node.queue), ("dermis", "/", 0, 2));
+        assert_eq!((node.connect, node.listen), (vec![ROUTER.to_owned()], vec![LOOPBACK.to_owned()]));
+        let patch = &patches[0];
+        assert_eq!((patch.frame_id.as_str(), patch.engine), ("thumb", EngineName::Golden));
+        assert_eq!(patch.origin, Origin::Lines(Source::Udp("0.0.0.0:9000".into())));
+        assert_eq!(patch.text, Scene::text("sensor-1").unwrap());
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_file() {
+        let of = |source: &str| {
+            let text = PATCH.replace("udp://0.0.0.0:9000", source);
+            PatchFile::parse(&text, Path::new("folder")).unwrap().patches.remove(0).origin
+        };
+        assert_eq!(of("press.mcap"), Origin::Recording("folder/press.mcap".into()));
+        assert_eq!(of("log.csv"), Origin::Lines(Source::Path("folder/log.csv".into())));
+        assert_eq!(of("serial:/dev/ttyUSB0"), Origin::Lines(Source::Path("/dev/ttyUSB0".into())));
+        assert_eq!(of("-"), Origin::Lines(Source::StandardInput));
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_with_line_field_and_value() {
+        for (text, wanted) in [
+            ("[node]\nport = 3\n", "line 2, node.port: unknown field port"),
+            ("[node]\nlate_ms = nan\n", "node.late_ms = NaN is not allowed; it must be a number above 0"),
+            ("[node]\nnamespace = \"hand\"\n", "node.namespace = \"hand\" is not allowed"),
+            ("[node]\nconnect = [\"here\"]\n", "node.connect = \"here\" is not allowed"),
+            ("[node]\nqueue = -1\n", "line 2, node.queue"),
+        ] {
+            let error = PatchFile::parse(&(text.to_owned() + PATCH), Path::new("")).unwrap_err().to_string();
+            assert!(error.starts_with(wanted), "{error}");
+        }
+        let absent = PatchFile::load(Path::new("absent.toml")).unwrap_err();
+        assert!(format!("{absent:#}").starts_with("absent.toml: "), "{absent:#}");
+    }
+
+    #[test]
+    fn angles_are_about_fixed_axes() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let turned = |rpy_rad| Pose { parent: base(), xyz_m: [0.0; 3], rpy_rad }.quaternion();
+        let right = std::f64::consts::FRAC_PI_2;
+        for (rpy, wanted) in [
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]),
+            ([right, 0.0, 0.0], [half, 0.0, 0.0, half]),
+            ([0.0, right, 0.0], [0.0, half, 0.0, half]),
+            ([right, 0.0, right], [0.5, 0.5, 0.5, 0.5]),
+        ] {
+            assert!(turned(rpy).iter().zip(wanted).all(|(own, wanted)| (own - wanted).abs() < 1e-12), "{rpy:?}");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+"""Patches that stall, flood, send rubbish or fail harm no other, and what is wrong in a patch file is said."""
+
+import threading
+from pathlib import Path
+
+from conftest import COLS, ROWS, feed, line, node, run, wait
+from rosbags.typesys import Stores, get_typestore
+from test_topics import STATE, TYPES, Raw, key, session
+
+PATCHES = "".join(
+    f'[[patch]]\nname = "{name}"\nscene = "scene.toml"\nsource = "{source}"\ncheck_every = 0\n'
+    for name, source in [
+        ("good", "good.pipe"),
+        ("flood", "flood.pipe"),
+        ("rubbish", "rubbish.pipe"),
+        ("stalled", "stalled.pipe"),
+        ("absent", "serial:no-such-port"),
+        ("again", "again.pipe"),
+    ]
+)
+FLOOD = 10**6
+FRAMES = 300
+
+
+def values(status: object) -> dict[str, str]:
+    return {pair.key: pair.value for pair in status.values}
+
+
+def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with node(tmp_path, PATCHES, "domain = 7\nqueue = 8") as own:
+        zenoh_session = session(own)
+        wrench = {name: Raw(zenoh_session, key(store, f"/{name}/wrench", TYPES["wrench"])) for name in ("good", "flood", "again")}
+        state = Raw(zenoh_session, key(store, "/diagnostics", STATE))
+        feed(tmp_path / "good.pipe", [line(0)] * 20, 50.0)
+        wait(lambda: wrench["good"].samples)
+        before = len(wrench["good"].samples)
+
+        def flood() -> None:
+            with (tmp_path / "flood.pipe").open("w") as file:
+                text = (",".join(["0"] * ROWS * COLS) + "\n") * 100
+                for _ in range(FLOOD // 100):
+                    file.write(text)
+
+        def rubbish() -> None:
+            with (tmp_path / "rubbish.pipe").open("wb") as file:
+                noise = bytes((7 * k * k + k // 3) % 256 for k in range(1 << 16))
+                for _ in range(100):
+                    file.write(noise)
+                file.write(b"1," * (1 << 20))
+
+        def stall() -> None:
+            with (tmp_path / "stalled.pipe").open("w") as file:
+                file.write(line(0)[:40])
+                file.flush()
+                done.wait()
+
+        done = threading.Event()
+        others = [threading.Thread(target=one, daemon=True) for one in (flood, rubbish, stall)]
+        for one in others:
+            one.start()
+        feed(tmp_path / "good.pipe", [line(number) for number in range(FRAMES)], 50.0, lambda: len(wrench["good"].samples), 4)
+        wait(lambda: len(wrench["good"].samples) - before >= FRAMES)
+        assert len(wrench["good"].samples) - before == FRAMES
+        others[0].join(120.0)
+        assert not others[0].is_alive() and wrench["flood"].samples
+        # A source that ends is opened again, and the patch goes on.
+        for _ in range(3):
+            feed(tmp_path / "again.pipe", [line(2)] * 10, 100.0)
+        wait(lambda: len(wrench["again"].samples) >= 25)
+        done.set()
+
+        def newest() -> dict[str, object]:
+            array = store.deserialize_cdr(state.samples[-1].payload.to_bytes(), STATE)
+            return {one.name.removeprefix("dermis: "): one for one in array.status}
+
+        wait(lambda: len(newest()) == 6)
+        found = newest()
+        flooded = values(found["flood"])
+        assert int(flooded["results"]) + int(flooded["dropped"]) <= FLOOD and int(flooded["dropped"]) > FLOOD // 2
+        assert int(values(found["rubbish"])["refused"]) > 100 and "results" in values(found["rubbish"])
+        assert found["absent"].level == 2 and "no-such-port" in found["absent"].message
+        assert values(found["good"])["dropped"] == "0" and int(values(found["again"])["source opened"]) >= 3
+        zenoh_session.close()
+    assert any("absent" in said and "tried again" in said for said in own.said)
+
+
+def refused(tmp_path: Path, text: str) -> str:
+    (tmp_path / "scene.toml").write_text("[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n")
+    path = tmp_path / "hand.toml"
+    path.write_text(text)
+    error = run("DERMIS_ROS", str(path), "--check", code=2).stderr
+    assert error.startswith(f"error: {path}: "), error
+    return error.removeprefix(f"error: {path}: ").strip()
+
+
+def test_what_is_wrong_in_a_patch_file_is_said_with_field_and_value(tmp_path: Path) -> None:
+    patch = '[[patch]]\nname = "a"\nscene = "scene.toml"\nsource = "-"\n'
+    cases = {
+        "": "patch = 0 patches is not allowed; it must be 1 to 1024 of [[patch]]",
+        "[node": "line 1: ",
+        '[node]\nnmae = "x"\n' + patch: "line 2, node.nmae: unknown field nmae; there are name, namespace",
+        "[node]\ndomain = 300\n" + patch: "node.domain = 300 is not allowed; it must be 0 to 232",
+        "[node]\nrate_Hz = 0\n" + patch: "node.rate_Hz = 0 is not allowed; it must be a number above 0",
+        '[node]\nlisten = ["udp/1.2.3.4:5"]\n' + patch: 'node.listen = "udp/1.2.3.4:5" is not allowed; it must be a list of',
+        patch.replace('"a"', '"9a"'): 'patch[0].name = "9a" is not allowed; it must be letters, digits and underscores',
+        patch + patch: 'patch[1].name = "a" is not allowed; it must be another one than that of patch[0]',
+        patch + patch.replace('"a"', '"b"'): 'patch[1].source = "-" is not allowed; it must be another one than',
+        patch.replace("scene.toml", "none.toml"): "patch[0].scene: ",
+        patch + 'estimator = "best"\n': 'patch[0].estimator = "best" is not allowed; it must be "search", "evidence"',
+        patch + 'engine = "rtl"\n': 'patch[0]: engine = "rtl" is not allowed; it must be "golden" or "fixed"',
+        patch + 'pose = { xyz_m = [0, 1] }\n': "patch[0].pose.xyz_m",
+        patch + "pose = { rpy_rad = [0, nan, 0] }\n": "patch[0].pose = NaN is not allowed; it must be finite numbers",
+        patch.replace('"-"', '"udp://9000"'): "patch[0].source = ",
+        '[[patch]]\nname = "a"\nsource = "-"\n': "scene is missing",
+    }
+    for text, wanted in cases.items():
+        assert wanted in refused(tmp_path, text), (text, refused(tmp_path, text))
+    assert run("DERMIS_ROS", str(tmp_path / "none.toml"), code=2).stderr.startswith(f"error: {tmp_path / 'none.toml'}: ")
+
+
+def test_an_address_that_is_taken_is_said(tmp_path: Path) -> None:
+    with node(tmp_path, '[[patch]]\nname = "a"\nscene = "scene.toml"\nsource = "a.pipe"\n') as first:
+        error = run("DERMIS_ROS", str(first.file), code=2).stderr
+        assert "node.listen" in error and str(first.port) in error
+
+
+def test_a_recording_is_published_at_its_pace_and_ends_the_node(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    run("DERMIS", "generate", "eight-by-eight", "--press", "hold", "--rate", "10", "--duration", "2", "--out", str(tmp_path / "press.mcap"))
+    file = tmp_path / "hand.toml"
+    file.write_text('[node]\nconnect = []\n[[patch]]\nname = "a"\nscene = "eight-by-eight"\nsource = "press.mcap"\nestimator = "search"\n')
+    assert not scene.exists()
+    said = run("DERMIS_ROS", str(file)).stderr
+    assert "a: 21 results; 0 lines refused, 0 dropped" in said, said
+    file.write_text(file.read_text().replace("press.mcap", "none.mcap"))
+    said = run("DERMIS_ROS", str(file)).stderr
+    assert "none.mcap: No such file" in said, said
+

@@ -1,0 +1,275 @@
+//! Several streams that one thread answers, in turn: each has a thread that reads, a queue, and what its frames so far show.
+//!
+//! ```text
+//! source 0 ── queue ─┐ bell
+//! source 1 ── queue ─┼──────── oldest line of each queue that has rung ── answer ── outcome of stream k
+//! source 2 ── queue ─┘
+//! ```
+//! A stream that has many lines is answered once, then the others that have one; what its queue does not hold meanwhile waits or is
+//! dropped, by its policy, and harms no other stream.
+
+use std::io::{Error as IoError, ErrorKind, Read, Result as IoResult};
+use std::sync::mpsc::channel;
+
+use anyhow::{Error, Result};
+
+use super::answers::{Counts, Outcome, Output, Stream, StreamOptions};
+use super::estimators::Estimators;
+use super::queue::{Bell, Policy, Taken};
+use super::reader::Lines;
+use super::stop::Stop;
+use super::zero::ZeroRequest;
+
+/// A stream that is answered together with others.
+pub struct Member<'a> {
+    /// What computes the results.
+    pub estimators: Estimators<'a>,
+    /// The source of its lines, and its name in errors.
+    pub input: (Box<dyn Read + Send>, String),
+    /// How it is read.
+    pub options: StreamOptions,
+    /// Asks for a new zero.
+    pub zero: ZeroRequest,
+}
+
+/// What takes the outcomes of all streams, each in the order of its lines, with the number of the stream; an error ends that stream,
+/// [`ErrorKind::BrokenPipe`] without being one.
+pub type Outputs<'a> = dyn FnMut(usize, &Outcome) -> IoResult<()> + 'a;
+
+/// Answers every line of `input`, called `name` in errors, until it ends or `output` is closed.
+///
+/// # Errors
+/// Input or output that fails; a bad line is none.
+pub fn run(
+    estimators: Estimators,
+    input: (Box<dyn Read + Send>, &str),
+    options: StreamOptions,
+    output: &mut Output,
+) -> Result<Counts> {
+    run_until(&Stop::default(), estimators, input, options, output)
+}
+
+/// As [`run`], or until `stop`.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_until(
+    stop: &Stop,
+    estimators: Estimators,
+    (input, name): (Box<dyn Read + Send>, &str),
+    options: StreamOptions,
+    output: &mut Output,
+) -> Result<Counts> {
+    let own = Member { estimators, input: (input, name.to_owned()), options, zero: ZeroRequest::default() };
+    let named = |error: IoError| match error.kind() {
+        ErrorKind::BrokenPipe => error,
+        kind => IoError::new(kind, format!("standard output: {error}")),
+    };
+    let mut all = run_together(stop, vec![own], &mut |_, outcome| output(outcome).map_err(named));
+    // One stream has one end.
+    all.pop().unwrap_or_else(|| Ok(Counts::default()))
+}
+
+/// A stream and its lines.
+struct Running<'a> {
+    stream: Stream<'a>,
+    lines: Lines,
+    options: StreamOptions,
+}
+
+impl Running<'_> {
+    /// Answers the oldest line.
+    fn next(&mut self, output: &mut Output) -> Next {
+        let Taken { item, full, ended } = self.lines.take();
+        self.stream.dropped(if self.options.policy == Policy::Latest { full } else { 0 });
+        let Some(received) = item else { return if ended { Next::Ended } else { Next::More } };
+        match self.stream.answer(&received, if self.options.live { full } else { 0 }, output) {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Next::Closed,
+            Err(error) => Next::Failed(error.into()),
+            Ok(()) => Next::More,
+        }
+    }
+
+    /// What it had until its lines ended, its output was closed or failed.
+    fn end(self, how: Next) -> Result<Counts> {
+        match how {
+            Next::Ended => self.lines.ended()?,
+            // What reads the lines may never return.
+            Next::Closed | Next::More => self.lines.close(),
+            Next::Failed(error) => {
+                self.lines.close();
+                return Err(error);
+            }
+        }
+        Ok(self.stream.counts())
+    }
+}
+
+/// Answers the lines of several streams in this thread until all have ended, or `stop`; returns what each had.
+pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> Vec<Result<Counts>> {
+    let (ring, rung) = channel();
+    let mut running = Vec::new();
+    let mut done: Vec<Option<Result<Counts>>> = Vec::new();
+    for (index, Member { estimators, input, options, zero }) in members.into_iter().enumerate() {
+        let (bell, clock) = (Bell::new(index, ring.clone()), estimators.clock().clone());
+        let lines = Lines::begin(input, (options.queue, options.policy), clock, bell, stop);
+        let stream = Stream::new(estimators, options.layout, zero);
+        let said = stream.choice(&mut |outcome| output(index, outcome));
+        done.push(said.err().map(|error| Err(error.into())));
+        running.push(Some(Running { stream, lines, options }));
+    }
+    while done.iter().any(Option::is_none) && !stop.stopped() {
+        let Ok(index) = rung.recv() else { break };
+        let Some(own) = running[index].as_mut().filter(|_| done[index].is_none() && !stop.stopped()) else { continue };
+        match own.next(&mut |outcome| output(index, outcome)) {
+            Next::More => (),
+            how => done[index] = running[index].take().map(|own| own.end(how)),
+        }
+    }
+    let all = std::iter::zip(running, done);
+    let stopped = |own: Option<Running>| own.map_or_else(|| Ok(Counts::default()), |own| own.end(Next::More));
+    all.map(|(own, done)| done.unwrap_or_else(|| stopped(own))).collect()
+}
+
+/// What comes of a line.
+enum Next {
+    /// There may be further lines.
+    More,
+    /// There is none.
+    Ended,
+    /// No one takes the outcomes.
+    Closed,
+    /// An outcome cannot be written.
+    Failed(Error),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::data::frame::Frame;
+    use dermis_golden::data::text::Stated;
+    use dermis_golden::engine::CheckPace;
+    use dermis_golden::estimate::float::Golden;
+    use dermis_golden::spec::scene::{EstimatorKind, Scene};
+    use std::io::Cursor;
+
+    const OPTIONS: StreamOptions = StreamOptions {
+        queue: 2,
+        policy: Policy::All,
+        live: false,
+        layout: Stated { columns: None, time_column: None, skip_rows: 0, form: None },
+    };
+
+    /// Forces of the results and number of refused lines, of each stream.
+    type Seen = Vec<(Vec<[f64; 3]>, u64)>;
+
+    /// What streams of these inputs give together, and how each ends.
+    fn together(engine: &Golden, inputs: Vec<Box<dyn Read + Send>>) -> (Seen, Vec<Result<Counts>>) {
+        let mut seen: Seen = vec![Default::default(); inputs.len()];
+        let member = |input| Member {
+            estimators: Estimators::only(engine, CheckPace::Never),
+            input: (input, "memory".to_owned()),
+            options: OPTIONS,
+            zero: ZeroRequest::default(),
+        };
+        let members = inputs.into_iter().map(member).collect();
+        let ends = run_together(&Stop::default(), members, &mut |index, outcome| {
+            match outcome {
+                Outcome::Answer(answer) => seen[index].0.push(answer.result.resultant_N),
+                Outcome::Refusal(_) => seen[index].1 += 1,
+                Outcome::Note(_) => (),
+            }
+            Ok(())
+        });
+        (seen, ends)
+    }
+
+    fn lines(frames: &[Frame]) -> String {
+        let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+        frames.iter().map(line).collect()
+    }
+
+    fn memory(text: String) -> Box<dyn Read + Send> {
+        Box::new(Cursor::new(text.into_bytes()))
+    }
+
+    /// Fails after its lines.
+    struct Failing(Cursor<Vec<u8>>);
+
+    impl Read for Failing {
+        fn read(&mut self, buffer: &mut [u8]) -> IoResult<usize> {
+            match self.0.read(buffer)? {
+                0 => Err(IoError::other("unplugged")),
+                bytes => Ok(bytes),
+            }
+        }
+    }
+
+    #[test]
+    fn each_stream_has_its_own_results_and_its_own_end() {
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, frames) = (Golden::new(&scene).unwrap(), Frame::shipped(&scene));
+        let alone = |frames: &[Frame]| together(&engine, vec![memory(lines(frames))]).0.remove(0).0;
+        let failing = Failing(Cursor::new(lines(&frames[..1]).into_bytes()));
+        let rubbish = memory("1,2\n".repeat(1000));
+        let inputs = vec![
+            memory(lines(&frames)),
+            memory(lines(&frames[1..])),
+            rubbish,
+            Box::new(failing),
+            memory(String::new()),
+        ];
+        let (seen, ends) = together(&engine, inputs);
+        assert_eq!(seen[0], (alone(&frames), 0));
+        assert_eq!(seen[1], (alone(&frames[1..]), 0));
+        assert_eq!(seen[2], (vec![], 1000));
+        assert_eq!(seen[3].0, alone(&frames[..1]));
+        let answered: Vec<Option<u64>> =
+            ends.iter().map(|end| end.as_ref().ok().map(|counts| counts.answered)).collect();
+        let all = frames.len() as u64;
+        assert_eq!(answered, [Some(all), Some(all - 1), Some(0), None, Some(0)]);
+        assert_eq!(ends[3].as_ref().unwrap_err().to_string(), "memory: unplugged");
+    }
+
+    /// The same line without end.
+    struct Flood(Vec<u8>, usize);
+
+    impl Read for Flood {
+        fn read(&mut self, buffer: &mut [u8]) -> IoResult<usize> {
+            let bytes = (&self.0[self.1..]).read(buffer)?;
+            self.1 = (self.1 + bytes) % self.0.len();
+            Ok(bytes)
+        }
+    }
+
+    /// A stream that always has lines is answered in turn: between the results of the other one there is a bounded number of its own.
+    #[test]
+    fn a_flood_is_answered_in_turn() {
+        const WANTED: usize = 50;
+        let scene = Scene::builtin("eight-by-eight").unwrap().estimated_by(EstimatorKind::Search);
+        let (engine, line) = (Golden::new(&scene).unwrap(), lines(&Frame::shipped(&scene)[..1]));
+        let member = |input, queue, policy| Member {
+            estimators: Estimators::only(&engine, CheckPace::Never),
+            input: (input, "memory".to_owned()),
+            options: StreamOptions { queue, policy, live: true, ..OPTIONS },
+            zero: ZeroRequest::default(),
+        };
+        let flood: Box<dyn Read + Send> = Box::new(Flood(line.clone().into_bytes(), 0));
+        // All lines of the other one wait at once.
+        let others = member(memory(line.repeat(WANTED)), WANTED, Policy::All);
+        let (mut order, stop) = (Vec::new(), Stop::default());
+        let ends = run_together(&stop, vec![member(flood, 1, Policy::Latest), others], &mut |index, outcome| {
+            if let Outcome::Answer(_) = outcome {
+                order.push(index);
+            }
+            if order.iter().filter(|own| **own == 1).count() == WANTED {
+                stop.now();
+            }
+            Ok(())
+        });
+        let [first, last] = [order.iter().position(|own| *own == 1), order.iter().rposition(|own| *own == 1)];
+        let flooded = order[first.unwrap()..last.unwrap()].iter().filter(|own| **own == 0).count();
+        assert!((WANTED / 10..=4 * WANTED).contains(&flooded), "{flooded} results of the flood between {WANTED}");
+        assert_eq!(ends[1].as_ref().unwrap().answered, WANTED as u64);
+    }
+}
