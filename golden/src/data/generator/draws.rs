@@ -353,7 +353,7 @@ mod tests {
             let contacts = draws.contacts(5).unwrap();
             let drawn_pieces = pieces(0, &contacts[0]).unwrap();
             let cells = super::super::cells::forces(&sensor, &drawn_pieces);
-            let body = super::super::stress::Body::HalfSpace { h: 3.0 };
+            let body = crate::physics::body::Body::HalfSpace { h: 3.0 };
             let taxels = [[0.0, 0.0], [2.05, -3.05], [-6.0, 1.0]];
             let wanted = taxels.map(|taxel| body.stress_MPa(taxel, &drawn_pieces));
             let peak = wanted.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
