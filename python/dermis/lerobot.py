@@ -25,7 +25,6 @@ from ._dermis import FLAGS, Frame, InputError, Reconstruction, Scene
 
 __all__ = ["export"]
 
-_Resampling = Literal["newest", "mean"]
 _Columns = dict[str, NDArray[Any]]
 
 _VERSION = "v3.0"
@@ -57,7 +56,7 @@ def export(
     *,
     fps: int = 30,
     task: str = "touch",
-    resampling: _Resampling = "newest",
+    resampling: Literal["newest", "mean"] = "newest",
     engine: Literal["golden", "fixed"] = "golden",
     rate_hz: float | None = None,
     start_ns: Sequence[int] | None = None,
@@ -145,7 +144,7 @@ def _wrench(found: Reconstruction) -> NDArray[np.float64]:
     return np.concatenate([found.resultant_N, moment])
 
 
-def _resampled(results: list[_Result], name: str, fps: int, start_ns: int | None, resampling: _Resampling) -> _Columns:
+def _resampled(results: list[_Result], name: str, fps: int, start_ns: int | None, resampling: str) -> _Columns:
     """The features of an episode at every tick."""
     times = np.array([result.time_ns for result in results])
     start = int(times[0]) if start_ns is None else start_ns
