@@ -99,6 +99,7 @@ ros: setup ## build dermis-ros, lint it, and test it against other programs that
 	@echo '== ros'
 	$(CARGO) clippy --locked --package dermis-ros --all-targets -- -D warnings
 	$(CARGO) build --locked --quiet --bin dermis
+	$(CARGO) build --locked --quiet --package dermis-ros
 	$(CARGO) test --locked --package dermis-ros
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --package dermis-ros --no-deps --document-private-items
 	python3 -m venv --clear $(BUILD)/ros

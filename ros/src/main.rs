@@ -8,13 +8,13 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`patches`] | the file that lists the patches |
-//! | [`source`] | lines of a patch, from a source that is opened again when it fails |
-//! | [`topics`] | names, types and qualities of the topics |
-//! | [`carrier`] | Zenoh, with the names that the middleware `rmw_zenoh` of ROS 2 has |
-//! | [`messages`] | results as messages |
-//! | [`diagnostics`] | what is known of each patch |
-//! | [`node`] | the workers, and what they publish |
+//! | `patches` | the file that lists the patches |
+//! | `source` | lines of a patch, from a source that is opened again when it fails |
+//! | `topics` | names, types and qualities of the topics |
+//! | `carrier` | Zenoh, with the names that the middleware `rmw_zenoh` of ROS 2 has |
+//! | `messages` | results as messages |
+//! | `diagnostics` | what is known of each patch |
+//! | `node` | the workers, and what they publish |
 // Field names end in their SI unit: `rate_Hz`.
 #![allow(non_snake_case)]
 #![deny(clippy::print_stderr, clippy::print_stdout)]

@@ -2,6 +2,10 @@
 //!
 //! Fields, their defaults and ranges are in the guide's page `sim/guide/ros.md`. Paths are relative to the file.
 
+mod fields;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -12,7 +16,10 @@ use dermis_golden::plain_words::plain;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
 use dermis_sim::stream::Source;
-use serde::Deserialize;
+
+pub use fields::{NodeFields, PatchFields, Pose};
+
+use fields::Fields;
 
 /// Largest patch file in bytes.
 const LARGEST_FILE: u64 = 1 << 20;
@@ -20,129 +27,6 @@ const LARGEST_FILE: u64 = 1 << 20;
 const MOST_PATCHES: usize = 1024;
 /// Domains that ROS 2 has.
 const LAST_DOMAIN: u32 = 232;
-/// Address of the router of rmw_zenoh.
-const ROUTER: &str = "tcp/127.0.0.1:7447";
-/// Any port of the loopback.
-const LOOPBACK: &str = "tcp/127.0.0.1:0";
-
-/// What a file states of the node.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct NodeFields {
-    /// Its name.
-    pub name: String,
-    /// Where its name and its topics are: `/` or `/hand`.
-    pub namespace: String,
-    /// Domain of ROS 2, 0 to 232.
-    pub domain: u32,
-    /// Addresses of routers and other nodes to connect to, as Zenoh writes them.
-    pub connect: Vec<String>,
-    /// Addresses to listen on.
-    pub listen: Vec<String>,
-    /// Most messages per second of a topic of a patch; every result if not stated.
-    pub rate_Hz: Option<f64>,
-    /// Results later than this after their frame count as late.
-    pub late_ms: f64,
-    /// Frames of a patch that may wait; the oldest one is dropped.
-    pub queue: usize,
-    /// Workers; if not stated as many as the computer has cores.
-    pub threads: Option<usize>,
-}
-
-impl Default for NodeFields {
-    fn default() -> NodeFields {
-        NodeFields {
-            name: "dermis".into(),
-            namespace: "/".into(),
-            domain: 0,
-            connect: vec![ROUTER.into()],
-            listen: vec![LOOPBACK.into()],
-            rate_Hz: None,
-            late_ms: 20.0,
-            queue: 2,
-            threads: None,
-        }
-    }
-}
-
-/// Where a patch is.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Pose {
-    /// The coordinate system in which the patch is placed.
-    #[serde(default = "base")]
-    pub parent: String,
-    /// Centre of the array in m.
-    #[serde(default)]
-    pub xyz_m: [f64; 3],
-    /// Rotation about the fixed x, then y, then z axis, in rad.
-    #[serde(default)]
-    pub rpy_rad: [f64; 3],
-}
-
-fn base() -> String {
-    "base_link".into()
-}
-
-impl Pose {
-    /// The rotation as a unit quaternion: x, y, z, w.
-    pub fn quaternion(&self) -> [f64; 4] {
-        let [(sr, cr), (sp, cp), (sy, cy)] = self.rpy_rad.map(|angle| (angle / 2.0).sin_cos());
-        [
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        ]
-    }
-}
-
-/// What a file states of a patch.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PatchFields {
-    /// Its name, that of its topics.
-    pub name: String,
-    /// Built-in name or path of its scene.
-    pub scene: String,
-    /// Where its frames come from.
-    pub source: String,
-    /// Bit rate of a serial port, in bit/s.
-    pub baud: Option<u32>,
-    /// Whether a recording begins again at its end.
-    #[serde(default)]
-    pub repeat: bool,
-    /// Coordinate system of its messages; if not stated its name.
-    pub frame_id: Option<String>,
-    /// Where it is.
-    pub pose: Option<Pose>,
-    /// Name of the estimator; if not stated the best one that keeps up.
-    pub estimator: Option<String>,
-    /// Name of the engine.
-    #[serde(default = "golden")]
-    pub engine: String,
-    /// Every so many results is cross-checked, 0: none.
-    pub check_every: Option<u64>,
-    /// Whether the forces of the taxels are published.
-    #[serde(default)]
-    pub forces: bool,
-    /// Whether the stress of the taxels is published.
-    #[serde(default)]
-    pub stress: bool,
-}
-
-fn golden() -> String {
-    "golden".into()
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Fields {
-    #[serde(default)]
-    node: NodeFields,
-    #[serde(default)]
-    patch: Vec<PatchFields>,
-}
 
 /// Where the frames of a patch come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -341,65 +225,4 @@ fn unique(patches: &[Patch], field: &str, of: impl Fn(&Patch) -> Option<String>)
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PATCH: &str = "[[patch]]\nname = \"thumb\"\nscene = \"sensor-1\"\nsource = \"udp://0.0.0.0:9000\"\n";
-
-    #[test]
-    fn what_a_file_leaves_out_has_defaults() {
-        let PatchFile { node, patches } = PatchFile::parse(PATCH, Path::new("folder")).unwrap();
-        assert_eq!((node.name.as_str(), node.namespace.as_str(), node.domain, node.queue), ("dermis", "/", 0, 2));
-        assert_eq!((node.connect, node.listen), (vec![ROUTER.to_owned()], vec![LOOPBACK.to_owned()]));
-        let patch = &patches[0];
-        assert_eq!((patch.frame_id.as_str(), patch.engine), ("thumb", EngineName::Golden));
-        assert_eq!(patch.origin, Origin::Lines(Source::Udp("0.0.0.0:9000".into())));
-        assert_eq!(patch.text, Scene::text("sensor-1").unwrap());
-    }
-
-    #[test]
-    fn paths_are_relative_to_the_file() {
-        let of = |source: &str| {
-            let text = PATCH.replace("udp://0.0.0.0:9000", source);
-            PatchFile::parse(&text, Path::new("folder")).unwrap().patches.remove(0).origin
-        };
-        assert_eq!(of("press.mcap"), Origin::Recording("folder/press.mcap".into()));
-        assert_eq!(of("log.csv"), Origin::Lines(Source::Path("folder/log.csv".into())));
-        assert_eq!(of("serial:/dev/ttyUSB0"), Origin::Lines(Source::Path("/dev/ttyUSB0".into())));
-        assert_eq!(of("-"), Origin::Lines(Source::StandardInput));
-    }
-
-    #[test]
-    fn a_wrong_file_is_refused_with_line_field_and_value() {
-        for (text, wanted) in [
-            ("[node]\nport = 3\n", "line 2, node.port: unknown field port"),
-            ("[node]\nlate_ms = nan\n", "node.late_ms = NaN is not allowed; it must be a number above 0"),
-            ("[node]\nnamespace = \"hand\"\n", "node.namespace = \"hand\" is not allowed"),
-            ("[node]\nconnect = [\"here\"]\n", "node.connect = \"here\" is not allowed"),
-            ("[node]\nqueue = -1\n", "line 2, node.queue"),
-        ] {
-            let error = PatchFile::parse(&(text.to_owned() + PATCH), Path::new("")).unwrap_err().to_string();
-            assert!(error.starts_with(wanted), "{error}");
-        }
-        let absent = PatchFile::load(Path::new("absent.toml")).unwrap_err();
-        assert!(format!("{absent:#}").starts_with("absent.toml: "), "{absent:#}");
-    }
-
-    #[test]
-    fn angles_are_about_fixed_axes() {
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let turned = |rpy_rad| Pose { parent: base(), xyz_m: [0.0; 3], rpy_rad }.quaternion();
-        let right = std::f64::consts::FRAC_PI_2;
-        for (rpy, wanted) in [
-            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]),
-            ([right, 0.0, 0.0], [half, 0.0, 0.0, half]),
-            ([0.0, right, 0.0], [0.0, half, 0.0, half]),
-            ([right, 0.0, right], [0.5, 0.5, 0.5, 0.5]),
-        ] {
-            assert!(turned(rpy).iter().zip(wanted).all(|(own, wanted)| (own - wanted).abs() < 1e-12), "{rpy:?}");
-        }
-    }
 }

@@ -65,17 +65,23 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
         others[0].join(120.0)
         assert not others[0].is_alive() and wrench["flood"].samples
         # A source that ends is opened again, and the patch goes on.
-        for _ in range(3):
-            feed(tmp_path / "again.pipe", [line(2)] * 10, 100.0)
+        for number in range(1, 4):
+            feed(tmp_path / "again.pipe", [line(2)] * 10, 20.0)
+            wait(lambda number=number: sum("again: the source has ended" in said for said in own.said) == number)
         wait(lambda: len(wrench["again"].samples) >= 25)
         done.set()
 
-        def newest() -> dict[str, object]:
-            array = store.deserialize_cdr(state.samples[-1].payload.to_bytes(), STATE)
-            return {one.name.removeprefix("dermis: "): one for one in array.status}
+        def report() -> dict[str, object]:
+            """The newest report of all patches from now on."""
+            before = len(state.samples)
+            while True:
+                wait(lambda: len(state.samples) > before)
+                array = store.deserialize_cdr(state.samples[before].payload.to_bytes(), STATE)
+                if len(array.status) == 6:
+                    return {one.name.removeprefix("dermis: "): one for one in array.status}
+                before += 1
 
-        wait(lambda: len(newest()) == 6)
-        found = newest()
+        found = report()
         flooded = values(found["flood"])
         assert int(flooded["results"]) + int(flooded["dropped"]) <= FLOOD and int(flooded["dropped"]) > FLOOD // 2
         assert int(values(found["rubbish"])["refused"]) > 100 and "results" in values(found["rubbish"])
