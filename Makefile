@@ -173,6 +173,7 @@ nightly: fuzz program tools ## run all variants of the tests, those too that `ma
 	@echo '== all tests'
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release --workspace --exclude dermis-python --exclude dermis-ros --lib --bins --examples --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
+	$(MAKE) --no-print-directory ros
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check
 
