@@ -395,7 +395,7 @@ mod tests {
         for end in (120..=560).step_by(20) {
             for every in [1, 7, 32] {
                 for sign in [1.0, -1.0] {
-                    let ends = |k: usize| if k % every == 0 { f64::from(end) } else { f64::INFINITY };
+                    let ends = |k: usize| if k.is_multiple_of(every) { f64::from(end) } else { f64::INFINITY };
                     let read = |k: usize, stress: f64| linear(k, stress);
                     let mut clipped = loads(&scene, 2e-4, read);
                     for frame in clipped.iter_mut().flat_map(|load| &mut load.frames) {

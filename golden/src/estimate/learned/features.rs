@@ -124,7 +124,8 @@ impl Features {
 /// The power of two s with `peak`/s from a half up to, not including, one; 1 for no peak.
 fn power_above(peak: f32) -> f32 {
     if peak > 0.0 && peak.is_finite() {
-        (peak.log2().floor() + 1.0).exp2()
+        // Exact; a rounded logarithm takes a peak just below a power of two for the power.
+        libm::ldexpf(1.0, libm::frexpf(peak).1)
     } else {
         1.0
     }
@@ -134,6 +135,18 @@ fn power_above(peak: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::spec::scene::Scene;
+
+    /// From a half up to, not including, one, also just below and at a power of two, as small or large as readings may be.
+    #[test]
+    fn a_peak_over_its_power_is_at_least_a_half_and_below_one() {
+        for exponent in -100..100 {
+            let power = 2f32.powi(exponent);
+            for (peak, above) in [(power.next_down(), power), (power, 2.0 * power), (1.4 * power, 2.0 * power)] {
+                assert_eq!(power_above(peak), above, "{peak}");
+            }
+        }
+        assert_eq!([0.0, f32::INFINITY, f32::NAN].map(power_above), [1.0; 3]);
+    }
 
     /// The inputs do not depend on the load but for a factor below two, and the sharper deconvolution finds a force on one
     /// cell again.
