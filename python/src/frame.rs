@@ -148,3 +148,35 @@ fn listed(value: &Bound<'_, PyAny>) -> PyResult<Option<Vec<Stress>>> {
     };
     items.iter().enumerate().map(frame).collect::<PyResult<_>>().map(Some)
 }
+
+/// Make one dataset of xarray of frames of one sensor, with an axis of time, as Frame.to_xarray has it of one.
+///
+/// Parameters
+/// ----------
+/// frames : iterable of Frame
+///     At least one, all of the same array.
+///
+/// Raises
+/// ------
+/// InputError
+///     No frame, what is none, or frames of different arrays.
+/// ImportError
+///     xarray is not installed.
+#[pyfunction]
+pub fn frames_to_xarray<'py>(frames: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let (mut sensor, mut all) = (None, Vec::new());
+    for (index, frame) in frames.try_iter()?.enumerate() {
+        let frame = frame?;
+        let own = frame.cast::<Frame>().map_err(|_| input(format!("frames[{index}] is not a Frame")))?;
+        let own = own.get().0.sensor.clone();
+        let first = sensor.get_or_insert_with(|| own.clone());
+        if *first != own {
+            return Err(input(format!("frames[{index}] has the array {own}, frames[0] {first}")));
+        }
+        all.push(frame);
+    }
+    match sensor {
+        Some(sensor) => datasets::made("of_frames", PyList::new(frames.py(), all)?.as_any(), &sensor),
+        None => Err(input("frames is empty, wanted at least one")),
+    }
+}

@@ -58,13 +58,11 @@ mod _dermis {
     #[pymodule_export]
     use crate::board::{Answers, Board, BoardError};
     #[pymodule_export]
-    use crate::datasets::frames_to_xarray;
-    #[pymodule_export]
     use crate::errors::{errors, Errors};
     #[pymodule_export]
     use crate::exceptions::InputError;
     #[pymodule_export]
-    use crate::frame::Frame;
+    use crate::frame::{frames_to_xarray, Frame};
     #[pymodule_export]
     use crate::reconstruction::{Contact, Reconstruction, Reconstructions};
     #[pymodule_export]

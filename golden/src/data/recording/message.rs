@@ -22,6 +22,7 @@ pub use diagnostics::{DiagnosticArray, DiagnosticStatus, KeyValue};
 pub use markers::{Marker, MarkerArray, NoTexture, Pose};
 pub use transforms::{TfMessage, Transform, TransformStamped};
 use type_hash::type_hash;
+pub use type_hash::Definition;
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::{Deserialize, Serialize, Serializer};
@@ -64,9 +65,6 @@ pub trait Message: Serialize + Sized {
         Ok(bytes)
     }
 }
-
-/// Name and text of a type.
-pub type Definition = (&'static str, &'static str);
 
 const TIME: Definition = ("builtin_interfaces/Time", include_str!("msg/Time.msg"));
 const HEADER: Definition = ("std_msgs/Header", include_str!("msg/Header.msg"));

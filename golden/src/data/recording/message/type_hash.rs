@@ -7,8 +7,6 @@
 
 use sha2::{Digest, Sha256};
 
-use super::Definition;
-
 /// Number of a field that is of another message type.
 const NESTED: u32 = 1;
 /// What the number of a list adds to that of its elements: of fixed, of bounded, of any length.
@@ -33,6 +31,9 @@ const PRIMITIVES: [(&str, u32); 15] = [
 ];
 /// The field of a type without one, as IDL requires it.
 const NO_FIELD: &str = "uint8 structure_needs_at_least_one_member";
+
+/// Name and text of a type.
+pub type Definition = (&'static str, &'static str);
 
 /// The type hash of the type `name` with this `text`, which uses `uses`.
 ///
