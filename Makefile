@@ -60,11 +60,11 @@ spelling: ## check the spelling of code and pages
 
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
-	$(CARGO) clippy --locked --workspace --exclude dermis-ros --all-targets -- -D warnings
+	$(CARGO) clippy --locked --all-targets -- -D warnings
 
 unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
-	$(CARGO) test --locked --workspace --exclude dermis-ros --no-fail-fast
+	$(CARGO) test --locked --no-fail-fast
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
@@ -113,7 +113,7 @@ c: setup ## build the C library, libdermis_c.a and .so, and run the tests of der
 
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --exclude dermis-ros --no-deps
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, the drawing of the live page, and how many patches dermis-ros holds
 	$(CARGO) bench --locked --package dermis-golden

@@ -93,6 +93,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let draws = Draws::new(&scene, DrawOptions { contacts, ..DrawOptions::default() })?;
         let spoiled = spoiled_frames(&scene, &SensorFaults { frames: 1, ..SensorFaults::default() })?;
         let spoiled: Vec<Frame> = spoiled.into_iter().map(|(_, _, frame)| frame).collect();
+        let (_, times) = results(&evidence, &spoiled, false)?;
+        let spoiled_ms = times.into_iter().fold(0.0, f64::max);
         for noise in NOISES {
             let draw =
                 |number: u64| draws.frame(number)?.read(&Converter { noise, seed: number, ..Converter::default() });
@@ -101,8 +103,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let [search_ms, _] = spread(&mut times);
             let (found, mut times) = results(&evidence, &unrelated, false)?;
             let [cold_ms, cold_worst] = spread(&mut times);
-            let (_, times) = results(&evidence, &spoiled, false)?;
-            let spoiled_worst = times.into_iter().fold(0.0, f64::max) / cold_ms;
+            let spoiled_worst = spoiled_ms / cold_ms;
             let mut times = Vec::new();
             for (number, motion) in (0..).zip(MOTIONS) {
                 let frames = Press::new(motion).of_frames(count / MOTIONS.len(), noise).frames(&scene, number)?;

@@ -9,7 +9,7 @@
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`deviations`] | standard deviations of forces that a search found |
 //! | [`misfit`] | how far a frame is from those of a network's training |
-//! | [`blind_gains`] | gains of the taxels from presses whose loads nobody knows |
+//! | [`blind_gains`] | blind calibration: gains of the taxels from presses of unknown load |
 
 pub mod blind_gains;
 pub mod degree;

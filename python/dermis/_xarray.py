@@ -73,13 +73,13 @@ def _dataset(
 
 def _contacts(all_contacts: Sequence[list[Contact] | None]) -> Iterable[_Variable]:
     """The variables of contacts; the axis `contact` is as long as the most contacts of a result."""
-    told_apart = np.array([contacts is not None for contacts in all_contacts], dtype=bool)
-    if not told_apart.any():
+    segmented = np.array([contacts is not None for contacts in all_contacts], dtype=bool)
+    if not segmented.any():
         return
     counts = np.array([len(contacts or ()) for contacts in all_contacts], dtype=np.int64)
     most = int(counts.max())
     yield "contact_count", (), counts, "1", "number of contacts"
-    yield "contacts_told_apart", (), told_apart, "", "whether the result tells contacts apart"
+    yield "contacts_segmented", (), segmented, "", "whether the result segments contacts"
     for name, of, dimensions, units, meaning in _OF_CONTACTS:
         length = len(_AXES if dimensions == _FORCE else _PLANE)
         values = np.full((len(counts), most, length), np.nan)

@@ -71,7 +71,7 @@ def test_another_runtime_finds_the_same(name: str, tmp_path: Path) -> None:
 def test_the_power_of_two_is_that_above_the_peak(tmp_path: Path) -> None:
     scene = scene_of("sensor-1")
     path = exported("sensor-1", tmp_path)
-    base = scene.generate(random=1, seed=4).stress_MPa.astype(np.float32)
+    base = scene.generate(random=1, seed=5).stress_MPa.astype(np.float32)
     base /= np.abs(base).max()
     # A peak at a power of two, one rounding below it, and above: the network sees a jump by two there, on both sides alike.
     one, below = np.float32(1), np.nextafter(np.float32(1), np.float32(0))
@@ -80,12 +80,10 @@ def test_the_power_of_two_is_that_above_the_peak(tmp_path: Path) -> None:
     stress = base * scales[:, None, None].astype(np.float32)
     mu, sigma = run(path, stress, np.zeros_like(stress))
     assert np.abs(mu[0::3] - mu[0]).max() < TOLERANCE and np.abs(mu[1::3] - mu[1]).max() < TOLERANCE
-    assert np.abs(mu[1] - mu[0]).max() > 50 * TOLERANCE
-    # Dermis' logarithm in single precision tells a rounding below a power of two from it only near one.
-    near = slice(3 * exponents.index(-1), 3 * exponents.index(1) + 3)
-    own = [scene.reconstruct(frame.astype(np.float64), cross_check=0).to_dict()["subarrays"][0] for frame in stress[near]]
-    assert len(own) == 9 and np.abs(mu[near] - [one["mu"] for one in own]).max() < TOLERANCE
-    assert np.abs(sigma[near] - [one["mu_sigma"] for one in own]).max() < TOLERANCE
+    assert np.abs(mu[1] - mu[0]).max() > 100 * TOLERANCE
+    own = [scene.reconstruct(frame.astype(np.float64), cross_check=0).to_dict()["subarrays"][0] for frame in stress]
+    assert len(own) == 3 * len(exponents) and np.abs(mu - [one["mu"] for one in own]).max() < TOLERANCE
+    assert np.abs(sigma - [one["mu_sigma"] for one in own]).max() < TOLERANCE
     nothing, wide = run(path, np.zeros((1, 10, 10)), np.zeros((1, 10, 10)))
     assert np.isfinite(nothing).all() and np.isfinite(wide).all()
 

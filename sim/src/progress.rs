@@ -27,12 +27,17 @@ impl Progress {
     }
 
     /// Steps of a bar of shares.
-    pub const SHARES: f64 = 1000.0;
+    const SHARES: f64 = 1000.0;
 
     /// Shows `message` with a bar of a share that is done.
     pub fn share(message: &str) -> Self {
         let bar = ProgressBar::new(Self::SHARES as u64);
         Progress::new(message, bar, "{msg} [{bar:30}] {percent} % ({elapsed}, {eta} left)")
+    }
+
+    /// Sets the share that is done, 0 to 1.
+    pub fn set_share(&self, done: f64) {
+        self.set((Self::SHARES * done) as u64);
     }
 
     /// The line of `bar`, which is drawn when it is added.

@@ -1,4 +1,4 @@
-//! Blind gains: the gain of every taxel from ordinary presses whose loads nobody knows.
+//! Blind calibration: the gain of every taxel from ordinary presses of unknown load.
 //!
 //! A press may have any smooth pressure and shear; a taxel whose gain is off shows beside its neighbours what none of them would,
 //! in one press after the other. The gains are those at which all presses together are most probable:
@@ -19,7 +19,7 @@
 //! | `smooth` | patterns that no press shows |
 //! | `ascent` | the gains at which all presses are most probable |
 //!
-//! What the gains are worth is told by presses that had no part in them: those of one half of the presses must make the other
+//! The gains are validated on presses that had no part in them: those of one half of the presses must make the other
 //! half more probable, and the other way round.
 //!
 //! | | shape | unit |

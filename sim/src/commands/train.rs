@@ -157,7 +157,7 @@ fn trained(scene: &Scene, training: &Training) -> Result<(Trained, String)> {
     let bar = Progress::share(&format!("{}: training", scene.name));
     let (mut losses, mut next) = (String::new(), 0.0);
     let trained = Learned::train(scene, training, &mut |stage: &Stage| {
-        bar.set((stage.done * Progress::SHARES) as u64);
+        bar.set_share(stage.done);
         if stage.done >= next {
             next += 0.1;
             losses.push_str(&format!("loss            {:8.4} at step {}\n", stage.loss, stage.steps));

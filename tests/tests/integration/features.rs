@@ -5,11 +5,10 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-/// Lines of `cargo tree` with name, version and features of every crate that the workspace has over `edges`.
+/// Lines of `cargo tree` with name, version and features of every crate that the workspace's default members have over `edges`.
 fn tree(edges: &str) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let arguments =
-        ["tree", "--offline", "--locked", "--workspace", "--exclude", "dermis-ros", "--prefix", "none", "--no-dedupe"];
+    let arguments = ["tree", "--offline", "--locked", "--prefix", "none", "--no-dedupe"];
     let mut command = Command::new(env!("CARGO"));
     let output = command.current_dir(root).args(arguments).args(["-f", "{p} [{f}]", "-e", edges]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

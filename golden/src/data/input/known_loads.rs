@@ -47,8 +47,8 @@ const FEWEST_FOR_RESIDUALS: usize = 3;
 /// Share of taxels at an end of the readings from which on a load is saturated.
 const SATURATED_SHARE: f64 = 0.1;
 /// Residual of a taxel from which on it does not follow the load: over the largest stress, and over the median of all taxels.
-const ASTRAY_SHARE: f64 = 0.025;
-const ASTRAY: f64 = 5.0;
+const OUTLIER_SHARE: f64 = 0.025;
+const OUTLIER: f64 = 5.0;
 /// Largest residual, root mean square over the largest stress, of a straight characteristic.
 const STRAIGHT: f64 = 0.05;
 
@@ -189,7 +189,7 @@ impl LoadFit {
         let enough = different(&all) >= FEWEST_FOR_RESIDUALS;
         let left_out: Vec<LeftOut> =
             (0..loads.len()).filter(|_| enough).filter_map(|load| LeftOut::new(&means, load, &whole, taxels)).collect();
-        for k in astray(&left_out, &means, taxels) {
+        for k in outliers(&left_out, &means, taxels) {
             whole.declare_dead(k, &all);
         }
         let Characteristic { table, live, .. } = &whole;
@@ -260,13 +260,13 @@ impl LeftOut {
 }
 
 /// Taxels whose reading under a load is far from the line of the others, where most taxels are near theirs: one that ends early.
-fn astray(left_out: &[LeftOut], means: &[Mean], taxels: usize) -> Vec<usize> {
+fn outliers(left_out: &[LeftOut], means: &[Mean], taxels: usize) -> Vec<usize> {
     let range = means.iter().map(|(stress, _)| stress.abs()).fold(0.0, f64::max);
     let far = |own: &LeftOut| -> Vec<usize> {
         let mut sizes: Vec<f64> = own.off_MPa.iter().map(|(_, off)| off.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let middle = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
-        let limit = (ASTRAY_SHARE * range).max(ASTRAY * middle);
+        let limit = (OUTLIER_SHARE * range).max(OUTLIER * middle);
         own.off_MPa.iter().filter(|(_, off)| off.abs() > limit).map(|(k, _)| *k).collect()
     };
     let mut all: Vec<usize> = left_out.iter().flat_map(far).collect();

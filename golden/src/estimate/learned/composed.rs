@@ -93,6 +93,7 @@ impl Features {
 
 #[cfg(test)]
 mod tests {
+    use super::super::features::power_above;
     use super::super::network::exchanged;
     use super::super::{Network, OneContact, Training};
     use super::*;
@@ -138,7 +139,7 @@ mod tests {
             let taxels = window.taxels_of(&scene.sensor, window.origin(&scene.sensor, centre_mm));
             let taxels: Vec<Option<usize>> = taxels.into_iter().map(|t| t.filter(|t| alive[*t])).collect();
             let peak = taxels.iter().flatten().map(|t| b[*t].abs()).fold(0.0, f64::max);
-            let s = 2f64.powf(peak.log2().floor() + 1.0);
+            let s = f64::from(power_above(peak as f32));
             let quads = window.quads();
             let parities = |of: &dyn Fn(Option<usize>) -> f64| {
                 let image = |lane| Mat::from_fn(quads.len(), 1, |quad, _| of(taxels[quads.taxel(quad, lane)]) as f32);
@@ -166,7 +167,7 @@ mod tests {
             let contact = OneContact { b: &frame.stress_MPa, alive: &alive, centre_mm: [0.0; 2] };
             let told = learned.shear(&contact);
             let peak = (0..100).filter(|t| alive[*t]).map(|t| frame.stress_MPa[t].abs()).fold(0.0, f64::max);
-            let s = 2f64.powf(peak.log2().floor() + 1.0);
+            let s = f64::from(power_above(peak as f32));
             let quads = learned.signature.window.quads();
             let image = |lane| {
                 Mat::from_fn(quads.len(), 1, |quad, _| {

@@ -122,7 +122,7 @@ impl Features {
 }
 
 /// The power of two s with `peak`/s from a half up to, not including, one; 1 for no peak.
-fn power_above(peak: f32) -> f32 {
+pub(super) fn power_above(peak: f32) -> f32 {
     if peak > 0.0 && peak.is_finite() {
         // Exact; a rounded logarithm takes a peak just below a power of two for the power.
         libm::ldexpf(1.0, libm::frexpf(peak).1)

@@ -40,7 +40,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// Power of σ by which the gradients of a frame are multiplied.
-const EASE: f32 = 0.6;
+const SIGMA_POWER: f32 = 0.6;
 /// Share of the training in which the rate rises.
 const RISE: f32 = 0.02;
 /// Share of the steps at either end over which the loss is averaged.
@@ -288,11 +288,12 @@ fn slope(outputs: &Mat<f32>, truth: &Mat<f32>, batch: usize) -> (f64, Mat<f32>) 
             let sigma = ln.exp();
             let off = (outputs[(axis, frame)] - truth[(axis, frame)]) / sigma;
             loss += f64::from(ln + 0.5 * off * off);
-            slope[(axis, frame)] = share * off * sigma.powf(EASE - 1.0);
+            let factor = share * sigma.powf(SIGMA_POWER);
+            slope[(axis, frame)] = factor * off / sigma;
             let pull = 1.0 - off * off;
             // Beyond its range ln σ is only moved back.
             let stuck = (raw > LN_SIGMA[1] && pull < 0.0) || (raw < LN_SIGMA[0] && pull > 0.0);
-            slope[(2 + axis, frame)] = if stuck { 0.0 } else { share * sigma.powf(EASE) * pull };
+            slope[(2 + axis, frame)] = if stuck { 0.0 } else { factor * pull };
         }
     }
     (loss / batch as f64, slope)
@@ -341,7 +342,7 @@ mod tests {
         for k in 0..OUTPUTS {
             let difference = (slope(&outputs(k, 1e-3), &truth, 1).0 - slope(&outputs(k, -1e-3), &truth, 1).0) / 2e-3;
             let sigma = f64::from([-1.0f32, -2.0][k % 2].exp());
-            let wanted = sigma.powf(f64::from(EASE)) * difference;
+            let wanted = sigma.powf(f64::from(SIGMA_POWER)) * difference;
             assert!(
                 (f64::from(got[(k, 0)]) - wanted).abs() < 1e-3 * wanted.abs().max(0.1),
                 "{k}: {} {wanted}",

@@ -70,8 +70,8 @@ pub struct BlindRow {
     pub before: [f64; 2],
     /// What is left of them with the table; `None` where the presses give none.
     pub after: Option<[f64; 2]>,
-    /// Rough spread before and the least that is left, as the recording tells it.
-    pub told: Option<[f64; 2]>,
+    /// Rough spread before and the least that is left, estimated from the recording alone.
+    pub estimated: Option<[f64; 2]>,
     /// Why the presses give no table.
     pub refused: Option<String>,
     /// Errors with the exact gains.
@@ -143,7 +143,7 @@ fn row(
         presses: presses.len(),
         before: rough_and_smooth(&scene.sensor, &log),
         after: left.as_ref().map(|left: &Vec<f64>| rough_and_smooth(&scene.sensor, left)),
-        told: found.as_ref().map(|found| [found.spread_before, found.spread_after]),
+        estimated: found.as_ref().map(|found| [found.spread_before, found.spread_after]),
         refused,
         exact: summary(&vec![0.0; gains.len()])?,
         without: summary(&log)?,

@@ -31,7 +31,7 @@ impl Arguments {
     pub(super) fn gains_of_presses(&self, scene: &Scene, presses: &Path) -> Result<String> {
         let frames = Frame::load_all_as(presses, Some(scene), &self.layout.stated())?;
         let bar = Progress::share("gains");
-        let share = |done: usize, all: usize| bar.set((Progress::SHARES * done as f64 / all as f64) as u64);
+        let share = |done: usize, all: usize| bar.set_share(done as f64 / all as f64);
         let gains = BlindGains::new(scene, &frames, &share)
             .map_err(|error| anyhow!("--blind {}: {error}", presses.display()))?;
         drop(bar);

@@ -10,7 +10,7 @@ use crate::progress::Progress;
 
 /// Explanation of the cells.
 const LEGEND: &str = "rough, smooth: root mean square of the part of the log gains that presses show, and of the one that they do \
-                      not, before → with the table; told: the rough part and the least that is left of it, by the recording alone; e_t: median / \
+                      not, before → with the table; estimated: the rough part and the least that is left of it, from the recording alone; e_t: median / \
                       nine of ten of frames of the same array";
 
 /// The table of a scene, or JSON.
@@ -20,13 +20,13 @@ const LEGEND: &str = "rough, smooth: root mean square of the part of the log gai
 pub fn run(scene: &str, asked: &BlindStudy, json: bool) -> Result<String> {
     let scene = Scene::load(scene)?;
     let bar = Progress::share("gains");
-    let share = |done: usize, all: usize| bar.set((Progress::SHARES * done as f64 / all as f64) as u64);
+    let share = |done: usize, all: usize| bar.set_share(done as f64 / all as f64);
     let rows = blind_study(&scene, asked, &share)?;
     drop(bar);
     if json {
         return Ok(serde_json::to_string(&rows)? + "\n");
     }
-    let head = ["spread", "presses", "rough", "smooth", "told", "e_t, exact gains", "no table", "table found"];
+    let head = ["spread", "presses", "rough", "smooth", "estimated", "e_t, exact gains", "no table", "table found"];
     let refused = rows
         .iter()
         .filter_map(|row| Some(format!("spread {}: {}\n", percent(Some(row.spread)), row.refused.as_ref()?)));
@@ -41,14 +41,15 @@ fn line(row: &BlindRow) -> Vec<String> {
     let errors = |summary: &Summary| {
         format!("{} / {}", share(summary.tangential.median.value), share(summary.tangential.ninety.value))
     };
-    let told = row.told.map_or("-".to_owned(), |[before, after]| format!("{} → {}", share(before), share(after)));
+    let estimated =
+        row.estimated.map_or("-".to_owned(), |[before, after]| format!("{} → {}", share(before), share(after)));
     let found = row.with.as_ref().map_or("refused".to_owned(), errors);
     vec![
         share(row.spread),
         row.presses.to_string(),
         parts(0),
         parts(1),
-        told,
+        estimated,
         errors(&row.exact),
         errors(&row.without),
         found,
