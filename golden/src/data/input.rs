@@ -92,11 +92,12 @@ pub enum InputError {
 }
 
 impl Input {
-    /// Loads the calibration table and the tare frame that the scene names.
+    /// Loads the calibration table and the tare frame that the scene names; of a scene of several arrays those of the first.
     ///
     /// # Errors
     /// [`InputError`] if the table or tare frame cannot be read or does not fit the sensor.
     pub fn new(scene: &Scene) -> Result<Input, InputError> {
+        let scene = &scene.of_array(0);
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
         let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;

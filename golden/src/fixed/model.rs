@@ -74,6 +74,18 @@ impl Model {
         Ok(Model { plan, input, deviations })
     }
 
+    /// The model of array `array` of those that this engine serves, alone; of an engine of one array the same model. Codes mean the
+    /// same for all arrays, so that the words of each are those that the engine sends for it.
+    ///
+    /// # Errors
+    /// As [`Model::of_plan`].
+    pub fn of_array(&self, array: usize) -> Result<Self, FixedError> {
+        match self.scene.hardware.arrays {
+            1 => Ok(self.clone()),
+            _ => Model::of_plan(self.plan.of_array(array)),
+        }
+    }
+
     /// The model of the plan as `change` makes it, as [`Model::of_plan`] builds it.
     ///
     /// # Errors

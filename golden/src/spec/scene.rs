@@ -335,6 +335,12 @@ table! {
             .page("method");
         /// Taxels that the search computes per cycle: fewer take fewer LUTs and more cycles, `dermis build --explain` says how many.
         search_width: Option<usize> = Listed(SEARCH_WIDTHS).optional("that of the board").hardware("4 with `\"adaptive\"`");
+        /// Arrays of the same geometry and cover that one engine serves; each frame names its own by `tid`, and `{array}` in the names of
+        /// `input.calibration` and `input.tare` stands for its number, from 0.
+        arrays: usize = Listed(ARRAYS)
+            .or(1)
+            .hardware("parallel engine; no link, no blocks of frames")
+            .page("in-your-soc");
         /// Where the tables of a specimen stand: in the bitstream, or written while the engine rests.
         tables: TableStorage = choice(&[("rom", TableStorage::Rom), ("writable", TableStorage::Writable)])
             .or(TableStorage::Rom)
@@ -345,6 +351,9 @@ table! {
         adc_scan: Option<AdcScan> = ScanFields;
     }
 }
+
+/// Numbers of arrays that an engine serves: powers of two, so that every `tid` of their width names one of them.
+const ARRAYS: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// The board of a scene that names none.
 const DEFAULT_BOARD: &str = "ulx3s-85f";
@@ -377,6 +386,11 @@ impl HardwareSpec {
             Some([_, most]) if self.has_writable_tables() => most,
             _ => gains.map_or(1.0, |gains| gains.iter().fold(0.0, |most, gain| gain.abs().max(most))),
         }
+    }
+
+    /// Width of the number of an array: 0 where there is one.
+    pub fn array_bits(&self) -> usize {
+        self.arrays.trailing_zeros() as usize
     }
 
     /// Takes frames of stress, which need neither calibration nor converters: the tables are in the bitstream, codes come as a
@@ -610,10 +624,26 @@ impl ObjectiveKind {
     }
 }
 
+/// What stands for the number of an array in the name of a file.
+const ARRAY_PLACE: &str = "{array}";
+
 /// Fewest rows and columns of which the hardware checks codes: with fewer no line has others on both sides.
 const LEAST_LINES: usize = 4;
 
 impl Scene {
+    /// The scene of array `array` of those that an engine serves, alone with its own files; the same scene where there is one.
+    pub fn of_array(&self, array: usize) -> Scene {
+        let mut own = self.clone();
+        if self.hardware.arrays > 1 {
+            own.hardware.arrays = 1;
+            let number = array.to_string();
+            for path in [&mut own.input.calibration, &mut own.input.tare].into_iter().flatten() {
+                *path = path.to_string_lossy().replace(ARRAY_PLACE, &number).into();
+            }
+        }
+        own
+    }
+
     /// Whether the hardware checks the codes of its frames for plateaus and repeated lines: not with the serial engine, whose plan
     /// says so in `hardware.code_check`, nor where tables are written, as signs of gains and dead taxels are not known before.
     pub fn checks_codes(&self) -> bool {

@@ -20,6 +20,9 @@ use crate::spec::sliding::most_frames;
 /// Covers for which writable coefficients are counted where the scene has none, over its own thickness.
 const OTHER_COVERS: [f64; 2] = [0.8, 1.25];
 
+/// Arrays for which the engine is counted where the scene has one.
+const OTHER_ARRAYS: usize = 16;
+
 /// An optional feature of the hardware.
 #[derive(Debug)]
 pub struct Feature {
@@ -43,7 +46,6 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         scene.partition.listed = Some([0, 1, 2, 3].map(|number| built.contains(&number)));
     }
     let scene = &scene;
-    let taxels = scene.sensor.taxels();
     let input = &scene.input;
     let with = |change: &dyn Fn(&mut Scene)| {
         let mut changed = scene.clone();
@@ -51,7 +53,8 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         changed
     };
     let plain = planned;
-    let scaled = |scene: &Scene, gains| planned_with(scene, Scale::of_tare(taxels, gains), None);
+    let of_zeros = |scene: &Scene, gains| Scale::of_tare(scene.hardware.arrays * scene.sensor.taxels(), gains);
+    let scaled = |scene: &Scene, gains| planned_with(scene, of_zeros(scene, gains), None);
     let full_scale = input.full_scale_MPa.unwrap_or(1.0);
 
     let mut all = Vec::new();
@@ -112,6 +115,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), &|| {
         plain(&with(&|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding)))
     });
+    let several = scene.hardware.arrays > 1;
+    let arrays = if several { scene.hardware.arrays } else { OTHER_ARRAYS };
+    add("several arrays", several, format!("{arrays} arrays"), &|| plain(&with(&|s| s.hardware.arrays = arrays)));
     let parts = plan.parts().len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
     if plan.chooses() {
@@ -193,6 +199,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     }
     if written {
         without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
+    }
+    if several {
+        without("several arrays", &|s| *s = s.of_array(0));
     }
     if coefficients {
         without("writable coefficients", &|s| {

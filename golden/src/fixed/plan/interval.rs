@@ -15,7 +15,7 @@
 
 use super::contact_cycles::{ContactCycles, ContactTiming};
 use super::contents::{CasePlan, Plan};
-use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, LABELS, NEXT, SEND};
+use super::cycles::{early_values, forces, passes, search, split_latency, Cycles, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
 use crate::fixed::stages::{choose, resultants};
 use crate::spec::board::EngineKind;
@@ -36,6 +36,13 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
             parallel(plan, case, &[ContactTiming::longest(plan); SETTLED]).last().copied().unwrap_or_default()
         }
     }
+}
+
+/// Cycles from the first input beat to the last output beat of frames of all arrays that come at once, one of each, to an idle engine
+/// whose receiver never waits: what the last of them waits at most for its result. Of one array the longest frame.
+pub fn longest_wait(plan: &Plan) -> u64 {
+    let interval = plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0);
+    (plan.scene.hardware.arrays as u64 - 1) * interval + Cycles::longest(plan).total
 }
 
 /// The longest of the intervals before the third and each later one of frames that follow one another, each with the contacts

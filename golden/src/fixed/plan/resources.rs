@@ -209,6 +209,12 @@ pub fn count_bits(limit: usize) -> usize {
     bit_length(limit.saturating_sub(1) as u64).max(1) as usize
 }
 
+/// Words of a memory that has one for each of `taxels` taxels of `arrays` arrays: the number of the array stands above that of the
+/// taxel in an address.
+pub fn array_places(arrays: usize, taxels: usize) -> usize {
+    ((arrays - 1) << count_bits(taxels)) + taxels
+}
+
 /// Width in bits of a search position: three grid steps and one candidate beyond, after all halvings.
 pub fn position_bits() -> usize {
     signed_bits(4 << HALVINGS) as usize
@@ -244,19 +250,20 @@ impl Resources {
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
         let quad = |bits: u32| 4 * bits as usize;
         let memory = |holds: Holds, words: usize, bits: usize| Memory::new(holds, [words, bits], board, shallow);
-        let (input, taxels) = (&scene.input, scene.sensor.taxels());
+        let input = &scene.input;
+        let places = array_places(scene.hardware.arrays, scene.sensor.taxels());
         let mut memories = Vec::new();
         let gains = input.calibration.is_some() || scene.hardware.has_writable_tables();
         let running = RunningZero::of_scene(scene);
         if gains || input.tare.is_some() {
             let gain = if gains { GAIN_BITS } else { 0 };
-            memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize));
+            memories.push(memory(Holds::Calibration, places, (f.code_bits + gain) as usize));
         }
         if let Some(zero) = &running {
-            memories.push(memory(Holds::Drift, taxels, (zero.moved_bits() + zero.step_bits()) as usize));
+            memories.push(memory(Holds::Drift, places, (zero.moved_bits() + zero.step_bits()) as usize));
         }
         if input.average > 0 {
-            memories.push(memory(Holds::Average, taxels, f.input_bits as usize));
+            memories.push(memory(Holds::Average, places, f.input_bits as usize));
         }
         for (index, case) in cases.iter().enumerate() {
             let lane = |lane| memory(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);

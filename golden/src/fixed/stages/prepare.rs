@@ -5,6 +5,9 @@
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
 //!                       or sliding mean           b ← b + ⌊(2^k s − b − c) / 2^g + 1/2⌋: likewise
 //! ```
+//! An engine that serves several arrays has a zero, a gain, a drift and a mean for each taxel of each of them; what follows is of one
+//! array, [`Prepare::of_array`].
+//!
 //! Where the zero runs, its drift is taken off `code − zero` ([`running_zero`]). Beside them the codes are checked as they
 //! arrive ([`code_check`]).
 //!
@@ -46,9 +49,9 @@ pub const GAIN_BITS: u32 = GAIN_FRACTION + 2;
 /// The stage of one scene; without input options it passes the codes on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prepare {
-    /// Zero of each taxel in codes, if the scene has a tare frame or a table.
+    /// Zero of each taxel in codes, if the scene has a tare frame or a table; array after array.
     pub zero: Option<Vec<i32>>,
-    /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table; 0 for a dead taxel that is written.
+    /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table; 0 for a dead taxel that is written. Array after array.
     pub gain: Option<Vec<i32>>,
     /// k: 2^average frames are added up, or the last gain of a sliding mean is 2^−average.
     pub average: u32,
@@ -80,30 +83,42 @@ pub struct Prepared {
 /// Conversion of a scene's readings to MPa, in floating point.
 #[derive(Clone)]
 pub struct Scale {
+    /// Of the taxels of all arrays, array after array.
     table: Option<Calibration>,
     tare: Option<Vec<f64>>,
-    /// Largest |gain|, 1 without a table.
+    /// Largest |gain|, of all arrays; 1 without a table.
     pub largest: f64,
 }
 
 impl Scale {
-    /// Readings with a tare frame of zeros and, with `gains`, a table of ones: to count resources without the files.
+    /// Readings of so many taxels, of all arrays together, with a tare frame of zeros and, with `gains`, a table of ones: to count
+    /// resources without the files.
     pub fn of_tare(taxels: usize, gains: bool) -> Scale {
         let table = gains.then(|| Calibration::identity(taxels));
         Scale { table, tare: Some(vec![0.0; taxels]), largest: 1.0 }
     }
 
-    /// Reads the calibration table and the tare frame that the scene names. Where tables are written there is always one, and
+    /// Reads the calibration tables and the tare frames that the scene names. Where tables are written there is always one, and
     /// the largest gain is that of `hardware.table_range`, so that a code keeps its meaning.
     ///
     /// # Errors
     /// What is wrong with a file; [`FixedError::TableRange`].
     pub fn new(scene: &Scene) -> Result<Scale, FixedError> {
-        let spec = &scene.input;
-        let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose();
-        let table = table.map_err(InputError::from)?;
-        let tare = spec.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, scene)?.zero));
-        let tare = tare.transpose()?;
+        let files = |array: usize| {
+            let own = scene.of_array(array);
+            let table = own.input.calibration.as_ref().map(|path| Calibration::load(path, &own.sensor)).transpose();
+            let tare = own.input.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, &own)?.zero));
+            Ok::<_, FixedError>((table.map_err(InputError::from)?, tare.transpose()?))
+        };
+        let (mut table, mut tare) = files(0)?;
+        for array in 1..scene.hardware.arrays {
+            let (own, zero) = files(array)?;
+            if let (Some(table), Some(own)) = (&mut table, own) {
+                table.offset.extend(own.offset);
+                table.gain.extend(own.gain);
+            }
+            tare.iter_mut().zip(zero).for_each(|(tare, zero)| tare.extend(zero));
+        }
         let largest = scene.hardware.largest_gain(table.as_ref().map(|table| table.gain.as_slice()));
         if !scene.hardware.has_writable_tables() {
             return Ok(Scale { tare, table, largest });
@@ -149,6 +164,15 @@ impl Prepare {
             code_bits,
             taxels,
         }
+    }
+
+    /// The stage of array `array` of those that the engine serves, alone; the same stage where there is one.
+    pub fn of_array(&self, array: usize) -> Prepare {
+        let own = |words: &Option<Vec<i32>>| {
+            let words = words.as_ref()?.chunks(self.taxels).nth(array)?;
+            Some(words.to_vec())
+        };
+        Prepare { zero: own(&self.zero), gain: own(&self.gain), ..self.clone() }
     }
 
     /// Largest word of the frame buffer: the largest code times 2^average.
@@ -274,6 +298,35 @@ mod tests {
         };
         // 4 · 10; + (4 · 13 − 40 − 1)/2 = 5.5 to 6; + (4 · −5 − 46)/4 = −16.5 rounds to −16; + (0 − 30 − 1)/4 = −7.75 to −8.
         assert_eq!([10, 13, -5, 0].map(&mut after), [(40, 1), (46, 2), (30, 3), (22, 4)]);
+    }
+
+    /// Each array has the words of its own files; codes mean the same in all, those of the largest gain.
+    #[test]
+    fn arrays_have_files_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        let path = |array: &str| folder.path().join(format!("table-{array}.csv"));
+        scene.hardware.arrays = 2;
+        (scene.input.calibration, scene.input.full_scale_MPa) = (Some(path("{array}")), Some(1.0));
+        for (array, gain) in [("0", 0.5), ("1", 2.0)] {
+            let table = Calibration { offset: vec![gain / 10.0; 64], gain: vec![gain; 64] };
+            std::fs::write(path(array), table.to_csv(&scene.sensor)).unwrap();
+        }
+        let scale = Scale::new(&scene).unwrap();
+        assert_eq!(scale.largest, 2.0);
+        let all = Prepare::new(&scene, scale, 1.0);
+        let [zeros, gains] = [&all.zero, &all.gain].map(|words| words.as_ref().unwrap());
+        assert_eq!((zeros.len(), gains[0], gains[127]), (128, 1 << (GAIN_FRACTION - 2), 1 << GAIN_FRACTION));
+        let second = all.of_array(1);
+        assert_eq!(second.zero.as_deref(), Some(&zeros[64..]));
+        assert_eq!(second.of_array(0), second);
+        // An offset of four times that of the first, both rounded.
+        assert!((zeros[64] - 4 * zeros[0]).abs() <= 2, "{} {}", zeros[64], zeros[0]);
+        let own = scene.of_array(1);
+        assert_eq!((own.hardware.arrays, own.input.calibration.clone()), (1, Some(path("1"))));
+        assert_eq!(own.of_array(0), own);
+        std::fs::remove_file(path("1")).unwrap();
+        assert!(Scale::new(&scene).err().unwrap().to_string().contains("table-1.csv"));
     }
 
     /// Noise falls to σ²/(2^(k+1) − 1), where σ² is that of the readings and twice that of rounding, 1/12 each.

@@ -31,6 +31,16 @@ pub enum SceneError {
         /// Largest allowed size in bytes.
         limit: u64,
     },
+    /// The scene has no array of this number.
+    #[error("{file}#{number}: the scene has {arrays} (hardware.arrays), numbered from 0")]
+    NoArray {
+        /// Path or built-in name.
+        file: String,
+        /// The number given.
+        number: String,
+        /// How many there are.
+        arrays: usize,
+    },
     /// The text is not valid TOML.
     #[error("{file}, line {line}: {message}")]
     Syntax {

@@ -487,6 +487,10 @@ impl<const N: usize> Kind for Listed<N> {
     fn schema(&self) -> Json {
         json!({ "enum": self.0.as_slice() })
     }
+
+    fn show(&self, number: &usize) -> Option<Value> {
+        i64::try_from(*number).ok().map(Value::Integer)
+    }
 }
 
 /// The power of two that is read as its binary logarithm, up to this.

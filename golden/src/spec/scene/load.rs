@@ -4,6 +4,8 @@ use super::{Scene, SceneError};
 use crate::spec::suggest::{distance, nearest};
 use std::io::Read;
 
+/// What stands between the name of a scene and the number of one of its arrays.
+const ARRAY_MARK: char = '#';
 /// Largest scene file in bytes.
 const LARGEST_FILE: u64 = 1 << 20;
 
@@ -46,12 +48,21 @@ impl Scene {
         builtin(name).ok_or_else(|| not_found(name)).and_then(|text| Scene::parse(text, name))
     }
 
-    /// Loads a scene by built-in name or by path; a built-in name takes precedence over a file of that name.
+    /// Loads a scene by built-in name or by path; a built-in name takes precedence over a file of that name. `hand.toml#3` is array 3
+    /// of an engine of several, alone ([`Scene::of_array`]).
     ///
     /// # Errors
     /// Any [`SceneError`] except `NotAvailable`.
     pub fn load(name_or_path: &str) -> Result<Scene, SceneError> {
-        Scene::parse(&Scene::text(name_or_path)?, name_or_path)
+        let Some((name, number)) = array_of(name_or_path) else {
+            return Scene::parse(&Scene::text(name_or_path)?, name_or_path);
+        };
+        let scene = Scene::parse(&Scene::text(name)?, name)?;
+        let arrays = scene.hardware.arrays;
+        match number.parse() {
+            Ok(array) if array < arrays => Ok(scene.of_array(array)),
+            _ => Err(SceneError::NoArray { file: name.to_owned(), number: number.to_owned(), arrays }),
+        }
     }
 
     /// The text of a scene that [`Scene::load`] loads.
@@ -75,6 +86,13 @@ impl Scene {
         }
         Ok(text)
     }
+}
+
+/// Name or path of a scene and the number of an array behind it; `None` if the whole is a file's name, or no number follows.
+fn array_of(name_or_path: &str) -> Option<(&str, &str)> {
+    let (name, number) = name_or_path.rsplit_once(ARRAY_MARK)?;
+    let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    (is_number && !std::path::Path::new(name_or_path).exists()).then_some((name, number))
 }
 
 /// The text of a built-in scene.

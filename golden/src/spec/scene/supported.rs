@@ -29,6 +29,8 @@
 //! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
 //! the bitstream; dead taxels with one subarray, as above.
 //!
+//! Several arrays: not with writable tables, a scan or blocks of frames, of which each would have to be told which array it is of.
+//!
 //! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
 //! are taken, no average of frames, `input_bits` for a result and a sign.
 //!
@@ -79,6 +81,12 @@ impl Scene {
             rule(input.running_zero().is_some(), "input.zero", "running".to_string(), "fixed, in C"),
             rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, in C"),
             rule(
+                self.hardware.arrays > 1,
+                "hardware.arrays",
+                self.hardware.arrays.to_string(),
+                "1, in C: build it for each array",
+            ),
+            rule(
                 self.hardware.adc_scan.is_some(),
                 "hardware.source",
                 "adc-scan".to_string(),
@@ -95,6 +103,7 @@ impl Scene {
     pub fn require_supported(&self) -> Result<(), SceneError> {
         let (search, input) = (&self.search, &self.input);
         let several = self.partition.case == Case::Adaptive;
+        let arrays = self.hardware.arrays > 1;
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
             rule(
@@ -162,6 +171,24 @@ impl Scene {
                 "false, or hardware.estimator = network",
             ),
             rule(several && self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adaptive"),
+            rule(
+                arrays && self.hardware.has_writable_tables(),
+                "hardware.tables",
+                writable(),
+                "rom, with hardware.arrays above 1",
+            ),
+            rule(
+                arrays && self.hardware.adc_scan.is_some(),
+                "hardware.source",
+                "adc-scan".to_string(),
+                "stream, with hardware.arrays above 1",
+            ),
+            rule(
+                arrays && input.average > 0 && input.mean == MeanKind::Block,
+                "input.average",
+                input.average.to_string(),
+                "0, with hardware.arrays above 1; or input.mean = sliding",
+            ),
             rule(
                 self.hardware.has_writable_coefficients() && self.hardware_estimator() == EstimatorKind::Network,
                 "hardware.estimator",
@@ -309,6 +336,12 @@ impl Scene {
                 "hardware.tables",
                 writable(),
                 "rom on a board with the serial engine",
+            ),
+            rule(
+                self.hardware.arrays > 1,
+                "hardware.arrays",
+                self.hardware.arrays.to_string(),
+                "1 on a board with the serial engine",
             ),
             rule(
                 self.hardware.search_width.is_some(),

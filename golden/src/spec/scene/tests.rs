@@ -170,6 +170,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
         ("[hardware]\ncode_check = true", "\"on\" or \"off\""),
         ("[hardware]\nsearch_width = 3", "hardware.search_width = 3 is not allowed; it must be 4, 2 or 1"),
+        ("[hardware]\narrays = 12", "hardware.arrays = 12 is not allowed; it must be 1, 2, 4, 8 or 16"),
         ("[hardware]\nboard = \"ulx4m\"", "\"colorlight-i5\" or \"colorlight-i9\" or \"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
         ("[input]\naverage = 13", "from 0 to 12"),
@@ -326,6 +327,14 @@ fn choices_not_built_yet_say_so() {
             "[partition]\ncase = \"adaptive\"\n[hardware]\nsearch_width = 2",
             "hardware.search_width = 2; available: 4, with adaptive",
         ),
+        (
+            "[hardware]\narrays = 2\ntables = \"writable\"",
+            "hardware.tables = writable; available: rom, with hardware.arrays",
+        ),
+        (
+            "[hardware]\narrays = 2\n[input]\naverage = 1",
+            "input.average = 1; available: 0, with hardware.arrays above 1; or",
+        ),
         ("[input]\nunipolar = true", "input.unipolar"),
         ("[search]\ndegree = 4", "search.degree"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
@@ -356,6 +365,24 @@ fn the_golden_model_rejects_unsupported_combinations() {
     for more in [patch, orthogonal, "[medium]\nkind = \"bonded-layer\"", "[input]\nunipolar = true\ndead = [[0, 1]]"] {
         assert!(with(more).unwrap().require_golden().is_ok(), "{more}");
     }
+}
+
+/// `#` and a number name an array of a scene, alone.
+#[test]
+fn an_array_of_a_scene_is_named_behind_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hand.toml").display().to_string();
+    std::fs::write(&path, format!("{SENSOR}[hardware]\narrays = 4\n[input]\ncalibration = \"{{array}}.csv\"\n"))
+        .unwrap();
+    let third = Scene::load(&format!("{path}#3")).unwrap();
+    assert_eq!((third.hardware.arrays, third.input.calibration), (1, Some(folder.path().join("3.csv"))));
+    let error = Scene::load(&format!("{path}#4")).unwrap_err().to_string();
+    assert!(error.ends_with("hand.toml#4: the scene has 4 (hardware.arrays), numbered from 0"), "{error}");
+    assert!(Scene::load("sensor-1#0").is_ok());
+    // A file of that name is a scene of its own.
+    std::fs::write(format!("{path}#4"), SENSOR).unwrap();
+    assert_eq!(Scene::load(&format!("{path}#4")).unwrap().hardware.arrays, 1);
+    assert!(Scene::load("sensor-1#").unwrap_err().to_string().contains("no scene"));
 }
 
 #[test]

@@ -108,7 +108,7 @@ pub fn image_bytes(plan: &Plan) -> Option<usize> {
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
 /// whether records take the place of forces, condition, noise floor and threshold in codes, limit of the score, whether codes are
-/// checked, zeros and gains of the taxels, dead taxels, the quantised matrices with the columns kept, the network, what finds the
+/// checked, the arrays, zeros and gains of the taxels, dead taxels, the quantised matrices with the columns kept, the network, what finds the
 /// contacts, and the scan. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
     let (scene, sensor) = (&plan.scene, &plan.scene.sensor);
@@ -135,6 +135,9 @@ pub fn scene_hash(plan: &Plan) -> u32 {
     }
     if plan.prepare.check.is_some() {
         text["code_check"] = json!(true);
+    }
+    if scene.hardware.arrays > 1 {
+        text["arrays"] = json!(scene.hardware.arrays);
     }
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());
