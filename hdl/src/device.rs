@@ -18,6 +18,8 @@ pub struct Inputs {
     pub s_valid: bool,
     /// `s_axis_tdata`: a taxel's code, two's complement, `code_bits` wide.
     pub s_data: i32,
+    /// `s_axis_tid`, of an engine of several arrays: the one that the frame is of.
+    pub s_array: usize,
     /// `s_axis_tlast`: the code is the frame's last.
     pub s_last: bool,
     /// `m_axis_tready`: the receiver accepts a beat in this cycle.
@@ -33,6 +35,8 @@ pub struct Outputs {
     pub m_valid: bool,
     /// `m_axis_tdata` as `[fx, fy, fz]`, each a 32-bit signed word.
     pub m_data: [i32; 3],
+    /// `m_axis_tid`, of an engine of several arrays: the one that the frame is of; else 0.
+    pub m_array: usize,
     /// `m_axis_tlast`: the beat is the last status beat of its frame.
     pub m_last: bool,
     /// One entry per [`Tap`]: the fields of the word that passes in this cycle, `None` if there is none.

@@ -9,6 +9,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::EngineKind;
 
 use crate::language::{Block, Builder, Inside, Interface, Make, View, Visit, VisitMut};
+use crate::primitives::Arrays;
 use crate::streams::{EnginePorts, Stage, Streams};
 use crate::{parallel, serial};
 
@@ -34,6 +35,7 @@ pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
 /// |---|---|---|---|
 /// | `s_axis_tdata` | in | `stream_bits` | a taxel's code, two's complement; row-major, frame after frame; or a byte of an image of tables |
 /// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
+/// | `…tid` | | width of the number of an array | of several arrays the one that the frame is of |
 /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
 ///
 /// Reset is synchronous; it clears all control registers, not the data.
@@ -45,7 +47,8 @@ pub struct Engine {
 impl Engine {
     /// The engine of `model`.
     pub fn new(model: &Model) -> Self {
-        Engine { streams: Streams { bits: model.stream_bits() as usize }, model: model.clone() }
+        let streams = Streams { bits: model.stream_bits() as usize, arrays: Arrays::of_model(model) };
+        Engine { streams, model: model.clone() }
     }
 }
 

@@ -318,6 +318,7 @@ fn manifest(
         "formats": f,
         "input": {
             "bits": f.code_bits,
+            "arrays": scene.hardware.arrays,
             "tables": model.tables().map(|tables| json!({
                 "stream_bits": model.stream_bits(),
                 "image_bytes": tables.image_bytes(),

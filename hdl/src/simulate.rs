@@ -21,10 +21,12 @@ struct Pins {
     rst: Slot,
     s_valid: Slot,
     s_data: Slot,
+    s_array: Slot,
     s_last: Slot,
     s_ready: Slot,
     m_valid: Slot,
     m_data: Slot,
+    m_array: Slot,
     m_last: Slot,
     m_ready: Slot,
 }
@@ -36,10 +38,12 @@ impl Pins {
             rst: pin("rst"),
             s_valid: pin("s_axis_tvalid"),
             s_data: pin("s_axis_tdata"),
+            s_array: pin("s_axis_tid"),
             s_last: pin("s_axis_tlast"),
             s_ready: pin("s_axis_tready"),
             m_valid: pin("m_axis_tvalid"),
             m_data: pin("m_axis_tdata"),
+            m_array: pin("m_axis_tid"),
             m_last: pin("m_axis_tlast"),
             m_ready: pin("m_axis_tready"),
         }
@@ -70,6 +74,7 @@ impl Running {
         run.set(pins.rst, inputs.rst.into());
         run.set(pins.s_valid, inputs.s_valid.into());
         run.set(pins.s_data, Word::of_fields(&[i64::from(inputs.s_data)], 64));
+        run.set(pins.s_array, (inputs.s_array as u64).into());
         run.set(pins.s_last, inputs.s_last.into());
         run.set(pins.m_ready, inputs.m_ready.into());
         run.settle();
@@ -78,6 +83,7 @@ impl Running {
             s_ready: run.is_high(pins.s_ready),
             m_valid: run.is_high(pins.m_valid),
             m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
+            m_array: run.get(pins.m_array).number() as usize,
             m_last: run.is_high(pins.m_last),
             taps: Vec::new(),
         };

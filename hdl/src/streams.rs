@@ -2,6 +2,7 @@
 
 use crate::block;
 use crate::language::{Expr, Net};
+use crate::primitives::Arrays;
 
 /// Width of a beat of the output.
 pub(crate) const BEAT_BITS: usize = 96;
@@ -115,12 +116,16 @@ block! {
     pub struct Streams {
         /// Width of a beat of the input.
         pub bits: usize,
+        /// Those whose frames come.
+        pub arrays: Arrays,
     }
     ports EnginePorts {
         clock;
         reset;
         /// A taxel's code, two's complement, or a byte of an image of tables; valid with `s_axis_tvalid`.
         in s_axis_tdata: bits;
+        /// Array of the frame, from 0, that of its first beat; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -129,6 +134,8 @@ block! {
         in s_axis_tlast;
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
         out m_axis_tdata: BEAT_BITS;
+        /// Array of the frame; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.

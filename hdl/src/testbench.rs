@@ -6,10 +6,11 @@
 //! One reconstruction at full speed; the status beats hold the cycle count, which is then equal too. Before it the sums of the core's
 //! own memory files are compared: a frame does not read all of them, and simulators go on without one that is missing.
 
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{Model, Plan};
 
 use crate::language::memory_file;
 use crate::manifest::GeneratedFile;
+use crate::primitives::Arrays;
 
 /// Cycles per cycle of the model after which the testbench gives up.
 const PATIENCE: u64 = 4;
@@ -29,10 +30,11 @@ pub(crate) struct Reconstruction {
     pub patience: u64,
 }
 
-/// The reconstruction of the testbenches of `model`.
-pub(crate) fn reconstruction(model: &Model) -> Reconstruction {
+/// The reconstruction of the testbenches of `model`, of array `array`.
+pub(crate) fn reconstruction(model: &Model, array: usize) -> Reconstruction {
     let codes = codes(model);
-    let trace = model.run(&codes);
+    let own = Plan::of_array(model, array);
+    let trace = model.variant(own).run(&codes);
     let beats = trace.beats.iter().chain(&trace.status).copied().collect();
     let patience = LEAST_CYCLES + PATIENCE * (codes.len() as u64 + trace.cycles.total);
     Reconstruction { codes, beats, patience }
@@ -40,7 +42,10 @@ pub(crate) fn reconstruction(model: &Model) -> Reconstruction {
 
 /// The testbench and its two memory files; `files` are those of the hardware.
 pub(crate) fn testbench(model: &Model, top: &str, files: &[GeneratedFile]) -> Vec<GeneratedFile> {
-    let Reconstruction { codes, beats, patience } = reconstruction(model);
+    let Arrays { bits: array_bits } = Arrays::of_model(model);
+    // The last array, so that a memory without the tables of the others is found.
+    let array = Arrays::of_model(model).count() - 1;
+    let Reconstruction { codes, beats, patience } = reconstruction(model, array);
     let bits = model.stream_bits();
     let mask = (1i64 << bits) - 1;
     let digits = bits.div_ceil(4) as usize;
@@ -55,7 +60,7 @@ pub(crate) fn testbench(model: &Model, top: &str, files: &[GeneratedFile]) -> Ve
         counts: [codes.len(), beats.len()],
         patience,
     };
-    let text = opening.text(model, top, files) + &text(top);
+    let text = opening.text(model, top, files) + &text(top, (array_bits > 0).then(|| format!("{array_bits}'d{array}")));
     vec![file(".sv", text), file("_codes.hex", code_lines), file("_beats.hex", beat_lines)]
 }
 
@@ -184,7 +189,16 @@ fn memory_checks(top: &str, files: &[GeneratedFile]) -> String {
     memories.enumerate().map(check).collect()
 }
 
-fn text(top: &str) -> String {
+/// The module after its opening; `array` is the number of the array whose codes are sent, where there are several.
+fn text(top: &str, array: Option<String>) -> String {
+    let port = |port: &str| array.as_ref().map_or(String::new(), |array| port.replace("ARRAY", array));
+    let [wire, input, output, check] = [
+        "  wire [$bits(ARRAY)-1:0] m_array;\n",
+        "    .s_axis_tid(ARRAY),\n",
+        "    .m_axis_tid(m_array),\n",
+        "      if (m_array !== ARRAY) $fatal(1, \"beat %0d: m_axis_tid is %0d\", received, m_array);\n",
+    ]
+    .map(port);
     format!(
         "
   wire rst = cycle < 2;
@@ -192,16 +206,16 @@ fn text(top: &str) -> String {
   wire s_ready;
   wire m_valid, m_last;
   wire [95:0] m_data;
-
+{wire}
   {top} engine (
     .clk(clk),
     .rst(rst),
     .s_axis_tdata(codes[s_valid ? sent : 0]),
-    .s_axis_tvalid(s_valid),
+{input}    .s_axis_tvalid(s_valid),
     .s_axis_tready(s_ready),
     .s_axis_tlast(s_valid && sent % TAXELS == TAXELS - 1),
     .m_axis_tdata(m_data),
-    .m_axis_tvalid(m_valid),
+{output}    .m_axis_tvalid(m_valid),
     .m_axis_tready(1'b1),
     .m_axis_tlast(m_last)
   );
@@ -212,7 +226,7 @@ fn text(top: &str) -> String {
     if (!rst && m_valid) begin
       if (m_data !== expected[received]) $fatal(1, \"beat %0d is %h, expected %h\", received, m_data, expected[received]);
       if (m_last !== (received == BEATS - 1)) $fatal(1, \"beat %0d: m_axis_tlast is %b\", received, m_last);
-      received <= received + 1;
+{check}      received <= received + 1;
       if (received == BEATS - 1) begin
         $display(\"PASS: %0d codes, %0d beats, %0d cycles\", CODES, BEATS, cycle);
         $finish;

@@ -9,7 +9,7 @@ use crate::block;
 use crate::engine::Engine;
 use crate::error::HdlError;
 use crate::language::{kernel_of, Block, Builder, Hierarchy, Inside};
-use crate::primitives::{Dff, Queue};
+use crate::primitives::{Arrays, Dff, Queue};
 use crate::scan::require_stream;
 use crate::streams::{arrive_at, sent_by, through};
 
@@ -31,7 +31,8 @@ block! {
         in s_axis_tdata: 8 * WORD_BYTES;
         /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
         in s_axis_tkeep: WORD_BYTES;
-        /// Identifier of the frame, the same in all its beats; valid with `s_axis_tvalid`.
+        /// Identifier of the frame, the same in all its beats; of several arrays the low bits are the number of the frame's. Valid
+        /// with `s_axis_tvalid`.
         in s_axis_tid: ID_BITS;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
@@ -126,7 +127,7 @@ impl Core {
         let constants = constants(model, REGISTER_BITS / 8 * shape.words);
         Core {
             shape,
-            stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits),
+            stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits, Arrays::of_model(model)),
             tables_in: writable.then(|| TablesIn::new(code_bits)),
             engine: Engine::new(model),
             stream_out: StreamOut::new(shape.words, model.force_triples()),
@@ -188,6 +189,9 @@ impl Block for Core {
             }
         }
         arrive_at!(through!(sent_by!(stream_in), tables_in), engine);
+        engine.s_axis_tid.set(stream_in.m_axis_tid);
+        // Its identifier, of which the array is a part, comes from `labels`.
+        k.unused([engine.m_axis_tid]);
 
         stream_in.room.set(labels.room);
         labels.reserve.set(stream_in.complete);
@@ -245,7 +249,7 @@ impl Block for Core {
 /// [`HdlError::Unsupported`]: a scene with several frames per result; [`HdlError::Check`].
 pub(super) fn hierarchy(model: &Model, shape: CoreShape) -> Result<Hierarchy, HdlError> {
     require_stream(model, "a core for a SoC around a scan")?;
-    if model.scene.input.average > 0 {
+    if model.scene.input.frames_per_result() > 1 {
         let value = model.scene.input.average.to_string();
         return Err(HdlError::Unsupported {
             field: "input.average",

@@ -5,6 +5,7 @@ use dermis_golden::fixed::plan::resources::count_bits;
 use super::ID_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
+use crate::primitives::Arrays;
 
 /// Bytes of a word of the input.
 pub const WORD_BYTES: usize = 4;
@@ -19,6 +20,7 @@ block! {
         taxels: usize,
         /// Width of a code, 2 to 32.
         code_bits: usize,
+        arrays: Arrays,
     }
     ports StreamInPorts {
         clock;
@@ -39,6 +41,8 @@ block! {
         in room;
         /// The taxel's code, `code_bits` wide, signed; valid with `m_axis_tvalid`.
         out m_axis_tdata: code_bits;
+        /// Array of the frame: the low bits of its identifier; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -60,15 +64,15 @@ block! {
 }
 
 impl StreamIn {
-    /// For frames of `taxels` codes of `code_bits` bits, 2 to 32.
-    pub fn new(taxels: usize, code_bits: usize) -> Self {
-        StreamIn { taxels, code_bits }
+    /// For frames of `taxels` codes of `code_bits` bits, 2 to 32, of one of the `arrays`.
+    pub fn new(taxels: usize, code_bits: usize, arrays: Arrays) -> Self {
+        StreamIn { taxels, code_bits, arrays }
     }
 }
 
 impl Block for StreamIn {
     fn build<'k>(&self, k: &'k Builder, io: StreamInPorts<Inside<'k>>) {
-        let StreamIn { taxels, code_bits } = *self;
+        let StreamIn { taxels, code_bits, arrays } = *self;
         let bit = Type::unsigned(1);
         let count = k.state("count", Type::unsigned(count_bits(taxels)), io.rst, 0);
         let spoiled = k.state("spoiled", bit, io.rst, 0);
@@ -99,6 +103,11 @@ impl Block for StreamIn {
             tlast.set(io.s_axis_tlast);
             valid.set(io.s_axis_tvalid & io.room);
         });
+        if arrays.bits > 0 {
+            // The engine takes that of the first beat.
+            let array = io.m_axis_tid.register();
+            k.when(moves, || array.set(io.s_axis_tid.low(arrays.bits)));
+        }
         k.when(taken, || {
             count.set((io.s_axis_tlast | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
             spoiled.set(now_spoiled);
@@ -117,6 +126,7 @@ mod tests {
 
     const TAXELS: usize = 5;
     const CODE_BITS: usize = 12;
+    const ARRAYS: Arrays = Arrays { bits: 3 };
 
     /// Taxels since the frame began, its identifier, whether it is spoiled; the beat in the register.
     #[derive(Default)]
@@ -125,7 +135,7 @@ mod tests {
         id: u64,
         mixed: bool,
         spoiled: bool,
-        beat: Option<(u64, u64)>,
+        beat: Option<(u64, u64, u64)>,
         reset: bool,
     }
 
@@ -171,15 +181,16 @@ mod tests {
             let ready = inputs[6].number() == 1 && (self.beat.is_none() || inputs[7].number() == 1);
             let label = Word::from(u64::from(event.spoiled) << ID_BITS | event.id);
             vec![
-                self.beat.map(|(code, _)| Word::from(code)),
+                self.beat.map(|(code, ..)| Word::from(code)),
                 bit(self.beat.is_some()),
-                self.beat.map(|(_, last)| Word::from(last)),
+                self.beat.map(|(_, last, _)| Word::from(last)),
                 bit(ready),
                 bit(event.clipped),
                 bit(event.partial),
                 bit(event.misframed),
                 bit(event.complete),
                 (self.reset && event.complete).then_some(label),
+                self.beat.map(|(.., array)| Word::from(array)),
             ]
         }
 
@@ -191,7 +202,7 @@ mod tests {
             let event = self.event(inputs);
             let last = inputs[5].number();
             if event.taken {
-                self.beat = Some((event.code, last));
+                self.beat = Some((event.code, last, inputs[3].number() % ARRAYS.count() as u64));
                 (self.id, self.spoiled) = (event.id, event.spoiled);
                 self.mixed = event.foreign || self.mixed && self.count > 0;
                 self.count = if last == 1 || event.complete { 0 } else { self.count + 1 };
@@ -226,6 +237,6 @@ mod tests {
             ]
         });
         let stimulus: Vec<_> = stimulus.collect();
-        check(&kernel_of(&StreamIn::new(TAXELS, CODE_BITS)), &stimulus, &mut Frames::default());
+        check(&kernel_of(&StreamIn::new(TAXELS, CODE_BITS, ARRAYS)), &stimulus, &mut Frames::default());
     }
 }

@@ -8,15 +8,19 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{ID, REGISTER_BITS};
 
-use super::{Bus, CoreShape};
+use super::{Bus, CoreShape, ID_BITS};
 use crate::generate::Generated;
 use crate::manifest::GeneratedFile;
+use crate::primitives::Arrays;
 use crate::testbench::{reconstruction, Opening, Reconstruction, SUFFIX};
+
+/// Identifier of the frame, whose low bits are the number of the array.
+const TID: usize = 9;
 
 /// The testbench of `core` and its two memory files; `command` generates them.
 pub(super) fn testbench(model: &Model, core: &Generated, shape: CoreShape, command: String) -> Vec<GeneratedFile> {
     let top = &core.top;
-    let Reconstruction { codes, beats, patience } = reconstruction(model);
+    let Reconstruction { codes, beats, patience } = reconstruction(model, TID % Arrays::of_model(model).count());
     let lines = |words: &[i32]| words.iter().map(|word| format!("{word:08x}\n")).collect::<String>();
     let words: Vec<i32> = beats.into_iter().flatten().collect();
     let file = |ending: &str, text: String| GeneratedFile { name: format!("{top}{SUFFIX}{ending}"), text };
@@ -41,7 +45,7 @@ fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
         "
   localparam LANES = {lanes};
   localparam FORCE_WORDS = {force_words};
-  localparam [3:0] TID = 4'd9;
+  localparam [{top_bit}:0] TID = {ID_BITS}'d{TID};
 
   integer lane;
   reg identified = 1'b0;
@@ -53,7 +57,7 @@ fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
   wire [32*LANES-1:0] m_data;
   wire [4*LANES-1:0] m_keep;
   wire [LANES:0] m_user;
-  wire [3:0] m_id;
+  wire [{top_bit}:0] m_id;
 
 {declarations}
   {top} core (
@@ -99,6 +103,7 @@ fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
 endmodule
 ",
         lanes = shape.words,
+        top_bit = ID_BITS - 1,
         declarations = declarations(shape.bus),
     )
 }

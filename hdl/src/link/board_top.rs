@@ -107,6 +107,13 @@ impl BoardTop {
                        come,",
             });
         }
+        if model.scene.hardware.arrays > 1 {
+            return Err(HdlError::Unsupported {
+                field: "hardware.arrays",
+                value: model.scene.hardware.arrays.to_string(),
+                what: "a board's link, whose packets are of one array",
+            });
+        }
         if model.formats().degree == 0 {
             return Err(HdlError::Unsupported {
                 field: "search.mu_max",

@@ -2,9 +2,9 @@
 
 use super::control::Control;
 use super::Parallel;
-use crate::language::Expr;
-use crate::primitives::{BitDelay, FrameCheck, CHECK_LATENCY};
-use crate::streams::Beats;
+use crate::language::{Expr, Inside};
+use crate::primitives::{Arrays, BitDelay, FrameCheck, Queue, CHECK_LATENCY};
+use crate::streams::{Beats, EnginePorts};
 
 impl<'k> Parallel<'k, '_> {
     /// Case, `tlast` and number of frames follow their frame; shifts and saturations their subarray.
@@ -42,6 +42,25 @@ impl<'k> Parallel<'k, '_> {
         let received = self.held("received_frames", s.receive.accept, frames, remembers);
         let passing = self.held("frame_frames", c.begin_frame, received, remembers);
         s.forces.frames.set(self.held("searched_frames", c.hand_over, passing, remembers));
+    }
+
+    /// Of several arrays the one of a frame comes out with its `beats`: those that wait in the output may be of several frames.
+    pub(super) fn name_array(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>, beats: Beats<'k>) {
+        let (k, s, arrays) = (self.k, &self.s, Arrays::of_model(self.model));
+        let Some(prepare) = s.prepare.as_ref().filter(|_| arrays.bits > 0) else { return };
+        k.comment("Array of the frame received, in the passes, searched; of the frames that are sent");
+        let received = self.held("received_array", s.receive.accept, prepare.m_axis_tid, true);
+        let passing = self.held("frame_array", c.begin_frame, received, true);
+        let searched = self.held("searched_array", c.hand_over, passing, true);
+        let sent = k.instance("sent_arrays", Queue::new(arrays.bits));
+        sent.reserve.set(c.begin_send);
+        sent.write.set(c.begin_send);
+        sent.last.set(c.begin_send);
+        sent.word.set(searched);
+        sent.m_axis_tready.set(beats.valid & beats.last & io.m_axis_tready);
+        io.m_axis_tid.set(sent.m_axis_tdata);
+        // A frame has at least two beats, so that those of fewer frames than there are places wait.
+        k.unused([sent.room, sent.m_axis_tvalid, sent.m_axis_tlast]);
     }
 
     /// The `codes` of a frame are checked as they arrive; their faults follow it as its other bits do, [`CHECK_LATENCY`] cycles

@@ -119,6 +119,7 @@ impl<'k> Parallel<'k, '_> {
         }
         let beats = through!(beats, s.resultants);
         leave_by!(beats, io);
+        self.name_array(io, c, beats);
         if let Some(prepare) = &s.prepare {
             k.comment("Tables are written while no frame is under way");
             prepare.idle.set(!(s.receive.full | c.computes | beats.valid));

@@ -18,6 +18,9 @@ impl<'k> Parallel<'k, '_> {
         let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
         let codes = Beats { data, valid, last, ready: io.s_axis_tready.net() };
         arrive_at!(through!(codes, s.prepare), s.receive);
+        if let Some(prepare) = &s.prepare {
+            prepare.s_axis_tid.set(io.s_axis_tid);
+        }
         self.check(codes, c);
         let fold_address = s.fold.quad_address;
         s.receive.quad_address.set(s.contacts.as_ref().map_or(fold_address, |contacts| contacts.quad_address));

@@ -32,6 +32,7 @@ pub use arithmetic::rescaler::{count_saturations, operand_of, saturating_sum, Re
 pub(crate) use arithmetic::saturated::saturated;
 pub(crate) use arithmetic::unfolder::hadamard;
 pub use arithmetic::unfolder::Unfolder;
+pub use frame::arrays::{Arrays, FrameArray};
 pub use frame::arrival::Arrival;
 #[cfg(test)]
 pub(crate) use frame::average::tests::Sums;

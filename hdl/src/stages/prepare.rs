@@ -1,5 +1,7 @@
 //! Stage `prepare`: images of tables, calibration and averaging before `receive`, as far as the scene has them.
 //!
+//! Of several arrays each has a zero, gain, drift and mean of its own; the array of a frame is that of its first beat.
+//!
 //! Where zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
 use dermis_golden::fixed::Model;
@@ -7,8 +9,8 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Inside, Outside};
 use crate::primitives::{
-    Average, Calibrate, CalibratePorts, CoefficientPlaces, FrameMarks, Load, LoadPorts, PAIR_BITS, THRESHOLD_BITS,
-    VERSION_WORD_BITS,
+    Arrays, Average, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray, FrameMarks, Load, LoadPorts, PAIR_BITS,
+    THRESHOLD_BITS, VERSION_WORD_BITS,
 };
 use crate::streams::{leave_by, through, Beats};
 
@@ -19,9 +21,12 @@ block! {
         input_bits: usize,
         floor_bits: usize,
         marks: FrameMarks,
+        arrays: Arrays,
         coefficients: CoefficientPlaces,
         /// Tables are written.
         load: Option<Load>,
+        /// There are several arrays.
+        frame_array: Option<FrameArray>,
         /// Zero and gain of each taxel.
         calibrate: Option<Calibrate>,
         average: Option<Average>,
@@ -33,6 +38,8 @@ block! {
         in idle;
         /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
         in s_axis_tdata: stream_bits;
+        /// Array of the frame, that of its first beat; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -41,6 +48,8 @@ block! {
         in s_axis_tlast;
         /// A taxel's word, `input_bits` wide, two's complement; valid with `m_axis_tvalid`.
         out m_axis_tdata: input_bits;
+        /// Array of the frame; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -78,16 +87,20 @@ impl Prepare {
         let (power, mean) = (model.prepare.average, model.prepare.mean);
         let marks = FrameMarks::new(model);
         let load = Load::of_plan(model);
-        let calibrate = Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables());
-        let average = Average::new(taxels, bits, power, mean, marks);
-        let prepares = load.is_some() || calibrate.is_some() || average.is_some();
+        let arrays = Arrays::of_model(model);
+        let frame_array = FrameArray::new(arrays, taxels);
+        let calibrate = Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables(), arrays);
+        let average = Average::new([taxels, bits], power, mean, marks, arrays);
+        let prepares = load.is_some() || calibrate.is_some() || average.is_some() || frame_array.is_some();
         prepares.then(|| Prepare {
             stream_bits: model.stream_bits() as usize,
             input_bits: formats.input_bits as usize,
             floor_bits: model.floor_bits() as usize,
             marks,
+            arrays,
             coefficients: CoefficientPlaces::new(model),
             load,
+            frame_array,
             calibrate,
             average,
         })
@@ -97,6 +110,7 @@ impl Prepare {
 impl Block for Prepare {
     fn build<'k>(&self, k: &'k Builder, io: PreparePorts<Inside<'k>>) {
         let load = k.instance("load", self.load.as_ref());
+        let frame_array = k.instance("frame_array", self.frame_array.as_ref());
         let calibrate = k.instance("calibrate", self.calibrate.as_ref());
         let average = k.instance("average", self.average.as_ref());
         match &load {
@@ -105,13 +119,27 @@ impl Block for Prepare {
         }
         let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
         let codes = through!(Beats { data, valid, last, ready: io.s_axis_tready.net() }, load);
+        let array = frame_array.map_or(io.s_axis_tid, |frame| {
+            frame.s_axis_tid.set(io.s_axis_tid);
+            frame.taken.set(codes.valid & *codes.ready);
+            frame.tlast.set(codes.last);
+            frame.array
+        });
         let words = through!(codes, calibrate);
+        let array = calibrate.as_ref().map_or(array, |calibrate| {
+            calibrate.s_axis_tid.set(array);
+            calibrate.m_axis_tid
+        });
         io.frames.set(match &average {
             Some(average) => average.frames,
             None if self.marks.limited => words.data.top(),
             None => k.constant(1, 0),
         });
         let words = through!(words, average);
+        io.m_axis_tid.set(average.as_ref().map_or(array, |average| {
+            average.s_axis_tid.set(array);
+            average.m_axis_tid
+        }));
         leave_by!(Beats { data: words.data.low(self.input_bits), ..words }, io);
     }
 }

@@ -4,6 +4,7 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Plan;
 use dermis_golden::spec::scene::MeanKind;
 
+use super::arrays::Arrays;
 use super::sliding_mean::{frames_bits, SlidingMean};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
@@ -30,12 +31,16 @@ block! {
         power: usize,
         mean: MeanKind,
         marks: FrameMarks,
+        /// Each has a sliding mean of its own; one where blocks are added up.
+        arrays: Arrays,
     }
     ports AveragePorts {
         clock;
         reset;
         /// A taxel's word, `bits` wide, two's complement, where zeros run with a bit above it; valid with `s_axis_tvalid`.
         in s_axis_tdata: bits + usize::from(marks.limited);
+        /// Array of the frame; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -44,6 +49,8 @@ block! {
         in s_axis_tlast;
         /// A taxel's sum, `bits + power` wide, two's complement; valid with `m_axis_tvalid`.
         out m_axis_tdata: bits + power;
+        /// Array of the frame; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -80,11 +87,17 @@ impl FrameMarks {
 }
 
 impl Average {
-    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean; with
-    /// the `marks` of a frame. `None` where each frame is its own sum.
-    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind, marks: FrameMarks) -> Option<Self> {
+    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean, one for each
+    /// of the `arrays`; with the `marks` of a frame. `None` where each frame is its own sum.
+    pub fn new(
+        [taxels, bits]: [usize; 2],
+        power: u32,
+        mean: MeanKind,
+        marks: FrameMarks,
+        arrays: Arrays,
+    ) -> Option<Self> {
         let averages = power > 0 || mean == MeanKind::Sliding;
-        averages.then_some(Average { taxels, bits, power: power as usize, mean, marks })
+        averages.then_some(Average { taxels, bits, power: power as usize, mean, marks, arrays })
     }
 
     fn sums<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
@@ -147,14 +160,15 @@ impl Average {
 
 impl Block for Average {
     fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
-        let from = [io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
-        let to = [io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast, io.s_axis_tready];
-        let Average { taxels, bits, power, mean, marks: FrameMarks { limited, .. } } = *self;
+        let Average { taxels, bits, power, mean, marks: FrameMarks { limited, .. }, arrays } = *self;
         match mean {
             MeanKind::Block => self.sums(k, io),
             // No hardware has an adaptive one.
             MeanKind::Sliding | MeanKind::Adaptive => {
-                SlidingMean { taxels, bits, power, limited }.build(k, io.rst, from, to, io.frames);
+                let from = [io.s_axis_tdata, io.s_axis_tid, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
+                let [data, array, valid, last] = [io.m_axis_tdata, io.m_axis_tid, io.m_axis_tvalid, io.m_axis_tlast];
+                let to = [data, array, valid, last, io.s_axis_tready, io.frames];
+                SlidingMean { taxels, bits, power, limited, arrays }.build(k, io.rst, from, to);
             }
         }
     }

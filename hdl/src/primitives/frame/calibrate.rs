@@ -4,6 +4,7 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::prepare::running_zero::RunningZero;
 use dermis_golden::fixed::stages::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 
+use super::arrays::Arrays;
 use super::running_zero::{follow, Beat, Followed, RECOVERY};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, MemoryPort, Net, Type};
@@ -16,11 +17,12 @@ block! {
     /// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone. A
     /// running zero takes its drift off the difference, which takes 2 cycles more. The taxel count restarts at `tlast`, as in `receive`.
     pub struct Calibrate {
-        /// Zero of each taxel.
+        /// Zero of each taxel, array after array.
         zero: Option<Vec<i32>>,
-        /// Gain of each taxel.
+        /// Gain of each taxel, likewise.
         gain: Option<Vec<i32>>,
         running: Option<RunningZero>,
+        arrays: Arrays,
         taxels: usize,
         /// Width of a code in bits.
         bits: usize,
@@ -32,6 +34,8 @@ block! {
         reset;
         /// A taxel's code, `bits` wide, two's complement; valid with `s_axis_tvalid`.
         in s_axis_tdata: bits;
+        /// Array of the frame; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -41,6 +45,8 @@ block! {
         /// A taxel's stress in codes, `bits` wide, two's complement, saturated; above it, where zeros run, whether one is at its
         /// limit. Valid with `m_axis_tvalid`.
         out m_axis_tdata: bits + usize::from(running.is_some());
+        /// Array of the frame; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -58,16 +64,16 @@ block! {
     }
 }
 
-/// File of the table, one line per taxel: zero in the low bits, gain above.
+/// File of the table, one line per taxel: zero in the low bits, gain above. Of several arrays each begins at a power of two.
 const CALIBRATION_FILE: &str = "calibration.hex";
 
 impl Calibrate {
-    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`, which are `written` or not; `None`
-    /// where they have no zero.
-    pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool) -> Option<Self> {
+    /// Calibrates codes of `bits` bits of `taxels` taxels of each of the `arrays` with the tables of `prepare`, which are `written`
+    /// or not; `None` where they have no zero.
+    pub fn new(prepare: &Prepare, taxels: usize, bits: usize, written: bool, arrays: Arrays) -> Option<Self> {
         let Prepare { zero, gain, running, .. } = prepare.clone();
         let calibrates = zero.is_some() || running.is_some();
-        calibrates.then_some(Calibrate { zero, gain, running, taxels, bits, written })
+        calibrates.then_some(Calibrate { zero, gain, running, arrays, taxels, bits, written })
     }
 
     /// Width of a gain in the table.
@@ -78,13 +84,19 @@ impl Calibrate {
     /// The memory of the table; none without a zero.
     fn entries<'k>(&self, k: &'k Builder, io: &CalibratePorts<Inside<'k>>) -> Option<MemoryPort<'k>> {
         let (zero, bits, gain_bits) = (self.zero.as_ref()?, self.bits, self.gain_bits());
-        let word = |taxel: usize| {
-            let gain = self.gain.as_ref().map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
-            vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
+        let word = |index: usize| {
+            let gain = self.gain.as_ref().map_or(0, |gain| gain[index] as u64 & ((1 << gain_bits) - 1));
+            vec![gain << bits | zero[index] as u64 & ((1 << bits) - 1)]
         };
-        let words = (0..self.taxels).map(word).collect();
+        // Between the last taxel of an array and the first of the next nothing is read.
+        let filled = |place: usize| match place % (1 << count_bits(self.taxels)) {
+            taxel if taxel < self.taxels => word((place >> count_bits(self.taxels)) * self.taxels + taxel),
+            _ => vec![0],
+        };
+        let places = self.arrays.places(self.taxels);
+        let words = (0..places).map(filled).collect();
         let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words };
-        let entries = k.memory("entries", self.taxels, bits + gain_bits, contents).holds(Holds::Calibration);
+        let entries = k.memory("entries", places, bits + gain_bits, contents).holds(Holds::Calibration);
         if !self.written {
             return Some(entries);
         }
@@ -99,6 +111,7 @@ impl Calibrate {
         let entries = self.entries(k, &io);
         let steps = 2 + if self.gain.is_some() { 2 } else { 0 } + if self.running.is_some() { 2 } else { 0 };
         let taxel = k.state("taxel", Type::unsigned(io.write_taxel.bits()), rst, 0);
+        let place = self.arrays.place(k, io.s_axis_tid, *taxel);
         let entry = entries.map(|entries| {
             let entry = k.register("entry", Type::unsigned(bits + gain_bits));
             (entry, entries)
@@ -128,7 +141,8 @@ impl Calibrate {
             let early = k.wire("early", tlast & !end);
             k.when(moves, || waits.set(waits.low(RECOVERY - 1).concat(offered & early)));
             let (taxel, off, gain, valid) = (*taxel, difference, factor, valids.at(2));
-            follow(k, zero, self.taxels, Beat { rst, moves, offered, taxel, end, early, off, gain, valid })
+            let beat = Beat { rst, moves, offered, taxel, place, end, early, off, gain, valid };
+            follow(k, zero, self.arrays, self.taxels, beat)
         });
         let (difference, factor, limited) = match followed {
             None => (difference, factor, None),
@@ -164,7 +178,7 @@ impl Calibrate {
             k.when(offered, || taxel.set(after.mux(k.constant(taxel.bits(), 0), taxel.plus(1))));
             lasts.set(lasts.low(steps - 1).concat(tlast));
             if let Some((entry, entries)) = &entry {
-                entry.set(entries.read(*taxel));
+                entry.set(entries.read(place));
             }
             code.set(io.s_axis_tdata.signed());
             let calibrated = clipped.mux(limit, result.low(bits));
@@ -174,6 +188,13 @@ impl Calibrate {
                 false => calibrated,
             });
         });
+        let array_bits = self.arrays.bits;
+        if array_bits > 0 {
+            let arrays =
+                k.register("arrays", Type::unsigned(steps * array_bits)).comment("Of the beats in the registers.");
+            k.when(moves, || arrays.set(arrays.low((steps - 1) * array_bits).concat(io.s_axis_tid)));
+            io.m_axis_tid.set(arrays.slice((steps - 1) * array_bits, array_bits));
+        }
     }
 }
 
@@ -328,6 +349,7 @@ pub(crate) mod tests {
             zero: Some(zero.to_vec()),
             gain: gain.map(<[i32]>::to_vec),
             running: None,
+            arrays: Arrays::default(),
             taxels: TAXELS,
             bits: BITS,
             written,
@@ -402,6 +424,7 @@ pub(crate) mod tests {
                 zero: with_zero.then_some(zero),
                 gain: gain.map(<[i32]>::to_vec),
                 running: Some(running),
+                arrays: Arrays::default(),
                 taxels,
                 bits: BITS,
                 written: false,

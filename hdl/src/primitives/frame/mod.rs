@@ -1,5 +1,6 @@
 //! What is done to the codes of a frame as they arrive.
 
+pub(crate) mod arrays;
 pub(crate) mod arrival;
 pub(crate) mod average;
 pub(crate) mod calibrate;

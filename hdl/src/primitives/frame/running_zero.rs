@@ -15,6 +15,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::prepare::running_zero::RunningZero;
 
+use super::arrays::Arrays;
 use crate::language::{Builder, Contents, Expr, Type};
 
 /// Cycles after an early `tlast` in which no beat is taken, so that the words of a frame of one beat have been written.
@@ -25,9 +26,10 @@ pub(super) struct Beat<'k> {
     /// Reset, and whether the registers advance.
     pub rst: Expr<'k>,
     pub moves: Expr<'k>,
-    /// In the cycle in which a beat is offered: whether one is, its taxel, whether it is the last, whether `tlast` is early.
+    /// In the cycle in which a beat is offered: whether one is, its taxel and place, whether it is the last, whether `tlast` is early.
     pub offered: Expr<'k>,
     pub taxel: Expr<'k>,
+    pub place: Expr<'k>,
     pub end: Expr<'k>,
     pub early: Expr<'k>,
     /// A cycle later: its code less the zero, and its gain.
@@ -46,35 +48,43 @@ pub(super) struct Followed<'k> {
     pub limited: Expr<'k>,
 }
 
-/// For `taxels` taxels.
-pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat: Beat<'k>) -> Followed<'k> {
-    let Beat { rst, moves, offered, taxel, end, early, off, gain, valid } = beat;
+/// For `taxels` taxels of each of the `arrays`.
+pub(super) fn follow<'k>(
+    k: &'k Builder,
+    zero: &RunningZero,
+    arrays: Arrays,
+    taxels: usize,
+    beat: Beat<'k>,
+) -> Followed<'k> {
+    let Beat { rst, moves, offered, taxel, place, end, early, off, gain, valid } = beat;
     let [moved_bits, step_bits] = [zero.moved_bits(), zero.step_bits()].map(|bits| bits as usize);
     let (limit, most) = (i64::from(zero.limit), i64::from(zero.limit) << zero.average);
     let bit = Type::unsigned(1);
-    let drifts = k.memory("drifts", taxels, moved_bits + step_bits, Contents::Undefined).holds(Holds::Drift);
+    let drifts =
+        k.memory("drifts", arrays.places(taxels), moved_bits + step_bits, Contents::Undefined).holds(Holds::Drift);
 
     k.comment("The drift as it was stored, 0 in the first frame after a reset.");
-    let first = k.state("first", bit, rst, 1);
+    let array = arrays.of_place(place);
+    let firsts = arrays.state(k, "first", bit, rst, 1);
     let word = k.register("word", Type::unsigned(moved_bits + step_bits));
     let held = |name: &str, value: Expr<'k>| {
         let register = k.register(name, value.ty());
         k.when(moves, || register.set(value));
         *register
     };
-    k.when(moves, || word.set(drifts.read(taxel)));
-    k.when(moves & offered & end, || first.set(k.constant(1, 0)));
-    let taxels_held = held("taxel_1", taxel);
+    k.when(moves, || word.set(drifts.read(place)));
+    k.when(moves & offered & end, || firsts.set(k, array, k.constant(1, 0)));
+    let taxels_held = held("taxel_1", place);
     let ends = held("end_1", end);
     let early_held = held("early_1", early);
-    let firsts = held("first_1", *first);
+    let first = held("first_1", firsts.of(array));
     let dead = (!zero.dead.is_empty()).then(|| {
         let table: Vec<u64> = (0..1 << taxel.bits()).map(|at| u64::from(zero.dead.contains(&at))).collect();
         held("dead_1", taxel.table(1, &table))
     });
 
     k.comment("With the step of the frame before and without it.");
-    let stored = k.wire("stored", firsts.mux(k.constant(word.bits(), 0), *word));
+    let stored = k.wire("stored", first.mux(k.constant(word.bits(), 0), *word));
     let stay = k.wire("stay", stored.low(moved_bits).signed());
     let sum = k.wire("sum", stay + stored.slice(moved_bits, step_bits).signed());
     let bound = |limit: i64, bits: usize| k.signed_constant(bits, limit);
@@ -93,13 +103,14 @@ pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat
     let (off, stay, go) = (held("off_3", off), held("stay_3", stay), held("go_3", go));
     let dead = dead.map(|dead| held("dead_3", dead));
     let gain = gain.map(|gain| held("gain_3", gain));
-    let [taxel, end, early] =
+    let [place, end, early] =
         [("taxel_3", taxels_held), ("end_3", ends), ("early_3", early_held)].map(|(name, value)| held(name, value));
 
-    let state = |name: &str| k.state(name, bit, rst, 0);
-    let rests = state("rests").comment("Nothing pressed in the frame before.");
-    let (pressed, limiting) = (state("pressed"), state("limiting"));
-    let limited = state("limited").comment("A zero was at its limit in the frame before.");
+    let [pressed, limiting] = ["pressed", "limiting"].map(|name| k.state(name, bit, rst, 0));
+    k.comment("Nothing pressed in the frame before; a zero was at its limit in it.");
+    let [all_rest, all_limited] = ["rests", "limited"].map(|name| arrays.state(k, name, bit, rst, 0));
+    let array = arrays.of_place(place);
+    let [rests, limited] = [&all_rest, &all_limited].map(|state| state.of(array));
     let either = |go: Expr<'k>, stay: Expr<'k>| rests.mux(go, stay);
     let difference = k.wire("rest", either(rest_go, rest_stay));
     let moved = k.wire("moved", either(go, stay));
@@ -123,9 +134,9 @@ pub(super) fn follow<'k>(k: &'k Builder, zero: &RunningZero, taxels: usize, beat
         let over = end | early;
         pressed.set(touched & !over);
         limiting.set(reached & !over);
-        k.when(over, || rests.set(end & !touched));
-        k.when(end, || limited.set(reached));
+        k.when(over, || all_rest.set(k, array, end & !touched));
+        k.when(end, || all_limited.set(k, array, reached));
     });
-    drifts.write(steps, taxel, step.unsigned().concat(moved.unsigned()));
-    Followed { difference, gain, limited: *limited }
+    drifts.write(steps, place, step.unsigned().concat(moved.unsigned()));
+    Followed { difference, gain, limited }
 }

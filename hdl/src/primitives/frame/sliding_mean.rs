@@ -7,11 +7,12 @@
 //! g grows with the number of frames ([`gain_shift`]), so that the first frame after a reset is its own mean. c is 1 in
 //! every second frame: halves are rounded up and down in turn. An early
 //! `tlast` leaves with its beat, at which `receive` drops the frame; some taxels hold its words by then, so the mean
-//! starts again with the next frame. A missing `tlast` is missing behind the mean too, and changes nothing else.
+//! starts again with the next frame of its array. A missing `tlast` is missing behind the mean too, and changes nothing else.
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::spec::sliding::gain_shift;
 
+use super::arrays::Arrays;
 use crate::language::{Builder, Contents, Expr, Output, Type};
 use crate::primitives::address::counter::count_bits;
 
@@ -30,31 +31,35 @@ pub(super) struct SlidingMean {
     pub power: usize,
     /// There is a bit above a word, which leaves above the number of frames.
     pub limited: bool,
+    /// Each has a mean of its own.
+    pub arrays: Arrays,
 }
 
 impl SlidingMean {
-    /// Data, `tvalid`, `tlast` and `m_axis_tready` to data, `tvalid`, `tlast`, `s_axis_tready`, and to the number of frames.
+    /// Data, array, `tvalid`, `tlast` and `m_axis_tready` to data, array, `tvalid`, `tlast`, `s_axis_tready` and the number of frames.
     pub fn build<'k>(
         &self,
         k: &'k Builder,
         rst: Expr<'k>,
-        [data, offered, tlast, ready]: [Expr<'k>; 4],
-        [data_out, valid_out, last_out, ready_out]: [Output<'k>; 4],
-        frames: Output<'k>,
+        [data, array, offered, tlast, ready]: [Expr<'k>; 5],
+        [data_out, array_out, valid_out, last_out, ready_out, frames]: [Output<'k>; 6],
     ) {
         let (power, wide) = (self.power, self.bits + self.power);
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
+        let place_type = Type::unsigned(index.bits + self.arrays.bits);
         let (shift, count) = (Type::unsigned(count_bits(power + 1)), Type::unsigned(power + 1));
-        let means = k.memory("means", self.taxels, wide, Contents::Undefined).holds(Holds::Average);
+        let means = k.memory("means", self.arrays.places(self.taxels), wide, Contents::Undefined).holds(Holds::Average);
         k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
         let taxel = k.state("taxel", index, rst, 0);
-        let gain = k.state("gain", shift, rst, 0);
-        let odd = k.state("odd", bit, rst, 0);
-        let whole = k.state("whole", count, rst, 0);
+        let gains = self.arrays.state(k, "gain", shift, rst, 0);
+        let odds = self.arrays.state(k, "odd", bit, rst, 0);
+        let wholes = self.arrays.state(k, "whole", count, rst, 0);
+        let [gain, odd, whole] = [&gains, &odds, &wholes].map(|state| state.of(array));
         let [held, added] = ["held", "added"].map(|name| k.state(name, bit, rst, 0));
         let valid = valid_out.state(rst, 0);
         let (word, sofar) = (k.register("word", Type::signed(self.bits)), k.register("sofar", Type::signed(wide)));
-        let (held_taxel, added_taxel) = (k.register("held_taxel", index), k.register("added_taxel", index));
+        let place = self.arrays.place(k, array, *taxel);
+        let [held_taxel, added_taxel] = ["held_taxel", "added_taxel"].map(|name| k.register(name, place_type));
         let held_gain = k.register("held_gain", shift);
         let held_odd = k.register("held_odd", bit);
         let [held_last, added_last] = ["held_last", "added_last"].map(|name| k.register(name, bit));
@@ -67,8 +72,8 @@ impl SlidingMean {
 
         let at_end = k.wire("at_end", taxel.is(self.taxels as u64 - 1));
         let early = k.wire("early", tlast & !at_end);
-        let next = k.wire("next", whole.all().mux(*whole, whole.plus(1)));
-        let rises = k.wire("rises", rises(k, *whole, power));
+        let next = k.wire("next", whole.all().mux(whole, whole.plus(1)));
+        let rises = k.wire("rises", rises(k, whole, power));
         k.comment("Of the first frame nothing has been stored.");
         let stored = k.wire("stored", held_gain.is(0).mux(k.signed_constant(wide, 0), *sofar));
         // 2 (2^k word − mean) − c, which the shift rounds down to the same as 2 (2^k word − mean − c): g is 0 only with c = 0.
@@ -81,22 +86,22 @@ impl SlidingMean {
             k.when(offered, || {
                 taxel.set((early | at_end).mux(k.constant(taxel.bits(), 0), taxel.plus(1)));
                 k.when(at_end, || {
-                    whole.set(next);
-                    odd.set(!*odd);
-                    gain.set((*gain + rises).low(gain.bits()));
+                    wholes.set(k, array, next);
+                    odds.set(k, array, !odd);
+                    gains.set(k, array, (gain + rises).low(gain.bits()));
                 });
                 k.when(early, || {
-                    whole.set(k.constant(whole.bits(), 0));
-                    odd.set(k.constant(1, 0));
-                    gain.set(k.constant(gain.bits(), 0));
+                    for (states, state) in [(&wholes, whole), (&odds, odd), (&gains, gain)] {
+                        states.set(k, array, k.constant(state.bits(), 0));
+                    }
                 });
             });
             held.set(offered);
             word.set(data.low(self.bits).signed());
-            sofar.set(means.read(*taxel).signed());
-            held_taxel.set(*taxel);
-            held_gain.set(*gain);
-            held_odd.set(*odd);
+            sofar.set(means.read(place).signed());
+            held_taxel.set(place);
+            held_gain.set(gain);
+            held_odd.set(odd);
             held_last.set(tlast);
             held_frames.set(if self.limited { data.top().concat(next) } else { next });
             added.set(*held);
@@ -111,6 +116,10 @@ impl SlidingMean {
             frames.set(*added_frames);
         });
         means.write(moves & *added, *added_taxel, result);
+        if self.arrays.bits > 0 {
+            let array_out = array_out.register();
+            k.when(moves, || array_out.set(self.arrays.of_place(*added_taxel)));
+        }
     }
 }
 

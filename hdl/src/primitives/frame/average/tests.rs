@@ -93,7 +93,8 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
             inputs
         })
         .collect();
-    let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block, FrameMarks::default()).unwrap();
+    let average =
+        Average::new([TAXELS, BITS], POWER, MeanKind::Block, FrameMarks::default(), Arrays::default()).unwrap();
     check(&kernel_of(&average), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
@@ -186,7 +187,7 @@ fn every_frame_gives_the_mean_so_far() {
             .collect();
         assert!(most > 2 << power, "{most} frames");
         let marks = FrameMarks { frames_bits: frames_bits(power), limited: false };
-        let average = Average::new(TAXELS, BITS, power, MeanKind::Sliding, marks).unwrap();
+        let average = Average::new([TAXELS, BITS], power, MeanKind::Sliding, marks, Arrays::default()).unwrap();
         check(&kernel_of(&average), &stimulus, &mut Means::new(power));
     }
 }
