@@ -26,7 +26,7 @@ const WATCHDOG: u64 = 100_000;
 fn fastest(hardware: &Hardware, simulator: Simulator, frame: &Frame) -> anyhow::Result<Duration> {
     let vector = hardware.vector(std::slice::from_ref(frame))?;
     let beats = vector.expected.beats.len() + vector.expected.status.len();
-    let input = [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats }];
+    let input = [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats, array: 0 }];
     let mut device = hardware.device(simulator)?;
     let mut best = Duration::MAX;
     for _ in 0..RUNS {

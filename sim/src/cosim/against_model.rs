@@ -30,6 +30,8 @@ pub struct Vector {
     pub codes: Vec<i32>,
     /// Taxels per frame.
     pub taxels: usize,
+    /// The array that the frames are of; 0 where there is one.
+    pub array: usize,
     /// The model's stages, beats, status and cycle counts.
     pub expected: Trace,
 }
@@ -48,7 +50,7 @@ impl Vector {
             let rows = expected.stages.iter().position(|stage| stage.name == "pass").unwrap_or_default();
             expected.stages.insert(rows, Stage { name: "instruction", words: words.collect() });
         }
-        Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected }
+        Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), array: 0, codes, expected }
     }
 
     /// The image of the tables of `model`, which nothing answers.
@@ -66,7 +68,7 @@ impl Vector {
     /// What is sent, and how many beats answer it.
     pub fn input(&self) -> InputFrame<'_> {
         let beats = self.expected.beats.len() + self.expected.status.len();
-        InputFrame { codes: &self.codes, taxels: self.taxels, beats }
+        InputFrame { codes: &self.codes, taxels: self.taxels, beats, array: self.array }
     }
 
     /// The vector without the model's stages, for a device without taps: only beats and cycles are compared.

@@ -5,7 +5,9 @@
 //! |---|---|---|
 //! | `in` | 31:0 | `s_axis_tdata`, two's complement |
 //! | | 32, 33, 34, 35 | `rst`, `s_axis_tvalid`, `s_axis_tlast`, `m_axis_tready` |
+//! | | from 40 | `s_axis_tid`, of several arrays |
 //! | `out` | 0, 1, 2 | `s_axis_tready`, `m_axis_tvalid`, `m_axis_tlast` |
+//! | | from 8 | `m_axis_tid`, of several arrays |
 //! | | 127:32 | `m_axis_tdata` = {fz, fy, fx} |
 //! | | from 128 | per tap: one 32-bit word with valid in bit 0, then the data padded to 32-bit words |
 //!
@@ -17,6 +19,9 @@ use dermis_hdl::device::{Inputs, Outputs, Tap, TapSignal};
 
 /// Hierarchical name of the design's instance.
 pub(crate) const INSTANCE: &str = "bench.dut";
+/// Positions of the numbers of arrays in `in` and `out`.
+const TID_IN: usize = 40;
+const TID_OUT: usize = 8;
 /// Words of `out` before the first tap.
 const PIN_WORDS: usize = 4;
 
@@ -24,21 +29,23 @@ const PIN_WORDS: usize = 4;
 #[derive(Clone, Debug)]
 pub struct Layout {
     input_bits: u32,
+    /// Width of the number of an array; 0 of one array.
+    array_bits: usize,
     taps: Vec<Tap>,
     /// First 32-bit word of each tap in `out`, and the length of `out`.
     offsets: Vec<usize>,
 }
 
 impl Layout {
-    /// The layout of a design with codes of `input_bits` (1..=32) and the given taps.
-    pub fn new(input_bits: u32, taps: &[Tap]) -> Self {
+    /// The layout of a design with codes of `input_bits` (1..=32), numbers of arrays of `array_bits` (0..=8) and the given taps.
+    pub fn new(input_bits: u32, array_bits: usize, taps: &[Tap]) -> Self {
         let mut offsets = vec![PIN_WORDS];
         let mut end = PIN_WORDS;
         for tap in taps {
             end += 1 + tap.bits().div_ceil(32);
             offsets.push(end);
         }
-        Layout { input_bits, taps: taps.to_vec(), offsets }
+        Layout { input_bits, array_bits, taps: taps.to_vec(), offsets }
     }
 
     /// The taps, in the order of [`Outputs::taps`].
@@ -53,16 +60,25 @@ impl Layout {
 
     /// Verilog text of `bench` around an instance `dut` of module `top`.
     pub fn verilog(&self, top: &str) -> String {
+        let array = match self.array_bits {
+            0 => String::new(),
+            bits => format!(
+                "\n    .s_axis_tid(in[{}:{TID_IN}]), .m_axis_tid(out[{}:{TID_OUT}]),",
+                TID_IN + bits - 1,
+                TID_OUT + bits - 1
+            ),
+        };
         let mut text = format!(
             "// Test bench of {top}: pins and taps packed into two vectors. Generated, do not edit.\n\
              module bench(input wire clk, input wire [63:0] in, output wire [{out}:0] out);\n  \
              wire s_ready, m_valid, m_last;\n  wire [95:0] m_data;\n  {top} dut(\n    \
              .clk(clk), .rst(in[32]),\n    \
              .s_axis_tdata(in[{data}:0]), .s_axis_tvalid(in[33]), .s_axis_tready(s_ready), .s_axis_tlast(in[34]),\n    \
-             .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(in[35]), .m_axis_tlast(m_last));\n  \
-             assign out[127:0] = {{m_data, 29'd0, m_last, m_valid, s_ready}};\n",
+             .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(in[35]),{array} .m_axis_tlast(m_last));\n  \
+             assign out[127:32] = m_data;\n  assign out[2:0] = {{m_last, m_valid, s_ready}};\n{rest}",
             out = 32 * self.out_words() - 1,
             data = self.input_bits - 1,
+            rest = unused(3, TID_OUT) + &unused(TID_OUT + self.array_bits, 32),
         );
         for (index, tap) in self.taps.iter().enumerate() {
             let bits = tap.bits();
@@ -95,6 +111,7 @@ impl Layout {
             | u64::from(inputs.s_valid) << 33
             | u64::from(inputs.s_last) << 34
             | u64::from(inputs.m_ready) << 35
+            | (inputs.s_array as u64) << TID_IN
     }
 
     /// Unpacks one cycle's outputs from [`Layout::out_words`] words.
@@ -109,10 +126,16 @@ impl Layout {
             s_ready: words[0] & 1 == 1,
             m_valid: words[0] >> 1 & 1 == 1,
             m_last: words[0] >> 2 & 1 == 1,
+            m_array: (words[0] >> TID_OUT) as usize & ((1 << self.array_bits) - 1),
             m_data: [words[1] as i32, words[2] as i32, words[3] as i32],
             taps: taps.collect(),
         }
     }
+}
+
+/// Verilog that drives bits `low` to below `end` of `out` low.
+fn unused(low: usize, end: usize) -> String {
+    format!("  assign out[{}:{low}] = {}'d0;\n", end - 1, end - low)
 }
 
 /// Verilog expression that is 1 in a cycle in which a word of `tap` passes, for an instance of the design.
@@ -174,7 +197,7 @@ mod tests {
 
     #[test]
     fn pins_and_taps_unpack_where_the_layout_says() {
-        let layout = Layout::new(20, &[tap("a", 3, 18), tap("b", 1, 64)]);
+        let layout = Layout::new(20, 0, &[tap("a", 3, 18), tap("b", 1, 64)]);
         // 54 bits need two words, 64 bits two: 4 + 3 + 3.
         assert_eq!(layout.out_words(), 10);
         let words = [0b110, 1, u32::MAX, 3, 1, 7 | 9 << 18, 0, 0, 1, 2];
@@ -187,6 +210,6 @@ mod tests {
     #[test]
     fn negative_codes_keep_to_their_bits() {
         let inputs = Inputs { s_data: -1, s_valid: true, ..Inputs::default() };
-        assert_eq!(Layout::new(20, &[]).pack(&inputs), 0xf_ffff | 1 << 33);
+        assert_eq!(Layout::new(20, 0, &[]).pack(&inputs), 0xf_ffff | 1 << 33);
     }
 }

@@ -45,7 +45,15 @@ impl VerilatedBoard {
             scan = scan.unwrap_or_default(),
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1, open_state: false, optimisation: Optimisation::On };
+        let design = Design {
+            top,
+            files,
+            taps: &[],
+            input_bits: 1,
+            array_bits: 0,
+            open_state: false,
+            optimisation: Optimisation::On,
+        };
         VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }

@@ -88,7 +88,8 @@ fn leave_work_in_progress(device: &mut dyn Device, play: &InputFrame) {
         }
         for (taxel, &s_data) in play.codes[..count].iter().enumerate() {
             let s_last = (taxel + 1).is_multiple_of(play.taxels);
-            device.cycle(&Inputs { s_valid: true, s_data, s_last, ..Inputs::default() });
+            let s_array = play.array;
+            device.cycle(&Inputs { s_valid: true, s_data, s_array, s_last, ..Inputs::default() });
         }
         for _ in 0..count {
             device.cycle(&Inputs::default());

@@ -145,7 +145,7 @@ fn draw(elements: &[StateElement], run: usize, random: &mut fastrand::Rng) -> Op
 }
 
 fn input_frame(sample: &Sample) -> InputFrame<'_> {
-    InputFrame { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
+    InputFrame { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len(), array: 0 }
 }
 
 impl Row {

@@ -7,6 +7,7 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
@@ -149,6 +150,7 @@ impl Hardware {
             files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.stream_bits(),
+            array_bits: self.model.scene.hardware.array_bits(),
             open_state,
             optimisation,
         };
@@ -199,30 +201,46 @@ impl Hardware {
     }
 
     /// The test vector of one reconstruction: codes of its frames and the bit-true model's results. With a sliding mean or a
-    /// running zero these are all frames since the reset, of which the last are sent.
+    /// running zero these are all frames since the reset, of which the last are sent. Of several arrays the frames are of the first.
     ///
     /// # Errors
     /// A frame of another sensor, or a number of frames that the scene does not average.
     pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
-        let codes = self.model.readings(frames)?;
-        let expected = self.model.run(&codes);
-        let before = frames.len() - self.model.scene.input.frames_per_result();
-        let frame = frames.get(before).map_or_else(String::new, |frame| frame.id.clone());
-        let codes = codes[before * self.model.scene.sensor.taxels()..].to_vec();
-        Ok(Vector::new(&self.model, frame, codes, expected))
+        vector(&self.model, frames)
     }
 
-    /// The test vectors of frames that follow one another after a reset.
+    /// The results of frames that follow one another after a reset: those of array k are of every frame whose number is k modulo the
+    /// number of arrays.
     ///
     /// # Errors
-    /// As [`Hardware::vector`].
+    /// What is wrong with the files of an array.
+    pub fn results(&self, frames: &[Frame]) -> Result<Vec<ArrayResult>> {
+        let arrays = self.model.scene.hardware.arrays;
+        let of_array = |array: usize| {
+            let own: Vec<Frame> = frames.iter().skip(array).step_by(arrays).cloned().collect();
+            let model = Rc::new(self.model.of_array(array)?);
+            let all = model.scene.input.frames_of_results(&own).into_iter();
+            Ok(all.map(|frames| ArrayResult { array, model: model.clone(), frames: frames.to_vec() }).collect())
+        };
+        let by_array = (0..arrays.min(frames.len().max(1))).map(of_array).collect::<Result<Vec<Vec<_>>>>()?;
+        let turns = by_array.iter().map(Vec::len).max().unwrap_or(0);
+        Ok((0..turns).flat_map(|turn| by_array.iter().filter_map(move |own| own.get(turn).cloned())).collect())
+    }
+
+    /// The test vectors of frames that follow one another after a reset, one for each of [`Hardware::results`].
+    ///
+    /// # Errors
+    /// As [`Hardware::vector`] and [`Hardware::results`].
     pub fn vectors(&self, frames: &[Frame]) -> Result<Vec<Vector>> {
-        self.model.scene.input.frames_of_results(frames).into_iter().map(|frames| self.vector(frames)).collect()
+        let vector =
+            |ArrayResult { array, model, frames }: ArrayResult| Ok(Vector { array, ..vector(&model, &frames)? });
+        self.results(frames)?.into_iter().map(vector).collect()
     }
 
     /// The forces and status beats that the verilated hardware sends after the last of the frames.
     fn words(&self, frames: &[Frame]) -> Result<[Vec<[i32; 3]>; 2]> {
-        let vectors = self.vectors(frames)?;
+        let results = self.model.scene.input.frames_of_results(frames).into_iter();
+        let vectors: Vec<Vector> = results.map(|frames| self.vector(frames)).collect::<Result<_>>()?;
         let inputs: Vec<InputFrame> = vectors.iter().map(Vector::input).collect();
         let mut device = self.device_for(Simulator::Verilator, &vectors, 1)?;
         let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
@@ -235,6 +253,27 @@ impl Hardware {
         let status = forces.split_off(self.model.force_beats().min(forces.len()));
         Ok([forces, status])
     }
+}
+
+/// The frames of a result and the model of their array.
+#[derive(Clone)]
+pub struct ArrayResult {
+    /// Number of the array.
+    pub array: usize,
+    /// Its bit-true model.
+    pub model: Rc<Model>,
+    /// Its frames: those that are averaged, or all since a reset.
+    pub frames: Vec<Frame>,
+}
+
+/// The test vector of one reconstruction by `model`.
+fn vector(model: &Model, frames: &[Frame]) -> Result<Vector> {
+    let codes = model.readings(frames)?;
+    let expected = model.run(&codes);
+    let before = frames.len() - model.scene.input.frames_per_result();
+    let frame = frames.get(before).map_or_else(String::new, |frame| frame.id.clone());
+    let codes = codes[before * model.scene.sensor.taxels()..].to_vec();
+    Ok(Vector::new(model, frame, codes, expected))
 }
 
 impl Engine for Hardware {

@@ -8,6 +8,8 @@
 //! | `tables` | with writable tables: frames and images of tables, half of them damaged, too short or long, for other hardware, inside a frame, broken off by a frame or a reset | every frame leaves once, with the forces of the tables of its time, their version and state |
 //! | `reset` | a reset at a given cycle of a frame, held for one cycle up to a frame's time | no beat of the frames inside leaves; the next frame is right, without flag, and in time |
 //!
+//! Where the engine serves several arrays, every frame is of one drawn at random.
+//!
 //! Each experiment runs for about the requested number of cycles; `reset` ends earlier once every cycle of a frame has
 //! had a reset. The expected effect of a wrong `tlast` is defined in `stress/scoreboard.rs`.
 
@@ -38,11 +40,13 @@ pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> 
     let mut samples = shipped_samples(&hardware.model, frames)?;
     samples.extend(synthetic_samples(&hardware.model, &mut random));
     let mut device = hardware.device(Simulator::Verilator)?;
+    let arrays = 0..hardware.model.scene.hardware.arrays;
+    let models = arrays.map(|array| hardware.model.of_array(array)).collect::<Result<Vec<_>, _>>()?;
     let mut outcomes = Vec::new();
     let all = ["stalls", "tlast", "reset", "tables"];
     let written = hardware.model.has_writable_tables();
     for experiment in all.into_iter().filter(|experiment| *experiment != "tables" || written) {
-        let mut bench = Testbench::new(device.as_mut(), &hardware.model, &samples);
+        let mut bench = Testbench::new(device.as_mut(), &models, &samples);
         bench.reset(RESET_CYCLES, &mut random);
         match experiment {
             "stalls" => stalls(&mut bench, &mut random, cycles),
@@ -61,12 +65,10 @@ fn stalls(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
     while bench.can_continue() && bench.cycle() < cycles {
         let mut rates = HandshakeRates::random(random);
         for _ in 0..1 + random.usize(..6) {
-            let sample = random.usize(..bench.sample_count());
-            bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
+            bench.send(&bench.any(random), &mut rates);
         }
         if random.u32(..8) == 0 {
-            let sample = random.usize(..bench.sample_count());
-            bench.send_alone(&Burst::whole(bench.sample(sample), sample));
+            bench.send_alone(&bench.any(random));
         }
     }
     bench.drain(&mut HandshakeRates::full_speed());
@@ -86,7 +88,7 @@ fn tlast(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
                 3 => Burst::late(codes, sample),
                 _ => Burst::whole(codes, sample),
             };
-            bench.send(&burst, &mut rates);
+            bench.send(&burst.of_array(random.usize(..bench.arrays())), &mut rates);
         }
     }
     bench.drain(&mut HandshakeRates::full_speed());

@@ -14,6 +14,7 @@ use std::path::Path;
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
+use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::plan::contact_cycles::ContactTiming;
 use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
@@ -24,7 +25,7 @@ use dermis_golden::spec::scene::Scene;
 use super::against_model::{run, DeviceUnderTest, Vector};
 use super::drive::{Stimulus, Times};
 use super::findings::Findings;
-use super::hardware::{Hardware, Simulator};
+use super::hardware::{ArrayResult, Hardware, Simulator};
 use crate::compare::{comparable_forces, difference, Difference};
 use crate::progress::Progress;
 
@@ -97,8 +98,7 @@ pub fn verify_specimen(
     if let Some(specimen) = specimen {
         hardware.load(specimen, 1)?;
     }
-    // Of the model's scene, which has the full scale filled in, so that both use the same codes.
-    let golden = hardware.model.reference()?;
+    let results = hardware.results(frames)?;
     let vectors = hardware.vectors(frames)?;
 
     let mut verified = Verified {
@@ -118,13 +118,18 @@ pub fn verify_specimen(
             times = seen;
         }
     }
-    let frames = scene.input.frames_of_results(frames);
-    for (index, ((frames, vector), times)) in frames.into_iter().zip(&vectors).zip(times).enumerate() {
-        let frame = &hardware.model.stress(frames)?;
-        let full_scale_MPa = full_scale(&hardware.model.scene, frame);
-        let golden = golden.run_averaged(frames)?;
-        let fixed = hardware.model.decode(frames, "fixed", &vector.expected.beats, &vector.expected.status)?;
-        let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
+    let mut references: Vec<Golden> = Vec::new();
+    for (index, ((result, vector), times)) in results.iter().zip(&vectors).zip(times).enumerate() {
+        let ArrayResult { array, model, frames } = result;
+        if references.len() == *array {
+            // Of the model's scene, which has the full scale filled in, so that both use the same codes.
+            references.push(model.reference()?);
+        }
+        let frame = &model.stress(frames)?;
+        let full_scale_MPa = full_scale(&model.scene, frame);
+        let golden = references[*array].run_averaged(frames)?;
+        let fixed = model.decode(frames, "fixed", &vector.expected.beats, &vector.expected.status)?;
+        let lsb_N = model.force_lsb_N(full_scale_MPa);
         verified.rows.push(FrameResult {
             frame: frame.id.clone(),
             full_scale_MPa,

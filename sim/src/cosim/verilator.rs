@@ -86,6 +86,8 @@ pub struct Design<'a> {
     pub taps: &'a [Tap],
     /// Width of `s_axis_tdata`, 1..=32.
     pub input_bits: u32,
+    /// Width of `s_axis_tid` and `m_axis_tid`; 0 of one array, which has neither.
+    pub array_bits: usize,
     /// Whether registers and memories can be read and changed; the simulation is slower then.
     pub open_state: bool,
     /// How much the compiler optimises.
@@ -241,7 +243,7 @@ impl Verilated {
     /// # Errors
     /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
     pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
-        let layout = Layout::new(design.input_bits, design.taps);
+        let layout = Layout::new(design.input_bits, design.array_bits, design.taps);
         let bench = VerilatedBench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
         Ok(Verilated { layout, bench })
     }

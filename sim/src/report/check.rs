@@ -1,5 +1,6 @@
 //! What `dermis check` finds, as JSON and as text.
 
+use dermis_golden::fixed::plan::interval::longest_wait;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::checks::pull::TareLoad;
 use dermis_golden::spec::sensor::Sensor;
@@ -124,6 +125,19 @@ pub struct HardwareCheck {
     pub clock_MHz: f64,
     /// Time of the cycles in µs.
     pub time_us: f64,
+    /// Of an engine that serves several arrays.
+    pub arrays: Option<ArraysCheck>,
+}
+
+/// Frames of all arrays that come at once, one of each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArraysCheck {
+    /// Number of arrays.
+    pub count: usize,
+    /// Cycles from the first input beat of all to the last output beat of the last, at most.
+    pub cycles: u64,
+    /// Time of the cycles in µs.
+    pub time_us: f64,
 }
 
 impl HardwareCheck {
@@ -135,7 +149,10 @@ impl HardwareCheck {
         left_out: Vec<&'static str>,
     ) -> Self {
         let (board, usage, cycles) = (&model.board, total(usage), Cycles::longest(model).total);
+        let (count, wait) = (model.scene.hardware.arrays, longest_wait(model));
+        let arrays = ArraysCheck { count, cycles: wait, time_us: board.microseconds(wait) };
         HardwareCheck {
+            arrays: (count > 1).then_some(arrays),
             degree: model.formats().degree,
             estimator_instead,
             left_out,
@@ -159,6 +176,11 @@ impl HardwareCheck {
         text += &format!(
             "time        at most {cycles} cycles = {time_us:.2} µs at {clock_MHz} MHz, {margin} the budget of {BUDGET_US} µs\n"
         );
+        if let Some(ArraysCheck { count, cycles, time_us }) = self.arrays {
+            text += &format!(
+                "arrays      {count}; of frames that come at once the last result is there after at most {cycles} cycles = {time_us:.2} µs\n"
+            );
+        }
         if let Some(instead) = self.estimator_instead {
             text += &format!("left out    by the hardware: the model's estimator; it computes {instead}\n");
         }

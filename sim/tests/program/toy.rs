@@ -37,7 +37,7 @@ fn cache() -> PathBuf {
 fn toy_of(verilog: &str, gain: &str, open_state: bool) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
     let optimisation = Optimisation::Off;
-    let design = Design { top: "toy", files, taps: &taps(), input_bits: 12, open_state, optimisation };
+    let design = Design { top: "toy", files, taps: &taps(), input_bits: 12, array_bits: 0, open_state, optimisation };
     Verilated::new(&design, &cache())
 }
 
@@ -57,6 +57,7 @@ fn vectors() -> Vec<Vector> {
             frame: name.into(),
             cols: 3,
             taxels: 6,
+            array: 0,
             codes: codes.to_vec(),
             expected: Trace {
                 beats: codes.iter().map(|&c| [GAIN as i32 * c, c, c]).collect(),
@@ -132,7 +133,7 @@ fn a_wrong_cycle_count_is_found() {
 fn every_output_beat_has_its_cycle() {
     let vectors = vectors();
     let inputs: Vec<InputFrame> =
-        vectors.iter().map(|v| InputFrame { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
+        vectors.iter().map(|v| InputFrame { codes: &v.codes, taxels: v.taxels, beats: 7, array: 0 }).collect();
     let mut recording = record(&mut toy(), TAPS.len(), &inputs, Stimulus::FullSpeed, 10_000);
     // Delays the third beat of the second frame by a cycle; the last beat keeps its cycle.
     recording.beats[9].cycle += 1;

@@ -12,6 +12,8 @@ pub(super) struct Receiver {
     pub(super) recording: Recording,
     /// Cumulative number of beats at the end of each frame.
     ends: Vec<usize>,
+    /// Array of each frame.
+    arrays: Vec<usize>,
     /// Number of frames received completely.
     pub(super) frame: usize,
     stability: StabilityCheck,
@@ -28,7 +30,8 @@ impl Receiver {
             times: vec![Times::default(); frames.len()],
             ..Recording::default()
         };
-        Receiver { recording, ends: ends.collect(), frame: 0, stability: StabilityCheck::default() }
+        let arrays = frames.iter().map(|frame| frame.array).collect();
+        Receiver { recording, ends: ends.collect(), arrays, frame: 0, stability: StabilityCheck::default() }
     }
 
     fn add_violation(&mut self, cycle: u64, rule: String) {
@@ -54,7 +57,7 @@ impl Receiver {
                 stream.push(TapWord { cycle, fields });
             }
         }
-        let Some((data, last)) = transferred else {
+        let Some((data, last, array)) = transferred else {
             return false;
         };
         match self.recording.times.get(self.frame).map(|t| t.last_in) {
@@ -62,6 +65,10 @@ impl Receiver {
             Some(None) => self.add_violation(cycle, "no beat may precede the frame's last input beat".into()),
             Some(Some(_)) => {
                 let end = self.ends[self.frame];
+                if array != self.arrays[self.frame] {
+                    let rule = format!("tid is {array}, of a frame of array {}", self.arrays[self.frame]);
+                    self.add_violation(cycle, rule);
+                }
                 let final_beat = self.recording.beats.len() + 1 == end;
                 if last != final_beat {
                     let rule = if last {

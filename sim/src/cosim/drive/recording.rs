@@ -9,6 +9,8 @@ pub struct InputFrame<'a> {
     pub taxels: usize,
     /// Expected output beats, status included.
     pub beats: usize,
+    /// The array that it is of; 0 where there is one.
+    pub array: usize,
 }
 
 /// An output beat.

@@ -29,6 +29,8 @@ impl<'a> Sender<'a> {
         if self.offering {
             inputs.s_valid = true;
             inputs.s_data = play.codes[self.taxel];
+            // That of the first beat counts.
+            inputs.s_array = if self.taxel == 0 { play.array } else { 0 };
             inputs.s_last = (self.taxel + 1).is_multiple_of(play.taxels);
         }
     }

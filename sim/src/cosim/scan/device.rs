@@ -62,7 +62,15 @@ impl VerilatedScan {
             images = if writable { &images } else { "" },
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1, open_state: false, optimisation: Optimisation::On };
+        let design = Design {
+            top,
+            files,
+            taps: &[],
+            input_bits: 1,
+            array_bits: 0,
+            open_state: false,
+            optimisation: Optimisation::On,
+        };
         Ok(VerilatedScan { bench: VerilatedBench::new(&design, &bench, OUT_WORDS, cache)?, stream_bits })
     }
 }

@@ -17,9 +17,9 @@ pub(super) fn resets(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: 
         let offset = index * total / affordable;
         let end = bench.cycle() + offset;
         // The reset's cycle counts from the start of sample 0; random samples follow it.
-        let mut sample = 0;
-        while bench.send_until(&Burst::whole(bench.sample(sample), sample), end) {
-            sample = random.usize(..bench.sample_count());
+        let mut burst = Burst::whole(bench.sample(0), 0);
+        while bench.send_until(&burst, end) {
+            burst = bench.any(random);
         }
         // Logarithmic distribution: 1, 2 … 3, 4 … 7, … cycles are equally likely.
         let octave = 1u64 << random.u32(..=total.ilog2());
@@ -28,7 +28,6 @@ pub(super) fn resets(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: 
         let outcome = bench.outcome();
         outcome.resets += 1;
         outcome.longest_reset = outcome.longest_reset.max(held);
-        let after = random.usize(..bench.sample_count());
-        bench.send_alone(&Burst::whole(bench.sample(after), after));
+        bench.send_alone(&bench.any(random));
     }
 }

@@ -26,6 +26,17 @@ pub(crate) struct Sample {
     pub beat_cycles: Vec<u64>,
 }
 
+/// A beat that is offered.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Code {
+    /// A code, or a byte of an image.
+    pub(super) data: i32,
+    /// `tlast`.
+    pub(super) last: bool,
+    /// `tid`.
+    pub(super) array: usize,
+}
+
 impl Sample {
     pub(super) fn new(model: &Model, codes: Vec<i32>) -> Sample {
         Sample::after(model, codes, &mut model.prepare.empty())

@@ -5,6 +5,8 @@
 //! frame. A reset clears the flag. A sliding mean holds the complete frames since the last early `tlast` or reset; a running
 //! zero follows all since the last reset, as [`Prepare::cut`](dermis_golden::fixed::stages::prepare::Prepare::cut) says.
 //!
+//! Of several arrays each has a state of its own; the array of a frame is that of its first beat.
+//!
 //! With writable tables a beat may be a byte of an image; the model takes it as the hardware does.
 
 use std::borrow::Cow;
@@ -17,7 +19,7 @@ use dermis_golden::fixed::{Intake, Model};
 use dermis_golden::result::flags::{StatusField, TABLES_REFUSED};
 
 use super::outcome::{Outcome, Violation};
-use super::samples::Sample;
+use super::samples::{Code, Sample};
 
 /// Violations reported with text; further ones are only counted.
 const REPORTED_VIOLATIONS: usize = 8;
@@ -32,15 +34,18 @@ struct PendingFrame<'a> {
     may_refuse: bool,
     /// Cycle of its last code, if the cycles of its beats are checked.
     timed: Option<u64>,
+    array: usize,
 }
 
 /// Input beats accepted so far and output beats due.
 pub(super) struct Scoreboard<'a> {
-    /// With the tables that the hardware has.
-    model: Cow<'a, Model>,
+    /// That of each array, with the tables that the hardware has.
+    models: Vec<Cow<'a, Model>>,
     samples: &'a [Sample],
-    /// What the hardware has of the frames so far.
-    prepared: Prepared,
+    /// What the hardware has of the frames of each array so far.
+    prepared: Vec<Prepared>,
+    /// Array of the current frame.
+    array: usize,
     /// Codes accepted of the current frame.
     accepted: usize,
     /// What has come of an image of tables.
@@ -54,11 +59,12 @@ pub(super) struct Scoreboard<'a> {
 }
 
 impl<'a> Scoreboard<'a> {
-    pub(super) fn new(model: &'a Model, samples: &'a [Sample]) -> Self {
+    pub(super) fn new(models: &'a [Model], samples: &'a [Sample]) -> Self {
         Scoreboard {
-            model: Cow::Borrowed(model),
+            models: models.iter().map(Cow::Borrowed).collect(),
             samples,
-            prepared: model.prepare.empty(),
+            prepared: models.iter().map(|model| model.prepare.empty()).collect(),
+            array: 0,
             intake: Intake::default(),
             accepted: 0,
             framing_error: false,
@@ -83,16 +89,37 @@ impl<'a> Scoreboard<'a> {
         self.pending.is_empty()
     }
 
+    /// Number of arrays.
+    pub(super) fn arrays(&self) -> usize {
+        self.models.len()
+    }
+
+    /// The model of the array of the current frame; where tables are written there is one array.
+    fn model(&self) -> &Model {
+        &self.models[self.array]
+    }
+
+    /// Whether the next beat is the first of a frame.
+    pub(super) fn begins(&self) -> bool {
+        self.accepted.is_multiple_of(self.model().scene.sensor.taxels())
+    }
+
     /// Records an accepted beat, a code of `sample` or a byte of an image; `alone`: sent at full speed, with no other frame in
     /// the device.
-    pub(super) fn accepted(&mut self, cycle: u64, sample: usize, (code, last): (i32, bool), alone: bool) {
-        if self.model.has_writable_tables() && code >> (self.model.formats().code_bits - 1) == 1 {
-            return self.accepted_byte(code as u8, last);
+    pub(super) fn accepted(&mut self, cycle: u64, sample: usize, code: Code, alone: bool) {
+        let Code { data, last, array } = code;
+        if self.model().has_writable_tables() && data >> (self.model().formats().code_bits - 1) == 1 {
+            return self.accepted_byte(data as u8, last);
         }
         if self.intake.is_busy() {
-            let outcome = self.intake.code(self.model.to_mut());
+            let outcome = self.intake.code(self.models[0].to_mut());
             self.count_image(outcome);
         }
+        if self.begins() {
+            self.array = array % self.arrays();
+        }
+        let (array, several) = (self.array, self.arrays() > 1);
+        let model = &*self.models[array];
         let Sample { codes, taxels, .. } = &self.samples[sample];
         self.accepted += 1;
         let at_end = self.accepted.is_multiple_of(*taxels);
@@ -100,32 +127,33 @@ impl<'a> Scoreboard<'a> {
             self.outcome.wrong_tlast += 1;
             self.framing_error = true;
         }
-        let has_memory = self.model.scene.input.has_memory();
+        let has_memory = model.scene.input.has_memory();
         let frame = (self.accepted - 1) / taxels * taxels..self.accepted;
         if last && !at_end {
             self.outcome.cut += 1;
             self.accepted = 0;
-            self.model.prepare.cut(&mut self.prepared, &codes[frame.clone()]);
+            model.prepare.cut(&mut self.prepared[array], &codes[frame.clone()]);
         }
         if at_end && has_memory {
-            self.model.add(&mut self.prepared, &codes[frame]);
+            model.add(&mut self.prepared[array], &codes[frame]);
         }
         if at_end && self.accepted == codes.len() {
             self.outcome.frames_in += 1;
             let flagged = std::mem::take(&mut self.framing_error);
             let sample = match has_memory {
-                true => Cow::Owned(Sample::of(&self.model, codes.clone(), &self.prepared)),
-                false if self.model.has_writable_tables() => Cow::Owned(Sample::new(&self.model, codes.clone())),
+                true => Cow::Owned(Sample::of(model, codes.clone(), &self.prepared[array])),
+                false if several || model.has_writable_tables() => Cow::Owned(Sample::new(model, codes.clone())),
                 false => Cow::Borrowed(&self.samples[sample]),
             };
-            self.pending.push_back(PendingFrame { sample, flagged, may_refuse: false, timed: alone.then_some(cycle) });
+            let timed = alone.then_some(cycle);
+            self.pending.push_back(PendingFrame { sample, flagged, may_refuse: false, timed, array });
             self.accepted = 0;
         }
     }
 
     fn accepted_byte(&mut self, byte: u8, last: bool) {
-        let in_frame = !self.accepted.is_multiple_of(self.model.scene.sensor.taxels());
-        let outcome = self.intake.byte(self.model.to_mut(), byte, last, in_frame);
+        let in_frame = !self.begins();
+        let outcome = self.intake.byte(self.models[0].to_mut(), byte, last, in_frame);
         if in_frame && outcome.is_some() {
             self.pending.iter_mut().for_each(|frame| frame.may_refuse = true);
         }
@@ -145,11 +173,16 @@ impl<'a> Scoreboard<'a> {
         };
         *counts += 1;
         (self.accepted, self.framing_error) = (0, false);
-        self.prepared = self.model.prepare.empty();
+        self.empty();
+    }
+
+    /// The state of the hardware is that after a reset.
+    fn empty(&mut self) {
+        self.prepared = self.models.iter().map(|model| model.prepare.empty()).collect();
     }
 
     /// Checks a delivered beat.
-    pub(super) fn delivered(&mut self, cycle: u64, data: [i32; 3], last: bool) {
+    pub(super) fn delivered(&mut self, cycle: u64, data: [i32; 3], last: bool, array: usize) {
         let Some(frame) = self.pending.front() else {
             return self.violate(cycle, "an output beat without a frame".to_owned());
         };
@@ -165,7 +198,10 @@ impl<'a> Scoreboard<'a> {
         if frame.may_refuse && holds(&TABLES_REFUSED) {
             wanted[TABLES_REFUSED.word] |= data[TABLES_REFUSED.word] & TABLES_REFUSED.mask() as i32;
         }
-        let at_end = index + 1 == beats.len();
+        let (at_end, of) = (index + 1 == beats.len(), frame.array);
+        if array != of {
+            self.violate(cycle, format!("beat {index}: tid is {array}, of a frame of array {of}"));
+        }
         if data != wanted {
             self.violate(cycle, format!("beat {index}: {wanted:?} expected, got {data:?}"));
         }
@@ -188,13 +224,13 @@ impl<'a> Scoreboard<'a> {
     /// Discards all frames in the device.
     pub(super) fn reset(&mut self) {
         self.outcome.frames_in -= self.pending.len() as u64;
-        if self.model.has_writable_tables() {
+        if self.model().has_writable_tables() {
             // The last byte was accepted in the cycle before.
-            let outcome = self.intake.reset(self.model.to_mut(), 1);
+            let outcome = self.intake.reset(self.models[0].to_mut(), 1);
             self.count_image(outcome);
         }
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
-        self.prepared = self.model.prepare.empty();
+        self.empty();
         self.pending.clear();
     }
 }

@@ -7,7 +7,7 @@ use dermis_hdl::device::{Device, Inputs};
 use super::super::drive::{StabilityCheck, STABILITY_RULE};
 use super::handshake_rates::HandshakeRates;
 use super::outcome::Outcome;
-use super::samples::Sample;
+use super::samples::{Code, Sample};
 use super::scoreboard::Scoreboard;
 
 /// Cycles of the reset before an experiment.
@@ -21,13 +21,16 @@ const QUIET_CYCLES: u64 = 16;
 pub(crate) struct Burst {
     sample: usize,
     codes: Vec<(i32, bool)>,
+    /// Array of its frames.
+    array: usize,
 }
 
 impl Burst {
     /// A correct frame.
     pub(crate) fn whole(of: &Sample, sample: usize) -> Burst {
         let end = |index: usize| (index + 1).is_multiple_of(of.taxels);
-        Burst { sample, codes: of.codes.iter().enumerate().map(|(index, &code)| (code, end(index))).collect() }
+        let codes = of.codes.iter().enumerate().map(|(index, &code)| (code, end(index))).collect();
+        Burst { sample, codes, array: 0 }
     }
 
     /// The first `count` codes with `tlast` on the last one; one code less where `tlast` would be correct there.
@@ -41,7 +44,7 @@ impl Burst {
 
     /// A frame without `tlast`.
     pub(super) fn missing(of: &Sample, sample: usize) -> Burst {
-        Burst { sample, codes: of.codes.iter().map(|&code| (code, false)).collect() }
+        Burst { sample, codes: of.codes.iter().map(|&code| (code, false)).collect(), array: 0 }
     }
 
     /// `tlast` on the last code and on the one before: two frames cut short.
@@ -56,7 +59,19 @@ impl Burst {
     pub(super) fn image(image: &[u8], code_bits: u32) -> Burst {
         let beats = load::beats(image, code_bits);
         let last = beats.len() - 1;
-        Burst { sample: 0, codes: beats.into_iter().enumerate().map(|(at, beat)| (beat, at == last)).collect() }
+        let codes = beats.into_iter().enumerate().map(|(at, beat)| (beat, at == last)).collect();
+        Burst { sample: 0, codes, array: 0 }
+    }
+
+    /// The same frames of array `array`.
+    pub(super) fn of_array(self, array: usize) -> Burst {
+        Burst { array, ..self }
+    }
+
+    /// The beat at `at`; in a frame that has begun it has another `tid`, which does not count.
+    fn code(&self, at: usize, begins: bool) -> Code {
+        let (data, last) = self.codes[at];
+        Code { data, last, array: if begins { self.array } else { self.array + at } }
     }
 
     /// Without `tlast` at the end.
@@ -93,9 +108,10 @@ pub(crate) struct Testbench<'a> {
 }
 
 impl<'a> Testbench<'a> {
-    pub(crate) fn new(device: &'a mut dyn Device, model: &'a Model, samples: &'a [Sample]) -> Self {
+    /// With the model of each array of the device.
+    pub(crate) fn new(device: &'a mut dyn Device, models: &'a [Model], samples: &'a [Sample]) -> Self {
         let longest = samples.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-        let scoreboard = Scoreboard::new(model, samples);
+        let scoreboard = Scoreboard::new(models, samples);
         let watchdog = WATCHDOG + 4 * longest;
         Testbench {
             device,
@@ -115,6 +131,17 @@ impl<'a> Testbench<'a> {
 
     pub(super) fn sample(&self, index: usize) -> &'a Sample {
         &self.samples[index]
+    }
+
+    /// Number of arrays.
+    pub(super) fn arrays(&self) -> usize {
+        self.scoreboard.arrays()
+    }
+
+    /// A correct frame of any sample and any array.
+    pub(super) fn any(&self, random: &mut fastrand::Rng) -> Burst {
+        let sample = random.usize(..self.sample_count());
+        Burst::whole(self.sample(sample), sample).of_array(random.usize(..self.arrays()))
     }
 
     pub(crate) fn cycle(&self) -> u64 {
@@ -149,14 +176,14 @@ impl<'a> Testbench<'a> {
     }
 
     fn offer(&mut self, burst: &Burst, rates: &mut HandshakeRates, alone: bool) {
-        for &(code, last) in &burst.codes {
+        for at in 0..burst.codes.len() {
+            let code = burst.code(at, self.scoreboard.begins());
             // AXI4-Stream: once valid, a beat stays until it is accepted.
             let mut offering = false;
             loop {
                 offering |= rates.sends();
-                let offer = offering.then_some((code, last));
-                if self.step(offer, rates.receives()) {
-                    self.scoreboard.accepted(self.cycle - 1, burst.sample, (code, last), alone);
+                if self.step(offering.then_some(code), rates.receives()) {
+                    self.scoreboard.accepted(self.cycle - 1, burst.sample, code, alone);
                     break;
                 }
                 if !self.can_continue() {
@@ -169,13 +196,14 @@ impl<'a> Testbench<'a> {
     /// Sends a burst at full speed up to cycle `end`; whether the whole burst was accepted.
     pub(super) fn send_until(&mut self, burst: &Burst, end: u64) -> bool {
         let alone = self.scoreboard.is_empty();
-        for &(code, last) in &burst.codes {
-            while self.cycle == end || !self.step(Some((code, last)), true) {
+        for at in 0..burst.codes.len() {
+            let code = burst.code(at, self.scoreboard.begins());
+            while self.cycle == end || !self.step(Some(code), true) {
                 if self.cycle >= end || !self.can_continue() {
                     return false;
                 }
             }
-            self.scoreboard.accepted(self.cycle - 1, burst.sample, (code, last), alone);
+            self.scoreboard.accepted(self.cycle - 1, burst.sample, code, alone);
         }
         true
     }
@@ -195,7 +223,7 @@ impl<'a> Testbench<'a> {
         self.scoreboard.reset();
         for held in 0..cycles {
             let (s_valid, m_ready, s_data) = (random.bool(), random.bool(), random.i32(..));
-            let inputs = Inputs { rst: true, s_valid, s_data, s_last: random.bool(), m_ready };
+            let inputs = Inputs { rst: true, s_valid, s_data, s_array: 0, s_last: random.bool(), m_ready };
             let outputs = self.device.cycle(&inputs);
             if outputs.s_ready {
                 self.scoreboard.violate(self.cycle, "s_axis_tready is high during reset".to_owned());
@@ -210,15 +238,16 @@ impl<'a> Testbench<'a> {
     }
 
     /// Simulates one cycle; whether the offered code was accepted.
-    fn step(&mut self, offer: Option<(i32, bool)>, m_ready: bool) -> bool {
-        let (s_data, s_last) = offer.unwrap_or_default();
-        let outputs = self.device.cycle(&Inputs { rst: false, s_valid: offer.is_some(), s_data, s_last, m_ready });
+    fn step(&mut self, offer: Option<Code>, m_ready: bool) -> bool {
+        let Code { data: s_data, last: s_last, array } = offer.unwrap_or_default();
+        let (s_valid, s_array) = (offer.is_some(), array % self.scoreboard.arrays());
+        let outputs = self.device.cycle(&Inputs { rst: false, s_valid, s_data, s_array, s_last, m_ready });
         let (transferred, stable) = self.stability.observe(&outputs, m_ready);
         if !stable {
             self.scoreboard.violate(self.cycle, STABILITY_RULE.to_owned());
         }
-        if let Some((data, last)) = transferred {
-            self.scoreboard.delivered(self.cycle, data, last);
+        if let Some((data, last, array)) = transferred {
+            self.scoreboard.delivered(self.cycle, data, last, array);
         }
         let accepted = offer.is_some() && outputs.s_ready;
         let stalled = (offer.is_none() && outputs.s_ready) || self.stability.is_pending();
