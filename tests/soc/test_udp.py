@@ -416,6 +416,14 @@ def test_short_resultants_are_refused():
         DermisUDP(Core(), Port(), force_bits=16)
 
 
+def test_several_arrays_are_refused():
+    class Core:
+        manifest = {"core": {"stream_bits": 32}, "input": {"arrays": 4}}
+
+    with pytest.raises(CoreError, match="input.arrays = 4, behind a network, whose packets are of one array"):
+        DermisUDP(Core(), Port())
+
+
 # Under Icarus; test_network.py has the same under Verilator, with LiteEth before it.
 @NIGHTLY
 def test_a_core_on_the_network(monkeypatch):

@@ -7,6 +7,7 @@
 //! | `event_driven` | every word and cycle under Icarus; no X after a reset; undefined registers found |
 //! | `accuracy` | golden model against known forces, bit-true against golden model, both against a committed table |
 //! | `bonded` | the Verilog of a bonded layer is that of the half-space, coefficients and widths of the search's words aside |
+//! | `arrays` | several arrays on one engine: each as if alone, over frames in any order, stalls, resets, damaged frames |
 //! | `dead` | dead taxels: the same equality, independence of their readings, agreement with the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `choice` | several cases in one design: equality in mixed order, wrong constants found, benefit of the choice |

@@ -58,6 +58,16 @@ def require_choice(name, value, choices):
         raise CoreError(f"{name} = {value!r}, not {' or '.join(map(str, choices))}")
 
 
+def require_one_array(core):
+    """A core of one array: behind a network `id` says who asked.
+
+    Raises `CoreError` with field, value and what would be right.
+    """
+    arrays = core.manifest.get("input", {}).get("arrays", 1)
+    if arrays > 1:
+        raise CoreError(f"input.arrays = {arrays}, behind a network, whose packets are of one array; build with hardware.arrays = 1")
+
+
 def require_forces(core):
     """A core that sends the force of every taxel.
 

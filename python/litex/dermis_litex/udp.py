@@ -16,7 +16,7 @@ from litex.gen import Case, Cat, Constant, FSM, If, LiteXModule, Memory, Mux, Ne
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.csr import CSRStatus
 
-from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_width
+from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_one_array, require_width
 from dermis_litex.packets import (
     CHECK_WORDS,
     EXPONENT_AT,
@@ -563,6 +563,7 @@ class DermisUDP(LiteXModule):
 
     def __init__(self, core, port, code_bytes=2, force_bits=WORD_BITS, udp_port=UDP_PORT):
         require_width(core, WORD_BITS)
+        require_one_array(core)
         require_choice("code_bytes", code_bytes, (2, 4))
         require_choice("force_bits", force_bits, (MANTISSA_BITS, WORD_BITS))
         self.requesters = Requesters()

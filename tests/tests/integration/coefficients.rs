@@ -75,7 +75,7 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
     let forces = vector.expected.beats.len();
     let beats = forces + vector.expected.status.len();
-    let play = InputFrame { codes: &vector.codes, taxels: vector.taxels, beats };
+    let play = InputFrame { codes: &vector.codes, taxels: vector.taxels, beats, array: 0 };
     let recording = record(device.as_mut(), 0, &[play], Stimulus::FullSpeed, 100_000);
     assert_eq!(recording.beats.len(), beats);
     let status: Vec<[i32; 3]> = recording.beats[forces..].iter().map(|beat| beat.data).collect();

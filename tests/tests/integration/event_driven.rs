@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+use crate::arrays;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
@@ -25,28 +26,34 @@ const WORD: usize = 32;
 
 /// A bench that reads the pins of a cycle as a hexadecimal number and writes the output pins and the taps, valid and
 /// word, in binary, before the rising edge.
-fn bench(top: &str, code_bits: u32, taps: &[Tap]) -> String {
+fn bench(top: &str, code_bits: u32, array_bits: usize, taps: &[Tap]) -> String {
     let declared = taps.iter().enumerate().map(|(k, tap)| {
         format!("  wire v{k} = {};\n  wire [{}:0] d{k} = {};\n", valid(tap, "dut"), tap.bits() - 1, word(tap, "dut"))
     });
     let declared: String = declared.collect();
     let format = " %b %b".repeat(taps.len());
     let words: String = (0..taps.len()).map(|k| format!(", v{k}, d{k}")).collect();
+    // Of one array there is no port for its number, which is then 0.
+    let array_end = array_bits.max(1) - 1;
+    let array = if array_bits == 0 { "" } else { ".s_axis_tid(s_array), .m_axis_tid(m_array), " };
+    let none = if array_bits == 0 { "  assign m_array = 1'b0;\n" } else { "" };
     format!(
         "module bench;
   reg clk, rst, s_valid, s_last, m_ready;
   reg [{code_end}:0] s_data;
-  wire s_ready, m_valid, m_last;
+  reg [{array_end}:0] s_array;
+  wire [{array_end}:0] m_array;
+{none}  wire s_ready, m_valid, m_last;
   wire [{data_end}:0] m_data;
   reg [63:0] pins;
   {top} dut(.clk(clk), .rst(rst), .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready),
-    .s_axis_tlast(s_last), .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready),
+    .s_axis_tlast(s_last), {array}.m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready),
     .m_axis_tlast(m_last));
 {declared}  initial begin
     clk = 0;
     while ($fscanf(32'h8000_0000, \"%h\", pins) == 1) begin
-      {{s_data, m_ready, s_last, s_valid, rst}} = pins;
-      #1 $display(\"%b %b %b %b{format}\", s_ready, m_valid, m_last, m_data{words});
+      {{s_array, s_data, m_ready, s_last, s_valid, rst}} = pins;
+      #1 $display(\"%b %b %b %b %b{format}\", s_ready, m_valid, m_last, m_array, m_data{words});
       $fflush;
       clk = 1;
       #1 clk = 0;
@@ -66,6 +73,7 @@ struct Icarus {
     inputs: ChildStdin,
     outputs: BufReader<ChildStdout>,
     code_bits: u32,
+    array_bits: usize,
     taps: Vec<Tap>,
     cycle: u64,
     was_reset: bool,
@@ -75,9 +83,10 @@ struct Icarus {
 }
 
 impl Icarus {
-    fn new(generated: &Generated, code_bits: u32) -> Self {
+    fn new(generated: &Generated, model: &Model) -> Self {
         let folder = folder_of(generated);
-        let bench = bench(&generated.top, code_bits, &generated.taps);
+        let (code_bits, array_bits) = (model.formats().code_bits, model.scene.hardware.array_bits());
+        let bench = bench(&generated.top, code_bits, array_bits, &generated.taps);
         std::fs::write(folder.path().join("bench.v"), bench).unwrap();
         let is_verilog = |name: &&str| Path::new(name).extension().is_some_and(|end| end == "v");
         let sources = generated.files.iter().map(|file| file.name.as_str()).filter(is_verilog);
@@ -97,7 +106,8 @@ impl Icarus {
             .unwrap();
         let (inputs, outputs) = (process.stdin.take().unwrap(), BufReader::new(process.stdout.take().unwrap()));
         let (undefined, taps) = (Vec::new(), generated.taps.clone());
-        Icarus { process, inputs, outputs, code_bits, taps, cycle: 0, was_reset: false, undefined, _folder: folder }
+        let (cycle, was_reset) = (0, false);
+        Icarus { process, inputs, outputs, code_bits, array_bits, taps, cycle, was_reset, undefined, _folder: folder }
     }
 }
 
@@ -113,15 +123,18 @@ impl Device for Icarus {
         let bits = [inputs.rst, inputs.s_valid, inputs.s_last, inputs.m_ready];
         let control: u64 = bits.iter().enumerate().map(|(at, bit)| u64::from(*bit) << at).sum();
         let code = u64::from(inputs.s_data as u32) & (u64::MAX >> (64 - self.code_bits));
-        writeln!(self.inputs, "{:x}", code << bits.len() | control).unwrap();
+        let array = (inputs.s_array as u64) << (bits.len() + self.code_bits as usize);
+        writeln!(self.inputs, "{:x}", array | code << bits.len() | control).unwrap();
         let mut line = String::new();
         self.outputs.read_line(&mut line).unwrap();
         let fields: Vec<&str> = line.split_whitespace().collect();
-        let [ready, valid, last, data, ref words @ ..] = fields[..] else { panic!("cycle {}: {line:?}", self.cycle) };
+        let [ready, valid, last, array, data, ref words @ ..] = fields[..] else {
+            panic!("cycle {}: {line:?}", self.cycle)
+        };
         if self.was_reset && !inputs.rst {
             let known = |bits: &str| bits.chars().all(|bit| matches!(bit, '0' | '1'));
-            let data = if valid == "1" { data } else { "" };
-            let outputs = [("ready", ready), ("valid", valid), ("last", last), ("data", data)];
+            let [data, array] = [data, array].map(|bits| if valid == "1" { bits } else { "" });
+            let outputs = [("ready", ready), ("valid", valid), ("last", last), ("array", array), ("data", data)];
             let undefined = outputs.iter().filter(|(_, bits)| !known(bits));
             self.undefined.extend(undefined.map(|(name, _)| (self.cycle, *name)));
         }
@@ -141,6 +154,7 @@ impl Device for Icarus {
             s_ready: ready == "1",
             m_valid: valid == "1",
             m_last: last == "1",
+            m_array: array.chars().fold(0, |number, bit| 2 * number + usize::from(bit == '1')) % (1 << self.array_bits),
             m_data: [0, 1, 2].map(|index| field(data, index, WORD) as i32),
             taps: self.taps.iter().zip(words.chunks(2)).map(tap).collect(),
         }
@@ -149,7 +163,7 @@ impl Device for Icarus {
 
 /// Runs the vectors under Icarus; what differs from the model, and which outputs were undefined.
 fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<(u64, &'static str)>) {
-    let mut device = Icarus::new(&hardware.generated, hardware.model.formats().code_bits);
+    let mut device = Icarus::new(&hardware.generated, &hardware.model);
     let dut = DeviceUnderTest { name: "icarus", device: &mut device, taps: &hardware.tap_names() };
     let (findings, _) = run(dut, vectors, stimulus);
     (findings, device.undefined.clone())
@@ -179,6 +193,16 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
         assert_equal(&findings, stimulus);
         assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
     }
+}
+
+#[test]
+fn several_arrays_are_equal_too() {
+    let (_folder, scene) = arrays::scene(arrays::SCENES[0].1);
+    let (hardware, _) = of_scene(&scene, &[]);
+    let vectors = arrays::vectors(&hardware.model);
+    let (findings, undefined) = simulate(&hardware, &vectors[..40], Stimulus::BackToBack);
+    assert_equal(&findings, "arrays");
+    assert!(undefined.is_empty(), "{} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
 }
 
 #[test]

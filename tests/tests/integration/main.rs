@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 
 mod accuracy;
+mod arrays;
 mod artix;
 mod bonded;
 mod choice;
