@@ -7,15 +7,21 @@ use dermis_golden::wire::registers::{c_header, constants, core_header, system_rd
 use serde_json::json;
 
 use super::core::hierarchy;
+use super::ip_xact::{component, TopPort};
 use super::testbench::testbench;
 use super::{Bus, CoreShape};
 use crate::error::HdlError;
 use crate::generate::{top_name, Generated, Wrapper};
-use crate::language::Change;
+use crate::language::{Change, Kernel};
 use crate::manifest::GeneratedFile;
 
+/// The ports of a top module.
+fn top_ports(top: &Kernel) -> impl Iterator<Item = TopPort> + '_ {
+    top.port_list().map(|(name, is_output, bits, meaning)| (name.to_owned(), is_output, bits, meaning.to_owned()))
+}
+
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
-/// place of the engine's, without taps; beside them `dermis_registers.h`, `<top>.h`, `registers.json` and `registers.rdl`, testbench
+/// place of the engine's, without taps; beside them `dermis_registers.h`, `<top>.h`, `registers.json` and `registers.rdl`, a component of IP-XACT, testbench
 /// and FuseSoC core file.
 ///
 /// # Errors
@@ -69,9 +75,12 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
         ("registers.rdl", system_rdl()),
     ];
     let own = own.map(|(name, text)| GeneratedFile { name: name.to_owned(), text });
+    let ports: Vec<TopPort> = hierarchy.top().into_iter().flat_map(top_ports).collect();
     let wrapper = Wrapper { top, hierarchy, header, row: "bus", is_board: false };
     let mut core = wrapper.generated(model, engine)?;
+    let xml = component(&core.top, shape.bus, &ports, core.files.iter().map(|file| file.name.as_str()));
     core.files.extend(own);
+    core.files.push(GeneratedFile { name: format!("{}.xml", core.top), text: xml });
     core.add_core_file(model, testbench(model, &core, shape, command));
     core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
     core.seal();

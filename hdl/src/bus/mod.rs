@@ -12,6 +12,7 @@
 mod axi_lite;
 mod core;
 mod generate;
+mod ip_xact;
 mod registers;
 mod stream_in;
 mod stream_out;
