@@ -40,11 +40,7 @@ fn misfits(scene: &Scene, frame: &Frame) -> ([f64; 3], bool) {
 /// Both models flag a frame unlike the training, and none like it; with forces and with resultants.
 #[test]
 fn both_models_flag_what_is_unlike_the_training() {
-    for (name, forces) in [
-        ("sensor-1-noisy", ForceOutput::Taxels),
-        ("sensor-1-unipolar", ForceOutput::Resultants),
-        ("sensor-1-bonded", ForceOutput::Taxels),
-    ] {
+    for (name, forces) in [("sensor-1-noisy", ForceOutput::Taxels), ("sensor-1-unipolar", ForceOutput::Resultants)] {
         let mut scene = Scene::builtin(name).unwrap();
         scene.output.forces = forces;
         for number in 0..6 {
