@@ -9,7 +9,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use crate::arrays;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
-use dermis_golden::spec::scene::Scene;
+use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate_changed, Generated};
@@ -169,9 +169,12 @@ fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Fin
     (findings, device.undefined.clone())
 }
 
-fn setup(name: &str, frames: usize, search_width: usize) -> (Hardware, Vec<Vector>) {
+/// A built-in scene with its own estimator, or searching so many taxels per cycle.
+fn setup(name: &str, frames: usize, search_width: Option<usize>) -> (Hardware, Vec<Vector>) {
     let (mut scene, shipped) = scene(name);
-    scene.hardware.search_width = Some(search_width);
+    if search_width.is_some() {
+        (scene.hardware.estimator, scene.hardware.search_width) = (Some(EstimatorKind::Search), search_width);
+    }
     of_scene(&scene, &shipped[..frames])
 }
 
@@ -184,9 +187,11 @@ fn of_scene(scene: &Scene, frames: &[Frame]) -> (Hardware, Vec<Vector>) {
 #[test]
 fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
     for (name, frames, search_width, stimulus) in [
-        ("eight-by-eight", 3, 4, Stimulus::FullSpeed),
-        ("eight-by-eight", 3, 4, Stimulus::Stalls { seed: 1 }),
-        ("eight-by-eight-bonded", 1, 1, Stimulus::FullSpeed),
+        ("eight-by-eight", 3, Some(4), Stimulus::FullSpeed),
+        ("eight-by-eight", 3, Some(4), Stimulus::Stalls { seed: 1 }),
+        ("eight-by-eight-bonded", 1, Some(1), Stimulus::FullSpeed),
+        // With its network.
+        ("sensor-1-bonded", 1, None, Stimulus::FullSpeed),
     ] {
         let (hardware, vectors) = setup(name, frames, search_width);
         let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
@@ -233,7 +238,7 @@ fn with_a_network_and_with_contacts_nothing_is_undefined_either() {
 /// start value shows as correct; the data of a queue place that has not been written.
 #[test]
 fn an_undefined_register_is_found() {
-    let (mut hardware, vectors) = setup("eight-by-eight", 1, 4);
+    let (mut hardware, vectors) = setup("eight-by-eight", 1, Some(4));
     let queue = "forces__leaving";
     let unwritten = |k: &'static str| Change::value(queue, k, |k| k.array("places").read(!k.named("read").low(4)));
     let defects = [(Change::undefined(queue, "m_axis_tvalid"), "valid"), (unwritten("head"), "data")];
