@@ -14,7 +14,7 @@ use crate::data::quantise::{quantise, Codes};
 use crate::data::reception::full_scale;
 use crate::estimate::deviations::Deviations;
 use crate::estimate::float::{Golden, GoldenError};
-use crate::spec::scene::{largest_code, EstimatorKind, Scene, MAX_DEGREE};
+use crate::spec::scene::{largest_code, EstimatorKind, Scene, SceneError, MAX_DEGREE};
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences, and the input
 /// options with their files, read once. Of the plan only the tables that the hardware takes change, by [`Model::load`] and
@@ -78,9 +78,13 @@ impl Model {
     /// same for all arrays, so that the words of each are those that the engine sends for it.
     ///
     /// # Errors
-    /// As [`Model::of_plan`].
+    /// [`SceneError::NoArray`], and as [`Model::of_plan`].
     pub fn of_array(&self, array: usize) -> Result<Self, FixedError> {
         match self.scene.hardware.arrays {
+            arrays if array >= arrays => {
+                let (file, number) = (self.scene.name.clone(), array.to_string());
+                Err(SceneError::NoArray { file, number, arrays }.into())
+            }
             1 => Ok(self.clone()),
             _ => Model::of_plan(self.plan.of_array(array)),
         }

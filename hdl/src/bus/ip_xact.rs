@@ -95,10 +95,9 @@ fn field(access: Access, Field { name, low, bits, meaning }: &Field) -> String {
     of("field", text("name", name) + &meaning + &places + &text("access", accessed) + &cleared)
 }
 
-fn register(Register { name, address, access, meaning, fields }: &Register) -> String {
-    let whole = [Field { name: "value", low: 0, bits: REGISTER_BITS, meaning: "" }];
-    let fields = if fields.is_empty() { &whole } else { *fields };
-    let fields: String = fields.iter().map(|own| field(*access, own)).collect();
+fn register(register: &Register) -> String {
+    let Register { name, address, access, meaning, .. } = register;
+    let fields: String = register.parts().iter().map(|own| field(*access, own)).collect();
     let place = number("addressOffset", *address) + &number("size", REGISTER_BITS);
     of("register", text("name", name) + &text("description", meaning) + &place + &fields)
 }

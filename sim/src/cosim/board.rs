@@ -8,7 +8,7 @@ use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::scan::ScanPins;
 use dermis_hdl::Generated;
 
-use super::verilator::{Design, Optimisation, VerilatedBench, VerilatorError};
+use super::verilator::{Design, VerilatedBench, VerilatorError};
 
 /// Length of the bench's vector `out` in 32-bit words, the shim's minimum.
 const OUT_WORDS: usize = 4;
@@ -44,17 +44,7 @@ impl VerilatedBoard {
              .alive(out[1]), .busy(out[2]), .error(out[3]){scan});\nendmodule\n",
             scan = scan.unwrap_or_default(),
         );
-        let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design {
-            top,
-            files,
-            taps: &[],
-            input_bits: 1,
-            array_bits: 0,
-            open_state: false,
-            optimisation: Optimisation::On,
-        };
-        VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
+        VerilatedBench::new(&Design::of_pins(generated), &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }
 

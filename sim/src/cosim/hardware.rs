@@ -7,7 +7,6 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
@@ -22,6 +21,7 @@ use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
 
 use super::against_model::Vector;
+use super::array_frames::{ArrayFrames, ArrayResult};
 use super::board::VerilatedBoard;
 use super::drive::{record, InputFrame, Stimulus};
 use super::scan::ScannedBoard;
@@ -144,15 +144,13 @@ impl Hardware {
         open_state: bool,
         optimisation: Optimisation,
     ) -> Result<Verilated, VerilatorError> {
-        let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
-            top: &generated.top,
-            files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.stream_bits(),
             array_bits: self.model.scene.hardware.array_bits(),
             open_state,
             optimisation,
+            ..Design::of_pins(generated)
         };
         Verilated::new(&design, &self.cache)
     }
@@ -206,35 +204,16 @@ impl Hardware {
     /// # Errors
     /// A frame of another sensor, or a number of frames that the scene does not average.
     pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
-        vector(&self.model, frames)
+        ArrayResult { array: 0, model: &self.model, frames }.vector()
     }
 
-    /// The results of frames that follow one another after a reset: those of array k are of every frame whose number is k modulo the
-    /// number of arrays.
+    /// The test vectors of frames that follow one another after a reset; of several arrays the frames are of one after the other.
     ///
     /// # Errors
-    /// What is wrong with the files of an array.
-    pub fn results(&self, frames: &[Frame]) -> Result<Vec<ArrayResult>> {
-        let arrays = self.model.scene.hardware.arrays;
-        let of_array = |array: usize| {
-            let own: Vec<Frame> = frames.iter().skip(array).step_by(arrays).cloned().collect();
-            let model = Rc::new(self.model.of_array(array)?);
-            let all = model.scene.input.frames_of_results(&own).into_iter();
-            Ok(all.map(|frames| ArrayResult { array, model: model.clone(), frames: frames.to_vec() }).collect())
-        };
-        let by_array = (0..arrays.min(frames.len().max(1))).map(of_array).collect::<Result<Vec<Vec<_>>>>()?;
-        let turns = by_array.iter().map(Vec::len).max().unwrap_or(0);
-        Ok((0..turns).flat_map(|turn| by_array.iter().filter_map(move |own| own.get(turn).cloned())).collect())
-    }
-
-    /// The test vectors of frames that follow one another after a reset, one for each of [`Hardware::results`].
-    ///
-    /// # Errors
-    /// As [`Hardware::vector`] and [`Hardware::results`].
+    /// As [`Hardware::vector`] and [`ArrayFrames::all`].
     pub fn vectors(&self, frames: &[Frame]) -> Result<Vec<Vector>> {
-        let vector =
-            |ArrayResult { array, model, frames }: ArrayResult| Ok(Vector { array, ..vector(&model, &frames)? });
-        self.results(frames)?.into_iter().map(vector).collect()
+        let arrays = ArrayFrames::all(&self.model, frames)?;
+        ArrayFrames::results(&arrays).into_iter().map(ArrayResult::vector).collect()
     }
 
     /// The forces and status beats that the verilated hardware sends after the last of the frames.
@@ -253,27 +232,6 @@ impl Hardware {
         let status = forces.split_off(self.model.force_beats().min(forces.len()));
         Ok([forces, status])
     }
-}
-
-/// The frames of a result and the model of their array.
-#[derive(Clone)]
-pub struct ArrayResult {
-    /// Number of the array.
-    pub array: usize,
-    /// Its bit-true model.
-    pub model: Rc<Model>,
-    /// Its frames: those that are averaged, or all since a reset.
-    pub frames: Vec<Frame>,
-}
-
-/// The test vector of one reconstruction by `model`.
-fn vector(model: &Model, frames: &[Frame]) -> Result<Vector> {
-    let codes = model.readings(frames)?;
-    let expected = model.run(&codes);
-    let before = frames.len() - model.scene.input.frames_per_result();
-    let frame = frames.get(before).map_or_else(String::new, |frame| frame.id.clone());
-    let codes = codes[before * model.scene.sensor.taxels()..].to_vec();
-    Ok(Vector::new(model, frame, codes, expected))
 }
 
 impl Engine for Hardware {

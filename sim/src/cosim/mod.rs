@@ -13,6 +13,7 @@
 //! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
 //! | [`drive`] | sends frames into a device and records every transfer with its cycle |
 //! | [`run`], [`compare_recording`] | compare a recording with the bit-true model |
+//! | [`array_frames`] | which array each frame is of, and the results in their order |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`VerilatedBoard`] | a board's top module under Verilator |
 //! | [`verify`] | one scene's frames through all three models |
@@ -25,6 +26,7 @@
 //! | [`waves`] | a run as a waveform file |
 
 mod against_model;
+pub mod array_frames;
 pub mod bench;
 pub mod block_timing;
 mod board;

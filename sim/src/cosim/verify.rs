@@ -14,7 +14,6 @@ use std::path::Path;
 use anyhow::Result;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
-use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::plan::contact_cycles::ContactTiming;
 use dermis_golden::fixed::plan::interval::{self, frame_interval};
 use dermis_golden::fixed::Model;
@@ -23,9 +22,10 @@ use dermis_golden::spec::board::Board;
 use dermis_golden::spec::scene::Scene;
 
 use super::against_model::{run, DeviceUnderTest, Vector};
+use super::array_frames::{ArrayFrames, ArrayResult};
 use super::drive::{Stimulus, Times};
 use super::findings::Findings;
-use super::hardware::{ArrayResult, Hardware, Simulator};
+use super::hardware::{Hardware, Simulator};
 use crate::compare::{comparable_forces, difference, Difference};
 use crate::progress::Progress;
 
@@ -98,8 +98,11 @@ pub fn verify_specimen(
     if let Some(specimen) = specimen {
         hardware.load(specimen, 1)?;
     }
-    let results = hardware.results(frames)?;
-    let vectors = hardware.vectors(frames)?;
+    let arrays = ArrayFrames::all(&hardware.model, frames)?;
+    // Of the models' scenes, which have the full scale filled in, so that both use the same codes.
+    let references = arrays.iter().map(|own| own.model.reference()).collect::<Result<Vec<_>, _>>()?;
+    let results = ArrayFrames::results(&arrays);
+    let vectors = results.iter().map(|result| result.vector()).collect::<Result<Vec<_>>>()?;
 
     let mut verified = Verified {
         scene: scene.clone(),
@@ -118,16 +121,11 @@ pub fn verify_specimen(
             times = seen;
         }
     }
-    let mut references: Vec<Golden> = Vec::new();
-    for (index, ((result, vector), times)) in results.iter().zip(&vectors).zip(times).enumerate() {
+    for (index, ((result, vector), times)) in results.into_iter().zip(&vectors).zip(times).enumerate() {
         let ArrayResult { array, model, frames } = result;
-        if references.len() == *array {
-            // Of the model's scene, which has the full scale filled in, so that both use the same codes.
-            references.push(model.reference()?);
-        }
         let frame = &model.stress(frames)?;
         let full_scale_MPa = full_scale(&model.scene, frame);
-        let golden = references[*array].run_averaged(frames)?;
+        let golden = references[array].run_averaged(frames)?;
         let fixed = model.decode(frames, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = model.force_lsb_N(full_scale_MPa);
         verified.rows.push(FrameResult {

@@ -19,6 +19,7 @@ use std::sync::OnceLock;
 use dermis_golden::write::{write, FileError};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use dermis_hdl::verilator::{Runtime, OBJECTS};
+use dermis_hdl::Generated;
 use libloading::Library;
 use thiserror::Error;
 
@@ -92,6 +93,21 @@ pub struct Design<'a> {
     pub open_state: bool,
     /// How much the compiler optimises.
     pub optimisation: Optimisation,
+}
+
+impl<'a> Design<'a> {
+    /// A design without taps, whose pins a bench of its own packs.
+    pub fn of_pins(generated: &'a Generated) -> Self {
+        Design {
+            top: &generated.top,
+            files: generated.files.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect(),
+            taps: &[],
+            input_bits: 1,
+            array_bits: 0,
+            open_state: false,
+            optimisation: Optimisation::On,
+        }
+    }
 }
 
 /// How much the compiler optimises a simulation. For the engine of an 8×8 array, [`Optimisation::Off`] takes half the

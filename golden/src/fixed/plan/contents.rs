@@ -101,7 +101,7 @@ pub struct Dropped {
 
 impl Plan {
     /// The plan of array `array` of those that this engine serves, alone; of an engine of one array the same plan. Formats and the
-    /// meaning of a code are those of all arrays.
+    /// meaning of a code are those of all arrays. `array` is below `hardware.arrays`.
     pub fn of_array(&self, array: usize) -> Plan {
         Plan { prepare: self.prepare.of_array(array), scene: self.scene.of_array(array), ..self.clone() }
     }

@@ -166,7 +166,7 @@ impl Prepare {
         }
     }
 
-    /// The stage of array `array` of those that the engine serves, alone; the same stage where there is one.
+    /// The stage of array `array` of those that the engine serves, below their number, alone; the same stage where there is one.
     pub fn of_array(&self, array: usize) -> Prepare {
         let own = |words: &Option<Vec<i32>>| {
             let words = words.as_ref()?.chunks(self.taxels).nth(array)?;

@@ -7,7 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_hdl::scan::{Beat, ScanDevice, ScanInputs, ScanOutputs, ScanPins};
 use dermis_hdl::Generated;
 
-use crate::cosim::verilator::{Design, Optimisation, VerilatedBench, VerilatorError};
+use crate::cosim::verilator::{Design, VerilatedBench, VerilatorError};
 
 /// Length of the bench's vector `out` in 32-bit words: beat, pins, row, what the engine takes.
 const OUT_WORDS: usize = 6;
@@ -61,17 +61,10 @@ impl VerilatedScan {
             miso_last = MISO + converters - 1,
             images = if writable { &images } else { "" },
         );
-        let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design {
-            top,
-            files,
-            taps: &[],
-            input_bits: 1,
-            array_bits: 0,
-            open_state: false,
-            optimisation: Optimisation::On,
-        };
-        Ok(VerilatedScan { bench: VerilatedBench::new(&design, &bench, OUT_WORDS, cache)?, stream_bits })
+        Ok(VerilatedScan {
+            bench: VerilatedBench::new(&Design::of_pins(generated), &bench, OUT_WORDS, cache)?,
+            stream_bits,
+        })
     }
 }
 
