@@ -106,9 +106,14 @@ impl Make<Signals> for MakeSignals {
         Default::default()
     }
 
-    // A port that is left out is a wire that nothing reads or drives.
+    // A port that is left out is a wire that nothing reads; an input of this kind counts as driven, or rust-hdl asks its user
+    // to connect what is not there.
     fn input(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> Wire<In> {
-        Wire::new(bits.max(1))
+        let mut wire = Wire::new(bits.max(1));
+        if bits == 0 {
+            Logic::connect(&mut wire);
+        }
+        wire
     }
 
     fn output(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> Wire<Out> {
@@ -174,7 +179,7 @@ impl<B: Interface> Logic for RustHdl<B> {
         B::visit(
             ports,
             &mut Each(|_, is_output: bool, port: &dyn Port| {
-                if let Some(&slot) = at.next().filter(|_| !is_output) {
+                if let Some(&slot) = at.next().filter(|slot| !is_output && slot.bits() > 0) {
                     run.set(slot, port.read());
                 }
             }),
