@@ -47,7 +47,7 @@ def found(scene: dermis.Scene, frames: list[dermis.Frame]) -> tuple[np.ndarray, 
     return np.array([one["mu"] for one in own]), np.array([one["mu_sigma"] for one in own])
 
 
-@pytest.mark.parametrize("name", ["sensor-1", "sensor-1-unipolar", "sensor-1-bonded"])
+@pytest.mark.parametrize("name", ["sensor-1", "sensor-1-unipolar", "sensor-1-bonded", "eight-by-eight-bonded"])
 def test_another_runtime_finds_the_same(name: str, tmp_path: Path) -> None:
     scene = scene_of(name)
     loads = [0.01, 1.0, 300.0]

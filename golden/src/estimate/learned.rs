@@ -66,11 +66,12 @@ use std::path::Path;
 const LARGEST_FILE: u64 = 64 << 20;
 
 /// Networks that are part of the program: `search.network` without its folder, and bytes.
-const SHIPPED: [(&str, &[u8]); 5] = [
+const SHIPPED: [(&str, &[u8]); 6] = [
     ("dermis:sensor-1", include_bytes!("../../scenes/sensor-1.network")),
     ("dermis:sensor-1-unipolar", include_bytes!("../../scenes/sensor-1-unipolar.network")),
     ("dermis:sensor-1-bonded", include_bytes!("../../scenes/sensor-1-bonded.network")),
     ("dermis:sensor-3-contacts", include_bytes!("../../scenes/sensor-3-contacts.network")),
+    ("dermis:eight-by-eight-bonded", include_bytes!("../../scenes/eight-by-eight-bonded.network")),
     ("dermis:eight-by-eight-contacts", include_bytes!("../../scenes/eight-by-eight-contacts.network")),
 ];
 

@@ -6,7 +6,7 @@ use crate::data::frame::Frame;
 use crate::estimate::float::Golden;
 use crate::estimate::learned::{with_network, Training};
 use crate::result::flags::Flag;
-use crate::spec::scene::{Medium, Scene};
+use crate::spec::scene::{EstimatorKind, Medium, Scene};
 
 const ARRAY: &str = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
 
@@ -89,15 +89,19 @@ fn the_other_medium_is_found() {
     assert!(layer.reconstruct(&frame).unwrap().flags.contains(&Flag::MediumMismatch));
 }
 
-/// Contacts wider than the array, whose shear no estimator finds, have flags.
+/// Contacts wider than the array, whose shear no estimator finds, have flags; by the network and by the search.
 #[test]
 fn a_contact_wider_than_the_array_is_flagged() {
-    let scene = Scene::builtin("eight-by-eight-bonded").unwrap();
-    let frame = Frame::shipped(&scene).into_iter().find(|frame| frame.id == "S8-bl48-cover").unwrap();
-    let results =
-        [Golden::new(&scene).unwrap().run(&frame).unwrap(), Model::new(&scene).unwrap().reconstruct(&frame).unwrap()];
-    for result in results {
-        assert!(result.error.unwrap().tangential.unwrap() > 0.5);
-        assert!(result.flags.contains(&Flag::LoadOutside), "{}: {:?}", result.engine, result.flags);
+    let own = Scene::builtin("eight-by-eight-bonded").unwrap();
+    let mut searched = own.estimated_by(EstimatorKind::Search);
+    searched.hardware.estimator = None;
+    for (scene, estimator) in [(own, EstimatorKind::Network), (searched, EstimatorKind::Search)] {
+        assert_eq!(scene.hardware_estimator(), estimator);
+        let frame = Frame::shipped(&scene).into_iter().find(|frame| frame.id == "S8-bl48-cover").unwrap();
+        let golden = Golden::new(&scene).unwrap().run(&frame).unwrap();
+        for result in [golden, Model::new(&scene).unwrap().reconstruct(&frame).unwrap()] {
+            assert!(result.error.unwrap().tangential.unwrap() > 0.5, "{estimator:?}, {}", result.engine);
+            assert!(result.flags.contains(&Flag::LoadOutside), "{estimator:?}, {}: {:?}", result.engine, result.flags);
+        }
     }
 }

@@ -125,7 +125,7 @@ const SANITIZED: [&str; 3] = ["-O1", "-fsanitize=undefined", "-fno-sanitize-reco
 
 #[test]
 fn built_in_scenes_are_equal_on_the_host() {
-    for name in ["sensor-1-noisy", "sensor-1", "sensor-1-unipolar", "sensor-1-bonded"] {
+    for name in ["sensor-1-noisy", "sensor-1", "sensor-1-unipolar", "sensor-1-bonded", "eight-by-eight-bonded"] {
         let (scene, frames) = scene(name);
         check(&Model::new(&scene).unwrap(), &frames, &SANITIZED);
     }

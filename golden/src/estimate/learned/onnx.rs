@@ -284,7 +284,7 @@ mod tests {
     /// `python/tests/test_onnx.py` runs the files; here every operand is there before it is used, and every name once.
     #[test]
     fn every_operand_is_defined_before() {
-        for name in ["sensor-1", "sensor-1-unipolar", "sensor-1-bonded", "sensor-3-contacts"] {
+        for name in ["sensor-1", "sensor-1-unipolar", "sensor-1-bonded", "eight-by-eight-bonded", "sensor-3-contacts"] {
             let scene = Scene::builtin(name).unwrap();
             let learned = Learned::of_scene(&scene, EstimatorKind::EvidenceNetwork).unwrap();
             let graph = Model::decode(&learned.to_onnx(name)[..]).unwrap().graph.unwrap();

@@ -192,12 +192,11 @@ fn standard_deviations_of_the_network_are_honest() {
     }
 }
 
-/// The hardware on a bonded layer, by its network: errors in full slip, of every shape; error bars; bias of contacts held at 0.8 and
+/// The hardware on bonded layers, by its networks: errors in full slip, of every shape; error bars; bias of contacts held at 0.8 and
 /// 0.6 of the friction. The search on the same frames is beyond each of these errors, and has no standard deviation where no noise is
 /// stated.
 #[test]
-fn the_hardware_on_a_bonded_layer_meets_its_limits() {
-    let scene = Scene::builtin("sensor-1-bonded").unwrap();
+fn the_hardware_on_bonded_layers_meets_its_limits() {
     let shapes = Shape::NAMES.map(|(_, shape)| shape).to_vec();
     let study = ShapeStudy {
         levels: vec![2e-3],
@@ -208,16 +207,17 @@ fn the_hardware_on_a_bonded_layer_meets_its_limits() {
         ..Default::default()
     };
     let rows = |scene: &Scene, study: &ShapeStudy| slip_study(scene, study, &|_, _| ()).unwrap();
-    let limits = [0.08, 0.18];
-    let found = rows(&scene, &study);
-    let full = &found[0];
-    assert!((0..2).all(|k| full.tangential[k] <= limits[k]), "{full:?}");
-    assert!((0.6..=0.76).contains(&full.within_1.unwrap()), "{full:?}");
-    assert!(found[1..3].iter().all(|held| held.bias.abs() <= 0.05), "{found:?}");
-    let mut searched = scene;
-    searched.hardware.estimator = Some(EstimatorKind::Search);
-    let full = &rows(&searched, &ShapeStudy { draws: 24, ..study })[0];
-    assert!((0..2).all(|k| full.tangential[k] > limits[k]) && full.within_1.is_none(), "{full:?}");
+    for (name, limits) in [("sensor-1-bonded", [0.08, 0.18]), ("eight-by-eight-bonded", [0.12, 0.26])] {
+        let mut scene = Scene::builtin(name).unwrap();
+        let found = rows(&scene, &study);
+        let full = &found[0];
+        assert!((0..2).all(|k| full.tangential[k] <= limits[k]), "{name}: {full:?}");
+        assert!((0.6..=0.76).contains(&full.within_1.unwrap()), "{name}: {full:?}");
+        assert!(found[1..3].iter().all(|held| held.bias.abs() <= 0.05), "{name}: {found:?}");
+        scene.hardware.estimator = Some(EstimatorKind::Search);
+        let full = &rows(&scene, &ShapeStudy { draws: 24, ..study.clone() })[0];
+        assert!((0..2).all(|k| full.tangential[k] > limits[k]) && full.within_1.is_none(), "{name}: {full:?}");
+    }
 }
 
 /// Hardware that sends resultants gives the same standard deviation of the shear as with a force per taxel.
