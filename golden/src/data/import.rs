@@ -57,11 +57,11 @@ pub use units::Unit;
 
 use crate::data::frame::Frame;
 use crate::data::input::missing::complete;
-use crate::data::text::Stated;
+use crate::data::text::{decoded, Stated};
 use crate::spec::scene::Scene;
 use crate::spec::sensor::{Sensor, MAX_LENGTH_MM};
 use error::Source;
-use recording::{decoded, DeviceFigure, RawFrame, Recording, LARGEST_SIDE};
+use recording::{DeviceFigure, RawFrame, Recording, LARGEST_SIDE};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

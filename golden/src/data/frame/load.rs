@@ -2,10 +2,10 @@
 
 use super::recorded::Recording;
 use super::{csv, json, Frame, FrameError};
-use crate::data::text::Stated;
+use crate::data::text::{decoded, Stated};
 use crate::spec::scene::Scene;
 use std::fs::File;
-use std::io::{Error, ErrorKind, Read};
+use std::io::{Error, Read};
 use std::path::Path;
 
 /// Largest frame file in bytes: 64 MB.
@@ -162,5 +162,5 @@ fn read(path: &Path, file: &str) -> Result<String, FrameError> {
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(too_large());
     }
-    String::from_utf8(bytes).map_err(|error| unreadable(Error::new(ErrorKind::InvalidData, error)))
+    Ok(decoded(&bytes))
 }

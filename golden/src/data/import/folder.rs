@@ -10,6 +10,7 @@ use super::Imported;
 use crate::data::frame::Frame;
 use crate::data::recording::message::{Header, Image, Time};
 use crate::data::recording::{frame_messages, Kind, RecordingError, RecordingFile, Stamp};
+use crate::data::text::decoded;
 use crate::spec::scene::Scene;
 use crate::write::{replace, write, FileError};
 use std::fs::File;
@@ -79,7 +80,7 @@ impl Imported {
             message: error.to_string(),
         })?;
         let path = folder.join(&summary.name).with_added_extension("toml");
-        let scene_text = super::recording::decoded(&super::read(&path, LARGEST_SUMMARY)?);
+        let scene_text = decoded(&super::read(&path, LARGEST_SUMMARY)?);
         let scene = Scene::parse(&scene_text, &path.display().to_string())?;
         let path = summary.recording(folder);
         let mut frames = Frame::load_all(&path, Some(&scene))?;

@@ -116,11 +116,3 @@ pub(super) fn side(source: &Source, field: &str, text: &str) -> Result<usize, Im
 pub(super) fn unit(source: &Source, field: &str, text: &str) -> Result<Unit, ImportError> {
     Unit::named(text).ok_or_else(|| source.field(field, text, format!("one of {}", Unit::names())))
 }
-
-/// The file's text: UTF-8, else Latin-1; without the mark U+FEFF.
-pub(super) fn decoded(bytes: &[u8]) -> String {
-    match std::str::from_utf8(bytes) {
-        Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_string(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
-    }
-}

@@ -7,6 +7,15 @@ use csv::ReaderBuilder;
 
 use super::shown;
 
+/// What stands between the time of a terminal and the line.
+const ARROW: &str = " -> ";
+/// Characters before the first value of a list, and after the last.
+const OPENING: [char; 2] = ['[', '('];
+const CLOSING: [char; 3] = [']', ')', ','];
+/// Words for a reading that is missing, beside `nan` and an empty cell: of JSON, of R, of spreadsheets, of Python, and Tekscan's mark
+/// of a sensel that does not exist.
+const MISSING: [&str; 7] = ["null", "NULL", "NA", "N/A", "#N/A", "None", "B"];
+
 /// What stands between two cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Separator {
@@ -24,8 +33,30 @@ impl Separator {
     /// Every separator, in the order in which they are tried: a comma can be a decimal mark, a blank stand beside any other.
     pub const ALL: [Separator; 4] = [Separator::Semicolon, Separator::Tab, Separator::Comma, Separator::Blank];
 
-    /// The cells of a line, without blanks around them and without quotes.
+    /// The cells of a line, without blanks around them and without quotes; of a list as Python and NumPy print it those within the
+    /// brackets; the time that a terminal puts before a line, as in `12:34:56.789 -> 1,2,3`, is the first.
     pub(crate) fn cells(self, line: &str) -> Vec<Cow<'_, str>> {
+        if let Some((time, rest)) = line.split_once(ARROW) {
+            let cells = self.cells(rest).into_iter();
+            return std::iter::once(Cow::Borrowed(time.trim())).chain(cells).collect();
+        }
+        let text = line.trim_start();
+        if !text.starts_with(OPENING) {
+            return self.split(line);
+        }
+        let list =
+            text.trim_start_matches(OPENING).trim_end_matches(|c: char| c.is_whitespace() || CLOSING.contains(&c));
+        match list.contains(['[', ']']) {
+            false => self.split(list),
+            true => {
+                let flat = list.replace(['[', ']'], "");
+                self.split(&flat).into_iter().map(|cell| Cow::Owned(cell.into_owned())).collect()
+            }
+        }
+    }
+
+    /// The cells of a line that is no list.
+    fn split(self, line: &str) -> Vec<Cow<'_, str>> {
         let byte = match self {
             Separator::Semicolon => b';',
             Separator::Tab => b'\t',
@@ -59,13 +90,12 @@ impl fmt::Display for Separator {
 /// use dermis_golden::data::text::reading;
 ///
 /// assert_eq!(reading(" -3e-1"), Some(-0.3));
-/// assert!([" ", "nan", "NaN", "null", "B"].iter().all(|cell| reading(cell).is_some_and(f64::is_nan)));
+/// assert!([" ", "nan", "NaN", "null", "NA", "#N/A", "None", "B"].iter().all(|cell| reading(cell).is_some_and(f64::is_nan)));
 /// assert!(["inf", "1e400", "x", "-"].iter().all(|cell| reading(cell).is_none()));
 /// ```
 pub fn reading(cell: &str) -> Option<f64> {
     match cell.trim() {
-        // `B` is Tekscan's mark of a sensel that does not exist.
-        "" | "null" | "B" => Some(f64::NAN),
+        cell if cell.is_empty() || MISSING.contains(&cell) => Some(f64::NAN),
         cell => cell.parse().ok().filter(|value: &f64| !value.is_infinite()),
     }
 }
@@ -152,6 +182,27 @@ impl Digits {
             padded,
             width: fixed(|number| number.whole.len() + usize::from(number.signed)).filter(|_| padded),
             leading: share(&|number| !number.whole.is_empty()) >= LIKE,
+        }
+    }
+
+    /// A cell of whose comma nobody can say whether it separates thousands or decimals, if that is so of all cells with one: three
+    /// digits behind it, no zero in front, and other numbers without any mark.
+    pub(super) fn thousands<'t>(cells: impl Iterator<Item = &'t str> + Clone) -> Option<&'t str> {
+        let is_grouped = |cell: &str| {
+            let unsigned = cell.trim().trim_start_matches(['-', '+']);
+            let (whole, thousand) = unsigned.split_once(',')?;
+            let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+            let own = thousand.len() == 3 && (1..4).contains(&whole.len()) && !whole.starts_with('0');
+            Some(own && digits(whole) && digits(thousand))
+        };
+        let with_comma = || cells.clone().filter_map(is_grouped);
+        let others =
+            cells.clone().filter(|cell| !cell.contains(',') && reading(cell).is_some_and(|value| value.abs() > 0.0));
+        // Beside a decimal point it is no decimal mark.
+        let has_point = cells.clone().any(|cell| cell.contains('.'));
+        match !has_point && with_comma().all(|grouped| grouped) && others.count() > 0 {
+            true => cells.clone().find(|cell| is_grouped(cell) == Some(true)),
+            false => None,
         }
     }
 

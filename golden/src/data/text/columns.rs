@@ -48,6 +48,8 @@ const TIMES: [&str; 13] = [
     "clock",
     "ms",
 ];
+/// Columns of a table with a line for each reading, which has a place in the array.
+const PLACES: [&str; 3] = ["row", "col", "column"];
 /// Most columns beside the readings whose header does not name them.
 const MOST_BESIDE: usize = 3;
 
@@ -126,6 +128,32 @@ impl<'t> Columns<'t> {
         let own: Vec<usize> = (0..names.len()).filter(|&column| !is_beside(names[column])).collect();
         let first = *own.first()?;
         (own.len() == readings && own[readings - 1] + 1 - first == readings).then_some(first)
+    }
+
+    /// Checks the names of the readings' columns: that the header calls none of some a time, an index, a place.
+    ///
+    /// # Errors
+    /// Such a column, in words.
+    pub(super) fn check_names(&self, first: usize, readings: usize) -> Result<(), String> {
+        // A letter is the name of a spreadsheet's column, a number behind it that of a taxel.
+        let is_other = |column: &usize| {
+            self.name(*column).is_some_and(|name| {
+                let (name, plain) = (name.trim(), plain(name));
+                let known = [&BESIDE[..], &TIMES, &PLACES].iter().any(|list| list.contains(&plain.as_str()));
+                known && name.len() > 1 && !name.contains(|c: char| c.is_ascii_digit())
+            })
+        };
+        let others: Vec<usize> = (first..first + readings).filter(is_other).collect();
+        let [column, ..] = others[..] else { return Ok(()) };
+        if others.len() == readings {
+            return Ok(());
+        }
+        let name = self.name(column).unwrap_or_default().trim();
+        Err(format!(
+            "the header calls column {} {name:?}, which is no reading; --columns A..B says which are, and a table with a line for each \
+             reading is turned into one with a frame per line (pandas: DataFrame.pivot)",
+            column + 1
+        ))
     }
 
     /// The readings from column `first` on and the time in one of the others.

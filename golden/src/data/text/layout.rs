@@ -206,6 +206,14 @@ impl<'s> Table<'s> {
             .body(first)
             .flat_map(|cells| cells[found.first..found.first + readings].iter().map(Cow::as_ref))
             .collect();
+        if let Some(cell) = Digits::thousands(of_readings.iter().copied()) {
+            let plain = cell.replace(',', "");
+            let point = point(cell);
+            return Err(at_first(format!(
+                "{cell:?} can be {plain} with a mark of thousands or {point} with a decimal comma; write numbers with a decimal \
+                 point, and without marks of thousands"
+            )));
+        }
         let layout = Layout {
             separator: self.separator,
             digits: Digits::of_cells(of_readings.iter().copied()),
@@ -281,7 +289,9 @@ impl<'s> Table<'s> {
                 ));
             }
         }
-        columns.find(readings, time)
+        let found = columns.find(readings, time)?;
+        columns.check_names(found.first, readings)?;
+        Ok(found)
     }
 
     /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … of nine and more.

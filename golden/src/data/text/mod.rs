@@ -25,10 +25,11 @@
 //! | in | a cell is |
 //! |---|---|
 //! | a number | a reading; finite |
-//! | empty, `nan`, `null`, `B` | a reading that is missing: NaN |
+//! | empty, `nan`, `null`, `NA`, `N/A`, `#N/A`, `None`, `B` | a reading that is missing: NaN |
 //! | anything else | none: the line is left out |
 //!
-//! Blank lines and those that begin with `#` are no frames.
+//! Blank lines and those that begin with `#` are no frames. A list in brackets, as Python and NumPy print it, is a line without them,
+//! and a time before an arrow, as the monitor of Arduino puts it, a cell.
 
 mod cells;
 mod columns;
@@ -46,6 +47,35 @@ pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
 pub use time::{is_date, TimeUnit};
 
 use std::fmt;
+
+/// The text of a file: UTF-8, or UTF-16 where its mark says so, else Latin-1; without the mark. Lines that end with a carriage return
+/// alone end with a line feed.
+///
+/// ```
+/// use dermis_golden::data::text::decoded;
+///
+/// let utf_16: Vec<u8> = "\u{feff}1\t2\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+/// assert_eq!(decoded(&utf_16), "1\t2\n");
+/// assert_eq!([decoded(b"1,2\r3,4\r"), decoded(b"5 \xb0C\r\n")], ["1,2\n3,4\n", "5 °C\r\n"]);
+/// ```
+pub fn decoded(bytes: &[u8]) -> String {
+    let utf_16 = |of: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
+        String::from_utf16_lossy(&units)
+    };
+    let text = match bytes {
+        [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
+        _ => match std::str::from_utf8(bytes) {
+            Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
+            Err(_) => bytes.iter().copied().map(char::from).collect(),
+        },
+    };
+    match text.contains('\r') && !text.contains('\n') {
+        true => text.replace('\r', "\n"),
+        false => text,
+    }
+}
 
 /// Characters of a cell that are shown in an error.
 const SHOWN: usize = 40;
@@ -66,10 +96,12 @@ impl<'t> Line<'t> {
         all.filter(Line::may_hold_readings).collect()
     }
 
-    /// Whether it is neither blank nor a comment.
+    /// Whether it is neither blank nor a comment, nor the begin or end of a list whose frames are on lines of their own.
     pub fn may_hold_readings(&self) -> bool {
         let text = self.text.trim();
-        !text.is_empty() && !text.starts_with('#')
+        let is_bracket = |c: char| matches!(c, '[' | ']' | '(' | ')');
+        !text.trim_end_matches(',').trim_matches(is_bracket).is_empty() && !text.starts_with('#')
+            || text.starts_with(',')
     }
 }
 

@@ -38,6 +38,11 @@ fn the_same_frames_in_every_layout() {
         "1.5,2\n3,4\n2,3\n4,5\n",
         "1.5,2\n3,4\n\n2,3\n4,5\n",
         "Frame 1 of 2\n1.5 2\n3 4\nFrame 2 of 2\n2 3\n4 5\n",
+        "[1.5, 2, 3, 4]\n[2, 3, 4, 5]\n",
+        "[[1.5, 2], [3, 4]]\n[[2, 3], [4, 5]]\n",
+        "[[1.5 2. ]\n [3.  4. ]]\n[[2. 3.]\n [4. 5.]]\n",
+        "[\n[1.5, 2, 3, 4],\n[2, 3, 4, 5]\n]\n",
+        "10:00:00.010 -> 1.5,2,3,4\n10:00:00.020 -> 2,3,4,5\n",
         "{\"stress_MPa\": [1.5, 2, 3, 4]}\n{\"id\": \"b\", \"timestamp\": 12.5, \"stress_MPa\": [2, 3, 4, 5]}\n",
     ];
     for text in texts {
@@ -221,4 +226,42 @@ fn a_lost_byte_makes_no_other_number() {
         }
     }
     assert_eq!(wrong, 0);
+}
+
+#[test]
+fn a_table_with_a_line_for_each_reading_is_no_grid() {
+    let lines =
+        (0..2).flat_map(|frame| (0..16).map(move |taxel| format!("{frame},{},{},{taxel}\n", taxel / 4, taxel % 4)));
+    let long = format!("frame,row,col,value\n{}", lines.collect::<String>());
+    let error = refused(&long, [4, 4], &Stated::default());
+    assert!(error.starts_with("line 2: the header calls column 1 \"frame\", which is no reading"), "{error}");
+    // Who states the columns means them; names of taxels that end with a number, and letters, are names of readings.
+    let stated = Stated { columns: Some([1, 4]), ..Stated::default() };
+    assert_eq!(frames(&long, [4, 4], &stated).unwrap().frames.len(), 8);
+    for names in ["t1,t2,t3,t4", "A,T,C,D", "Time,Time,Time,Time"] {
+        assert_eq!(readings(&read(&format!("{names}\n1,2,3,5\n2,3,4,7\n"), [2, 2])).len(), 2, "{names}");
+    }
+}
+
+#[test]
+fn a_comma_that_may_separate_thousands_is_refused() {
+    for text in ["\"1,234\",567,12,\"2,000\"\n1,2,3,4\n", "1,234;567;12;2,000\n1;2;3;4\n"] {
+        let error = refused(text, [2, 2], &Stated::default());
+        assert!(error.starts_with("line 1: \"1,234\" can be 1234 with a mark of thousands or 1.234"), "{error}");
+    }
+    // Three decimals in every cell, a zero in front, and decimals of other lengths are no thousands.
+    for text in ["1,234;5,670;1,200;2,000\n", "0,234;567;12;2,000\n", "1,5;567;12;2,125\n"] {
+        assert_eq!(read(text, [2, 2]).frames.len(), 1, "{text}");
+    }
+}
+
+#[test]
+fn words_of_other_programs_for_a_missing_reading() {
+    let words = ["NaN", "nan", "NA", "N/A", "#N/A", "None", "null", "NULL", ""];
+    let lines: String = words.iter().map(|word| format!("1,{word},3,4\n")).collect();
+    assert_eq!(readings(&read(&lines, [2, 2])), [[1.0, -1.0, 3.0, 4.0]; 9]);
+    for word in ["-", "inf", "na na", "0x1F", "#REF!"] {
+        let read = read(&format!("1,2,3,4\n1,{word},3,4\n"), [2, 2]);
+        assert_eq!((read.frames.len(), read.left_out.len()), (1, 1), "{word}");
+    }
 }
