@@ -78,7 +78,7 @@ fn all_formats_agree() {
     let (head, rows) = table(&report, "time");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     // Frames with one contact and with several are never in one row.
-    assert_eq!((rows.len(), row_counts(rows, at("contacts"))), (4 * 4, [16, 0]));
+    assert_eq!((rows.len(), row_counts(rows, at("contacts"))), (4 * 5, [20, 0]));
     for row in rows {
         let ninety = row[at("shear error, median") + 1].as_f64().unwrap();
         assert!(ninety >= row[at("shear error, median")].as_f64().unwrap(), "{row}");

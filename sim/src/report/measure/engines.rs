@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use anyhow::{anyhow, Result};
 use dermis_golden::data::frame::Frame;
-use dermis_golden::estimate::float::Golden;
+use dermis_golden::estimate::float::{Golden, GoldenError};
 use dermis_golden::fixed::{FixedError, Model, Trace};
+use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::partition::{subarrays, Case};
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::study::baseline::Baseline;
@@ -91,7 +92,28 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
             (Some(literal), Ok(forces))
         }
     };
-    Ok(Measured { scene, frames, engine, golden, bit_true, baseline, times: BTreeMap::new(), literal })
+    let (evidence_engine, evidence) = match evidence_of(&scene, &frames, options) {
+        Ok((engine, results)) => (Some(engine), Ok(results)),
+        Err(reason) => (None, Err(reason)),
+    };
+    let times = BTreeMap::new();
+    Ok(Measured { scene, frames, engine, golden, evidence, bit_true, baseline, times, literal, evidence_engine })
+}
+
+/// `evidence` on every frame, or why not. It takes the array as a whole, so that other cases have nothing else.
+fn evidence_of(scene: &Scene, frames: &[Frame], options: &Options) -> Result<(Golden, Vec<Reconstruction>), String> {
+    if scene.partition.case != Case::WHOLE {
+        return Err("as in case 0".to_owned());
+    }
+    if options.quick && scene.sensor.taxels() > QUICK_LITERAL {
+        return Err("left out of the quick variant".to_owned());
+    }
+    let run = || -> Result<(Golden, Vec<Reconstruction>), GoldenError> {
+        let engine = Golden::new(&scene.estimated_by(EstimatorKind::Evidence))?;
+        let results = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
+        Ok((engine, results))
+    };
+    run().map_err(|error| in_one_line(&error.to_string()))
 }
 
 /// A message of several lines for a cell of a table: the first line, then the others separated by semicolons.
@@ -130,33 +152,20 @@ fn is_simulated(scene: &Scene, options: &Options) -> bool {
 /// Measures every CPU engine that supports the case.
 fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
     let frames = &measured.frames;
-    let mut times = BTreeMap::new();
-    times.insert(
-        Engine::Golden,
-        Timing::of(frames.len(), |k| {
-            measured.engine.run(&frames[k])?;
-            Ok(())
-        })?,
-    );
+    type Run<'m> = Box<dyn Fn(&Frame) -> Result<()> + 'm>;
+    let golden = |engine: &'_ Golden, frame: &Frame| Ok(engine.run(frame).map(drop)?);
+    let mut runs: Vec<(Engine, Run)> = vec![(Engine::Golden, Box::new(move |frame| golden(&measured.engine, frame)))];
+    if let Some(engine) = &measured.evidence_engine {
+        runs.push((Engine::Evidence, Box::new(move |frame| golden(engine, frame))));
+    }
     if let Ok(bit_true) = &measured.bit_true {
-        times.insert(
-            Engine::Fixed,
-            Timing::of(frames.len(), |k| {
-                bit_true.model.reconstruct(&frames[k])?;
-                Ok(())
-            })?,
-        );
+        runs.push((Engine::Fixed, Box::new(|frame| Ok(bit_true.model.reconstruct(frame).map(drop)?))));
     }
     if let Some(literal) = &measured.literal {
-        times.insert(
-            Engine::Baseline,
-            Timing::of(frames.len(), |k| {
-                literal.run(&frames[k])?;
-                Ok(())
-            })?,
-        );
+        runs.push((Engine::Baseline, Box::new(|frame| Ok(literal.run(frame).map(drop)?))));
     }
-    Ok(times)
+    let timed = |(engine, run): (Engine, Run)| Ok((engine, Timing::of(frames.len(), |k| run(&frames[k]))?));
+    runs.into_iter().map(timed).collect()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use dermis_golden::fixed::{Model, Trace};
 use dermis_golden::result::errors::Errors;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::partition::Case;
-use dermis_golden::spec::scene::{Condition, Scene};
+use dermis_golden::spec::scene::{Condition, EstimatorKind, Scene};
 use dermis_golden::study::baseline::Baseline;
 use dermis_hdl::usage::StageUsage;
 
@@ -42,8 +42,10 @@ pub struct Options {
 pub enum Engine {
     /// Eq. 1 with dense matrices and a simplex search, on the CPU.
     Baseline,
-    /// Floating point, on the CPU.
+    /// The estimator of the hardware in floating point, on the CPU.
     Golden,
+    /// The estimator `evidence`, which the floating-point model takes where a scene states none, on the CPU.
+    Evidence,
     /// The bit-true model, on the CPU.
     Fixed,
     /// The generated hardware.
@@ -52,15 +54,17 @@ pub enum Engine {
 
 impl Engine {
     /// All engines, in the order of tables.
-    pub const ALL: [Engine; 4] = [Engine::Baseline, Engine::Golden, Engine::Fixed, Engine::Hardware];
+    pub const ALL: [Engine; 5] = [Engine::Baseline, Engine::Golden, Engine::Evidence, Engine::Fixed, Engine::Hardware];
 
-    /// Name in tables and legends.
-    pub fn name(self) -> &'static str {
+    /// Name in tables and legends, with that of the estimator that it computes for a scene.
+    pub fn name(self, scene: &Scene) -> String {
+        let of_hardware = scene.hardware_estimator().name();
         match self {
-            Engine::Baseline => "literal Eq. 1, CPU",
-            Engine::Golden => "golden, CPU",
-            Engine::Fixed => "bit-true, CPU",
-            Engine::Hardware => "hardware",
+            Engine::Baseline => "literal Eq. 1, CPU".to_owned(),
+            Engine::Golden => format!("golden {of_hardware}, CPU"),
+            Engine::Evidence => format!("golden {}, CPU", EstimatorKind::Evidence.name()),
+            Engine::Fixed => format!("bit-true {of_hardware}, CPU"),
+            Engine::Hardware => format!("hardware, {of_hardware}"),
         }
     }
 }
@@ -93,6 +97,8 @@ pub struct Measured {
     pub engine: Golden,
     /// Its result for every frame.
     pub golden: Vec<Reconstruction>,
+    /// Results of `evidence` for every frame, or the reason why there are none.
+    pub evidence: Result<Vec<Reconstruction>, String>,
     /// Results of the bit-true model and the hardware, or the reason why there is no hardware.
     pub bit_true: Result<BitTrue, String>,
     /// The literal baseline's forces for every frame, or the reason why it was not run.
@@ -100,6 +106,7 @@ pub struct Measured {
     /// Times per frame on the CPU.
     pub times: BTreeMap<Engine, Timing>,
     pub(super) literal: Option<Baseline>,
+    pub(super) evidence_engine: Option<Golden>,
 }
 
 /// Whether a frame has one contact or several.
@@ -143,6 +150,8 @@ pub struct Point {
     pub case: Case,
     /// The engine.
     pub engine: Engine,
+    /// Its name with that of its estimator.
+    pub name: String,
     /// Tangential error of the resultant, median over the frames.
     pub tangential: Option<f64>,
     /// Normal error of the resultant, median over the frames.
@@ -168,6 +177,7 @@ impl Measured {
         match engine {
             Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
             Engine::Golden => of(&self.golden),
+            Engine::Evidence => self.evidence.as_deref().map(of).unwrap_or_default(),
             Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
         }
     }
@@ -193,6 +203,7 @@ impl Measured {
         Some(Point {
             case: self.scene.partition.case,
             engine,
+            name: engine.name(&self.scene),
             tangential: median(of(|e| e.tangential)),
             normal: median(of(|e| e.normal)),
             ninety: [quantile(of(|e| e.tangential), 0.9), quantile(of(|e| e.normal), 0.9)],

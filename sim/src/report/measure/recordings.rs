@@ -26,6 +26,8 @@ pub struct RecordedFixed {
     pub results: Vec<Reconstruction>,
     /// Difference from the golden model, for every frame.
     pub differences: Vec<Difference>,
+    /// Name of its estimator.
+    pub estimator: &'static str,
     /// Time of a frame on the CPU in s.
     pub seconds: f64,
     /// Cycles of the slowest frame.
@@ -42,6 +44,8 @@ pub struct Recorded {
     pub chosen: Vec<usize>,
     /// The golden model's result for each of them.
     pub golden: Vec<Reconstruction>,
+    /// Name of its estimator.
+    pub estimator: &'static str,
     /// Time of a frame in s.
     pub seconds: f64,
     /// The bit-true model, or the reason why there is no hardware.
@@ -71,7 +75,8 @@ pub fn recorded(imported: Imported, interrupt: &Interrupt) -> Result<Recorded> {
         }
         Err(error) => return Err(error.into()),
     };
-    Ok(Recorded { chosen, golden, seconds, fixed, imported })
+    let estimator = engine.estimator().name();
+    Ok(Recorded { chosen, golden, estimator, seconds, fixed, imported })
 }
 
 fn fixed(model: &Model, frames: &[&Frame], golden: &[Reconstruction], interrupt: &Interrupt) -> Result<RecordedFixed> {
@@ -86,7 +91,8 @@ fn fixed(model: &Model, frames: &[&Frame], golden: &[Reconstruction], interrupt:
         difference(&comparable_forces(golden), &comparable_forces(fixed), lsb_N)
     });
     let hardware_seconds = clock(&model.board, &model.scene).seconds(cycles);
-    Ok(RecordedFixed { differences: compared.collect(), results, seconds, cycles, hardware_seconds })
+    let (differences, estimator) = (compared.collect(), model.estimator().name());
+    Ok(RecordedFixed { differences, results, estimator, seconds, cycles, hardware_seconds })
 }
 
 /// Runs a model on all frames: the results and the median time of a frame in s.

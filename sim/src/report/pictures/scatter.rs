@@ -291,7 +291,8 @@ fn mark(area: &Area, series: &Series, (x, y): (i32, i32)) -> Result<()> {
         0 => area.draw(&Circle::new((x, y), 5, fill))?,
         1 => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill))?,
         2 => polygon(vec![(x, y - 6), (x - 5, y + 4), (x + 5, y + 4)])?,
-        _ => polygon(vec![(x, y - 6), (x - 6, y), (x, y + 6), (x + 6, y)])?,
+        3 => polygon(vec![(x, y - 6), (x - 6, y), (x, y + 6), (x + 6, y)])?,
+        _ => polygon(vec![(x, y + 6), (x - 5, y - 4), (x + 5, y - 4)])?,
     }
     Ok(())
 }
@@ -382,7 +383,7 @@ mod tests {
             y: "e".into(),
             log: [true, true],
             ticks: [|v| v.to_string(); 2],
-            series: (0..4)
+            series: (0..5)
                 .map(|shape| Series {
                     name: "s".into(),
                     colour: LIMIT,
@@ -395,8 +396,8 @@ mod tests {
             guides,
         };
         let filled = |drawn: &str| drawn.matches("fill=\"#050505\"").count();
-        // Two marks and one in the legend, of each of four shapes.
-        assert_eq!(filled(&scatter(&plot(false, vec![])).unwrap()), 12);
+        // Two marks and one in the legend, of each of five shapes.
+        assert_eq!(filled(&scatter(&plot(false, vec![])).unwrap()), 15);
         assert_eq!(filled(&scatter(&plot(true, vec![])).unwrap()), 0);
         // The axis reaches the guide, which no point comes near.
         let drawn = scatter(&plot(false, vec![Guide::Y(1.0, "no shear".into())])).unwrap();

@@ -91,12 +91,13 @@ fn row(m: &Measured, engine: Engine, contacts: ContactCount) -> Vec<Cell> {
         text_cell(m.scene.name.clone()),
         text_cell(case_text(m.scene.partition.case)),
         text_cell(contacts.name()),
-        text_cell(engine.name()),
+        text_cell(engine.name(&m.scene)),
     ];
     let bit_true = m.bit_true.as_ref();
     let Some(point) = m.point_over(engine, |frame| ContactCount::of(frame) == contacts) else {
         let reason = match engine {
             Engine::Baseline => m.baseline.as_ref().err(),
+            Engine::Evidence => m.evidence.as_ref().err(),
             _ => bit_true.err(),
         };
         row.extend(std::iter::repeat_with(empty_cell).take(8));
@@ -136,7 +137,10 @@ fn picture(
             .filter_map(|point| Some((point.seconds, error(point).filter(|e| *e > 0.0)?, point.case.to_string())));
         let index = engine as usize;
         Series {
-            name: if hollow { MODELLED[0] } else { engine.name() }.into(),
+            name: match own.iter().find(|point| point.engine == engine) {
+                Some(point) if !hollow => point.name.clone(),
+                _ => MODELLED[0].into(),
+            },
             colour: SERIES[index],
             shape: index,
             hollow,
