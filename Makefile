@@ -25,7 +25,7 @@ MINUTES   ?= 5
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling clippy unit lint quick python wheel buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -46,7 +46,7 @@ program: setup
 run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt spelling clippy unit quick python buses docs ## run all checks, as .ci/run does
+test: setup fmt spelling packaging clippy unit quick python buses docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
@@ -57,6 +57,13 @@ spelling: ## check the spelling of code and pages
 	python3 -m venv $(BUILD)/spelling
 	$(BUILD)/spelling/bin/pip install -q --disable-pip-version-check -r tests/spelling.txt
 	$(BUILD)/spelling/bin/typos
+
+packaging: ## lint the Dockerfile and the workflow of GitHub
+	@echo '== packaging'
+	python3 -m venv $(BUILD)/packaging
+	$(BUILD)/packaging/bin/pip install -q --disable-pip-version-check -r tests/packaging.txt
+	$(BUILD)/packaging/bin/hadolint Dockerfile
+	$(BUILD)/packaging/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
@@ -115,15 +122,16 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
-bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a stream, an import, the drawing of the live page, and how many patches dermis-ros holds
+bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a start, a stream, an import, the drawing of the live page, how many patches dermis-ros holds, and a frame on CPU, microcontroller and FPGA
 	$(CARGO) bench --locked --package dermis-golden
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
-	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
+	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt scipy ./python
 	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --locked --package dermis-python
 	$(CARGO) build --locked --release --bin dermis
 	$(CARGO) build --locked --release --package dermis-ros
 	DERMIS=$(DERMIS) DERMIS_ROS=$(CARGO_TARGET_DIR)/release/dermis-ros python3 ros/tests/bench.py
+	$(DERMIS) --build-dir $(BUILD) study devices --python $(VENV)-release/bin/python --picture $(BUILD)/devices.svg
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)

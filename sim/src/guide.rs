@@ -46,6 +46,7 @@ pages! {
     "your-board.md" your_board,
     "in-your-soc.md" in_your_soc,
     "microcontroller.md" microcontroller,
+    "devices.md" devices,
     "method.md" method,
     "formats.md" formats,
     "architecture.md" architecture,

@@ -256,7 +256,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Power(arguments) => Ok((super::power::run(arguments, build_dir)?, true)),
         Command::Faults(arguments) => super::faults::run(arguments, build_dir),
         Command::Stress(arguments) => super::stress::run(arguments, build_dir),
-        Command::Study(arguments) => Ok((super::study::run(arguments)?, true)),
+        Command::Study(arguments) => Ok((super::study::run(arguments, build_dir)?, true)),
         Command::Guide(arguments) => super::guide_pages::run(arguments, build_dir),
         Command::Completions { shell } => {
             let mut text = Vec::new();

@@ -64,6 +64,7 @@ Attributes follow the command after semicolons, all of them optional:
   columns: A | B          columns to keep, in this order
   row: A                  of a figure: the first cell of its row
   column: B               of a figure: the head of its column
+  measured: yes           the table has times of this machine: every check takes the check's command
   part: N                 of a figure: the N-th of several that `/` separates in its cell
   takes: 40 s             how long the command takes, for the reader")]
 pub struct Arguments {

@@ -32,6 +32,7 @@
 //! | [`mod@schema`] | `dermis schema`: the fields of scenes, frames and results |
 //! | [`replay`] | `dermis replay`: the frames or the results of a recording, line by line |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
+//! | `devices` | `dermis study devices`: time and energy of a frame on CPU, microcontroller and FPGA |
 //! | `sensor_faults` | `dermis study sensor-faults`: frames of faulty sensors, flagged or silently wrong |
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
@@ -52,6 +53,7 @@ mod cli;
 pub mod converters;
 pub mod cosim;
 pub mod deviations;
+mod devices;
 pub mod export;
 pub mod faults;
 pub mod generate;

@@ -13,17 +13,21 @@ use super::inputs::scenes_or;
 use crate::jobs::Interrupt;
 use crate::report::document::{Document, Section};
 use crate::report::measure::{
-    self, clock, machine, measure, recorded, sweep, ContactCount, Measured, Options, SweepPoint, MOST_FRAMES,
+    self, clock, machine, measure, recorded, sweep, ContactCount, DeviceOptions, Measured, Options, SweepPoint,
+    MOST_FRAMES,
 };
 use crate::report::save::save;
 use crate::report::sections::{
-    choice, choose, extremes, fields, frames, noise, paper, power, published, ratios, recordings, resources, run_logs,
-    search, stability, stages, sweeps, time, Choice,
+    choice, choose, devices, extremes, fields, frames, noise, paper, power, published, ratios, recordings, resources,
+    run_logs, search, stability, stages, sweeps, time, Choice, DEVICE_SCENES,
 };
 use crate::run_log::RunLog;
 
 /// Number of random frames of a sweep in addition to the shipped ones: quick, full variant.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];
+
+/// Frames of each row of the CPU in the section on devices.
+const DEVICE_FRAMES: usize = 1000;
 
 /// Arguments of `dermis report`.
 #[derive(Args, Debug)]
@@ -149,7 +153,17 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         power(measured, &choices, options)?,
         run_logs(&RunLog::load_all(&options.build)?),
     ];
-    Ok(first.into_iter().chain(others).collect())
+    Ok(first.into_iter().chain(others).chain(where_computed(options)?).collect())
+}
+
+/// Time and energy by estimator and device, minutes of measurement that the quick variant leaves out.
+fn where_computed(options: &Options) -> Result<Option<Section>> {
+    if options.quick {
+        return Ok(None);
+    }
+    let scenes = DEVICE_SCENES.map(Scene::builtin).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let asked = DeviceOptions { frames: DEVICE_FRAMES, python: None, power: true, build: options.build.clone() };
+    Ok(Some(devices(&measure::devices(&scenes, &asked)?)?))
 }
 
 /// The sweeps of the scenes with hardware, each in its recommended case, with contact count and number of frames.

@@ -45,12 +45,18 @@ pub struct Core {
     machine: &'static str,
     /// Clock of a usual part in MHz.
     pub clock_MHz: f64,
+    /// Power of that part while it computes, W: typical run current at 3.3 V, from peripherals off to all on.
+    pub power_W: [f64; 2],
 }
+
+/// Where the power of the cores comes from.
+pub const POWER_SOURCE: &str =
+    "ST DS12110 (STM32H743) and DS8626 (STM32F407), supply current in run mode, rounded outwards";
 
 /// The cores that are measured: of an STM32H7 and an STM32F4.
 pub const CORES: [Core; 2] = [
-    Core { name: "Cortex-M7", cpu: "cortex-m7", machine: "mps2-an500", clock_MHz: 480.0 },
-    Core { name: "Cortex-M4", cpu: "cortex-m4", machine: "mps2-an386", clock_MHz: 168.0 },
+    Core { name: "Cortex-M7", cpu: "cortex-m7", machine: "mps2-an500", clock_MHz: 480.0, power_W: [0.25, 0.8] },
+    Core { name: "Cortex-M4", cpu: "cortex-m4", machine: "mps2-an386", clock_MHz: 168.0, power_W: [0.13, 0.3] },
 ];
 
 /// What a core did with the frames of a source.

@@ -1,6 +1,7 @@
 //! Sections of the report, one file each.
 
 mod choice;
+mod devices;
 mod fields;
 mod lookup;
 mod noise;
@@ -18,6 +19,7 @@ mod sweeps;
 mod time;
 
 pub use choice::{choice, choose, frames, Choice};
+pub use devices::{device_picture, device_table, device_text, devices, DEVICE_SCENES};
 pub use fields::fields;
 pub use noise::noise;
 pub use paper::paper;

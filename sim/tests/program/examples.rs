@@ -71,6 +71,10 @@ const NOT_RUN: [(&str, &str); 73] = [
     ("dermis study sensor-faults", "minutes; guide.rs"),
     ("dermis study sensor-faults my-scene.toml --quick", "a minute; golden/src/study/sensor_faults/tests.rs"),
     ("dermis study sensor-faults sensor-1-noisy --noise 0.002 --json", "minutes"),
+    ("dermis study devices", "minutes; make bench"),
+    ("dermis study devices my-scene.toml --frames 2000", "minutes"),
+    ("dermis study devices sensor-1 --python build/python/bin/python", "minutes; make bench"),
+    ("dermis study devices eight-by-eight --frames 10 --no-power --json", "report/measure/devices.rs; guide.rs"),
     ("dermis study blind-gains", "a minute; golden/src/estimate/blind_gains/tests.rs"),
     ("dermis study blind-gains my-scene.toml --spread 0.03 --spread 0.1 --presses 600", "minutes"),
     (
@@ -142,6 +146,7 @@ fn all_examples() -> BTreeSet<String> {
         overview.clone(),
         help(&["study", "sensor-faults"]),
         help(&["study", "blind-gains"]),
+        help(&["study", "devices"]),
     ]);
     texts.flat_map(|text| examples(&text)).collect()
 }

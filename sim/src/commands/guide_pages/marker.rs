@@ -49,6 +49,8 @@ pub struct Marker {
     pub check: Option<String>,
     /// Columns of the check's table to compare; without any all that the page has.
     pub check_columns: Vec<String>,
+    /// Whether times of a machine are in the table, which no other run has: every check takes the check's command.
+    pub measured: bool,
     /// Which of the printed tables, from 1.
     pub table: usize,
     /// Columns to keep; without any all.
@@ -66,7 +68,7 @@ pub struct Marker {
 impl Marker {
     /// The check's command where it is to be taken, and there is one.
     pub fn quick_check(&self, quick: bool) -> Option<&str> {
-        self.check.as_deref().filter(|_| quick)
+        self.check.as_deref().filter(|_| quick || self.measured)
     }
 
     /// The line behind the content.
@@ -169,6 +171,7 @@ fn parse(inner: &str) -> Result<Marker> {
         command: command.to_owned(),
         check: None,
         check_columns: Vec::new(),
+        measured: false,
         table: 1,
         columns: Vec::new(),
         language: None,
@@ -188,16 +191,21 @@ fn parse(inner: &str) -> Result<Marker> {
             "column" => marker.cell.get_or_insert_default().column = value.to_owned(),
             "columns" => marker.columns = columns(value),
             "language" => marker.language = Some(value.to_owned()),
+            "measured" => {
+                ensure!(value == "yes", "measured: {value:?} is not `yes`");
+                marker.measured = true;
+            }
             "part" => marker.cell.get_or_insert_default().part = Some(from_one(name, value)?),
             "row" => marker.cell.get_or_insert_default().row = value.to_owned(),
             "takes" => marker.takes = Some(value.to_owned()),
             "table" => marker.table = from_one(name, value)?,
             _ => bail!(
-                "unknown attribute {name:?}; known: check, check columns, column, columns, language, part, row, table, takes"
+                "unknown attribute {name:?}; known: check, check columns, column, columns, language, measured, part, row, table, takes"
             ),
         }
     }
     ensure!(marker.check_columns.is_empty() || marker.check.is_some(), "check columns: there is no check");
+    ensure!(!marker.measured || marker.check.is_some(), "measured: there is no check");
     Ok(marker)
 }
 
@@ -254,6 +262,8 @@ mod tests {
         assert_eq!(of("takes"), "a.md:1: \"takes\": wanted `attribute: value`");
         assert_eq!(of("takes: 1 s ; takes: 2 s"), "a.md:1: takes: wanted one value");
         assert_eq!(of("check columns: a"), "a.md:1: check columns: there is no check");
+        assert_eq!(of("measured: yes"), "a.md:1: measured: there is no check");
+        assert_eq!(of("measured: no ; check: dermis b"), "a.md:1: measured: \"no\" is not `yes`");
         assert_eq!(error("<!-- table: ; check: dermis b -->"), "a.md:1: a marker without a command");
     }
 

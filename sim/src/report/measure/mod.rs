@@ -1,16 +1,19 @@
 //! Measurements of the report: all engines on the same frames of each scene and case, their errors and times.
 //!
 //! ```text
-//! scene × case ─┬─ literal baseline, CPU ─┐
-//!               ├─ golden, CPU ───────────┼─> errors, forces, time of a frame
-//!               ├─ bit-true, CPU ─────────┤
-//!               └─ hardware: co-simulation ── cycles / clock
+//! scene × case ─┬─ literal baseline, CPU ─────────────────┐
+//!               ├─ golden, CPU: hardware's estimator ─────┤
+//!               ├─ golden, CPU: evidence ─────────────────┼─> errors, forces, time of a frame
+//!               ├─ bit-true, CPU ─────────────────────────┤
+//!               └─ hardware: co-simulation, cycles / clock ┘
+//! scene ────────── devices: CPU, microcontroller, FPGA ──────> time, jitter, energy of a frame
 //! ```
 //!
 //! First all results are computed and compared, several cases in parallel; then the CPU engines are timed one after the
 //! other, with no other work in parallel.
 
 mod clock;
+mod devices;
 mod engines;
 mod formats;
 mod machine;
@@ -24,6 +27,7 @@ mod sweep;
 mod timing;
 
 pub use clock::{clock, Clock};
+pub use devices::{devices, DeviceOptions, DeviceRow, Devices, CORE_W};
 pub use engines::measure;
 pub use formats::{formats, FormatRow};
 pub use machine::machine;

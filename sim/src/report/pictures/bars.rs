@@ -7,13 +7,15 @@ use plotters::style::text_anchor::{HPos, VPos};
 use super::super::style::{GRID, INK, LIMIT};
 use super::{label, note, svg, WIDTH};
 
-/// Left edge of the bars; their names are to the left.
-const LEFT: i32 = 132;
+/// Left edge of the bars where their names are to the left, and where they are above.
+const LEFT: [i32; 2] = [132, 26];
 const RIGHT: i32 = 344;
 const TOP: i32 = 10;
 /// Height of a bar, and space between groups.
 const BAR: i32 = 14;
 const GAP: i32 = 7;
+/// Height of a name above its bars.
+const NAME: i32 = 17;
 /// Height of the labels of a logarithmic axis, and the most of them.
 const TICKS: i32 = 18;
 const MOST_TICKS: f64 = 4.0;
@@ -31,6 +33,8 @@ pub struct Bars {
     pub text: fn(f64) -> String,
     /// Value at which a line is drawn, for example a budget.
     pub limit: Option<f64>,
+    /// Whether a group's name is above its bars, where there is room for a long one.
+    pub names_above: bool,
     /// Whether the axis is logarithmic; it then starts at a tenth of the smallest value.
     pub log: bool,
 }
@@ -50,9 +54,11 @@ pub fn bars(plot: &Bars) -> Result<String> {
         false => (values().fold(0.0, f64::min), values().fold(0.0, f64::max)),
     };
     let span = if high > low { high - low } else { 1.0 };
-    let at = |v: f64| LEFT + ((scale(v) - low) / span * f64::from(RIGHT - LEFT)).round() as i32;
-    let zero = if plot.log { LEFT } else { at(0.0) };
-    let group = BAR * plot.series.len() as i32 + GAP;
+    let left = LEFT[usize::from(plot.names_above)];
+    let at = |v: f64| left + ((scale(v) - low) / span * f64::from(RIGHT - left)).round() as i32;
+    let zero = if plot.log { left } else { at(0.0) };
+    let name_height = if plot.names_above { NAME } else { 0 };
+    let group = name_height + BAR * plot.series.len() as i32 + GAP;
     let bottom = TOP + group * plot.groups.len() as i32;
     // A logarithmic axis has a labelled line per decade, of many every second, third, …
     let exponents = plot.log.then(|| low.ceil() as i32..=high.floor() as i32).into_iter().flatten();
@@ -67,8 +73,11 @@ pub fn bars(plot: &Bars) -> Result<String> {
             note(area, &(plot.text)(*tick), (x, bottom + 8), HPos::Center, VPos::Center)?;
         }
         for (index, (name, values)) in plot.groups.iter().enumerate() {
-            let top = TOP + group * index as i32;
-            note(area, name, (LEFT - 6, top + (group - GAP) / 2), HPos::Right, VPos::Center)?;
+            let top = TOP + group * index as i32 + name_height;
+            match plot.names_above {
+                true => note(area, name, (left, top - NAME / 2), HPos::Left, VPos::Center)?,
+                false => note(area, name, (left - 6, top + (group - GAP) / 2), HPos::Right, VPos::Center)?,
+            }
             for (k, (value, (_, colour))) in values.iter().zip(&plot.series).enumerate() {
                 let Some(value) = value else { continue };
                 let (y, end) = (top + BAR * k as i32, at(*value));
@@ -110,6 +119,7 @@ mod tests {
             series: vec![("max".into(), INK)],
             text: |value| format!("<{value}>"),
             limit: None,
+            names_above: false,
             log,
         };
         let texts = |log: bool| {

@@ -164,6 +164,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         series: names.iter().zip(&SERIES).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
         text: super::super::document::seconds_text,
         limit: None,
+        names_above: false,
         log: true,
     };
     let picture = Picture {

@@ -77,6 +77,7 @@ pub(super) fn picture(
         series: vec![("μ1, along x".into(), SERIES[1]), ("μ2, along y".into(), SERIES[2])],
         text: |mu| format!("{mu:.3}"),
         limit: None,
+        names_above: false,
         log: false,
     };
     let id = own.first().map_or("", |m| m.frames[frame(m)].id.as_str());

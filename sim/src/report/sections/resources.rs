@@ -29,6 +29,7 @@ pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -
         series: names.iter().zip(&SERIES[1..]).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
         text: |value| format!("{value:.0} %"),
         limit: Some(100.0),
+        names_above: false,
         log: false,
     };
     let board = chosen().next().map_or("", |(_, bit_true)| bit_true.model.board.name.as_str());

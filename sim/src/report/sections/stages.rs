@@ -132,6 +132,7 @@ fn picture(scene: &str, case: &str, contacts: ContactCount, frames: usize, own: 
         series: vec![("max over the frames".into(), SERIES[2]), ("RMS".into(), SERIES[1])],
         text: two_digits,
         limit: None,
+        names_above: false,
         log: true,
     };
     let name = contacts.name();
