@@ -35,8 +35,7 @@ const MOST_MEASURED: usize = 4096;
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
   dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
-Then, in the scene: [search] with estimator = \"evidence+network\" and network = \"my-scene.network\",
-[hardware] with estimator = \"network\".
+Then, in the scene: [search] with network = \"my-scene.network\", [hardware] with estimator = \"network\".
 Interrupted (Ctrl-C), it keeps the best network so far; a second time, it ends at once and writes nothing.
 Prints the errors on frames that were not in the training; exit code 1 if they are not better than no shear.")]
 pub struct Arguments {
