@@ -6,6 +6,7 @@
 //! | `feet.svg` | forces of two feet, bit-true model | always the same |
 //! | `timing-STAGE.svg` | the ports of a stage during a frame, kernel simulation | always the same |
 //! | `time-sensor-1-shear.svg` | shear error against the time of a frame | measured anew |
+//! | `devices.svg` | time of a frame by estimator and device | by `dermis study devices --picture` |
 
 use std::collections::BTreeSet;
 use std::path::Path;

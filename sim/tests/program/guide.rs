@@ -145,6 +145,7 @@ fn pictures_have_titles_their_labels_and_colours_for_light_and_dark() {
         ("data-flow.svg", &["receive", "pass", "search", "20 bits", "μ of 18 bits"][..]),
         ("feet.svg", &["N, normal"]),
         ("time-sensor-1-shear.svg", &["1 ms", "hardware", "time of a frame"]),
+        ("devices.svg", &["sensor-1-noisy: network, Cortex-M7", "median", "time of a frame"]),
     ];
     let folder = root().join(GUIDE).join("pictures");
     let pictures: Vec<_> = pictures.into_iter().chain(of_stages).collect();

@@ -100,9 +100,9 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
     Ok(Measured { scene, frames, engine, golden, evidence, bit_true, baseline, times, literal, evidence_engine })
 }
 
-/// `evidence` on every frame, or why not. It takes the array as a whole, so that other cases have nothing else.
+/// `evidence` on every frame, or why not.
 fn evidence_of(scene: &Scene, frames: &[Frame], options: &Options) -> Result<(Golden, Vec<Reconstruction>), String> {
-    if scene.partition.case != Case::WHOLE {
+    if !Engine::Evidence.is_of(scene.partition.case) {
         return Err("as in case 0".to_owned());
     }
     if options.quick && scene.sensor.taxels() > QUICK_LITERAL {

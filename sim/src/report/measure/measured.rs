@@ -56,6 +56,11 @@ impl Engine {
     /// All engines, in the order of tables.
     pub const ALL: [Engine; 5] = [Engine::Baseline, Engine::Golden, Engine::Evidence, Engine::Fixed, Engine::Hardware];
 
+    /// Whether it has results of its own in a case: evidence takes the array as a whole, as in case 0.
+    pub fn is_of(self, case: Case) -> bool {
+        self != Engine::Evidence || case == Case::WHOLE
+    }
+
     /// Name in tables and legends, with that of the estimator that it computes for a scene.
     pub fn name(self, scene: &Scene) -> String {
         let of_hardware = scene.hardware_estimator().name();

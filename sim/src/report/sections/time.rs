@@ -42,7 +42,8 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
     ];
     let rows = measured.iter().flat_map(|m| {
         let counts = ContactCount::all_of(&m.frames);
-        counts.into_iter().flat_map(move |contacts| Engine::ALL.map(|engine| row(m, engine, contacts)))
+        let engines = Engine::ALL.into_iter().filter(|engine| engine.is_of(m.scene.partition.case));
+        counts.into_iter().flat_map(move |contacts| engines.clone().map(move |engine| row(m, engine, contacts)))
     });
     items.insert(
         0,
