@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum LearnedError {
     /// The scene names no network.
-    #[error("scene {scene}: search.network is missing; search.estimator = learned needs a file made by dermis train")]
+    #[error("scene {scene}: search.network is missing; an estimator with a network needs a file made by dermis train")]
     NoNetwork {
         /// The scene's name.
         scene: String,
