@@ -18,7 +18,7 @@ const WORDS: usize = 3;
 /// Measures the scenes, those of the guide where there are none: a table, or JSON; and the picture of it, an SVG file.
 ///
 /// # Errors
-/// A scene that cannot be loaded, and as [`measure::devices`]; a file that cannot be written.
+/// A scene that cannot be loaded, drawn on or generated; an interpreter or a simulation that fails; a file that cannot be written.
 pub fn run(scenes: &[String], options: &DeviceOptions, picture: Option<&Path>, json: bool) -> Result<String> {
     let names: Vec<&str> = match scenes {
         [] => DEVICE_SCENES.to_vec(),
