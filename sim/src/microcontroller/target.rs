@@ -45,7 +45,7 @@ pub struct Core {
     machine: &'static str,
     /// Clock of a usual part in MHz.
     pub clock_MHz: f64,
-    /// Power of that part while it computes, W: typical run current at 3.3 V, from peripherals off to all on.
+    /// Power of that part while it computes, W: lower and upper figure of [`POWER_SOURCE`].
     pub power_W: [f64; 2],
 }
 

@@ -10,7 +10,7 @@ use super::super::pictures::{bars, Bars};
 use super::super::power::range;
 use super::super::style::SERIES;
 use super::super::BUDGET_US;
-use crate::microcontroller::target::POWER_SOURCE;
+use crate::microcontroller::target::{Core, CORES, POWER_SOURCE};
 
 /// Scenes of the guide's table: search, network, a network for each contact.
 pub const DEVICE_SCENES: [&str; 3] = ["sensor-1", "sensor-1-noisy", "eight-by-eight-contacts"];
@@ -18,11 +18,13 @@ pub const DEVICE_SCENES: [&str; 3] = ["sensor-1", "sensor-1-noisy", "eight-by-ei
 /// What the figures are.
 pub fn device_text() -> String {
     let [least, most] = CORE_W;
+    let cores = CORES.map(|Core { name, power_W, .. }| format!("a {name} {} to {} W", power_W[0], power_W[1]));
+    let cores = cores.join(", ");
     format!(
         "Median: of the frames on the CPU while nothing else is started, of instructions at one per cycle, of cycles. 99.9 %: not \
          exceeded by as many frames on a CPU whose cores all have another thread, by any frame of an FPGA. Ratio: over the hardware's \
          estimator in floating point, in this run. Arrays: of 1000 frames per second, by time alone. Energy: a core of the CPU takes \
-         {least} to {most} W, an assumption; a microcontroller what its data sheet says ({POWER_SOURCE}), and sleeps in between; the \
+         {least} to {most} W, an assumption; {cores}, {POWER_SOURCE}, and sleeps in between; the \
          FPGA as dermis power estimates it, static power and clock included, for one array and for as many as there is time for."
     )
 }
