@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{value_parser, Args};
 
-use crate::report::measure::DeviceOptions;
+use crate::report::measure::{DeviceOptions, DEVICE_FRAMES};
 use crate::report::study::devices;
 
 /// Arguments of `dermis study devices`.
@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Built-in names or paths of scenes; default: sensor-1, sensor-1-noisy, eight-by-eight-contacts.
     scenes: Vec<String>,
     /// Frames of each row of the CPU.
-    #[arg(long, default_value_t = 1000, value_parser = value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, default_value_t = DEVICE_FRAMES, value_parser = value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
     /// Interpreter with NumPy and SciPy, which solve Eq. 1 beside the others.
     #[arg(long, value_name = "FILE")]

@@ -14,7 +14,7 @@ use crate::jobs::Interrupt;
 use crate::report::document::{Document, Section};
 use crate::report::measure::{
     self, clock, machine, measure, recorded, sweep, ContactCount, DeviceOptions, Measured, Options, SweepPoint,
-    MOST_FRAMES,
+    DEVICE_FRAMES, MOST_FRAMES,
 };
 use crate::report::save::save;
 use crate::report::sections::{
@@ -25,9 +25,6 @@ use crate::run_log::RunLog;
 
 /// Number of random frames of a sweep in addition to the shipped ones: quick, full variant.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];
-
-/// Frames of each row of the CPU in the section on devices.
-const DEVICE_FRAMES: usize = 1000;
 
 /// Arguments of `dermis report`.
 #[derive(Args, Debug)]
@@ -162,7 +159,8 @@ fn where_computed(options: &Options) -> Result<Option<Section>> {
         return Ok(None);
     }
     let scenes = DEVICE_SCENES.map(Scene::builtin).into_iter().collect::<Result<Vec<_>, _>>()?;
-    let asked = DeviceOptions { frames: DEVICE_FRAMES, python: None, power: true, build: options.build.clone() };
+    let frames = DEVICE_FRAMES as usize;
+    let asked = DeviceOptions { frames, python: None, power: true, build: options.build.clone() };
     Ok(Some(devices(&measure::devices(&scenes, &asked)?)?))
 }
 

@@ -11,7 +11,7 @@ pub(super) const WHAT: &str =
     "An estimate of the engine alone, without pins, link and oscillator, calibrated against no board";
 
 /// Two ends with two significant digits each, which is more than they mean.
-pub(in crate::report) fn range(ends: [f64; 2]) -> String {
+pub(super) fn range(ends: [f64; 2]) -> String {
     let [lower, upper] = ends.map(|value| {
         let unit = 10_f64.powf((value.abs().max(f64::MIN_POSITIVE).log10() - 1.0).floor());
         two_digits((value / unit).round() * unit)

@@ -185,8 +185,8 @@ impl Digits {
         }
     }
 
-    /// A cell of whose comma nobody can say whether it separates thousands or decimals, if that is so of all cells with one: three
-    /// digits behind it, no zero in front, and other numbers without any mark.
+    /// The first cell with an ambiguous comma, a thousands separator or a decimal comma, where all cells with a comma are so: three
+    /// digits behind it, no zero in front, beside other numbers without comma or point.
     pub(super) fn thousands<'t>(cells: impl Iterator<Item = &'t str> + Clone) -> Option<&'t str> {
         let is_grouped = |cell: &str| {
             let unsigned = cell.trim().trim_start_matches(['-', '+']);

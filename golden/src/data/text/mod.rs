@@ -99,9 +99,9 @@ impl<'t> Line<'t> {
     /// Whether it is neither blank nor a comment, nor the begin or end of a list whose frames are on lines of their own.
     pub fn may_hold_readings(&self) -> bool {
         let text = self.text.trim();
-        let is_bracket = |c: char| matches!(c, '[' | ']' | '(' | ')');
-        !text.trim_end_matches(',').trim_matches(is_bracket).is_empty() && !text.starts_with('#')
-            || text.starts_with(',')
+        let list = text.trim_end_matches(',');
+        let is_edge = !list.is_empty() && list.chars().all(|c| matches!(c, '[' | ']' | '(' | ')'));
+        !text.is_empty() && !text.starts_with('#') && !is_edge
     }
 }
 

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::thread::{available_parallelism, JoinHandle};
 use std::time::Instant;
 
-use anyhow::{bail, ensure, Context, Result};
+use anyhow::{ensure, Context, Result};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Draws};
@@ -31,6 +31,7 @@ use dermis_golden::estimate::float::objective::EPSILON;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::physics::matrices::Matrices;
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::study::baseline::Baseline;
@@ -58,6 +59,9 @@ const MOST: f64 = 0.999;
 const PERIOD_S: f64 = 1e-3;
 /// The program that solves frames with NumPy and SciPy.
 const SCIPY: &str = include_str!("scipy_frame.py");
+
+/// Frames of each row of a CPU where nothing else is asked for.
+pub const DEVICE_FRAMES: u32 = 1000;
 
 /// Options of the measurement.
 #[derive(Clone, Debug)]
@@ -118,15 +122,15 @@ pub fn devices(scenes: &[Scene], options: &DeviceOptions) -> Result<Devices> {
     for scene in scenes {
         let mut own = Devices::default();
         let model = Model::new(scene)?;
-        on_cpu(&model, options, &mut own)?;
+        let frames = unrelated(scene)?;
+        on_cpu(&model, &frames, options, &mut own)?;
         let base =
             own.rows.iter().find(|row| row.device == FLOAT && row.estimator == scene.hardware_estimator().name());
         if let Some(base) = base.map(|row| row.median_s) {
             own.rows.iter_mut().for_each(|row| row.ratio = Some(row.median_s / base));
         }
-        let frames: Vec<Frame> = unrelated(scene)?.into_iter().take(COUNTED).collect();
-        on_microcontrollers(&model, &frames, &mut own)?;
-        on_fpga(&model, &frames, options, &mut own)?;
+        on_microcontrollers(&model, &frames[..COUNTED], &mut own)?;
+        on_fpga(&model, &frames[..COUNTED], options, &mut own)?;
         all.rows.extend(own.rows);
         all.notes.extend(own.notes);
     }
@@ -146,9 +150,8 @@ fn unrelated(scene: &Scene) -> Result<Vec<Frame>> {
 }
 
 /// The rows of this CPU.
-fn on_cpu(model: &Model, options: &DeviceOptions, to: &mut Devices) -> Result<()> {
+fn on_cpu(model: &Model, frames: &[Frame], options: &DeviceOptions, to: &mut Devices) -> Result<()> {
     let scene = &model.scene;
-    let frames = unrelated(scene)?;
     let ordered = Press::new(Motion::Slide).of_frames(options.frames, NOISE).frames(scene, 1)?;
     let mut row = |estimator: String, device: &str, run: &mut dyn FnMut(usize) -> Result<()>| -> Result<()> {
         let _progress = Progress::start(&format!("{}: {estimator}, {device}", scene.name));
@@ -158,17 +161,16 @@ fn on_cpu(model: &Model, options: &DeviceOptions, to: &mut Devices) -> Result<()
     let hardware = scene.hardware_estimator();
     // Eq. 1 as printed is of one subarray.
     let is_literal = hardware == EstimatorKind::Search && scene.partition.case == Case::WHOLE;
-    if is_literal {
-        let literal = Baseline::new(scene)?;
+    let literal = is_literal.then(|| Baseline::new(scene)).transpose()?;
+    if let Some(literal) = &literal {
         row("Eq. 1, literal".into(), FLOAT, &mut |k| Ok(literal.run(&frames[k % DRAWN]).map(drop)?))?;
     }
-    let golden = Golden::new(&scene.estimated_by(hardware))?;
+    let golden = Golden::reference(scene)?;
     row(hardware.name().into(), FLOAT, &mut |k| Ok(golden.run(&frames[k % DRAWN]).map(drop)?))?;
     let own = match hardware {
-        EstimatorKind::Search => scene.estimated_by(EstimatorKind::Evidence),
-        _ => scene.clone(),
+        EstimatorKind::Search => Golden::with(scene, EstimatorKind::Evidence)?,
+        _ => Golden::new(scene)?,
     };
-    let own = Golden::new(&own)?;
     let name = Engine::estimator(&own).name();
     row(format!("{name}, unrelated frames"), FLOAT, &mut |k| Ok(own.run(&frames[k % DRAWN]).map(drop)?))?;
     let mut state = State::default();
@@ -181,8 +183,8 @@ fn on_cpu(model: &Model, options: &DeviceOptions, to: &mut Devices) -> Result<()
     row(hardware.name().into(), "CPU, bit-true integers", &mut |k| {
         Ok(model.reconstruct(&frames[k % DRAWN]).map(drop)?)
     })?;
-    if let (Some(python), true) = (&options.python, is_literal) {
-        to.rows.push(with_scipy(scene, &frames, options, python)?);
+    if let (Some(python), Some(literal), Some(matrices)) = (&options.python, &literal, golden.matrices()) {
+        to.rows.push(with_scipy(scene, &frames[..options.frames.min(DRAWN)], literal, matrices, python)?);
     }
     Ok(())
 }
@@ -218,19 +220,34 @@ fn on_this_cpu(
     median_s: f64,
     most_s: Option<f64>,
 ) -> DeviceRow {
-    let energy = Some(CORE_W.map(|power| 1e6 * power * median_s));
-    DeviceRow {
-        scene: scene.name.clone(),
-        estimator,
-        device: device.to_owned(),
-        frames,
-        median_s,
-        most_s,
-        jitter_s: most_s.map(|most| (most - median_s).max(0.0)),
-        ratio: None,
-        arrays: arrays(median_s),
-        one_array_uJ: energy,
-        all_arrays_uJ: energy,
+    let row = DeviceRow::of_core(scene, estimator, device.to_owned(), frames, median_s, CORE_W);
+    DeviceRow { most_s, jitter_s: most_s.map(|most| (most - median_s).max(0.0)), ..row }
+}
+
+impl DeviceRow {
+    /// The row of a core that takes power while it computes: the energy of a frame does not depend on the number of arrays.
+    fn of_core(
+        scene: &Scene,
+        estimator: String,
+        device: String,
+        frames: usize,
+        median_s: f64,
+        power_W: [f64; 2],
+    ) -> DeviceRow {
+        let energy = Some(power_W.map(|power| 1e6 * power * median_s));
+        DeviceRow {
+            scene: scene.name.clone(),
+            estimator,
+            device,
+            frames,
+            median_s,
+            most_s: None,
+            jitter_s: None,
+            ratio: None,
+            arrays: arrays(median_s),
+            one_array_uJ: energy,
+            all_arrays_uJ: energy,
+        }
     }
 }
 
@@ -280,15 +297,18 @@ struct Solved {
 }
 
 /// The row of NumPy and SciPy. Their forces are compared with those of the literal Eq. 1, so that the times are of the same problem.
-fn with_scipy(scene: &Scene, frames: &[Frame], options: &DeviceOptions, python: &Path) -> Result<DeviceRow> {
+fn with_scipy(
+    scene: &Scene,
+    frames: &[Frame],
+    literal: &Baseline,
+    matrices: &Matrices,
+    python: &Path,
+) -> Result<DeviceRow> {
     let _progress = Progress::start(&format!("{}: NumPy and SciPy", scene.name));
-    let model = Golden::reference(scene)?;
-    let Some(matrices) = model.matrices() else { bail!("{}: no matrices", scene.name) };
     let n = matrices.cz.nrows();
     let columns = [&matrices.cx, &matrices.cy, &matrices.cz];
     let row = |i: usize| columns.iter().flat_map(move |own| (0..n).map(move |j| own[(i, j)])).collect::<Vec<f64>>();
-    let kept = &frames[..options.frames.min(frames.len())];
-    let stress: Vec<&Vec<f64>> = kept.iter().map(|frame| &frame.stress_MPa).collect();
+    let stress: Vec<&Vec<f64>> = frames.iter().map(|frame| &frame.stress_MPa).collect();
     let input = serde_json::json!({ "C": (0..n).map(row).collect::<Vec<_>>(), "frames": stress }).to_string();
     let solve = || {
         let mut command = Command::new(python);
@@ -306,13 +326,12 @@ fn with_scipy(scene: &Scene, frames: &[Frame], options: &DeviceOptions, python: 
         let solved: Vec<Solved> =
             serde_json::from_slice(&output.stdout).with_context(|| python.display().to_string())?;
         let count = solved.len();
-        ensure!(count == kept.len(), "{}: {count} of {} frames", python.display(), kept.len());
+        ensure!(count == frames.len(), "{}: {count} of {} frames", python.display(), frames.len());
         Ok(solved)
     };
     let idle = solve()?;
-    let literal = Baseline::new(scene)?;
-    let mut apart = Vec::with_capacity(kept.len());
-    for (frame, solved) in kept.iter().zip(&idle) {
+    let mut apart = Vec::with_capacity(frames.len());
+    for (frame, solved) in frames.iter().zip(&idle) {
         let (own, theirs) = (literal.run(frame)?.resultant(), solved.resultant_N);
         let length = |of: [f64; 3]| of.iter().map(|f| f * f).sum::<f64>().sqrt();
         apart.push(length(std::array::from_fn(|k| own[k] - theirs[k])) / length(own));
@@ -325,7 +344,7 @@ fn with_scipy(scene: &Scene, frames: &[Frame], options: &DeviceOptions, python: 
     let times = |solved: Vec<Solved>| solved.into_iter().map(|own| own.seconds).collect::<Vec<f64>>();
     let median_s = median(times(idle)).unwrap_or(f64::NAN);
     let estimator = "Eq. 1, NumPy and SciPy".to_owned();
-    Ok(on_this_cpu(scene, estimator, FLOAT, kept.len(), median_s, quantile(times(loaded?), MOST)))
+    Ok(on_this_cpu(scene, estimator, FLOAT, frames.len(), median_s, quantile(times(loaded?), MOST)))
 }
 
 /// Most that the resultants of two simplex searches of the same problem may differ by, over their size, median of the frames: with
@@ -353,20 +372,8 @@ fn on_microcontrollers(model: &Model, frames: &[Frame], to: &mut Devices) -> Res
     let row = |CoreRun { core, instructions, .. }: CoreRun| {
         let Core { name, clock_MHz, power_W, .. } = core;
         let median_s = instructions as f64 / (1e6 * clock_MHz);
-        let energy = Some(power_W.map(|power| 1e6 * power * median_s));
-        DeviceRow {
-            scene: scene.name.clone(),
-            estimator: model.estimator().name().to_owned(),
-            device: format!("{name}, {clock_MHz} MHz, C"),
-            frames: frames.len(),
-            median_s,
-            most_s: None,
-            jitter_s: None,
-            ratio: None,
-            arrays: arrays(median_s),
-            one_array_uJ: energy,
-            all_arrays_uJ: energy,
-        }
+        let (estimator, device) = (model.estimator().name().to_owned(), format!("{name}, {clock_MHz} MHz, C"));
+        DeviceRow::of_core(scene, estimator, device, frames.len(), median_s, power_W)
     };
     to.rows.extend(runs.into_iter().map(row));
     Ok(())
@@ -415,14 +422,11 @@ mod tests {
 
     use super::*;
 
-    fn options(python: Option<PathBuf>) -> DeviceOptions {
-        DeviceOptions { frames: 3, python, power: false, build: PathBuf::new() }
-    }
-
     #[test]
     fn every_device_has_a_row() {
         let scene = Scene::builtin("eight-by-eight").unwrap();
-        let Devices { rows, notes } = devices(std::slice::from_ref(&scene), &options(None)).unwrap();
+        let options = DeviceOptions { frames: 3, python: None, power: false, build: PathBuf::new() };
+        let Devices { rows, notes } = devices(std::slice::from_ref(&scene), &options).unwrap();
         assert_eq!(notes, [""; 0]);
         let names: Vec<String> = rows.iter().map(|row| format!("{} / {}", row.estimator, row.device)).collect();
         let expected = [
@@ -465,12 +469,13 @@ mod tests {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let folder = tempfile::tempdir().unwrap();
         let frames = &unrelated(&scene).unwrap()[..1];
+        let (literal, golden) = (Baseline::new(&scene).unwrap(), Golden::reference(&scene).unwrap());
         let result = |text: &str| {
-            let options = DeviceOptions { frames: 1, ..options(Some(interpreter(folder.path(), text))) };
-            with_scipy(&scene, frames, &options, options.python.as_deref().unwrap())
+            let python = interpreter(folder.path(), text);
+            with_scipy(&scene, frames, &literal, golden.matrices().unwrap(), &python)
                 .map_err(|error| format!("{error:#}"))
         };
-        let [x, y, z] = Baseline::new(&scene).unwrap().run(&frames[0]).unwrap().resultant();
+        let [x, y, z] = literal.run(&frames[0]).unwrap().resultant();
         let own = |share: f64| {
             format!("echo '[{{\"seconds\": 0.5, \"resultant_N\": [{}, {}, {}]}}]'", share * x, share * y, share * z)
         };

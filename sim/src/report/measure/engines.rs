@@ -92,12 +92,8 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
             (Some(literal), Ok(forces))
         }
     };
-    let (evidence_engine, evidence) = match evidence_of(&scene, &frames, options) {
-        Ok((engine, results)) => (Some(engine), Ok(results)),
-        Err(reason) => (None, Err(reason)),
-    };
-    let times = BTreeMap::new();
-    Ok(Measured { scene, frames, engine, golden, evidence, bit_true, baseline, times, literal, evidence_engine })
+    let (evidence, times) = (evidence_of(&scene, &frames, options), BTreeMap::new());
+    Ok(Measured { scene, frames, engine, golden, evidence, bit_true, baseline, times, literal })
 }
 
 /// `evidence` on every frame, or why not.
@@ -109,7 +105,7 @@ fn evidence_of(scene: &Scene, frames: &[Frame], options: &Options) -> Result<(Go
         return Err("left out of the quick variant".to_owned());
     }
     let run = || -> Result<(Golden, Vec<Reconstruction>), GoldenError> {
-        let engine = Golden::new(&scene.estimated_by(EstimatorKind::Evidence))?;
+        let engine = Golden::with(scene, EstimatorKind::Evidence)?;
         let results = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
         Ok((engine, results))
     };
@@ -153,10 +149,10 @@ fn is_simulated(scene: &Scene, options: &Options) -> bool {
 fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
     let frames = &measured.frames;
     type Run<'m> = Box<dyn Fn(&Frame) -> Result<()> + 'm>;
-    let golden = |engine: &'_ Golden, frame: &Frame| Ok(engine.run(frame).map(drop)?);
-    let mut runs: Vec<(Engine, Run)> = vec![(Engine::Golden, Box::new(move |frame| golden(&measured.engine, frame)))];
-    if let Some(engine) = &measured.evidence_engine {
-        runs.push((Engine::Evidence, Box::new(move |frame| golden(engine, frame))));
+    let mut runs: Vec<(Engine, Run)> =
+        vec![(Engine::Golden, Box::new(|frame| Ok(measured.engine.run(frame).map(drop)?)))];
+    if let Ok((engine, _)) = &measured.evidence {
+        runs.push((Engine::Evidence, Box::new(|frame| Ok(engine.run(frame).map(drop)?))));
     }
     if let Ok(bit_true) = &measured.bit_true {
         runs.push((Engine::Fixed, Box::new(|frame| Ok(bit_true.model.reconstruct(frame).map(drop)?))));

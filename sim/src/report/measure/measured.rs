@@ -102,8 +102,8 @@ pub struct Measured {
     pub engine: Golden,
     /// Its result for every frame.
     pub golden: Vec<Reconstruction>,
-    /// Results of `evidence` for every frame, or the reason why there are none.
-    pub evidence: Result<Vec<Reconstruction>, String>,
+    /// The estimator `evidence` with its result for every frame, or the reason why there is none.
+    pub evidence: Result<(Golden, Vec<Reconstruction>), String>,
     /// Results of the bit-true model and the hardware, or the reason why there is no hardware.
     pub bit_true: Result<BitTrue, String>,
     /// The literal baseline's forces for every frame, or the reason why it was not run.
@@ -111,7 +111,6 @@ pub struct Measured {
     /// Times per frame on the CPU.
     pub times: BTreeMap<Engine, Timing>,
     pub(super) literal: Option<Baseline>,
-    pub(super) evidence_engine: Option<Golden>,
 }
 
 /// Whether a frame has one contact or several.
@@ -182,7 +181,7 @@ impl Measured {
         match engine {
             Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
             Engine::Golden => of(&self.golden),
-            Engine::Evidence => self.evidence.as_deref().map(of).unwrap_or_default(),
+            Engine::Evidence => self.evidence.as_ref().map(|(_, results)| of(results)).unwrap_or_default(),
             Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
         }
     }

@@ -27,7 +27,7 @@ mod sweep;
 mod timing;
 
 pub use clock::{clock, Clock};
-pub use devices::{devices, DeviceOptions, DeviceRow, Devices, CORE_W};
+pub use devices::{devices, DeviceOptions, DeviceRow, Devices, CORE_W, DEVICE_FRAMES};
 pub use engines::measure;
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
