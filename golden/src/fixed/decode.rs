@@ -14,6 +14,7 @@ use super::stages::prepare::Prepared;
 use super::stages::send::{labels_of_beats, ln_sigma_of_word, Status, CASE};
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::data::frame::{Forces, Frame};
+use crate::data::input::means::Window;
 use crate::data::input::memory::Memory;
 use crate::data::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::estimate::float::objective::Estimate;
@@ -24,11 +25,12 @@ use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
 use crate::spec::partition::Subarray;
+use crate::spec::sliding::most_frames;
 
 /// The mean of the frames of a result.
-struct Mean<'a> {
+struct Mean {
     /// Calibrated.
-    stress: &'a Frame,
+    stress: Frame,
     /// Variance over that of a frame.
     variance: f64,
     /// As in [`Checks`].
@@ -76,7 +78,7 @@ impl Model {
         let (stress, variance) = self.stress_after(memory, frames)?;
         self.add(prepared, &self.readings_after(&before, full_scale(&self.scene, &stress), frames));
         let trace = self.run_prepared(prepared);
-        let mean = Mean { stress: &stress, variance, zero_share: memory.drift().share() };
+        let mean = self.mean_of(memory, stress, variance, &trace.status);
         self.decode_mean(frames, mean, "fixed", &trace.beats, &trace.status)
     }
 
@@ -94,19 +96,44 @@ impl Model {
     ) -> Result<Reconstruction, FixedError> {
         let mut memory = Memory::default();
         let (stress, variance) = self.stress_after(&mut memory, readings)?;
-        let mean = Mean { stress: &stress, variance, zero_share: memory.drift().share() };
+        let mean = self.mean_of(&memory, stress, variance, status);
         self.decode_mean(readings, mean, engine, beats, status)
+    }
+
+    /// The mean after the frames of which `memory` is: `stress`, with its `variance`; where it is adaptive that of the window that
+    /// the device took.
+    fn mean_of(&self, memory: &Memory, stress: Frame, variance: f64, status: &[[i32; 3]]) -> Mean {
+        let zero_share = memory.drift().share();
+        let window = Status::all(status).next().and_then(|status| self.window_of(&status));
+        match (window, memory.means()) {
+            (Some(window), Some(means)) => {
+                let mean = Frame { stress_MPa: means.mean(&window), ..stress };
+                Mean { stress: self.input.calibrate(&mean), variance: window.variance, zero_share }
+            }
+            _ => Mean { stress, variance, zero_share },
+        }
+    }
+
+    /// The window of an adaptive mean that a status names.
+    fn window_of(&self, status: &Status) -> Option<Window> {
+        let adaptive = self.prepare.adaptive.as_ref()?;
+        let window = adaptive.windows.get(status.window as usize)?;
+        // The count of frames stops.
+        let frames = status.frames as usize;
+        let most = most_frames(adaptive.longest());
+        Some(Window::after(&adaptive.averages, *window, if frames < most { frames } else { 8 * most }))
     }
 
     /// The same where the mean of the readings is known.
     fn decode_mean(
         &self,
         readings: &[Frame],
-        Mean { stress: frame, variance, zero_share }: Mean,
+        Mean { stress, variance, zero_share }: Mean,
         engine: &str,
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
+        let frame = &stress;
         let case = self.case_of(status)?;
         let codes = self.codes(frame)?;
         if beats.len() != self.force_beats() {
@@ -197,7 +224,10 @@ impl Model {
         }
         if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.
-            result.extra.mean_frames = all.first().map(|status| status.frames as usize);
+            let window = all.first().and_then(|status| self.window_of(status));
+            result.extra.lag_frames = window.as_ref().map(|window| window.age);
+            let frames = all.first().map(|status| status.frames as usize);
+            result.extra.mean_frames = window.map(|window| window.frames_held()).or(frames);
         }
         if self.has_writable_tables() {
             result.extra.tables_version = all.first().map(|status| status.tables_version as u16);

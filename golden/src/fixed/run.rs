@@ -62,10 +62,7 @@ impl Model {
     /// Adds frames of codes to `prepared`, as [`Prepare::add`](super::stages::prepare::Prepare::add) does; every stress is 0
     /// while the tables are not whole.
     pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
-        self.prepare.add(prepared, codes);
-        if self.tables_outcome == Outcome::Broken {
-            prepared.words.fill(0);
-        }
+        self.prepare.add(prepared, codes, self.tables_outcome == Outcome::Broken);
     }
 
     /// Computes one reconstruction from the words of the frame buffer.
@@ -84,6 +81,7 @@ impl Model {
         let cycles = Cycles::of_beats(self, &sending);
         let number = if self.chooses() { case.number() } else { 0 };
         let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
+        let window = prepared.adaptive.window as u32;
 
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {
@@ -101,6 +99,7 @@ impl Model {
                 framing: false,
                 case: number,
                 frames,
+                window,
                 raised: prepared.raised
                     | FlagSet::raised([
                         (Flag::NoContact, !contact),

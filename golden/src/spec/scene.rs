@@ -404,8 +404,9 @@ impl HardwareSpec {
 
 /// k of the shortest mean of an adaptive one: with fewer frames the shear is mostly noise.
 pub(crate) const SHORTEST_AVERAGE: u32 = 2;
-/// k of its longest one, unless a scene states it: 127 frames, an eighth of a second at 1 kHz.
-const LONGEST_AVERAGE: u32 = 6;
+/// k of its longest one, unless a scene states it: 127 frames, an eighth of a second at 1 kHz. A status holds the index of one of the
+/// eight windows that it makes.
+pub(crate) const LONGEST_AVERAGE: u32 = 6;
 
 /// How frames are averaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -442,7 +443,9 @@ table! {
         /// readings change, where it is adaptive. Give all frames since the start.
         mean: MeanKind = choice(&MeanKind::NAMES)
             .or(MeanKind::Block)
-            .hardware("`\"block\"`, `\"sliding\"`");
+            .page("over-time");
+        /// Whether the pressure of contacts that stay in place is remembered, with an adaptive mean: their forces follow the newest frames.
+        template: bool = Flag.or(true).hardware("`false`, with an adaptive mean").page("over-time");
         /// Table of the taxels' offsets and gains: a file, relative to the scene.
         calibration: Option<PathBuf> = File.optional("none").page("files");
         /// Characteristic common to all taxels, behind the table, where it is curved: \[MPa by the table, MPa\] each, both rising,
@@ -521,8 +524,8 @@ impl InputSpec {
         }
     }
 
-    /// k of the longest mean that slides.
-    fn longest_average(&self) -> u32 {
+    /// k: that of the scene, or of the longest mean of an adaptive one.
+    pub fn longest_average(&self) -> u32 {
         if self.mean == MeanKind::Adaptive && self.average == 0 {
             LONGEST_AVERAGE
         } else {
@@ -563,7 +566,7 @@ impl InputSpec {
 
     /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.
     pub fn frames_held(&self, frames: usize) -> Option<usize> {
-        self.slides().then(|| frames.min(sliding::most_frames(self.average)))
+        self.slides().then(|| frames.min(sliding::most_frames(self.longest_average())))
     }
 
     /// The frames of each result, where `frames` arrive after a reset: blocks of 2^average of them, or all up to each where

@@ -84,13 +84,12 @@ impl Prepare {
     pub fn of_model(model: &Model) -> Option<Self> {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
-        let (power, mean) = (model.prepare.average, model.prepare.mean);
         let marks = FrameMarks::new(model);
         let load = Load::of_plan(model);
         let arrays = Arrays::of_model(model);
         let frame_array = FrameArray::new(arrays, taxels);
         let calibrate = Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables(), arrays);
-        let average = Average::new([taxels, bits], power, mean, marks, arrays);
+        let average = Average::new([taxels, bits], &model.prepare, marks, arrays);
         let prepares = load.is_some() || calibrate.is_some() || average.is_some() || frame_array.is_some();
         prepares.then(|| Prepare {
             stream_bits: model.stream_bits() as usize,

@@ -1,11 +1,6 @@
-//! Adaptive mean: of the [windows](super::means) of the frames so far the one with the least noise that agrees with the newest frames.
-//!
-//! ```text
-//! χ² = Σ over live taxels of (window − shortest mean)² / (σ² v)        v: variance of that difference over that of a reading
-//! window: the least variance of all with  χ² / n < 1 + AGREES √(2/n)
-//! ```
-//! σ is the noise of a calibrated reading, from how readings change ([`change_noise`](super::change_noise)). A window that does not
-//! agree would be behind by more than the noise of some twenty frames.
+//! Adaptive mean: of the [windows](crate::spec::mean_window) of the frames so far the one with the least noise that agrees with the
+//! newest frames, tested by χ² against the noise of a calibrated reading, which is found from how readings change
+//! ([`change_noise`](super::change_noise)). A window that does not agree would be behind by more than the noise of some twenty frames.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -16,10 +11,6 @@ use super::means::{Means, Window};
 use super::Input;
 use crate::data::frame::Frame;
 
-/// Standard deviations of χ²/n by which a window may differ. On drawn presses of sensor-1 of seven kinds at 0.2 and 1 % of noise,
-/// 3.5 to 7 gave the same errors within a twentieth.
-const AGREES: f64 = 5.0;
-
 impl Input {
     /// The window of an adaptive mean, where readings have the noise `sigma_MPa`; the shortest mean before it is known. `frame` is the
     /// newest one.
@@ -27,14 +18,14 @@ impl Input {
         let shortest = means.shortest();
         let Some(sigma_MPa) = sigma_MPa else { return shortest };
         let live = frame.stress_MPa.len() - self.spec().dead.len();
-        let most = 1.0 + AGREES * (2.0 / live.max(1) as f64).sqrt();
-        let agrees = |window: &Window| {
-            let (difference_MPa, variance) = self.stress_difference(means, window, &shortest);
+        let agrees = |(window, limit): &(Window, f64)| {
+            let (difference_MPa, _) = self.stress_difference(means, window, &shortest);
             let square: f64 = difference_MPa.iter().map(|d| d * d).sum();
             // Where neither differs nor has noise, 0 ≤ 0.
-            square <= most * live as f64 * sigma_MPa.powi(2) * variance
+            square <= limit * live as f64 * sigma_MPa.powi(2)
         };
-        means.windows().into_iter().find(agrees).unwrap_or(shortest)
+        let agreeing = means.windows(live).find(agrees);
+        agreeing.map_or(shortest, |(window, _)| window)
     }
 
     /// What the mean of `window` is above that of `other`, in MPa, 0 for dead taxels, with its variance over that of a reading.

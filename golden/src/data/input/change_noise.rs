@@ -1,29 +1,34 @@
 //! Change noise: the noise of a reading, from how readings change from frame to frame.
 //!
 //! ```text
-//! σ² = median over the last frames of  mean over taxels of (b_t − 2 b_{t−1} + b_{t−2})² / 6
+//! S  = Σ over taxels of (b_t − 2 b_{t−1} + b_{t−2})²
+//! σ² = S̃ / (6 n)        S̃: the level above which S is in half of the frames; n live taxels
+//! S̃ ← S̃ ± S̃ / 2^5       up where S is above it, else down; S̃ ← S where S was on the same side in 16 frames
 //! ```
-//! A reading that changes evenly has no second difference, and the median leaves out the frames in which a contact comes, goes or
-//! jumps.
+//! A reading that changes evenly has no second difference, and the level hardly moves in the few frames in which a contact comes, goes
+//! or jumps. The hardware does the same with codes.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: calibrated frames in their order | taxels | MPa |
 //! | out: standard deviation of a reading | scalar | MPa |
 
-/// Number of frames of which the median is.
-const FRAMES: usize = 31;
 /// The variance of a second difference over that of a reading: 1 + 4 + 1.
-const SECOND_DIFFERENCE: f64 = 6.0;
+pub(crate) const SECOND_DIFFERENCE: f64 = 6.0;
+/// The level moves by 2^−this of itself.
+pub const LEVEL_SHIFT: u32 = 5;
+/// Frames on the same side of the level that end it.
+pub const SAME_SIDE: u32 = 16;
 
 /// The noise of the frames so far; the default is that before any.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChangeNoise {
     /// The frame before, and that before it.
     last: [Vec<f64>; 2],
-    /// The variance in each of the last frames.
-    variances: Vec<f64>,
-    frames: usize,
+    /// S̃ over the number of live taxels; `None` before the third frame.
+    level: Option<f64>,
+    /// Whether the last frames were above the level, and how many.
+    side: (bool, u32),
 }
 
 impl ChangeNoise {
@@ -32,21 +37,22 @@ impl ChangeNoise {
         let [before, earlier] = &self.last;
         if !earlier.is_empty() && live > 0 {
             let second = |k: usize| (frame_MPa[k] - 2.0 * before[k] + earlier[k]).powi(2);
-            let variance = (0..frame_MPa.len()).map(second).sum::<f64>() / (SECOND_DIFFERENCE * live as f64);
-            match self.variances.len() < FRAMES {
-                true => self.variances.push(variance),
-                false => self.variances[self.frames % FRAMES] = variance,
-            }
+            let sum = (0..frame_MPa.len()).map(second).sum::<f64>() / live as f64;
+            let level = self.level.unwrap_or(sum);
+            let above = sum > level;
+            let run = if self.side.0 == above { self.side.1 + 1 } else { 1 };
+            let step = level * 0.5f64.powi(LEVEL_SHIFT as i32);
+            (self.level, self.side) = match self.level {
+                Some(_) if run < SAME_SIDE => (Some(if above { level + step } else { level - step }), (above, run)),
+                _ => (Some(sum), (false, 0)),
+            };
         }
-        self.frames += 1;
         self.last = [frame_MPa.to_vec(), std::mem::take(&mut self.last[0])];
     }
 
     /// Standard deviation of a reading in MPa; `None` before the third frame.
     pub fn sigma_MPa(&self) -> Option<f64> {
-        let mut sorted = self.variances.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).map(|variance| variance.sqrt())
+        self.level.map(|level| (level / SECOND_DIFFERENCE).sqrt())
     }
 }
 

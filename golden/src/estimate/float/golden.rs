@@ -102,8 +102,8 @@ impl Golden {
         scene.require_golden()?;
         let estimator = estimator(kind, scene, &input)?;
         let (misfit, deviations) = (Misfit::of_scene(scene, kind)?, Deviations::of_scene(scene, kind)?);
-        let adapts = scene.input.mean == MeanKind::Adaptive;
-        let influences = adapts.then(|| Influences::new(&scene.sensor, scene.medium));
+        let remembers = scene.input.mean == MeanKind::Adaptive && scene.input.template;
+        let influences = remembers.then(|| Influences::new(&scene.sensor, scene.medium));
         Ok(Golden { scene: scene.clone(), input, kind, estimator, misfit, deviations, influences })
     }
 

@@ -109,11 +109,22 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         };
         plain(&with(&writable))
     });
-    let (average, slides, power) = (input.average > 0, input.slides(), input.average.max(1));
-    let frames = if slides { most_frames(power) } else { 1 << power };
-    add("averaging", average, format!("{frames} frames"), &|| plain(&with(&|s| s.input.average = power)));
+    let adaptive = |s: &mut Scene| {
+        let average = if s.input.mean == MeanKind::Adaptive { s.input.average } else { 0 };
+        (s.input.average, s.input.mean, s.input.template) = (average, MeanKind::Adaptive, false);
+    };
+    let (mean, power) = (input.mean, input.longest_average().max(1));
+    let (slides, adapts) = (mean == MeanKind::Sliding, mean == MeanKind::Adaptive);
+    let frames = if input.slides() { most_frames(power) } else { 1 << power };
+    add("averaging", input.longest_average() > 0, format!("{frames} frames"), &|| {
+        plain(&with(&|s| s.input.average = power))
+    });
     add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), &|| {
         plain(&with(&|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding)))
+    });
+    let longest = with(&adaptive).input.longest_average();
+    add("adaptive mean", adapts, format!("the longest of {} frames", most_frames(longest)), &|| {
+        plain(&with(&adaptive))
     });
     let several = scene.hardware.arrays > 1;
     let arrays = if several { scene.hardware.arrays } else { OTHER_ARRAYS };
@@ -196,6 +207,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     }
     if slides {
         without("sliding mean", &|s| s.input.mean = MeanKind::Block);
+    }
+    if adapts {
+        without("adaptive mean", &|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding));
     }
     if written {
         without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());

@@ -6,7 +6,7 @@
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
-//! | prepare | drift of a running zero and its step; zero and gain; sums of several frames, or their sliding mean | taxels × those of the limit, once with `zero_average` more; taxels × `code_bits` and 18; taxels × `input_bits` |
+//! | prepare | drift of a running zero and its step; zero and gain; sums of several frames, or their sliding means, with two frames where they are several | taxels × those of the limit, once with `zero_average` more; taxels × `code_bits` and 18; taxels × `input_bits`, or × the means · `input_bits` + 2 · `code_bits` |
 //! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
@@ -22,6 +22,7 @@ use serde::Serialize;
 
 use super::storage::{word_bits, LaidOut, Storage};
 use crate::estimate::segment::{Segmenter, BASINS, WEIGHT_BITS, WIDTH, WORD_BITS};
+use crate::fixed::stages::prepare::adaptive_mean::AdaptiveMean;
 use crate::fixed::stages::prepare::running_zero::RunningZero;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
@@ -43,7 +44,7 @@ pub enum Holds {
     Calibration,
     /// Drift of each taxel's running zero, and its next step.
     Drift,
-    /// Sums of the frames that are averaged, or their sliding mean.
+    /// Sums of the frames that are averaged, or their sliding means, with two frames where they are several.
     Average,
     /// One lane of the quads of a frame, in the layout of a case.
     Frame {
@@ -262,8 +263,10 @@ impl Resources {
         if let Some(zero) = &running {
             memories.push(memory(Holds::Drift, places, (zero.moved_bits() + zero.step_bits()) as usize));
         }
-        if input.average > 0 {
-            memories.push(memory(Holds::Average, places, f.input_bits as usize));
+        let adaptive = AdaptiveMean::of_scene(scene);
+        let kept = adaptive.as_ref().map_or(f.input_bits, |adaptive| adaptive.word_bits(f.code_bits));
+        if input.longest_average() > 0 {
+            memories.push(memory(Holds::Average, places, kept as usize));
         }
         for (index, case) in cases.iter().enumerate() {
             let lane = |lane| memory(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);
@@ -304,13 +307,18 @@ impl Resources {
         memories.push(memory(Holds::Values, values, f.search_width * f.search_bits[0] as usize));
         let difference = f.code_bits + if running.is_some() { 2 } else { 1 };
         let calibrate = if gains { board.multipliers_for(difference, GAIN_BITS) } else { 0 };
+        let square = |bits: u32| board.multipliers_for(bits, bits);
+        let squares = adaptive.as_ref().map_or(0, |own| {
+            let judged = own.judged().map(|(window, _)| square(own.apart_bits(window, f.code_bits)));
+            square(own.second_bits(f.code_bits)) + judged.sum::<usize>()
+        });
         // Operands times μ, and the size of μ.
         let scale = 4 * board.multipliers_for(f.data_bits, MU_BITS);
         let of = |wanted: bool, count: usize| if wanted { count } else { 0 };
         let segments = segmenter.as_ref().map_or(0, |own| segment_multipliers(&segmentation(scene, own), board));
         let lane = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
         let multipliers = vec![
-            ("prepare", calibrate),
+            ("prepare", calibrate + squares),
             ("pass", 4 * f.lanes_per_parity * lane + of(f.scales_operands(), scale)),
             ("segment", segments),
             ("estimate", of(f.has_network(), 2 * board.multipliers_for(MU_BITS, MU_BITS))),

@@ -91,7 +91,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
     let shared_a =
         !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric() && composed.is_empty();
 
-    let input_bits = spec.input_bits + scene.input.average;
+    let input_bits = spec.input_bits + scene.input.longest_average();
     let fold_bits = input_bits + 2;
     let input_low_bits = fold_bits.saturating_sub(operand_bits);
     if input_low_bits >= operand_bits {

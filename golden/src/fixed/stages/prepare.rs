@@ -4,6 +4,7 @@
 //! code ── calibrate ── average ── receive        s = ⌊gain·(code − zero) / 2^16 + 1/2⌋,  held to code_bits
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
 //!                       or sliding mean           b ← b + ⌊(2^k s − b − c) / 2^g + 1/2⌋: likewise
+//!                       or adaptive mean          that of a window: `adaptive_mean`
 //! ```
 //! An engine that serves several arrays has a zero, a gain, a drift and a mean for each taxel of each of them; what follows is of one
 //! array, [`Prepare::of_array`].
@@ -24,6 +25,7 @@
 //! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
 //! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
+pub mod adaptive_mean;
 pub mod code_check;
 pub mod running_zero;
 
@@ -38,6 +40,7 @@ use crate::result::flags::FlagSet;
 use crate::spec::scene::largest_code;
 use crate::spec::scene::{MeanKind, Scene};
 use crate::spec::sliding::gain_shift;
+use adaptive_mean::{AdaptiveMean, AdaptiveState};
 use code_check::CodeCheck;
 use running_zero::{Drift, RunningZero};
 
@@ -53,10 +56,12 @@ pub struct Prepare {
     pub zero: Option<Vec<i32>>,
     /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table; 0 for a dead taxel that is written. Array after array.
     pub gain: Option<Vec<i32>>,
-    /// k: 2^average frames are added up, or the last gain of a sliding mean is 2^−average.
+    /// k: 2^average frames are added up, or the last gain of a sliding mean is 2^−average; of an adaptive one that of its longest mean.
     pub average: u32,
     /// How frames are averaged.
     pub mean: MeanKind,
+    /// The windows of an adaptive mean.
+    pub adaptive: Option<AdaptiveMean>,
     /// How zeros follow the readings, if they do.
     pub running: Option<RunningZero>,
     /// How codes are checked, if they are.
@@ -74,6 +79,8 @@ pub struct Prepared {
     pub words: Vec<i32>,
     /// Number of frames in them.
     pub frames: usize,
+    /// The means of which an adaptive mean is.
+    pub adaptive: AdaptiveState,
     /// How far zeros have moved.
     pub drift: Drift,
     /// What the codes of a block of frames raise, or with a sliding mean those of the last one.
@@ -158,8 +165,9 @@ impl Prepare {
             check: CodeCheck::of_scene(scene, gain.as_deref()),
             gain,
             running,
-            average: scene.input.average,
+            average: scene.input.longest_average(),
             mean: scene.input.mean,
+            adaptive: AdaptiveMean::of_scene(scene),
             reading_per_MPa,
             code_bits,
             taxels,
@@ -204,21 +212,30 @@ impl Prepare {
     /// No frames yet.
     pub fn empty(&self) -> Prepared {
         let (words, drift) = (vec![0; self.taxels], Drift::new(self.taxels));
-        Prepared { words, frames: 0, drift, raised: FlagSet::default() }
+        Prepared { words, frames: 0, adaptive: AdaptiveState::default(), drift, raised: FlagSet::default() }
     }
 
     /// Calibrates frames of codes and adds them to `prepared`, frame after frame, each row-major. A block that is complete
-    /// makes room for the next.
-    pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
+    /// makes room for the next. Every sample is 0 while tables are `incomplete`.
+    pub fn add(&self, prepared: &mut Prepared, codes: &[i32], incomplete: bool) {
         for frame in codes.chunks(self.taxels) {
             if self.mean == MeanKind::Block && prepared.frames == 1 << self.average {
                 self.restart_mean(prepared);
             }
             let raised = self.check.as_ref().map_or(FlagSet::default(), |check| check.flags(frame));
-            let samples = self.calibrate(&mut prepared.drift, frame, false);
+            let mut samples = self.calibrate(&mut prepared.drift, frame, false);
+            if incomplete {
+                samples.fill(0);
+            }
             let slides = self.mean != MeanKind::Block;
+            prepared.raised = if slides { raised } else { prepared.raised | raised };
+            if let Some(adaptive) = &self.adaptive {
+                prepared.frames += 1;
+                let input_bits = self.code_bits + self.average;
+                prepared.words = adaptive.add(&mut prepared.adaptive, &samples, prepared.frames, input_bits);
+                continue;
+            }
             let shift = slides.then(|| gain_shift(prepared.frames + 1, self.average));
-            prepared.raised = if shift.is_some() { raised } else { prepared.raised | raised };
             let half_down = (prepared.frames % 2) as i64;
             for (word, sample) in prepared.words.iter_mut().zip(samples) {
                 let added = match shift {
@@ -248,7 +265,7 @@ impl Prepare {
     /// a sliding mean.
     pub fn run(&self, codes: &[i32]) -> Prepared {
         let mut prepared = self.empty();
-        self.add(&mut prepared, codes);
+        self.add(&mut prepared, codes, false);
         prepared
     }
 
@@ -263,8 +280,8 @@ impl Prepare {
         let average = match self.mean {
             MeanKind::Block if self.average == 0 => 0,
             MeanKind::Block => 2,
-            // No hardware has an adaptive one.
-            MeanKind::Sliding | MeanKind::Adaptive => 3,
+            MeanKind::Sliding => 3,
+            MeanKind::Adaptive => self.adaptive.as_ref().map_or(0, AdaptiveMean::latency),
         };
         calibrate + running + average
     }
@@ -289,11 +306,12 @@ mod tests {
         };
         // (15 − 10)/2 = 2.5 rounds to 3; 127 + 3 is held to 127.
         let (drift, raised) = (Drift::new(2), FlagSet::default());
-        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2, drift, raised });
+        let of = Prepared { words: vec![3, 127 - 125], frames: 2, adaptive: AdaptiveState::default(), drift, raised };
+        assert_eq!(prepare.run(&[15, 127, 10, -128]), of);
         let sliding = Prepare { zero: None, gain: None, average: 2, mean: MeanKind::Sliding, taxels: 1, ..prepare };
         let mut words = sliding.empty();
         let mut after = |code: i32| {
-            sliding.add(&mut words, &[code]);
+            sliding.add(&mut words, &[code], false);
             (words.words[0], words.frames)
         };
         // 4 · 10; + (4 · 13 − 40 − 1)/2 = 5.5 to 6; + (4 · −5 − 46)/4 = −16.5 rounds to −16; + (0 − 30 − 1)/4 = −7.75 to −8.
@@ -343,7 +361,7 @@ mod tests {
             for _ in 0..5 * most {
                 let code = |taxel| (level(taxel) + spread * random.normal()).round() as i32;
                 let codes: Vec<i32> = (0..taxels).map(code).collect();
-                prepare.add(&mut prepared, &codes);
+                prepare.add(&mut prepared, &codes, false);
             }
             let words = prepared.words.iter().enumerate();
             let errors: Vec<f64> =
@@ -363,11 +381,11 @@ mod tests {
         let prepare = Prepare { average: 4, mean: MeanKind::Sliding, code_bits: 12, taxels: 2, ..Prepare::default() };
         let mut prepared = prepare.empty();
         for _ in 0..40 {
-            prepare.add(&mut prepared, &[-2048, 777]);
+            prepare.add(&mut prepared, &[-2048, 777], false);
             assert_eq!(prepared.words, [-2048 << 4, 777 << 4]);
         }
         for _ in 0..300 {
-            prepare.add(&mut prepared, &[2047, -1000]);
+            prepare.add(&mut prepared, &[2047, -1000], false);
         }
         let off = |(word, code): (&i32, i32)| (word - (code << 4)).abs();
         assert!(prepared.words.iter().zip([2047, -1000]).map(off).all(|off| off <= 8), "{prepared:?}");

@@ -137,7 +137,9 @@ status! {
     FRAMING framing: bool = [0, 2], [3, 1], Always,
         "since the last frame sent `tlast` came early or was missing, and the frame concerned was dropped";
     CASE case: u32 = [0, 2], [8, 2], Adaptive, "the paper's number of the case that was taken";
-    FRAMES frames: u32 = [0, 2], [16, 13], SlidingMean, "number of frames in the mean, up to 2^(average+1) − 1";
+    FRAMES frames: u32 = [0, 2], [16, 13], SlidingMean, "number of frames in the mean, of an adaptive one in its longest, up to 2^(k+1) − 1";
+    WINDOW window: u32 = [0, 2], [29, 3], AdaptiveMean,
+        "index of the window of the mean, in the order of their noise, the least first; the last is the shortest mean";
     SCORE score: i32 = [1, 0], [0, 32], Always,
         "score at μ* in 2^−6 bit, 0 if nothing was found; with a network a word of two ln σ, that of μ1 in the lower half";
     RESCALE rescale: u32 = [1, 1], [0, 32], Always, "right shift of `rescale`";
@@ -209,6 +211,7 @@ mod tests {
             condition: true,
             case: 3,
             frames: 8191,
+            window: 5,
             score: -70_000,
             normalise: 3,
             tables_version: 5,
@@ -220,9 +223,9 @@ mod tests {
         assert_eq!(Status::of_beats(&beats), Some(status));
         assert_eq!(Status::of_beats(&beats[..1]), None);
         // Condition; no_contact, coefficients, more_contacts, tables, rail; case; wrong_channel, score_low, zero_limit, clipped,
-        // line_fault, negative_pressure; frames.
-        let flags = 1 | 1 << 2 | 0b1111 << 4 | 3 << 8 | 63 << 10 | 8191 << 16;
-        assert_eq!(beats, [[-3, 384, flags], [-70_000, 0, 0x8005_0003u32 as i32], [0, 0, 77]]);
+        // line_fault, negative_pressure; frames; window.
+        let flags = 1 | 1 << 2 | 0b1111 << 4 | 3 << 8 | 63 << 10 | 8191 << 16 | 5u32 << 29;
+        assert_eq!(beats, [[-3, 384, flags as i32], [-70_000, 0, 0x8005_0003u32 as i32], [0, 0, 77]]);
     }
 
     /// A field written alone changes only its bits, and reads back: no two fields share a bit.

@@ -1,7 +1,7 @@
 //! Status fields: where the words of a status hold what.
 
 use crate::spec::partition::Case;
-use crate::spec::scene::{CoefficientCheck, EstimatorKind, Scene};
+use crate::spec::scene::{CoefficientCheck, EstimatorKind, MeanKind, Scene};
 
 /// Beats of a status.
 pub const STATUS_BEATS: usize = 3;
@@ -25,6 +25,8 @@ pub enum Feature {
     Adaptive,
     /// The mean of the frames slides.
     SlidingMean,
+    /// It is adaptive.
+    AdaptiveMean,
     /// Zeros follow the readings.
     RunningZero,
     /// Tables are written at run time.
@@ -47,6 +49,7 @@ impl Feature {
             Feature::Contacts => scene.partition.case == Case::Contacts,
             Feature::Adaptive => scene.partition.case == Case::Adaptive,
             Feature::SlidingMean => scene.input.slides(),
+            Feature::AdaptiveMean => scene.input.mean == MeanKind::Adaptive,
             Feature::RunningZero => scene.input.running_zero().is_some(),
             Feature::WritableTables => scene.hardware.has_writable_tables(),
             Feature::Scan => scene.hardware.adc_scan.is_some(),
@@ -62,7 +65,8 @@ impl Feature {
             Feature::CoefficientCheck => "`hardware.coefficient_check = \"signature\"`",
             Feature::Contacts => "`partition.case = \"contacts\"`",
             Feature::Adaptive => "`partition.case = \"adaptive\"`",
-            Feature::SlidingMean => "`input.mean = \"sliding\"`",
+            Feature::SlidingMean => "`input.mean = \"sliding\"`, `\"adaptive\"`",
+            Feature::AdaptiveMean => "`input.mean = \"adaptive\"`",
             Feature::RunningZero => "`input.zero = \"running\"`",
             Feature::WritableTables => "`hardware.tables = \"writable\"`",
             Feature::Scan => "`hardware.source = \"adc-scan\"`",

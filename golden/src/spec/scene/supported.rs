@@ -11,7 +11,7 @@
 //! | `hardware.estimator` | any: the model has `search.estimator` | "search", "network" |
 //! | `search.form` | all, "orthogonal" up to [`crate::estimate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.curve` | all | none |
-//! | `input.mean` | all | "block", "sliding" |
+//! | `input.template` | all | with an adaptive mean false, and `input.average` up to 6 |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | with a network |
 //!
@@ -42,7 +42,7 @@
 
 use super::{
     CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, MeanKind, Medium, ObjectiveKind, Scene, SceneError,
-    TABLE_CODE_BITS,
+    LONGEST_AVERAGE, TABLE_CODE_BITS,
 };
 use crate::spec::partition::Case;
 use crate::spec::quads::Quads;
@@ -78,6 +78,12 @@ impl Scene {
         self.require([
             rule(self.partition.case != Case::WHOLE, "partition.case", self.partition.case.to_string(), "0, in C"),
             rule(input.average > 0, "input.average", input.average.to_string(), "0, in C: average the readings before"),
+            rule(
+                input.slides(),
+                "input.mean",
+                input.mean.name().to_string(),
+                "block, in C: average the readings before",
+            ),
             rule(input.running_zero().is_some(), "input.zero", "running".to_string(), "fixed, in C"),
             rule(self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, in C"),
             rule(
@@ -103,7 +109,7 @@ impl Scene {
     pub fn require_supported(&self) -> Result<(), SceneError> {
         let (search, input) = (&self.search, &self.input);
         let several = self.partition.case == Case::Adaptive;
-        let arrays = self.hardware.arrays > 1;
+        let (arrays, adapts) = (self.hardware.arrays > 1, input.mean == MeanKind::Adaptive);
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
             rule(
@@ -157,7 +163,13 @@ impl Scene {
                 "1 to 3",
             ),
             rule(!input.curve.is_empty(), "input.curve", "[…]".to_string(), "none; a table of gains and offsets alone"),
-            rule(input.mean == MeanKind::Adaptive, "input.mean", "adaptive".to_string(), "block, sliding"),
+            rule(adapts && input.template, "input.template", "true".to_string(), "false, with input.mean = adaptive"),
+            rule(
+                adapts && input.average > LONGEST_AVERAGE,
+                "input.average",
+                input.average.to_string(),
+                "0, 3, 4, 5 or 6, with input.mean = adaptive",
+            ),
             rule(
                 !input.dead.is_empty() && !matches!(self.partition.case, Case::WHOLE | Case::Contacts),
                 "input.dead",
@@ -235,9 +247,9 @@ impl Scene {
                 "at least 13 with a max11125, 16 with an ads8688: a code holds a result and a sign",
             ),
             rule(
-                self.input.average > 0,
+                self.input.longest_average() > 0,
                 "input.average",
-                self.input.average.to_string(),
+                self.input.longest_average().to_string(),
                 "0 with adc-scan: hardware.adc_scan.samples averages",
             ),
             rule(
@@ -311,6 +323,12 @@ impl Scene {
             ),
             rule(!input.dead.is_empty(), "input.dead", self.dead(), none),
             rule(input.average > 0, "input.average", input.average.to_string(), "0 on a board with the serial engine"),
+            rule(
+                input.mean == MeanKind::Adaptive,
+                "input.mean",
+                input.mean.name().to_string(),
+                "block on a board with the serial engine",
+            ),
             rule(input.calibration.is_some(), "input.calibration", path(&input.calibration), none),
             rule(input.tare.is_some(), "input.tare", path(&input.tare), none),
             rule(

@@ -62,6 +62,7 @@ fn every_field_is_read() {
         full_scale_MPa = 0.25
         average = 6
         mean = "sliding"
+        template = false
         calibration = "table.csv"
         curve = [[-0.1, -0.2], [0, 0], [0.1, 0.12]]
         tare = "zero.json"
@@ -94,6 +95,7 @@ fn every_field_is_read() {
         full_scale_MPa: Some(0.25),
         average: 6,
         mean: MeanKind::Sliding,
+        template: false,
         calibration: Some("table.csv".into()),
         curve: vec![[-0.1, -0.2], [0.0, 0.0], [0.1, 0.12]],
         tare: Some("zero.json".into()),

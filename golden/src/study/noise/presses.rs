@@ -85,7 +85,7 @@ impl Averaged {
 pub enum PressEngine {
     /// The floating-point model with this estimator.
     Golden(EstimatorKind),
-    /// The bit-true model of the scene's hardware; an adaptive mean has none.
+    /// The bit-true model of the scene's hardware; its adaptive mean has no template.
     Fixed,
 }
 
@@ -191,7 +191,8 @@ pub fn press_study(
         });
         let bounds = bounds.collect::<Result<Vec<_>, _>>()?;
         for (&own, &mean) in study.engines.iter().flat_map(|own| study.means.iter().map(move |mean| (own, mean))) {
-            let stated = mean.stated(scene);
+            let mut stated = mean.stated(scene);
+            stated.input.template &= own != PressEngine::Fixed;
             let engine: Box<dyn Engine + Send + Sync> = match own {
                 PressEngine::Golden(kind) => Box::new(Golden::with(&stated, kind)?),
                 PressEngine::Fixed => Box::new(Model::for_frames(&stated, &largest(&drawn))?),

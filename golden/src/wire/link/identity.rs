@@ -28,8 +28,8 @@ impl Identity {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
         let scene = &plan.scene;
         let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
-        if scene.input.average > 0 {
-            return refuse("input.average", scene.input.average.to_string());
+        if scene.input.longest_average() > 0 {
+            return refuse("input.average", scene.input.longest_average().to_string());
         }
         if scene.input.running_zero().is_some() {
             return refuse("input.zero", "running".to_string());

@@ -1,9 +1,12 @@
-//! Sums of 2^k frames, taxel by taxel, or their sliding mean.
+//! Sums of 2^k frames, taxel by taxel, or their sliding or adaptive mean.
 
 use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::stages::prepare::adaptive_mean::AdaptiveMean;
+use dermis_golden::fixed::stages::prepare::Prepare;
 use dermis_golden::fixed::Plan;
 use dermis_golden::spec::scene::MeanKind;
 
+use super::adaptive_mean::{AdaptiveKernel, MARK_BITS};
 use super::arrays::Arrays;
 use super::sliding_mean::{frames_bits, SlidingMean};
 use crate::block;
@@ -16,12 +19,12 @@ block! {
     /// ```
     /// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
     /// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
-    /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. Module
-    /// `sliding_mean` has the kernel of a sliding mean.
+    /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. Modules
+    /// `sliding_mean` and `adaptive_mean` have the kernels of the others.
     ///
     /// Where zeros run, the bit above a word says whether one is at its limit; it goes on with the number of frames.
     ///
-    /// Latency two cycles, of a sliding mean three; all registers advance together while the output is free.
+    /// Latency two cycles, of a sliding mean three; all registers advance together while the output is free. Of an adaptive mean see there.
     pub struct Average {
         /// Taxels of a frame.
         taxels: usize,
@@ -30,6 +33,8 @@ block! {
         /// k.
         power: usize,
         mean: MeanKind,
+        /// The windows of an adaptive mean.
+        adaptive: Option<AdaptiveMean>,
         marks: FrameMarks,
         /// Each has a sliding mean of its own; one where blocks are added up.
         arrays: Arrays,
@@ -57,7 +62,7 @@ block! {
         in m_axis_tready;
         /// The beat is the last of the sums; valid with `m_axis_tvalid`.
         out m_axis_tlast;
-        /// Number of frames in a sliding mean, up to 2^(k+1) − 1; above it, where zeros run, whether one is at its limit. Valid
+        /// Number of frames in a sliding mean, up to 2^(k+1) − 1, with the window of an adaptive one above; above it, where zeros run, whether one is at its limit. Valid
         /// with `m_axis_tvalid`. Otherwise one bit, 0.
         out frames: marks.bits();
     }
@@ -66,7 +71,7 @@ block! {
 /// What goes with the words of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameMarks {
-    /// Bits of the number of frames in a sliding mean; 0 where the mean does not slide.
+    /// Bits of the number of frames in a sliding mean, of an adaptive one with its window; 0 where the mean does not slide.
     pub frames_bits: usize,
     /// Whether a running zero is at its limit.
     pub limited: bool,
@@ -76,7 +81,11 @@ impl FrameMarks {
     /// Those of `model`.
     pub fn new(model: &Plan) -> Self {
         let input = &model.scene.input;
-        let frames_bits = if input.slides() { frames_bits(input.average) } else { 0 };
+        let frames_bits = match input.mean {
+            MeanKind::Block => 0,
+            MeanKind::Sliding => frames_bits(input.average),
+            MeanKind::Adaptive => MARK_BITS,
+        };
         FrameMarks { frames_bits, limited: input.running_zero().is_some() }
     }
 
@@ -87,17 +96,12 @@ impl FrameMarks {
 }
 
 impl Average {
-    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean, one for each
-    /// of the `arrays`; with the `marks` of a frame. `None` where each frame is its own sum.
-    pub fn new(
-        [taxels, bits]: [usize; 2],
-        power: u32,
-        mean: MeanKind,
-        marks: FrameMarks,
-        arrays: Arrays,
-    ) -> Option<Self> {
+    /// Sums words of `bits` bits of `taxels` taxels over 2^k frames, or gives 2^k times their sliding or adaptive mean, as `prepare` has
+    /// it, one for each of the `arrays`; with the `marks` of a frame. `None` where each frame is its own sum.
+    pub fn new([taxels, bits]: [usize; 2], prepare: &Prepare, marks: FrameMarks, arrays: Arrays) -> Option<Self> {
+        let Prepare { average: power, mean, adaptive, .. } = prepare.clone();
         let averages = power > 0 || mean == MeanKind::Sliding;
-        averages.then_some(Average { taxels, bits, power: power as usize, mean, marks, arrays })
+        averages.then_some(Average { taxels, bits, power: power as usize, mean, adaptive, marks, arrays })
     }
 
     fn sums<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
@@ -160,11 +164,15 @@ impl Average {
 
 impl Block for Average {
     fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
-        let Average { taxels, bits, power, mean, marks: FrameMarks { limited, .. }, arrays } = *self;
+        let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays } = *self;
         match mean {
             MeanKind::Block => self.sums(k, io),
-            // No hardware has an adaptive one.
-            MeanKind::Sliding | MeanKind::Adaptive => {
+            MeanKind::Adaptive => {
+                if let Some(mean) = adaptive {
+                    AdaptiveKernel { mean, bits, limited, arrays }.build(k, io);
+                }
+            }
+            MeanKind::Sliding => {
                 let from = [io.s_axis_tdata, io.s_axis_tid, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
                 let [data, array, valid, last] = [io.m_axis_tdata, io.m_axis_tid, io.m_axis_tvalid, io.m_axis_tlast];
                 let to = [data, array, valid, last, io.s_axis_tready, io.frames];
@@ -174,5 +182,7 @@ impl Block for Average {
     }
 }
 
+#[cfg(test)]
+mod adaptive_tests;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -1,5 +1,6 @@
 //! What is done to the codes of a frame as they arrive.
 
+mod adaptive_mean;
 pub(crate) mod arrays;
 pub(crate) mod arrival;
 pub(crate) mod average;

@@ -124,7 +124,7 @@ impl SlidingMean {
 }
 
 /// Whether g grows by one from the frame after `whole` frames to the frame after that.
-fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: usize) -> Expr<'k> {
+pub(super) fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: usize) -> Expr<'k> {
     let grows = |whole: &usize| gain_shift(whole + 2, power as u32) > gain_shift(whole + 1, power as u32);
     let numbers = (0..1 << power).filter(grows).map(|number| whole.is(number as u64));
     numbers.reduce(|any, one| any | one).unwrap_or(k.constant(1, 0))

@@ -1,4 +1,4 @@
-//! Both kernels against sums and means in plain integers, with stalls, resets and framing errors.
+//! Sums and sliding mean against sums and means in plain integers, with stalls, resets and framing errors.
 
 use super::*;
 use crate::language::kernel_of;
@@ -77,6 +77,13 @@ impl Reference for Sums {
     }
 }
 
+/// A stage that averages so.
+fn prepare(average: u32, mean: MeanKind) -> Prepare {
+    let mut prepare = Prepare::default();
+    (prepare.average, prepare.mean) = (average, mean);
+    prepare
+}
+
 #[test]
 fn frames_are_added_up_and_framing_errors_restart_the_sum() {
     let mut random = fastrand::Rng::with_seed(5);
@@ -93,8 +100,8 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
             inputs
         })
         .collect();
-    let average =
-        Average::new([TAXELS, BITS], POWER, MeanKind::Block, FrameMarks::default(), Arrays::default()).unwrap();
+    let prepare = prepare(POWER, MeanKind::Block);
+    let average = Average::new([TAXELS, BITS], &prepare, FrameMarks::default(), Arrays::default()).unwrap();
     check(&kernel_of(&average), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
@@ -187,7 +194,8 @@ fn every_frame_gives_the_mean_so_far() {
             .collect();
         assert!(most > 2 << power, "{most} frames");
         let marks = FrameMarks { frames_bits: frames_bits(power), limited: false };
-        let average = Average::new([TAXELS, BITS], power, MeanKind::Sliding, marks, Arrays::default()).unwrap();
+        let prepare = prepare(power, MeanKind::Sliding);
+        let average = Average::new([TAXELS, BITS], &prepare, marks, Arrays::default()).unwrap();
         check(&kernel_of(&average), &stimulus, &mut Means::new(power));
     }
 }
