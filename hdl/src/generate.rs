@@ -361,7 +361,7 @@ fn manifest(
 mod tests {
     use super::*;
     use crate::scenes::model;
-    use dermis_golden::fixed::stages::send::{CASE, FRAMES, TABLES_VERSION};
+    use dermis_golden::fixed::stages::send::{CASE, FRAMES, TABLES_VERSION, WINDOW};
     use dermis_golden::result::flags::Feature;
     use dermis_golden::spec::scene::Scene;
 
@@ -375,6 +375,10 @@ mod tests {
             (Feature::CoefficientCheck, model(4, 4, "[hardware]\ncoefficient_check = \"signature\"\n")),
             (Feature::Adaptive, model(8, 8, "[partition]\ncases = [0, 1]\n")),
             (Feature::SlidingMean, model(4, 4, "[input]\nfull_scale_MPa = 0.5\naverage = 1\nmean = \"sliding\"\n")),
+            (
+                Feature::AdaptiveMean,
+                model(4, 4, "[input]\nfull_scale_MPa = 0.5\nmean = \"adaptive\"\ntemplate = false\n"),
+            ),
             (Feature::RunningZero, model(4, 4, "[input]\nfull_scale_MPa = 0.5\nzero = \"running\"\n")),
             (
                 Feature::WritableTables,
@@ -385,7 +389,9 @@ mod tests {
         ];
         for (feature, model) in &scenes {
             let masks = status_masks(model);
-            let with = [Feature::Always, *feature];
+            // An adaptive mean slides.
+            let slides = if *feature == Feature::AdaptiveMean { Feature::SlidingMean } else { *feature };
+            let with = [Feature::Always, slides, *feature];
             for flag in Flag::ALL {
                 let Some(bit) = flag.status_bit() else { continue };
                 // Most of the scenes search the whole array.
@@ -409,7 +415,7 @@ mod tests {
                     assert_eq!(at, [(3 * field.beat + field.word) as u32, field.low, field.bits]);
                 }
             }
-            for field in [CASE, FRAMES, TABLES_VERSION] {
+            for field in [CASE, FRAMES, WINDOW, TABLES_VERSION] {
                 let wanted = with.contains(&field.feature).then_some(field.low);
                 assert_eq!(masks.get(&format!("{}_shift", field.name)), Some(&wanted), "{feature:?}");
             }

@@ -64,7 +64,7 @@ pub(crate) fn vectors(model: &Model) -> Vec<Vector> {
 }
 
 /// What each array has of its own.
-pub(crate) const SCENES: [(&str, &str); 5] = [
+pub(crate) const SCENES: [(&str, &str); 6] = [
     (
         "tables, running zeros and sliding means",
         "[input]\naverage = 2\nmean = \"sliding\"\ncalibration = \"table-{array}.csv\"\nfull_scale_MPa = 1.0\n\
@@ -79,6 +79,7 @@ pub(crate) const SCENES: [(&str, &str); 5] = [
     // Of the shortest frames, several of which wait in the output.
     ("nothing but their number", "[output]\nforces = \"resultants\"\n"),
     ("sliding means", "[input]\naverage = 3\nmean = \"sliding\"\n"),
+    ("adaptive means", "[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false\n"),
 ];
 
 fn hardware(scene: &Scene) -> Hardware {

@@ -86,7 +86,7 @@ fn raised(vector: &Vector) -> FlagSet {
     Status::all(&vector.expected.status).next().unwrap().raised
 }
 
-const SCENES: [(&str, &str); 7] = [
+const SCENES: [(&str, &str); 8] = [
     ("one subarray", "[search]\nmu_max = 0.05\n[input]"),
     ("blocks, of which the next begins while one waits", "[search]\nmu_max = 0.05\n[input]\naverage = 1"),
     ("two rows of subarrays", "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n[input]"),
@@ -97,6 +97,7 @@ const SCENES: [(&str, &str); 7] = [
         "[search]\nmu_max = 0.0\n[partition]\nrows = 2\ncols = 1\n[output]\nforces = \"resultants\"\n[input]",
     ),
     ("a sliding mean", "[search]\nmu_max = 0.05\n[input]\naverage = 2\nmean = \"sliding\""),
+    ("an adaptive mean", "[search]\nmu_max = 0.05\n[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false"),
 ];
 
 #[test]

@@ -112,6 +112,22 @@ fn a_sliding_mean_costs_what_two_builds_differ_by() {
     assert!(saved("[fixed]\nlanes = 36\n", "sliding mean")[0] > 0);
 }
 
+/// Against a sliding mean as long as the longest; without any averaging, what the default would cost.
+#[test]
+fn an_adaptive_mean_costs_what_two_builds_differ_by() {
+    let input = |mean: &str| model(&format!("[fixed]\nlanes = 36\n[input]\naverage = 3\n{mean}\n"));
+    let (adaptive, sliding) = (input("mean = \"adaptive\"\ntemplate = false"), input("mean = \"sliding\""));
+    let [with, without] = [&adaptive, &sliding].map(|model| total(&generate(model).unwrap().usage));
+    let of = |model: &Model| explain(model).unwrap().into_iter().find(|e| e.feature == "adaptive mean").unwrap();
+    assert!(of(&adaptive).present && !of(&sliding).present);
+    let costs = of(&adaptive).costs.unwrap();
+    let latency = |model: &Model| model.prepare.latency() as i64;
+    assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+    assert_eq!(costs.cycles, latency(&adaptive) - latency(&sliding));
+    assert!((200..3000).contains(&costs.luts) && costs.multipliers > 0, "{costs:?}");
+    assert!(saved("[fixed]\nlanes = 36\n", "adaptive mean")[0] > 0);
+}
+
 /// With it and without it.
 #[test]
 fn a_running_zero_costs_what_two_builds_differ_by() {

@@ -28,6 +28,7 @@ mod lint;
 mod microcontroller;
 mod missing;
 mod netlist;
+mod over_time;
 mod power;
 mod proofs;
 mod resources;

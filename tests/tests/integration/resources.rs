@@ -63,7 +63,7 @@ fn contacts(lanes: usize) -> Model {
 #[test]
 fn block_rams_and_multipliers_are_those_of_yosys() {
     // Made when they are checked: a run of one does not make the others.
-    let models: [fn() -> Model; 8] = [
+    let models: [fn() -> Model; 9] = [
         // ROMs of the input options, sums of frames, no search.
         || small("no-search", "[search]\nmu_max = 0\n[fixed]\nlanes = 16\n[input]\naverage = 2\n"),
         // Means and drifts of several arrays.
@@ -72,6 +72,14 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
                 "arrays",
                 "[search]\nmu_max = 0\n[fixed]\nlanes = 16\n[hardware]\narrays = 8\n[input]\naverage = 3\n\
                  mean = \"sliding\"\nfull_scale_MPa = 1.0\nzero = \"running\"\n",
+            )
+        },
+        // Five means, the squares of seven windows and of second differences.
+        || {
+            small(
+                "adaptive",
+                "[search]\nmu_max = 0\n[fixed]\nlanes = 16\n[input]\nmean = \"adaptive\"\ntemplate = false\n\
+                 dead = [[2, 2]]\nfull_scale_MPa = 1.0\n",
             )
         },
         // Three flips more of every matrix; coefficients, zero and gain in memories that are written.

@@ -62,10 +62,11 @@ fn vectors(model: &Model) -> Vec<Vector> {
     model.scene.input.frames_of_results(&frames).iter().map(|frames| vector(&codes[..12 * frames.len()])).collect()
 }
 
-const SCENES: [(&str, &str); 4] = [
+const SCENES: [(&str, &str); 5] = [
     ("zeros alone, two subarrays", "[partition]\nrows = 2\ncols = 1\n[input]"),
     ("gains of both signs, a dead taxel, blocks", "[input]\naverage = 1\ncalibration = \"table.csv\"\ndead = [[1, 1]]"),
     ("a sliding mean, gains", "[input]\naverage = 2\nmean = \"sliding\"\ncalibration = \"table.csv\""),
+    ("an adaptive mean", "[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false"),
     ("a dead taxel without gains", "[input]\ndead = [[0, 0], [3, 2]]"),
 ];
 

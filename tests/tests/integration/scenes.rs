@@ -13,7 +13,7 @@ use dermis_tests::{assert_equal, build_dir, compare, variants, with_network};
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels; those behind the first seven run in `make nightly`.
-const SCENES: [(&str, &str); 16] = [
+const SCENES: [(&str, &str); 17] = [
     // One quad: a longer pause between accumulations.
     ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Six subarrays in turn, odd rows, under a bonded layer.
@@ -55,6 +55,12 @@ const SCENES: [(&str, &str); 16] = [
         "sliding",
         "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[input]\naverage = 2\n\
          mean = \"sliding\"\n",
+    ),
+    // An adaptive mean of a frame, which has its window from the third frame on.
+    (
+        "adaptive",
+        "[sensor]\nrows = 3\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[input]\n\
+         mean = \"adaptive\"\ntemplate = false\n",
     ),
     // A low limb of Cz⁺ and none of the input.
     ("16-bit", "[fixed]\ninput_bits = 16\ndata_bits = 16\ncoef_bits = 16\ninverse_bits = 24\n"),

@@ -86,6 +86,8 @@ fn sums_without_a_search_and_averaged_frames_recover() {
     // The mean starts again after a reset and after a frame cut short.
     let sliding = "[search]\nmu_max = 0.0\n[input]\naverage = 2\nmean = \"sliding\"\n";
     check(&small(4, 4, sliding), &[], 100_000);
+    let adaptive = "[search]\nmu_max = 0.0\n[input]\naverage = 4\nmean = \"adaptive\"\ntemplate = false\n";
+    check(&small(4, 4, adaptive), &[], 200_000);
     // A running zero goes on after a frame cut short, and starts again after a reset.
     check(&small(2, 2, RUNNING), &[], 100_000);
     let sums = check(&unsearched(), &[], 200_000);
@@ -97,7 +99,9 @@ fn images_of_tables_are_taken_or_refused() {
     // An image with coefficients is longer.
     let covers = "[hardware.table_range]\nthickness_mm = [2.0, 4.0]\n";
     let running = "zero = \"running\"\nzero_average = 3\n";
-    let scenes = [(running, 200_000), ("", 200_000), ("average = 2\nmean = \"sliding\"\n", 200_000), (covers, 800_000)];
+    let sliding = "average = 2\nmean = \"sliding\"\n";
+    let adaptive = "average = 3\nmean = \"adaptive\"\ntemplate = false\n";
+    let scenes = [(running, 200_000), (adaptive, 400_000), ("", 200_000), (sliding, 200_000), (covers, 800_000)];
     for (more, cycles) in variants(&scenes, 1) {
         let written = format!("[hardware]\ntables = \"writable\"\n[input]\nfull_scale_MPa = 1.0\n{more}");
         check(&small(4, 3, &format!("[search]\nmu_max = 0.05\n{written}")), &[], *cycles);

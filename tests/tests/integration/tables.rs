@@ -116,10 +116,12 @@ fn is_equal(scene: &Scene, what: &str) {
 fn hardware_with_loaded_tables_is_the_specimen_s() {
     let full_scale = "[input]\nfull_scale_MPa = 1.0\n";
     let sliding = "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\naverage = 2\nmean = \"sliding\"\n";
+    let adaptive = "[input]\nfull_scale_MPa = 1.0\naverage = 3\nmean = \"adaptive\"\ntemplate = false\n";
     let running = "[input]\nfull_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 1\nzero_limit_MPa = 0.05\n";
     let scenes = [
         (COVERS, "another cover, dead taxels"),
         (sliding, "two subarrays, sliding mean"),
+        (adaptive, "an adaptive mean"),
         (running, "a running zero"),
         (PARTS, "another cover, two subarrays"),
         (full_scale, "whole array"),

@@ -4,7 +4,7 @@
 //! The longest of these decides, with T taxels, Q quads per subarray, S steps of a sweep and blocks of 2^k frames, one frame
 //! where the mean slides:
 //! ```text
-//! input    2^k T, or T from the last quad that fold has read
+//! input    2^k T, or T from the last quad that fold has read; with an adaptive mean until the window of the frame has left, 2 T and more
 //! pass     the passes of all subarrays, waiting where the search is busy; with several rows of subarrays they begin with
 //!          the first row, and the first subarray waits for the rest of the frame
 //! search   one subarray after the other
@@ -101,7 +101,8 @@ fn parallel(plan: &Plan, case: &CasePlan, timings: &[Option<ContactTiming>]) -> 
         // Codes that are averaged are taken while the frame buffer is full, the sums are not.
         // Windows are read from the frame buffer until the μ of the last contact is known.
         let free = start + contacts.map_or(quads + FOLDED, |contacts| contacts.free + 1);
-        received = (received + taxels * plan.scene.input.frames_per_result() as u64).max(free + taxels - 1);
+        let arriving = taxels * plan.scene.input.frames_per_result() as u64 + plan.prepare.occupied();
+        received = (received + arriving).max(free + taxels - 1);
         let passed = if plan.resources.overlaps { handed_over } else { sent };
         complete = received + ACCEPT;
         begin = (complete + choice - after_begin).max(passed + BEGIN);

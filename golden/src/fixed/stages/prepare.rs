@@ -269,6 +269,11 @@ impl Prepare {
         prepared
     }
 
+    /// Cycles from the last code of a frame to the first that is taken of the next, less one, where `receive` does not wait.
+    pub fn occupied(&self) -> u64 {
+        self.adaptive.as_ref().map_or(0, AdaptiveMean::latency)
+    }
+
     /// Latency in cycles between the input stream and `receive`.
     pub fn latency(&self) -> u64 {
         let calibrate = match (&self.zero, &self.gain) {
