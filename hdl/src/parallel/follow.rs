@@ -64,7 +64,7 @@ impl<'k> Parallel<'k, '_> {
     }
 
     /// The `codes` of a frame are checked as they arrive; their faults follow it as its other bits do, [`CHECK_LATENCY`] cycles
-    /// later.
+    /// later. With an adaptive mean they are known before its words arrive, and the codes of the next frame come meanwhile.
     pub(super) fn check(&self, codes: Beats<'k>, c: &Control<'k>) {
         let (k, s) = (self.k, &self.s);
         let Some(check) = k.instance("check", FrameCheck::of_model(self.model)) else {
@@ -75,12 +75,23 @@ impl<'k> Parallel<'k, '_> {
         check.accept.set(codes.valid & *codes.ready);
         check.code.set(codes.data);
         check.tlast.set(codes.last);
+        let adapts = self.model.prepare.adaptive.is_some();
         let follow = |state: &str, enters: Expr<'k>, faults: Expr<'k>| {
-            let entered = k.instance(&format!("{state}_checked"), BitDelay::new(CHECK_LATENCY));
-            entered.d.set(enters);
-            self.held(&format!("{state}_faults"), entered.q, faults, true)
+            let entered = match adapts {
+                true => enters,
+                false => {
+                    let entered = k.instance(&format!("{state}_checked"), BitDelay::new(CHECK_LATENCY));
+                    entered.d.set(enters);
+                    entered.q
+                }
+            };
+            self.held(&format!("{state}_faults"), entered, faults, true)
         };
-        let faults = follow("frame", c.arrives, check.faults);
+        let faults = match adapts {
+            true => self.held("received_faults", s.receive.accept, check.faults, true),
+            false => check.faults,
+        };
+        let faults = follow("frame", c.arrives, faults);
         let faults = follow("searched", c.hand_over, faults);
         s.forces.faults.set(follow("sent", c.begin_send, faults));
     }

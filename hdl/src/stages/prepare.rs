@@ -7,7 +7,7 @@
 use dermis_golden::fixed::Model;
 
 use crate::block;
-use crate::language::{Block, Builder, Inside, Outside};
+use crate::language::{Block, Builder, Expr, Inside, Outside};
 use crate::primitives::{
     Arrays, Average, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray, FrameMarks, Load, LoadPorts, PAIR_BITS,
     THRESHOLD_BITS, VERSION_WORD_BITS,
@@ -114,7 +114,13 @@ impl Block for Prepare {
         let average = k.instance("average", self.average.as_ref());
         match &load {
             None => without_tables(k, &io, calibrate.as_ref()),
-            Some(load) => tables(k, &io, load, calibrate.as_ref()),
+            Some(load) => {
+                // An adaptive mean takes no codes while a frame is in it.
+                let adapts = self.average.as_ref().is_some_and(Average::adapts);
+                let waits = average.as_ref().filter(|_| adapts).map(|average| average.s_axis_tready);
+                let idle = waits.map_or(io.idle, |takes| io.idle & takes);
+                tables(k, &io, load, calibrate.as_ref(), idle);
+            }
         }
         let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
         let codes = through!(Beats { data, valid, last, ready: io.s_axis_tready.net() }, load);
@@ -143,15 +149,16 @@ impl Block for Prepare {
     }
 }
 
-/// What [`Load`] writes goes to calibration and out; while it writes, the rest is reset.
+/// What [`Load`] writes goes to calibration and out; while it writes, the rest is reset. It begins where no frame is under way, `idle`.
 fn tables<'k>(
     k: &'k Builder,
     io: &PreparePorts<Inside<'k>>,
     load: &LoadPorts<Outside<'k>>,
     calibrate: Option<&CalibratePorts<Outside<'k>>>,
+    idle: Expr<'k>,
 ) {
     load.rst.set(io.rst);
-    load.idle.set(io.idle);
+    load.idle.set(idle);
     k.reset_instances(load.restart);
     io.restart.set(load.restart);
     io.coefficient_write.set(load.coefficient_write);

@@ -388,9 +388,11 @@ mod tests {
             (MeanKind::Sliding, EngineName::Golden),
             (MeanKind::Sliding, EngineName::Fixed),
             (MeanKind::Adaptive, EngineName::Golden),
+            (MeanKind::Adaptive, EngineName::Fixed),
         ] {
             let mut scene = scene();
             (scene.input.mean, scene.input.average, scene.input.full_scale_MPa) = (mean, 3, Some(1.0));
+            scene.input.template = name == EngineName::Golden;
             let frames = &Frame::shipped(&scene)[..4];
             let input: String = frames.iter().map(csv).collect();
             let (_, answers) = answers(&scene, name, input, ALL, true);

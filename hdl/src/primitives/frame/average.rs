@@ -104,6 +104,11 @@ impl Average {
         averages.then_some(Average { taxels, bits, power: power as usize, mean, adaptive, marks, arrays })
     }
 
+    /// Whether the mean is adaptive.
+    pub fn adapts(&self) -> bool {
+        self.adaptive.is_some()
+    }
+
     fn sums<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
         let wide = self.bits + self.power;
