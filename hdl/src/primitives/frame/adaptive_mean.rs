@@ -236,6 +236,7 @@ impl AdaptiveKernel<'_> {
         let next: Vec<Expr<'k>> = self.mean.averages.iter().enumerate().map(follow).collect();
         let (sample, recent) = (k.delay("sample", *beat.word), k.delay("recent", before));
         let second = (*beat.word + earlier) - before.shift_left(1).extend(self.bits + 1);
+        let second = second.shift_right(self.mean.shifts[1] as usize);
         let (second, _) = saturated(k, second, self.mean.second_bits(self.bits as u32) as usize);
         let second = k.delay("second", self.of_live(k, beat, 0, second));
         let kept: Vec<Expr<'k>> =
@@ -268,7 +269,8 @@ impl AdaptiveKernel<'_> {
             k.scope(&format!("window_{index}_"), || {
                 let value = self.value(&means, window);
                 let bits = self.mean.apart_bits(window, self.bits as u32) as usize;
-                let (apart, _) = saturated(k, value - means[0], bits);
+                let apart = (value - means[0]).shift_right(self.mean.shifts[0] as usize);
+                let (apart, _) = saturated(k, apart, bits);
                 let apart = k.delay("apart", self.of_live(k, beat, 2, apart)).signed();
                 sum("sum", square("square", apart), 4)
             })
