@@ -392,22 +392,15 @@ impl AdaptiveKernel<'_> {
         let [final_read, final_picked] = ["final_read", "final_picked"].map(|name| k.register(name, bit));
         let ends = k.wire("ends", frame.sent.is(self.taxels() as u64 - 1));
         let mean = |index: usize| stored.slice(index * wide, wide).signed();
-        let all: Vec<(u64, usize, Option<(usize, u32)>)> = (0..)
-            .zip(&self.mean.windows)
-            .map(|(index, window)| {
-                let (short, long) = self.mean.means(*window);
-                (index, short, long)
-            })
-            .collect();
-        let by_window = |of: &dyn Fn(usize, Option<(usize, u32)>) -> Expr<'k>| {
-            let arms: Vec<(u64, Expr<'k>)> =
-                all.iter().map(|(index, short, long)| (*index, of(*short, *long))).collect();
+        let by_window = |of: &dyn Fn(MeanWindow) -> Expr<'k>| {
+            let arms: Vec<(u64, Expr<'k>)> = (0..).zip(self.mean.windows.iter().map(|window| of(*window))).collect();
             frame.chosen.case(&arms[1..], arms[0].1)
         };
-        let short = by_window(&|short, _| mean(short));
-        let long = by_window(&|short, long| mean(long.map_or(short, |(long, _)| long)));
+        let pair = |window: MeanWindow| self.mean.means(window);
+        let short = by_window(&|window| mean(pair(window).0));
+        let long = by_window(&|window| mean(pair(window).1.map_or(pair(window).0, |(long, _)| long)));
         let most = count_bits(self.mean.longest() as usize);
-        let shift = by_window(&|_, long| k.constant(most, long.map_or(0, |(_, shift)| u64::from(shift))));
+        let shift = by_window(&|window| k.constant(most, pair(window).1.map_or(0, |(_, shift)| u64::from(shift))));
         let held = |name: &str, value: Expr<'k>| {
             let net = k.register(name, value.ty());
             k.when(moves, || net.set(value));

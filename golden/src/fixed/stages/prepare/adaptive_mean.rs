@@ -191,7 +191,7 @@ impl AdaptiveMean {
     /// Sum of the squares over the live taxels, without the low bits of a difference.
     fn square(&self, difference: impl Fn(usize) -> i64, shift: u32) -> i64 {
         let live = (0..self.live.len()).filter(|&taxel| self.live[taxel]);
-        live.map(|taxel| i64::from(saturate(difference(taxel) >> shift, MULTIPLIER_BITS).0).pow(2)).sum()
+        live.map(|taxel| saturate(difference(taxel) >> shift, MULTIPLIER_BITS).0.pow(2)).sum()
     }
 }
 
