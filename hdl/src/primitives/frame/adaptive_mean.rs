@@ -18,9 +18,8 @@ use dermis_golden::fixed::stages::send::{FRAMES, WINDOW};
 use dermis_golden::spec::mean_window::MeanWindow;
 
 use super::arrays::Arrays;
-use super::average::AveragePorts;
-use super::sliding_mean::rises;
-use crate::language::{concat, Builder, Contents, Expr, Inside, Net, Type};
+use super::sliding_mean::{rises, MeanPorts};
+use crate::language::{concat, Builder, Contents, Expr, Net, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::saturated;
 
@@ -82,13 +81,13 @@ struct Sums<'k> {
 
 impl AdaptiveKernel<'_> {
     /// The kernel.
-    pub fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
+    pub fn build<'k>(&self, k: &'k Builder, io: MeanPorts<'k>) {
         let kept = self.mean.word_bits(self.bits as u32) as usize;
         let places = self.arrays.places(self.taxels());
         let means = k.memory("means", places, kept, Contents::Undefined).holds(Holds::Average);
-        let (valid, final_out) = (io.m_axis_tvalid.state(io.rst, 0), k.register("final_out", Type::unsigned(1)));
-        let moves = k.wire("moves", !*valid | io.m_axis_tready);
-        let (frame, beat, place) = self.take(k, &io, *valid & *final_out & io.m_axis_tready);
+        let (valid, final_out) = (io.valid_out.state(io.rst, 0), k.register("final_out", Type::unsigned(1)));
+        let moves = k.wire("moves", !*valid | io.ready);
+        let (frame, beat, place) = self.take(k, &io, *valid & *final_out & io.ready);
         let stored = k.register("stored", Type::unsigned(kept));
         k.when(moves, || stored.set(means.read(place)));
         let (fresh, second, written) = self.follow(k, &beat, *stored);
@@ -97,20 +96,20 @@ impl AdaptiveKernel<'_> {
         let sums = self.sums(k, &beat, &fresh, second);
         self.judge(k, io.rst, &frame, &sums);
         let (value, leaves, final_value) = self.window(k, io.rst, &frame, *stored, moves);
-        let data = io.m_axis_tdata.register();
+        let data = io.data_out.register();
         k.when(moves, || {
             valid.set(leaves);
             final_out.set(final_value);
             data.set(value);
         });
-        io.m_axis_tlast.set(*final_out & *frame.last);
-        io.m_axis_tid.set(frame.array);
+        io.last_out.set(*final_out & *frame.last);
+        io.array_out.set(frame.array);
         let marks = frame.chosen.extend(WINDOW.bits as usize).concat(frame.count.extend(FRAMES.bits as usize));
         io.frames.set(match self.limited {
             false => marks,
             true => {
                 let limit = k.register("limit", Type::unsigned(1));
-                k.when(!*frame.full, || limit.set(io.s_axis_tdata.top()));
+                k.when(!*frame.full, || limit.set(io.data.top()));
                 limit.concat(marks)
             }
         });
@@ -127,13 +126,8 @@ impl AdaptiveKernel<'_> {
 
     /// Takes the beats of a frame until it is full, and again once its last word has left. What is read: the place of the beat, or of the
     /// word that is sent.
-    fn take<'k>(
-        &self,
-        k: &'k Builder,
-        io: &AveragePorts<Inside<'k>>,
-        left: Expr<'k>,
-    ) -> (Frame<'k>, Beat<'k>, Expr<'k>) {
-        let (rst, tlast, power) = (io.rst, io.s_axis_tlast, self.mean.longest() as usize);
+    fn take<'k>(&self, k: &'k Builder, io: &MeanPorts<'k>, left: Expr<'k>) -> (Frame<'k>, Beat<'k>, Expr<'k>) {
+        let (rst, tlast, power) = (io.rst, io.tlast, self.mean.longest() as usize);
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels())));
         let end = self.taxels() as u64 - 1;
         k.comment("Place of the next word; g and c of its frame, whole frames in the longest mean.");
@@ -143,16 +137,16 @@ impl AdaptiveKernel<'_> {
         let wholes = self.arrays.state(k, "whole", Type::unsigned(power + 1), rst, 0);
         let [full, settling, sending] = ["full", "settling", "sending"].map(|name| k.state(name, bit, rst, 0));
         let (sent, last) = (k.register("sent", index), k.register("last", bit));
-        let takes = k.wire("takes", io.s_axis_tvalid & !*full);
-        io.s_axis_tready.set(!*full & !rst);
-        let [gain, odd, whole] = [&gains, &odds, &wholes].map(|state| state.of(io.s_axis_tid));
+        let takes = k.wire("takes", io.offered & !*full);
+        io.ready_out.set(!*full & !rst);
+        let [gain, odd, whole] = [&gains, &odds, &wholes].map(|state| state.of(io.array));
         let at_end = k.wire("at_end", taxel.is(end));
         let early = k.wire("early", tlast & !at_end);
         let held_array = (self.arrays.bits > 0).then(|| k.register("array", Type::unsigned(self.arrays.bits)));
-        let array = held_array.map_or(io.s_axis_tid, |held| *held);
+        let array = held_array.map_or(io.array, |held| *held);
         k.when(takes, || {
             taxel.set((early | at_end).mux(k.constant(index.bits, 0), taxel.plus(1)));
-            held_array.iter().for_each(|held| held.set(io.s_axis_tid));
+            held_array.iter().for_each(|held| held.set(io.array));
             full.set(early | at_end);
             settling.set(at_end);
             last.set(tlast);
@@ -160,18 +154,18 @@ impl AdaptiveKernel<'_> {
             sending.set(early);
             sent.set(early.mux(k.constant(index.bits, end), k.constant(index.bits, 0)));
             k.when(at_end, || {
-                wholes.set(k, io.s_axis_tid, whole.all().mux(whole, whole.plus(1)));
-                odds.set(k, io.s_axis_tid, !odd);
-                gains.set(k, io.s_axis_tid, (gain + rises(k, whole, power)).low(gain.bits()));
+                wholes.set(k, io.array, whole.all().mux(whole, whole.plus(1)));
+                odds.set(k, io.array, !odd);
+                gains.set(k, io.array, (gain + rises(k, whole, power)).low(gain.bits()));
             });
             k.when(early, || {
                 for (states, state) in [(&wholes, whole), (&odds, odd), (&gains, gain)] {
-                    states.set(k, io.s_axis_tid, k.constant(state.bits(), 0));
+                    states.set(k, io.array, k.constant(state.bits(), 0));
                 }
             });
         });
         k.when(left, || full.set(k.constant(1, 0)));
-        let read_array = if self.arrays.bits > 0 { sending.mux(array, io.s_axis_tid) } else { array };
+        let read_array = if self.arrays.bits > 0 { sending.mux(array, io.array) } else { array };
         let place = self.arrays.place(k, read_array, sending.mux(*sent, *taxel));
         let count = wholes.of(array);
         let chosen = k.register("chosen", Type::unsigned(count_bits(self.mean.windows.len())));
@@ -183,12 +177,12 @@ impl AdaptiveKernel<'_> {
     fn hold<'k>(
         &self,
         k: &'k Builder,
-        io: &AveragePorts<Inside<'k>>,
+        io: &MeanPorts<'k>,
         takes: Expr<'k>,
         [taxel, place, gain, odd]: [Expr<'k>; 4],
     ) -> Beat<'k> {
         let word = k.register("word", Type::signed(self.bits));
-        word.set(io.s_axis_tdata.low(self.bits).signed());
+        word.set(io.data.low(self.bits).signed());
         let held = |name: &str, value: Expr<'k>| {
             let net = k.register(name, value.ty());
             net.set(value);

@@ -8,7 +8,7 @@ use dermis_golden::spec::scene::MeanKind;
 
 use super::adaptive_mean::{AdaptiveKernel, MARK_BITS};
 use super::arrays::Arrays;
-use super::sliding_mean::{frames_bits, SlidingMean};
+use super::sliding_mean::{frames_bits, MeanPorts, SlidingMean};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::address::counter::count_bits;
@@ -170,19 +170,24 @@ impl Average {
 impl Block for Average {
     fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
         let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays } = *self;
-        match mean {
-            MeanKind::Block => self.sums(k, io),
-            MeanKind::Adaptive => {
-                if let Some(mean) = adaptive {
-                    AdaptiveKernel { mean, bits, limited, arrays }.build(k, io);
-                }
-            }
-            MeanKind::Sliding => {
-                let from = [io.s_axis_tdata, io.s_axis_tid, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready];
-                let [data, array, valid, last] = [io.m_axis_tdata, io.m_axis_tid, io.m_axis_tvalid, io.m_axis_tlast];
-                let to = [data, array, valid, last, io.s_axis_tready, io.frames];
-                SlidingMean { taxels, bits, power, limited, arrays }.build(k, io.rst, from, to);
-            }
+        let ports = MeanPorts {
+            rst: io.rst,
+            data: io.s_axis_tdata,
+            array: io.s_axis_tid,
+            offered: io.s_axis_tvalid,
+            tlast: io.s_axis_tlast,
+            ready_out: io.s_axis_tready,
+            data_out: io.m_axis_tdata,
+            array_out: io.m_axis_tid,
+            valid_out: io.m_axis_tvalid,
+            last_out: io.m_axis_tlast,
+            ready: io.m_axis_tready,
+            frames: io.frames,
+        };
+        match (mean, adaptive) {
+            (MeanKind::Block, _) => self.sums(k, io),
+            (_, Some(mean)) => AdaptiveKernel { mean, bits, limited, arrays }.build(k, ports),
+            (_, None) => SlidingMean { taxels, bits, power, limited, arrays }.build(k, ports),
         }
     }
 }

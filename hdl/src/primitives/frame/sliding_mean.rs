@@ -21,6 +21,23 @@ pub fn frames_bits(power: u32) -> usize {
     power as usize + 1
 }
 
+/// The ports of [`Average`](super::average::Average), for the kernels of means.
+#[derive(Clone, Copy)]
+pub(super) struct MeanPorts<'k> {
+    pub rst: Expr<'k>,
+    pub data: Expr<'k>,
+    pub array: Expr<'k>,
+    pub offered: Expr<'k>,
+    pub tlast: Expr<'k>,
+    pub ready_out: Output<'k>,
+    pub data_out: Output<'k>,
+    pub array_out: Output<'k>,
+    pub valid_out: Output<'k>,
+    pub last_out: Output<'k>,
+    pub ready: Expr<'k>,
+    pub frames: Output<'k>,
+}
+
 /// The sizes of a sliding mean.
 pub(super) struct SlidingMean {
     /// Taxels of a frame, at least three.
@@ -36,14 +53,10 @@ pub(super) struct SlidingMean {
 }
 
 impl SlidingMean {
-    /// Data, array, `tvalid`, `tlast` and `m_axis_tready` to data, array, `tvalid`, `tlast`, `s_axis_tready` and the number of frames.
-    pub fn build<'k>(
-        &self,
-        k: &'k Builder,
-        rst: Expr<'k>,
-        [data, array, offered, tlast, ready]: [Expr<'k>; 5],
-        [data_out, array_out, valid_out, last_out, ready_out, frames]: [Output<'k>; 6],
-    ) {
+    /// The kernel.
+    pub fn build<'k>(&self, k: &'k Builder, io: MeanPorts<'k>) {
+        let MeanPorts { rst, data, array, offered, tlast, ready_out, .. } = io;
+        let MeanPorts { data_out, array_out, valid_out, last_out, ready, frames, .. } = io;
         let (power, wide) = (self.power, self.bits + self.power);
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
         let place_type = Type::unsigned(index.bits + self.arrays.bits);

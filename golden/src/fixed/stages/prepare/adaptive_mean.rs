@@ -17,9 +17,8 @@
 //! | differences before they are squared, rounded down, saturated | up to 18 | 2^−17 of full scale or finer; of S four times as much |
 //! | c_w | 12 | 2^−e |
 
-use super::round_shift;
 use crate::data::input::change_noise::{LEVEL_SHIFT, SAME_SIDE, SECOND_DIFFERENCE};
-use crate::fixed::words::arith::saturate;
+use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::spec::mean_window::MeanWindow;
 use crate::spec::scene::{MeanKind, Scene};
