@@ -302,8 +302,8 @@ impl AdaptiveKernel<'_> {
         let factor = k.register("factor", Type::unsigned(bits));
         let product = k.register("product", Type::unsigned(level.bits() + bits));
         let done = k.wire("done", digit.is(bits as u64));
-        let froms: Vec<u64> = self.mean.judged().map(|(window, _)| window.counts_from() as u64).collect();
-        let from = window.table(frame.count.bits(), &padded(&froms));
+        let counts_from: Vec<u64> = self.mean.judged().map(|(window, _)| window.counts_from() as u64).collect();
+        let from = window.table(frame.count.bits(), &padded(&counts_from));
         let arms: Vec<(u64, Expr<'k>)> = (0..).zip(sums.squares.iter().map(|sum| **sum)).collect();
         let widest = sums.squares.iter().map(|sum| sum.bits()).max().unwrap_or(1);
         let arms: Vec<(u64, Expr<'k>)> = arms.into_iter().map(|(index, sum)| (index, sum.extend(widest))).collect();
