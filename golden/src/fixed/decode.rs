@@ -24,6 +24,7 @@ use crate::result::flags::{frame_flags, Flag, FlagSet};
 use crate::result::reconstruct::{
     assemble, shear_sigma_N, shear_spread_of, CaseChoice, Reconstruction, Region, SubarrayResult,
 };
+use crate::spec::mean_window::MeanNoise;
 use crate::spec::partition::Subarray;
 use crate::spec::sliding::most_frames;
 
@@ -120,8 +121,12 @@ impl Model {
         let window = adaptive.windows.get(status.window as usize)?;
         // The count of frames stops.
         let frames = status.frames as usize;
-        let most = most_frames(adaptive.longest());
-        Some(Window::after(&adaptive.averages, *window, if frames < most { frames } else { 8 * most }))
+        let averages = &adaptive.averages;
+        let noise = match frames < most_frames(adaptive.longest()) {
+            true => MeanNoise::after(averages, frames),
+            false => MeanNoise::settled(averages),
+        };
+        Some(Window::of(averages, *window, &noise))
     }
 
     /// The same where the mean of the readings is known.

@@ -10,6 +10,7 @@
 //! cov_jk ← (1 − 2^−g_j)(1 − 2^−g_k) cov_jk + 2^−g_j 2^−g_k        over the variance of a reading
 //! age_k  ← (1 − 2^−g_k)(age_k + 1)                                mean age of what mean_k holds, in frames
 //! ```
+//! and settle where a frame changes nothing more.
 //! A window is the mean of a frame if it agrees with the shortest one, which is tested by χ² against the noise σ of a reading:
 //! ```text
 //! Σ over live taxels of (window − shortest mean)² ≤ limit σ² n,    limit = (1 + AGREES √(2/n)) v
@@ -17,7 +18,7 @@
 //! v: variance of that difference once the means have settled; n: live taxels. Of those that agree the one with the least noise counts.
 //! A window counts from the frame on at which the last gain of its means is reached; the next longer mean has the same frames before.
 
-use super::sliding::{gain_shift, most_frames};
+use super::sliding::gain_shift;
 
 /// Standard deviations of χ²/n by which a window may differ. On drawn presses of sensor-1 of seven kinds at 0.2 and 1 % of noise,
 /// 3.5 to 7 gave the same errors within a twentieth.
@@ -105,9 +106,16 @@ impl MeanNoise {
         noise
     }
 
-    /// After so many frames that more change nothing.
-    fn settled(averages: &[u32]) -> MeanNoise {
-        MeanNoise::after(averages, averages.iter().max().map_or(0, |&longest| 8 * most_frames(longest)))
+    /// After so many frames that more change nothing: each gain is the last one, 2^−k.
+    pub fn settled(averages: &[u32]) -> MeanNoise {
+        let gains: Vec<f64> = averages.iter().map(|&k| 0.5f64.powi(k as i32)).collect();
+        let covariance = |j: f64, k: f64| j * k / (1.0 - (1.0 - j) * (1.0 - k));
+        MeanNoise {
+            averages: averages.to_vec(),
+            covariance: gains.iter().map(|&j| gains.iter().map(|&k| covariance(j, k)).collect()).collect(),
+            ages: gains.iter().map(|gain| (1.0 - gain) / gain).collect(),
+            frames: usize::MAX,
+        }
     }
 
     /// With one more frame.
@@ -157,6 +165,13 @@ mod tests {
         assert_eq!(MeanWindow::all(&[2, 3]), [Mean(3), Mean(2)]);
         assert_eq!(all.iter().map(|own| own.counts_from()).collect::<Vec<_>>(), [48, 24, 48, 12, 24, 6, 12, 3]);
         let settled = MeanNoise::settled(&averages);
+        // As a thousand frames leave them.
+        let after = MeanNoise::after(&averages, 1000);
+        for window in &all {
+            let weights = window.weights(&averages);
+            assert!((settled.variance(&weights) / after.variance(&weights) - 1.0).abs() < 1e-4, "{window:?}");
+            assert!((settled.age(&weights) - after.age(&weights)).abs() < 1e-4, "{window:?}");
+        }
         for window in &all {
             let weights = window.weights(&averages);
             let age = match window {

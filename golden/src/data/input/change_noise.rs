@@ -20,6 +20,23 @@ pub const LEVEL_SHIFT: u32 = 5;
 /// Frames on the same side of the level that end it.
 pub const SAME_SIDE: u32 = 16;
 
+/// On which side of the level the last frames were, and how many; the default is that of a level that has just begun.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Side {
+    above: bool,
+    frames: u32,
+}
+
+impl Side {
+    /// Whether one more frame, above the level or not, ends it; then it begins again.
+    pub(crate) fn ends(&mut self, above: bool) -> bool {
+        let frames = if self.above == above { self.frames + 1 } else { 1 };
+        let ends = frames == SAME_SIDE;
+        *self = if ends { Side::default() } else { Side { above, frames } };
+        ends
+    }
+}
+
 /// The noise of the frames so far; the default is that before any.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChangeNoise {
@@ -27,8 +44,7 @@ pub struct ChangeNoise {
     last: [Vec<f64>; 2],
     /// S̃ over the number of live taxels; `None` before the third frame.
     level: Option<f64>,
-    /// Whether the last frames were above the level, and how many.
-    side: (bool, u32),
+    side: Side,
 }
 
 impl ChangeNoise {
@@ -38,14 +54,17 @@ impl ChangeNoise {
         if !earlier.is_empty() && live > 0 {
             let second = |k: usize| (frame_MPa[k] - 2.0 * before[k] + earlier[k]).powi(2);
             let sum = (0..frame_MPa.len()).map(second).sum::<f64>() / live as f64;
-            let level = self.level.unwrap_or(sum);
-            let above = sum > level;
-            let run = if self.side.0 == above { self.side.1 + 1 } else { 1 };
-            let step = level * 0.5f64.powi(LEVEL_SHIFT as i32);
-            (self.level, self.side) = match self.level {
-                Some(_) if run < SAME_SIDE => (Some(if above { level + step } else { level - step }), (above, run)),
-                _ => (Some(sum), (false, 0)),
-            };
+            self.level = Some(match self.level {
+                Some(level) if !self.side.ends(sum > level) => {
+                    let step = level * 0.5f64.powi(LEVEL_SHIFT as i32);
+                    if sum > level {
+                        level + step
+                    } else {
+                        level - step
+                    }
+                }
+                _ => sum,
+            });
         }
         self.last = [frame_MPa.to_vec(), std::mem::take(&mut self.last[0])];
     }

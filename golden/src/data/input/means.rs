@@ -47,9 +47,9 @@ impl Window {
         Window { variance: noise.variance(&weights), age: noise.age(&weights), weights }
     }
 
-    /// The window of means of `averages` after so many frames.
-    pub(crate) fn after(averages: &[u32], window: MeanWindow, frames: usize) -> Window {
-        Window::new(&MeanNoise::after(averages, frames), window.weights(averages))
+    /// The window of means of `averages` of which `noise` is.
+    pub(crate) fn of(averages: &[u32], window: MeanWindow, noise: &MeanNoise) -> Window {
+        Window::new(noise, window.weights(averages))
     }
 
     /// Number of frames of equal weight with its noise.
@@ -111,13 +111,14 @@ impl Means {
     /// The windows that count, as [`MeanWindow::all`] has them, each with the limit of its χ² with `live` taxels.
     pub fn windows(&self, live: usize) -> impl Iterator<Item = (Window, f64)> + '_ {
         let counts = |window: &&MeanWindow| window.counts_from() <= self.frames();
-        self.windows.iter().filter(counts).map(move |window| {
-            (Window::new(&self.noise, window.weights(&self.averages)), window.limit(&self.averages, live))
-        })
+        self.windows
+            .iter()
+            .filter(counts)
+            .map(move |window| (Window::of(&self.averages, *window, &self.noise), window.limit(&self.averages, live)))
     }
 
     fn single(&self, mean: usize) -> Window {
-        Window::new(&self.noise, MeanWindow::Mean(self.averages[mean]).weights(&self.averages))
+        Window::of(&self.averages, MeanWindow::Mean(self.averages[mean]), &self.noise)
     }
 
     /// The mean of a window, row-major.

@@ -42,7 +42,7 @@
 
 use super::{
     CoefficientCheck, Condition, EstimatorKind, ForceOutput, Form, MeanKind, Medium, ObjectiveKind, Scene, SceneError,
-    LONGEST_AVERAGE, TABLE_CODE_BITS,
+    LONGEST_AVERAGE, SHORTEST_AVERAGE, TABLE_CODE_BITS,
 };
 use crate::spec::partition::Case;
 use crate::spec::quads::Quads;
@@ -165,7 +165,7 @@ impl Scene {
             rule(!input.curve.is_empty(), "input.curve", "[…]".to_string(), "none; a table of gains and offsets alone"),
             rule(adapts && input.template, "input.template", "true".to_string(), "false, with input.mean = adaptive"),
             rule(
-                adapts && input.average > LONGEST_AVERAGE,
+                adapts && !(SHORTEST_AVERAGE + 1..=LONGEST_AVERAGE).contains(&input.longest_average()),
                 "input.average",
                 input.average.to_string(),
                 "0, 3, 4, 5 or 6, with input.mean = adaptive",

@@ -59,12 +59,12 @@ struct Frame<'k> {
 
 /// A beat in the cycle after it was taken, and what goes with it through the stages.
 struct Beat<'k> {
-    word: Net<'k>,
+    word: Expr<'k>,
     /// Where its taxel is stored.
-    place: Net<'k>,
+    place: Expr<'k>,
     /// g of the longest mean, c.
-    gain: Net<'k>,
-    odd: Net<'k>,
+    gain: Expr<'k>,
+    odd: Expr<'k>,
     /// Bit i: there is a beat i + 1 stages behind the one in which it was taken.
     valid: Net<'k>,
     /// It is the first of its frame.
@@ -91,7 +91,7 @@ impl AdaptiveKernel<'_> {
         let stored = k.register("stored", Type::unsigned(kept));
         k.when(moves, || stored.set(means.read(place)));
         let (fresh, second, written) = self.follow(k, &beat, *stored);
-        let followed = k.delay("followed_place", *beat.place);
+        let followed = k.delay("followed_place", beat.place);
         means.write(beat.valid.at(1), followed, written);
         let sums = self.sums(k, &beat, &fresh, second);
         self.judge(k, io.rst, &frame, &sums);
@@ -181,14 +181,8 @@ impl AdaptiveKernel<'_> {
         takes: Expr<'k>,
         [taxel, place, gain, odd]: [Expr<'k>; 4],
     ) -> Beat<'k> {
-        let word = k.register("word", Type::signed(self.bits));
-        word.set(io.data.low(self.bits).signed());
-        let held = |name: &str, value: Expr<'k>| {
-            let net = k.register(name, value.ty());
-            net.set(value);
-            net
-        };
-        let (place, gain, odd) = (held("held_place", place), held("held_gain", gain), held("held_odd", odd));
+        let word = k.delay("word", io.data.low(self.bits).signed());
+        let (place, gain, odd) = (k.delay("held_place", place), k.delay("held_gain", gain), k.delay("held_odd", odd));
         let valid = k.state("valids", Type::unsigned(STAGES), io.rst, 0);
         valid.set(valid.low(STAGES - 1).concat(takes));
         let follow = |name: &str, value: Expr<'k>, stages: usize| {
@@ -221,15 +215,15 @@ impl AdaptiveKernel<'_> {
                 let shift = beat.gain.table(beat.gain.bits(), &shifts);
                 // As in `sliding_mean`: 2 (2^L word − mean) − c, which the shift rounds down to the same.
                 let difference = beat.word.shift_left(power as usize + 1);
-                let difference = difference - stored.unsigned().concat(*beat.odd).signed();
+                let difference = difference - stored.unsigned().concat(beat.odd).signed();
                 let (base, moved) = (k.delay("base", stored), k.delay("moved", difference.shift_right_by(shift)));
                 let half = (base.unsigned().concat(k.constant(1, 1)).signed() + moved).slice(1, wide);
                 k.wire("next", half)
             })
         };
         let next: Vec<Expr<'k>> = self.mean.averages.iter().enumerate().map(follow).collect();
-        let (sample, recent) = (k.delay("sample", *beat.word), k.delay("recent", before));
-        let second = (*beat.word + earlier) - before.shift_left(1).extend(self.bits + 1);
+        let (sample, recent) = (k.delay("sample", beat.word), k.delay("recent", before));
+        let second = (beat.word + earlier) - before.shift_left(1).extend(self.bits + 1);
         let second = second.shift_right(self.mean.shifts[1] as usize);
         let (second, _) = saturated(k, second, self.mean.second_bits(self.bits as u32) as usize);
         let second = k.delay("second", self.of_live(k, beat, 0, second));

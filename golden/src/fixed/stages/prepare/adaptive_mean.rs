@@ -17,7 +17,7 @@
 //! | differences before they are squared, rounded down, saturated | up to 18 | 2^−17 of full scale or finer; of S four times as much |
 //! | c_w | 12 | 2^−e |
 
-use crate::data::input::change_noise::{LEVEL_SHIFT, SAME_SIDE, SECOND_DIFFERENCE};
+use crate::data::input::change_noise::{Side, LEVEL_SHIFT, SECOND_DIFFERENCE};
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::spec::mean_window::MeanWindow;
@@ -60,8 +60,7 @@ pub struct AdaptiveState {
     last: [Vec<i64>; 2],
     /// S̃; 0 before the third frame.
     level: i64,
-    /// Whether the last frames were above the level, and how many.
-    side: (bool, u32),
+    side: Side,
     /// Index of the window of the last frame.
     pub window: usize,
 }
@@ -81,7 +80,7 @@ impl AdaptiveMean {
         let shifts = [code_bits + longest + 1, code_bits + 2].map(|bits| bits.saturating_sub(MULTIPLIER_BITS));
         // LSBs of S over those of χ².
         let unit = 2f64.powi((longest + shifts[1]) as i32 - shifts[0] as i32).powi(2) / SECOND_DIFFERENCE;
-        let tested = &windows[..windows.len() - 1];
+        let (_, tested) = windows.split_last()?;
         let limits: Vec<f64> = tested.iter().map(|window| unit * window.limit(&averages, count)).collect();
         let largest = limits.iter().copied().fold(0.0, f64::max);
         let factor_shift = FACTOR_BITS as i32 - 1 - largest.log2().floor() as i32;
@@ -197,12 +196,10 @@ impl AdaptiveMean {
 impl AdaptiveState {
     /// Moves the level with S of one more frame, the `first` with one.
     fn follow(&mut self, sum: i64, first: bool) {
-        let above = sum > self.level;
-        let run = if self.side.0 == above { self.side.1 + 1 } else { 1 };
-        let step = self.level >> LEVEL_SHIFT;
-        (self.level, self.side) = match first || run == SAME_SIDE {
-            true => (sum, (false, 0)),
-            false => (self.level + if above { step } else { -step }, (above, run)),
+        let (above, step) = (sum > self.level, self.level >> LEVEL_SHIFT);
+        self.level = match first || self.side.ends(above) {
+            true => sum,
+            false => self.level + if above { step } else { -step },
         };
     }
 }
@@ -216,6 +213,7 @@ mod tests {
     use crate::data::input::memory::Memory;
     use crate::data::input::Input;
     use crate::data::quantise::quantise;
+    use crate::spec::mean_window::MeanNoise;
 
     fn scene(more: &str) -> Scene {
         let text = "name = \"a\"\n[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[input]\n\
@@ -269,7 +267,7 @@ mod tests {
                 let averaged = input.average_after(&mut memory, &scene, &[read]).unwrap();
                 let window = adaptive.windows[prepared.adaptive.window];
                 let means = memory.means().unwrap();
-                let own = Window::after(&adaptive.averages, window, means.frames());
+                let own = Window::of(&adaptive.averages, window, &MeanNoise::after(&adaptive.averages, means.frames()));
                 let alike = averaged.frames_held == Some(own.frames_held()) && averaged.lag_frames == Some(own.age);
                 (same, all) = (same + usize::from(alike), all + 1);
                 taken.insert(prepared.adaptive.window);
