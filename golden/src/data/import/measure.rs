@@ -107,20 +107,26 @@ pub fn noise(frames: &[&[f64]], alive: &[bool]) -> Noise {
 
 /// The level without load, and the sign of the load; `None` where no taxel exists.
 pub fn idle(frames: &[&[f64]], alive: &[bool]) -> Option<Idle> {
-    let sorted = |frame: &&[f64]| {
-        let mut own: Vec<f64> = std::iter::zip(*frame, alive).filter(|(_, alive)| **alive).map(|(b, _)| *b).collect();
-        own.sort_by(f64::total_cmp);
-        own
+    if !alive.contains(&true) {
+        return None;
+    }
+    let own = |frame: &[f64]| std::iter::zip(frame, alive).filter(|(_, alive)| **alive).map(|(b, _)| *b).collect();
+    // The smallest and the largest reading of a frame.
+    let ends = |frame: &&[f64]| {
+        let readings: Vec<f64> = own(frame);
+        readings.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], b| [b.min(least), b.max(most)])
     };
-    let all: Vec<Vec<f64>> = frames.iter().map(sorted).filter(|own| !own.is_empty()).collect();
-    let range = |own: &[f64]| own[own.len() - 1] - own[0];
-    let evenest = all.iter().min_by(|a, b| range(a).total_cmp(&range(b)))?;
-    let middle = evenest[evenest.len() / 2];
-    let below = all.iter().map(|own| middle - own[0]).fold(0.0, f64::max);
-    let above = all.iter().map(|own| own[own.len() - 1] - middle).fold(0.0, f64::max);
+    let all: Vec<[f64; 2]> = frames.iter().map(ends).collect();
+    let range = |[least, most]: &[f64; 2]| most - least;
+    let (evenest, least) = std::iter::zip(frames, &all).min_by(|(_, a), (_, b)| range(a).total_cmp(&range(b)))?;
+    let mut sorted: Vec<f64> = own(evenest);
+    sorted.sort_unstable_by(f64::total_cmp);
+    let middle = sorted[sorted.len() / 2];
+    let below = all.iter().map(|[least, _]| middle - least).fold(0.0, f64::max);
+    let above = all.iter().map(|[_, most]| most - middle).fold(0.0, f64::max);
     let falls = below > FALLS * above;
-    let nearest = evenest.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    let frames = all.iter().take_while(|own| range(own) <= UNLOADED * range(evenest)).count();
+    let nearest = sorted.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let frames = all.iter().take_while(|ends| range(ends) <= UNLOADED * range(least)).count();
     Some(Idle { level_MPa: if falls { middle } else { nearest }, falls, frames })
 }
 
@@ -188,7 +194,7 @@ fn deviation(frames: &[&[f64]], selected: &[bool]) -> f64 {
 /// the full scale of the scene.
 pub(super) fn codes(mut readings: Vec<f64>, per_MPa: f64, stated_MPa: Option<f64>, largest_MPa: f64) -> Codes {
     let at_full_scale = stated_MPa.map_or(0, |MPa| readings.iter().filter(|b| b.abs() / per_MPa >= MPa).count());
-    readings.sort_by(f64::total_cmp);
+    readings.sort_unstable_by(f64::total_cmp);
     // −0 and 0 are the same reading.
     readings.dedup_by(|a, b| a == b);
     let step = readings.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);

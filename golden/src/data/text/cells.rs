@@ -94,9 +94,14 @@ impl fmt::Display for Separator {
 /// assert!(["inf", "1e400", "x", "-"].iter().all(|cell| reading(cell).is_none()));
 /// ```
 pub fn reading(cell: &str) -> Option<f64> {
-    match cell.trim() {
-        cell if cell.is_empty() || MISSING.contains(&cell) => Some(f64::NAN),
-        cell => cell.parse().ok().filter(|value: &f64| !value.is_infinite()),
+    of_trimmed(cell.trim())
+}
+
+/// [`reading`] of a cell without blanks around it.
+fn of_trimmed(cell: &str) -> Option<f64> {
+    match cell.parse::<f64>() {
+        Ok(value) => Some(value).filter(|value| !value.is_infinite()),
+        Err(_) => (cell.is_empty() || MISSING.contains(&cell)).then_some(f64::NAN),
     }
 }
 
@@ -215,7 +220,7 @@ impl Digits {
             return Err(format!("{} has a comma, where others have a decimal point", shown(cell)));
         }
         let text = point(cell);
-        let value = reading(&text).ok_or_else(|| format!("{} is not a finite number", shown(cell)))?;
+        let value = of_trimmed(&text).ok_or_else(|| format!("{} is not a finite number", shown(cell)))?;
         let number = Number::of(&text);
         let differs = |own: usize, wanted: Option<usize>| wanted.is_some_and(|wanted| own != wanted);
         match value.is_finite() && !(self.bare_zero && number.is_bare_zero()) {

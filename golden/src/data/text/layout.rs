@@ -61,10 +61,18 @@ pub struct Layout {
     names_line: Option<usize>,
 }
 
+/// A line split at a separator.
+struct Row<'s> {
+    line: Line<'s>,
+    cells: Vec<Cow<'s, str>>,
+    /// Whether it [has numbers](has_numbers).
+    numeric: bool,
+}
+
 /// Lines split at one separator.
 struct Table<'s> {
     separator: Separator,
-    rows: Vec<(Line<'s>, Vec<Cow<'s, str>>)>,
+    rows: Vec<Row<'s>>,
     /// Cells of most lines that have numbers.
     cells: usize,
     /// The last cell of these is always empty.
@@ -167,9 +175,12 @@ impl Layout {
 impl<'s> Table<'s> {
     /// The lines split at a separator; `None` if no line has numbers.
     fn of(separator: Separator, lines: &[Line<'s>]) -> Option<Table<'s>> {
-        let rows: Vec<_> = lines.iter().take(LOOKED_AT).map(|line| (*line, separator.cells(line.text))).collect();
-        let mut counts: Vec<usize> =
-            rows.iter().filter(|(_, cells)| has_numbers(cells)).map(|(_, cells)| cells.len()).collect();
+        let split = |line: &Line<'s>| {
+            let cells = separator.cells(line.text);
+            Row { line: *line, numeric: has_numbers(&cells), cells }
+        };
+        let rows: Vec<Row> = lines.iter().take(LOOKED_AT).map(split).collect();
+        let mut counts: Vec<usize> = rows.iter().filter(|row| row.numeric).map(|row| row.cells.len()).collect();
         counts.sort_unstable();
         let cells = counts.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len())?[0];
         let mut table = Table { separator, cells, trailing: false, rows };
@@ -177,30 +188,31 @@ impl<'s> Table<'s> {
         Some(table)
     }
 
+    /// Whether a line has numbers, and as many cells as most that have.
+    fn is_like_most(&self, row: &Row) -> bool {
+        row.numeric && row.cells.len() == self.cells
+    }
+
     /// Cells of the lines from `first` on that are like most.
     fn body(&self, first: usize) -> impl Iterator<Item = &Vec<Cow<'s, str>>> + Clone {
-        self.rows[first..]
-            .iter()
-            .map(|(_, cells)| cells)
-            .filter(|cells| cells.len() == self.cells && has_numbers(cells))
+        self.rows[first..].iter().filter(|row| self.is_like_most(row)).map(|row| &row.cells)
     }
 
     /// The layout with this separator.
     fn layout(&self, [rows, cols]: [usize; 2], stated: &Stated) -> Result<Layout, NoReadings> {
         // A table has a line with numbers.
-        let mut first =
-            self.rows.iter().position(|(_, cells)| cells.len() == self.cells && has_numbers(cells)).unwrap_or(0);
-        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].0, reason);
+        let mut first = self.rows.iter().position(|row| self.is_like_most(row)).unwrap_or(0);
+        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].line, reason);
         let (form, readings) = self.form([rows, cols], stated).map_err(at_first)?;
         let lines = if form == Form::Line { 1 } else { rows };
-        let before = first.checked_sub(1).map(|before| &self.rows[before].1);
+        let before = first.checked_sub(1).map(|before| &self.rows[before].cells);
         let mut names = before.filter(|names| names.len() == self.cells);
         let data = self.body(first).count();
         if self.is_numbered(first, readings) && data > lines && (data - 1).is_multiple_of(lines) {
-            names = Some(&self.rows[first].1);
+            names = Some(&self.rows[first].cells);
             first += 1;
         }
-        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].0, reason);
+        let at_first = |reason: String| NoReadings::of_line(&self.rows[first].line, reason);
         let found = self.columns(first, names, readings, stated).map_err(at_first)?;
         let of_readings: Vec<&str> = self
             .body(first)
@@ -225,8 +237,8 @@ impl<'s> Table<'s> {
             form,
             lines,
             blocks: form == Form::Grid && self.has_blocks(first, lines),
-            first_line: self.rows[first].0.number,
-            names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].0.number),
+            first_line: self.rows[first].line.number,
+            names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].line.number),
         };
         self.check(first, &layout)?;
         Ok(layout)
@@ -296,7 +308,7 @@ impl<'s> Table<'s> {
 
     /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … of nine and more.
     fn is_numbered(&self, first: usize, readings: usize) -> bool {
-        let cells = &self.rows[first].1;
+        let cells = &self.rows[first].cells;
         let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
         let others = cells.iter().filter(|cell| cell.parse::<usize>().is_err());
         let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
@@ -310,16 +322,17 @@ impl<'s> Table<'s> {
 
     /// Whether frames of `lines` lines stand apart, by blank lines or headings.
     fn has_blocks(&self, first: usize, lines: usize) -> bool {
-        let rows = self.rows[first..].iter().filter(|(_, cells)| cells.len() == self.cells && has_numbers(cells));
-        let numbers: Vec<usize> = rows.map(|(line, _)| line.number).collect();
+        let rows = self.rows[first..].iter().filter(|row| self.is_like_most(row));
+        let numbers: Vec<usize> = rows.map(|row| row.line.number).collect();
         let runs: Vec<usize> = numbers.chunk_by(|a, b| a + 1 == *b).map(<[usize]>::len).collect();
         runs.len() > 1 && 2 * runs.iter().filter(|run| **run == lines).count() >= runs.len()
     }
 
     /// Checks that at least half of the lines with numbers have readings.
     fn check(&self, first: usize, layout: &Layout) -> Result<(), NoReadings> {
-        let rows = self.rows[first..].iter().filter(|(_, cells)| has_numbers(cells));
-        let unfit: Vec<Option<NoReadings>> = rows.map(|(line, cells)| layout.readings_of(line, cells).err()).collect();
+        let rows = self.rows[first..].iter().filter(|row| row.numeric);
+        let unfit: Vec<Option<NoReadings>> =
+            rows.map(|row| layout.readings_of(&row.line, &row.cells).err()).collect();
         match unfit.iter().flatten().count() * 2 > unfit.len() {
             true => unfit.into_iter().flatten().next().map_or(Ok(()), Err),
             false => Ok(()),
