@@ -31,6 +31,12 @@ class Port:
         self.sink, self.source = [stream.Endpoint(eth_udp_user_description(32)) for _ in range(2)]
 
 
+def connect_tables(module):
+    """Connects the packets of tables with the registers of the core."""
+    if module.udp.bus:
+        module.comb += module.udp.bus.connect(module.core.bus)
+
+
 class Packets(LiteXModule):
     """A core between the two directions of a UDP port."""
 
@@ -39,6 +45,7 @@ class Packets(LiteXModule):
         self.platform, self.port = Sources(), Port()
         self.core = Dermis(self.platform, folder)
         self.udp = DermisUDP(self.core, self.port, code_bytes)
+        connect_tables(self)
 
     def pins(self):
         return {"sys_clk": self.cd_sys.clk, "sys_rst": self.cd_sys.rst} | {
@@ -70,6 +77,7 @@ class Network(LiteXModule):
         self.core = Dermis(self.platform, folder)
         self.network = LiteEth(self.phy, MAC_ADDRESS, IP_ADDRESS, clock_Hz)
         self.udp = DermisUDP(self.core, self.network.udp.crossbar.get_port(UDP_PORT, dw=32), code_bytes, force_bits)
+        connect_tables(self)
         counters = self.udp.receiver.counters
         self.counter_names = list(counters)
         self.counters = Signal(32 * len(counters))

@@ -1,8 +1,10 @@
 """A core behind LiteEth, from the bytes of Ethernet on, under Verilator: frames of a host in, its results out."""
 
 import itertools
+import json
 import os
 import random
+import shutil
 import subprocess
 import zlib
 from collections import Counter
@@ -10,18 +12,40 @@ from collections import Counter
 import dermis_litex.packets
 import pytest
 from dermis_litex.network import IP_ADDRESS, MAC_ADDRESS
-from dermis_litex.packets import LATE, UDP_PORT, Results, checked, exponent_of, frame_packets, mantissa_of, short_counts
+from dermis_litex.packets import (
+    IDENTITY,
+    KIND_IDENTITY,
+    KIND_TABLES_TAKEN,
+    LATE,
+    UDP_PORT,
+    VERSION,
+    Results,
+    answer_of,
+    checked,
+    exponent_of,
+    frame_packets,
+    identify_packet,
+    mantissa_of,
+    short_counts,
+    tables_packets,
+)
 from gateware import Network, verilate
 from scapy.layers.inet import ICMP, IP, UDP
 from scapy.layers.l2 import ARP, Ether
 from scapy.packet import Raw
-from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
+from test_cores import BUILD, DERMIS, HERE, NIGHTLY, SCENE, generate
+from test_tables import HARDWARE, SPECIMEN
+from test_tables import VERSION as VERSION_OF_TABLES
 from test_udp import Received
 
 CYCLES = 1_000_000 if "DERMIS_NIGHTLY" in os.environ else 20_000
 # A slow compilation pays with many cycles.
 OPTIMISATION = "-O1" if "DERMIS_NIGHTLY" in os.environ else "-O0"
 CLOCK_HZ = 100_000_000
+# Of the simulation's reset; the core's time begins behind it.
+RESET_CYCLES = 20
+# How well a host knows when a frame was acquired.
+TIME_ERROR_PS = 100e6
 HOST_MAC, HOST_IP, HOST_PORT = "02:00:00:00:00:09", "192.168.1.100", 4321
 CORE_MAC = ":".join(f"{byte:02x}" for byte in MAC_ADDRESS.to_bytes(6, "big"))
 PREAMBLE = bytes([0x55] * 7 + [0xD5])
@@ -68,14 +92,14 @@ def flipped(data, at, bit):
 
 
 class Wire:
-    """A simulation, and the frame and result of its core's testbench."""
+    """A simulation, and the frame and result of its core's testbench; `received` has the times in ps at which what was played had come."""
 
     def __init__(self, folder, force_bits=32, clock_Hz=CLOCK_HZ):
         network = Network(folder, 4, force_bits, clock_Hz)
         self.folder, self.half_period_ps = folder, round(1e12 / clock_Hz / 2)
         self.counter_names, self.force_words = network.counter_names, network.core.force_words
         self.program = verilate(network, network.pins(), folder, "network", HERE / "wire.cpp", OPTIMISATION)
-        words = lambda kind: [int(line, 16) for line in next(folder.glob(f"*_tb_{kind}.hex")).read_text().split()]
+        words = lambda kind: words_of(next(folder.glob(f"*_tb_{kind}.hex")))
         signed = lambda word: word - (1 << 32) if word >> 31 else word
         self.codes, self.result = [signed(word) for word in words("codes")], words("words")
 
@@ -87,6 +111,7 @@ class Wire:
         done = subprocess.run(command, cwd=self.program.parent, capture_output=True, text=True, timeout=3000)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
         lines = [line.split() for line in done.stdout.splitlines()]
+        self.received = [int(own[1]) for own in lines if own[0] == "received"]
         back = [(int(time), bytes.fromhex(data)) for name, time, data in (own for own in lines if own[0] == "frame")]
         numbers = next(own[1:] for own in lines if own[0] == "counters")
         cycles = next(int(own[1]) for own in lines if own[0] == "cycles")
@@ -138,13 +163,19 @@ def short_packets():
 
 @pytest.fixture(scope="module")
 def wire(short_packets):
-    return built("wire")
+    return built("wire", scene=HARDWARE)
 
 
 def built(name, scene=SCENE, **options):
     folder = BUILD / name
+    # Of another scene files stay.
+    shutil.rmtree(folder, ignore_errors=True)
     generate(folder, "--bus", "wishbone", "--stream-bits", "32", scene=scene)
     return Wire(folder, **options)
+
+
+def words_of(path):
+    return [int(line, 16) for line in path.read_text().split()]
 
 
 def packets_of(words):
@@ -165,8 +196,100 @@ def test_frames_over_ethernet_are_answered_with_the_words_of_the_model(wire):
     sequences = [7, 8, 0x80000000]
     first = packets_of(len(wire.codes))
     back, counters, _ = wire.play_after_arp(right_frames(wire, sequences), first)
-    assert results_of(back) == [(sequence, wire.result, 0) for sequence in sequences]
+    results = results_of(back)
+    assert [own[:3] for own in results] == [(sequence, wire.result, 0) for sequence in sequences]
     assert counters == {name: first * len(sequences) if name == "taken" else 0 for name in wire.counter_names}
+
+
+def identity_of(frame):
+    kind, sequence, index, words = answer_of(payload_of(frame))
+    assert (kind, index) == (KIND_IDENTITY, 0)
+    return sequence, dict(zip(IDENTITY, words, strict=True))
+
+
+def test_a_core_says_what_it_is_and_when_it_had_a_frame(wire):
+    questions = [(0 if at == 0 else 1, 0, on_the_wire(datagram(identify_packet(at)))) for at in range(2)]
+    frames = [(2, 3000, on_the_wire(datagram(packet))) for packet in frame_packets(9, wire.codes, 4)]
+    back, counters, _ = wire.play_after_arp([*questions, *frames], 1)
+    registers = json.loads((wire.folder / "registers.json").read_text())["constants"]
+    constants = ("scene", "array", "clock_Hz", "force_triples", "status_triples")
+    wanted = {name: registers[name] for name in constants} | {"version": VERSION, "code_bytes": 4, "force_bits": 32}
+    own_ps = lambda cycles: (cycles + RESET_CYCLES) * 2 * wire.half_period_ps
+    offsets = []
+    for at, (received_ps, (answered_ps, frame)) in enumerate(zip([wire.received[1], wire.received[3]], back[2:4], strict=True)):
+        sequence, words = identity_of(frame)
+        assert sequence == at and wanted.items() <= words.items() and words["writable_tables"] == 1
+        assert all(words[name] == 0 for name in counters)
+        cycles = words["time_low"] | words["time_high"] << 32
+        assert received_ps < own_ps(cycles) < answered_ps
+        offsets.append((received_ps + answered_ps) / 2 - cycles * 2 * wire.half_period_ps)
+    host = Results()
+    (result,) = [own for _, frame in back[4:] if (own := host.add(payload_of(frame)))]
+    assert result[:3] == (9, wire.result, 0)
+    # What a host makes of the times of question and answer, beside when the frame's last packet had come.
+    for offset in offsets:
+        assert abs(result.time * 2 * wire.half_period_ps + offset - wire.received[-1]) < TIME_ERROR_PS
+
+
+def specimen_of(wire):
+    """The image of a specimen's tables, and its forces for the core's frame."""
+    folder = wire.folder / "specimen"
+    generate(folder, scene=SPECIMEN)
+    image = folder / "tables.bin"
+    command = [DERMIS, "load", HARDWARE, SPECIMEN, "--tables-version", str(VERSION_OF_TABLES), "--out", image]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    beats = words_of(next(folder.glob("*_tb_beats.hex")))
+    return image.read_bytes(), [beat >> 32 * at & 0xFFFFFFFF for beat in beats for at in range(3)][: wire.force_words]
+
+
+def forces_and_version(wire, result):
+    """Forces, the version of the tables, and whether the last image was refused."""
+    version = result.words[wire.force_words + 5] >> 16
+    return result.words[: wire.force_words], version & 0x7FFF, bool(version >> 15)
+
+
+def test_tables_over_ethernet_are_those_of_the_specimen(wire):
+    image, specimen = specimen_of(wire)
+    frames, answers = [], 0
+
+    def send(packets, answered=1):
+        """Packets, each once what came before has been answered."""
+        nonlocal answers
+        for at, packet in enumerate(packets):
+            frames.append((answers, 0, on_the_wire(datagram(packet))))
+            answers += answered if at == len(packets) - 1 or answered == 1 else 0
+
+    solve = lambda sequence: send(frame_packets(sequence, wire.codes, 4), packets_of(len(wire.result)))
+    fragments = tables_packets(5, image)
+    assert len(fragments) > 2
+    solve(1)
+    # A fragment too soon, and one of another image, are not answered; the first one twice, as after an answer that was lost.
+    send(fragments[2:3], 0)
+    send(fragments[:1])
+    send(fragments[:1])
+    send(tables_packets(6, image)[1:2], 0)
+    send(fragments[1:])
+    solve(2)
+    # An image that is given up leaves nothing, and the next is whole.
+    send(tables_packets(7, image)[:2])
+    send(tables_packets(8, image))
+    solve(3)
+    send(tables_packets(9, image)[:1])
+    wire_back, counters, _ = wire.play_after_arp(frames, packets_of(len(wire.codes)))
+    host, results, taken = Results(), [], []
+    for _, frame in wire_back[2:]:
+        payload = payload_of(frame)
+        if answer := answer_of(payload):
+            assert answer[0] == KIND_TABLES_TAKEN and not answer[3]
+            taken.append(answer[1:3])
+        elif result := host.add(payload):
+            results.append(result)
+    whole = range(len(fragments))
+    assert taken == [(5, 0), *((5, at) for at in whole), (7, 0), (7, 1), *((8, at) for at in whole), (9, 0)]
+    assert counters["refused"] == 2
+    own, after, again = [forces_and_version(wire, result) for result in results]
+    assert own == (wire.result[: wire.force_words], 0, False)
+    assert after == again == (specimen, VERSION_OF_TABLES, False) and after[0] != own[0]
 
 
 def test_a_ping_is_answered(wire):
@@ -189,7 +312,7 @@ def test_another_coefficient_is_found(wire):
         back, *_ = wire.play_after_arp(right_frames(wire, [7]), packets_of(len(wire.codes)))
     finally:
         memory.write_text(right)
-    ((sequence, words, _),) = results_of(back)
+    ((sequence, words, *_),) = results_of(back)
     assert sequence == 7 and words != wire.result
 
 
@@ -214,7 +337,7 @@ def test_short_forces_over_ethernet_are_those_of_the_model_rounded(short_packets
         for packet in frame_packets(number, wire.codes, 4)
     ]
     back, *_ = wire.play_after_arp(frames, packets_of(len(wire.codes)))
-    assert results_of(back) == [(sequence, rounded(wire), 0) for sequence in range(2)]
+    assert [own[:3] for own in results_of(back)] == [(sequence, rounded(wire), 0) for sequence in range(2)]
     assert rounded(wire) != wire.result
 
 
@@ -326,7 +449,7 @@ def harmed(wire, cycles):
     assert took >= cycles
     assert counters == {name: traffic.reference.counters[name] for name in counters}
     results = results_of(back)
-    found = {sequence: (words, flags) for sequence, words, flags in results}
+    found = {own.sequence: (own.words, own.flags) for own in results}
     assert len(found) == len(results), "a frame is answered twice"
     lines = {form: Counter() for form in FORMS}
     for at, (form, sequence, clipped, _) in enumerate(traffic.forms):

@@ -29,6 +29,8 @@ from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
 from test_cores import BUILD, NIGHTLY, environment, generate, icarus
 
+# Of both words of a time.
+TIMES = [7, 0x0123456789ABCDEF]
 CYCLES = 20_000 if "DERMIS_NIGHTLY" in os.environ else 3_000
 
 
@@ -255,6 +257,7 @@ def test_results_leave_in_whole_packets(crc_in_python, words):
             yield dut.requesters.written.ip_address.eq(number + 1)
             yield dut.requesters.written.port.eq(number + 100)
             yield dut.requesters.written.sequence.eq(3 * number)
+            yield dut.requesters.written.time.eq(TIMES[number % 2] + number)
             yield
             yield dut.requesters.written.valid.eq(0)
             for at, word in enumerate(frame):
@@ -300,7 +303,7 @@ def test_results_leave_in_whole_packets(crc_in_python, words):
         result = host.add(data)
         if result:
             results.append((ip_address, *result))
-    assert results == [(k + 1, 3 * k, frame, clipped[k]) for k, frame in enumerate(frames)]
+    assert results == [(k + 1, 3 * k, frame, clipped[k], TIMES[k % 2] + k) for k, frame in enumerate(frames)]
 
 
 def extremes(exponent):

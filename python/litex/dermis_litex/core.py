@@ -126,6 +126,8 @@ class Dermis(LiteXModule):
       `user` and `id` as the guide says.
     - `bus`: the register map on Wishbone, addresses of words, 64 registers.
     - `manifest`: scales and counts, as in `manifest.json`.
+    - `constants`: the content of the constant registers, by name.
+    - `writable_tables`, `tables_register`: whether a specimen's tables can be written, and the register for them.
     - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
     - `force_words`: how many of those are forces, or resultants.
 
@@ -135,7 +137,10 @@ class Dermis(LiteXModule):
     def __init__(self, platform, folder):
         folder = Path(folder).resolve()
         self.manifest = read_manifest(folder)
-        constants = read_json(folder / "registers.json")["constants"]
+        registers = read_json(folder / "registers.json")
+        self.constants = constants = registers["constants"]
+        self.tables_register = next(own for own in registers["registers"] if own["name"] == "tables")
+        self.writable_tables = self.manifest["input"].get("tables") is not None
         rows, cols, self.code_bits, _ = constants["array"].to_bytes(4, "little")
         self.taxels = rows * cols
         self.force_words = 3 * constants["force_triples"]

@@ -101,6 +101,8 @@ class Gateware(LiteXModule):
         self.network = Network(self.phy, mac, ip, clock_Hz)
         port = self.network.udp.crossbar.get_port(UDP_PORT, dw=WORD_BITS)
         self.udp = DermisUDP(self.core, port, code_bytes, force_bits)
+        if self.udp.bus:
+            self.comb += self.udp.bus.connect(self.core.bus)
 
 
 def write(name, folder, out, mac=MAC_ADDRESS, ip=IP_ADDRESS, code_bytes=2, force_bits=WORD_BITS):

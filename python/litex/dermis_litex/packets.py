@@ -4,20 +4,38 @@ All numbers are little-endian.
 
 | word of 32 bits | bits | meaning |
 |---|---|---|
-| 0 | 7:0 | `KIND_FRAME` from the host, `KIND_RESULT` or `KIND_SHORT_RESULT` from the core |
-| | 15:8 | flags of a result: bit 0 a code was clipped; of a short one bit 1 the last mantissa is none, bits 7:3 exponent |
+| 0 | 7:0 | the kind, `KIND_…` below |
+| | 15:8 | flags |
 | | 23:16 | index of the fragment |
-| | 31:24 | number of fragments of the frame or result |
-| 1 | | sequence number, chosen by the host; a result has that of its frame |
-| 2 … | | `FRAGMENT_WORDS` words of the payload; of the last fragment the rest |
+| | 31:24 | number of fragments |
+| 1 | | sequence number, chosen by the host; an answer has that of what it answers |
+| of a result 2, 3 | | cycles of the core's clock since its reset when the frame's first code entered it, low word first |
+| 2 or 4 … | | `FRAGMENT_WORDS` words of the payload; of the last fragment the rest |
 | last | | CRC-32 of the words before it, as of Ethernet |
+
+| kind | from | payload | flags |
+|---|---|---|---|
+| `FRAME` | host | codes, row-major | |
+| `RESULT` | core | words of forces and status | bit 0: a code was clipped |
+| `SHORT_RESULT` | core | mantissas of forces, two in a word | bit 0 as above, bit 1: the last mantissa is none, bits 7:3: exponent |
+| `IDENTIFY` | host | none | |
+| `IDENTITY` | core | the words of `IDENTITY`, in this order | |
+| `TABLES` | host | bytes of an image, as `dermis load` makes one | bytes of the last word that are none |
+| `TABLES_TAKEN` | core | none: the fragment of this index is in the core | |
 
 Fragments of a frame may come in any order and more than once. Of a frame that lacks one when the next begins, nothing is
 solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored. A packet whose
 CRC-32 is wrong counts as lost: LiteEth does not compare UDP's checksum, and Ethernet's guards one cable only.
 
+A host sends a fragment of an image once the one before is taken, all with one sequence number, and again if no answer comes; the
+first fragment of another number begins anew. Whether the image is whole, the status of the next result says. Meanwhile the core
+takes no frames: their packets are lost, and counted.
+
+An identity has the time at which it was asked for: with the times of question and answer a host knows how the core's clock and
+its own differ. The counters are those of `dermis_litex.udp.FrameReceiver`.
+
 A core of short forces sends them as mantissas of 16 bits, two in a word, the first in its low half, with one exponent per packet:
-a force is about mantissa · 2^exponent. The packets of status are `KIND_RESULT`. With the largest force F of the packet, by its
+a force is about mantissa · 2^exponent. The packets of status are `RESULT`. With the largest force F of the packet, by its
 absolute value, the error is at most 2^(exponent − 1), and less than F · (2^-15 + 2^-29). No mantissa saturates.
 
 The numbers of the format are in `packets.json`, which `dermis` reads too.
@@ -27,17 +45,25 @@ import json
 import struct
 import zlib
 from pathlib import Path
+from typing import NamedTuple
 
 LAYOUT = json.loads(Path(__file__).with_name("packets.json").read_text(encoding="utf-8"))
+VERSION = LAYOUT["version"]
 UDP_PORT = LAYOUT["udp_port"]
 KIND_FRAME = LAYOUT["kind_frame"]
 KIND_RESULT = LAYOUT["kind_result"]
 KIND_SHORT_RESULT = LAYOUT["kind_short_result"]
+KIND_IDENTIFY = LAYOUT["kind_identify"]
+KIND_IDENTITY = LAYOUT["kind_identity"]
+KIND_TABLES = LAYOUT["kind_tables"]
+KIND_TABLES_TAKEN = LAYOUT["kind_tables_taken"]
 HEADER_WORDS = LAYOUT["header_words"]
+RESULT_HEADER_WORDS = LAYOUT["result_header_words"]
 CHECK_WORDS = LAYOUT["check_words"]
 # 1440 bytes: with the headers of UDP, IP and Ethernet less than 1500.
 FRAGMENT_WORDS = LAYOUT["fragment_words"]
 LATE = LAYOUT["late"]
+IDENTITY = LAYOUT["identity"]
 FLAG_CLIPPED = 1
 FLAG_PADDED = 2
 EXPONENT_AT = 3
@@ -58,12 +84,13 @@ def code_words(taxels, code_bytes):
 
 
 def packets(kind, sequence, words, flags=0):
-    """The packets of a payload, each as bytes."""
+    """The packets of a payload, each as bytes; `flags` are those of the last one."""
     counts = fragment_words(len(words))
     result = []
     for index, count in enumerate(counts):
         payload = words[index * FRAGMENT_WORDS :][:count]
-        head = kind | flags << 8 | index << 16 | len(counts) << 24
+        own = flags if index == len(counts) - 1 else 0
+        head = kind | own << 8 | index << 16 | len(counts) << 24
         result.append(checked(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload)))
     return result
 
@@ -85,6 +112,27 @@ def frame_packets(sequence, codes, code_bytes=2):
     data = struct.pack(f"<{len(codes)}{form}", *codes)
     data += bytes(-len(data) % 4)
     return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data))
+
+
+def identify_packet(sequence):
+    """The question for a core's identity."""
+    return checked(struct.pack(f"<{HEADER_WORDS}I", KIND_IDENTIFY | 1 << 24, sequence))
+
+
+def tables_packets(sequence, image):
+    """The packets of an image of tables."""
+    empty = -len(image) % WORD_BYTES
+    words = struct.unpack(f"<{(len(image) + empty) // WORD_BYTES}I", image + bytes(empty))
+    return packets(KIND_TABLES, sequence, words, empty)
+
+
+class Result(NamedTuple):
+    """A result of a core: words of forces and status, flags, and the cycle in which the frame's first code entered the core."""
+
+    sequence: int
+    words: list
+    flags: int
+    time: int
 
 
 def exponent_of(forces):
@@ -126,11 +174,11 @@ class Results:
         self.fragments = {}
 
     def add(self, packet):
-        """Takes a packet; `(sequence, words, flags)` once a result is complete, else None. Other and damaged packets are ignored."""
+        """Takes a packet; a `Result` once one is complete, else None. Other and damaged packets are ignored."""
         packet = unchecked(packet)
-        if packet is None or len(packet) < WORD_BYTES * HEADER_WORDS or len(packet) % WORD_BYTES:
+        if packet is None or len(packet) < WORD_BYTES * RESULT_HEADER_WORDS or len(packet) % WORD_BYTES:
             return None
-        head, sequence, *words = struct.unpack(f"<{len(packet) // WORD_BYTES}I", packet)
+        head, sequence, low, high, *words = struct.unpack(f"<{len(packet) // WORD_BYTES}I", packet)
         kind, flags, index, count = head.to_bytes(4, "little")
         if kind not in (KIND_RESULT, KIND_SHORT_RESULT) or index >= count:
             return None
@@ -143,4 +191,15 @@ class Results:
         if len(own) < count:
             return None
         del self.fragments[sequence]
-        return sequence, [word for index in range(count) for word in own[index]], flags & FLAG_CLIPPED
+        whole = [word for index in range(count) for word in own[index]]
+        return Result(sequence, whole, flags & FLAG_CLIPPED, low | high << 32)
+
+
+def answer_of(packet):
+    """What a core answers to a question or to tables: its kind, sequence number, index and words; None for any other packet."""
+    packet = unchecked(packet)
+    if packet is None or len(packet) < WORD_BYTES * HEADER_WORDS or len(packet) % WORD_BYTES:
+        return None
+    head, sequence, *words = struct.unpack(f"<{len(packet) // WORD_BYTES}I", packet)
+    kind, _, index, _ = head.to_bytes(4, "little")
+    return (kind, sequence, index, words) if kind in (KIND_IDENTITY, KIND_TABLES_TAKEN) else None

@@ -3,7 +3,9 @@
 ```text
  UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
         PacketCheck, two frame buffers   a packet at a time, ShortForces before it
-                    └── who asked, by id ──┘
+              │     └── who asked, when, by id ──┘             │
+              └──────────────── Requests ──────────────────────┘
+            who are you; tables, to the core's registers over `bus`
 ```
 """
 
@@ -13,7 +15,8 @@ from operator import and_
 from liteeth.common import eth_udp_user_description
 from liteeth.mac.crc import LiteEthMACCRC32, LiteEthMACCRCEngine
 from litex.gen import Case, Cat, Constant, FSM, If, LiteXModule, Memory, Mux, NextState, NextValue, READ_FIRST, Replicate, Signal
-from litex.soc.interconnect import stream
+from litex.soc.interconnect import packet as packets
+from litex.soc.interconnect import stream, wishbone
 from litex.soc.interconnect.csr import CSRStatus
 
 from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_one_array, require_width
@@ -22,12 +25,19 @@ from dermis_litex.packets import (
     EXPONENT_AT,
     FRAGMENT_WORDS,
     HEADER_WORDS,
+    IDENTITY,
     KIND_FRAME,
+    KIND_IDENTIFY,
+    KIND_IDENTITY,
     KIND_RESULT,
     KIND_SHORT_RESULT,
+    KIND_TABLES,
+    KIND_TABLES_TAKEN,
     LATE,
     MANTISSA_BITS,
+    RESULT_HEADER_WORDS,
     UDP_PORT,
+    VERSION,
     WORD_BYTES,
     code_words,
     fragment_words,
@@ -35,7 +45,8 @@ from dermis_litex.packets import (
 )
 
 SEQUENCE_BITS = 32
-REQUESTER = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS)]
+TIME_BITS = 64
+REQUESTER = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS), ("time", TIME_BITS)]
 BYTE = 8
 # Exponents are 0 to 17.
 EXPONENT_BITS = 5
@@ -55,8 +66,22 @@ def choose(target, index, values):
     return Case(index, {**{key: target.eq(value) for key, value in enumerate(values)}, "default": target.eq(0)})
 
 
+class Cycles(LiteXModule):
+    """The cycles since the reset, in `count`. Its halves are apart, so that no carry is longer than one of them."""
+
+    def __init__(self):
+        self.count = Signal(TIME_BITS)
+
+        # # #
+
+        half = TIME_BITS // 2
+        low, high, wraps = Signal(half), Signal(half), Signal()
+        self.comb += self.count.eq(Cat(low, high))
+        self.sync += [low.eq(low + 1), wraps.eq(low == 2**half - 2), high.eq(high + wraps)]
+
+
 class Requesters(LiteXModule):
-    """Who sent each frame that is under way: address, port and sequence number, by the frame's id."""
+    """Who sent each frame that is under way: address, port and sequence number, and when it entered the core, by the frame's id."""
 
     def __init__(self):
         self.written = stream.Endpoint(REQUESTER)
@@ -185,7 +210,8 @@ class FrameReceiver(LiteXModule):
     A frame leaves only when all its packets have come; the next is collected meanwhile. Codes of 16 bits are those of the
     converter: they are shifted up to the `code_bits` of the engine. Five numbers count packets: `taken`, `ignored` (late, or come
     before), `refused` (another kind, number of fragments or length), `damaged` (`PacketCheck`), `overrun` (two frames wait already),
-    and one frames: `cut` (given up without a packet).
+    and one frames: `cut` (given up without a packet). Questions and tables leave by `others`, which counts with `others_refused`.
+    `time` is given to `requester`.
     """
 
     def __init__(self, taxels, code_bits, code_bytes):
@@ -195,7 +221,11 @@ class FrameReceiver(LiteXModule):
         # What comes from a block RAM comes late in a cycle. Its port is READ_FIRST: of another one the address has the register, and
         # Yosys would take this one into the block RAM.
         self.words = checked = stream.Buffer(check.source.description)
-        self.sink, sink = check.sink, checked.source
+        self.sink = check.sink
+        sink, self.others = [stream.Endpoint(check.source.description) for _ in range(2)]
+        self.others_refused = Signal()
+        self.dispatcher = packets.Dispatcher(checked.source, [sink, self.others])
+        self.time = Signal(TIME_BITS)
         self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
         self.requester = requester = stream.Endpoint(REQUESTER)
         # A whole frame waits until the one before has left.
@@ -206,7 +236,11 @@ class FrameReceiver(LiteXModule):
 
         # # #
 
-        self.comb += check.source.connect(checked.sink)
+        kind = checked.source.data[:BYTE]
+        self.comb += [
+            check.source.connect(checked.sink),
+            self.dispatcher.sel.eq((kind == KIND_IDENTIFY) | (kind == KIND_TABLES)),
+        ]
         depth = 2 ** (words - 1).bit_length()
         memory = Memory(WORD_BITS, 2 * depth)
         write, read = memory.get_port(write_capable=True), memory.get_port(mode=READ_FIRST)
@@ -295,7 +329,9 @@ class FrameReceiver(LiteXModule):
             full.eq(collects & reduce(and_, list(come))),
             self.decides.eq(fsm.ongoing("SEQUENCE") & sink.valid),
         ]
-        self.sync += If(check.damaged, self.counters["damaged"].eq(self.counters["damaged"] + 1))
+        # While a packet is one of the others, none of those above is counted.
+        for name, happens in (("damaged", check.damaged), ("refused", self.others_refused)):
+            self.sync += If(happens, self.counters[name].eq(self.counters[name] + 1))
 
         # The other bank leaves, a code per beat.
         per_word = WORD_BYTES // code_bytes
@@ -325,6 +361,7 @@ class FrameReceiver(LiteXModule):
             requester.ip_address.eq(ip_address),
             requester.port.eq(port),
             requester.sequence.eq(sequence),
+            requester.time.eq(self.time),
         ]
         # The id of the frame that leaves next is that of the requester written.
         self.next_id = Signal(ID_BITS)
@@ -489,7 +526,7 @@ class ResultSender(LiteXModule):
         # # #
 
         layout = eth_udp_user_description(WORD_BITS)
-        self.packets = fifo = PacketQueue(layout, 2 ** (HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS - 1).bit_length())
+        self.packets = fifo = PacketQueue(layout, 2 ** (RESULT_HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS - 1).bit_length())
         self.source = fifo.source
         packet = fifo.sink
         fragment, at = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
@@ -512,7 +549,7 @@ class ResultSender(LiteXModule):
             packet.src_port.eq(udp_port),
             packet.dst_port.eq(to.port),
             packet.ip_address.eq(to.ip_address),
-            packet.length.eq(WORD_BYTES * (HEADER_WORDS + count + CHECK_WORDS)),
+            packet.length.eq(WORD_BYTES * (RESULT_HEADER_WORDS + count + CHECK_WORDS)),
         ]
         self.fsm = fsm = FSM(reset_state="WAIT")
         fsm.act("WAIT", NextValue(fragment, 0), NextValue(at, 0), If(sink.valid, NextState("HEAD")))
@@ -527,8 +564,15 @@ class ResultSender(LiteXModule):
             packet.valid.eq(1),
             packet.data.eq(requesters.read.sequence),
             NextValue(to.payload.raw_bits(), requesters.read.payload.raw_bits()),
-            If(packet.ready, NextState("PAYLOAD")),
+            If(packet.ready, NextState("TIME_LOW")),
         )
+        for state, first, after in (("TIME_LOW", 0, "TIME_HIGH"), ("TIME_HIGH", WORD_BITS, "PAYLOAD")):
+            fsm.act(
+                state,
+                packet.valid.eq(1),
+                packet.data.eq(to.time[first:][:WORD_BITS]),
+                If(packet.ready, NextState(after)),
+            )
         fsm.act(
             "PAYLOAD",
             packet.valid.eq(sink.valid),
@@ -553,10 +597,156 @@ class ResultSender(LiteXModule):
         fsm.act("NEXT", If(sink.valid, NextState("HEAD")))
 
 
+class TablesWriter(LiteXModule):
+    """Bytes of images in, each written into a core's register `tables` once there is room; `last` is the last of an image.
+
+    `register` is that of the core's `registers.json`.
+    """
+
+    def __init__(self, register):
+        self.sink = sink = stream.Endpoint([("data", BYTE)])
+        self.bus = bus = wishbone.Interface(data_width=WORD_BITS, address_width=8, addressing="word")
+
+        # # #
+
+        places = {field["name"]: field["low"] for field in register["fields"]}
+        last = Signal(places["last"] + 1)
+        self.fsm = fsm = FSM(reset_state="ROOM")
+        self.comb += [
+            last.eq(sink.last << places["last"]),
+            bus.adr.eq(register["address"] // WORD_BYTES),
+            bus.sel.eq(2**WORD_BYTES - 1),
+            bus.dat_w.eq(sink.data << places["octet"] | last),
+            bus.cyc.eq(bus.stb),
+        ]
+        fsm.act("ROOM", bus.stb.eq(sink.valid), If(bus.ack & ~bus.dat_r[places["waiting"]], NextState("WRITE")))
+        fsm.act("WRITE", bus.stb.eq(1), bus.we.eq(1), If(bus.ack, sink.ready.eq(1)), If(bus.ack | bus.err, NextState("ROOM")))
+
+
+class Requests(LiteXModule):
+    """Questions for the identity and images of tables in; their answers out, each a packet without a pause.
+
+    `identity` has what answers each name of `IDENTITY`, but the time. `tables` is the `sink` of a `TablesWriter`; None for a core
+    whose tables are not written. `refused`: a packet is not answered.
+    """
+
+    def __init__(self, identity, time, udp_port, tables=None):
+        layout = eth_udp_user_description(WORD_BITS)
+        self.sink = sink = stream.Endpoint(layout)
+        self.source = source = stream.Endpoint(layout)
+        self.refused = Signal()
+
+        # # #
+
+        head, sequence, asked = Signal(WORD_BITS), Signal(SEQUENCE_BITS), Signal(TIME_BITS)
+        ip_address, port = Signal(32), Signal(16)
+        is_question = Signal()
+        at, words, content = Signal(max=len(IDENTITY) + 1), Signal(max=len(IDENTITY) + 1), Signal(WORD_BITS)
+        identity = {**identity, "time_low": asked[:WORD_BITS], "time_high": asked[WORD_BITS:]}
+        self.crc = crc = CRC32()
+        self.comb += [
+            is_question.eq(head[:BYTE] == KIND_IDENTIFY),
+            words.eq(Mux(is_question, len(IDENTITY), 0)),
+            choose(content, at, [identity[name] for name in IDENTITY]),
+            crc.data.eq(source.data),
+            crc.ce.eq(source.valid & source.ready),
+            crc.last.eq(source.last),
+            source.src_port.eq(udp_port),
+            source.dst_port.eq(port),
+            source.ip_address.eq(ip_address),
+            source.length.eq(WORD_BYTES * (HEADER_WORDS + words + CHECK_WORDS)),
+        ]
+        refuse = [self.refused.eq(1), If(sink.last, NextState("HEAD")).Else(NextState("SKIP"))]
+        self.fsm = fsm = FSM(reset_state="HEAD")
+        fsm.act("HEAD", sink.ready.eq(1), NextValue(head, sink.data), If(sink.valid, NextState("SEQUENCE"), If(sink.last, *refuse)))
+        takes_tables = self.take_tables(tables, head, sequence) if tables else refuse
+        fsm.act(
+            "SEQUENCE",
+            sink.ready.eq(1),
+            NextValue(sequence, sink.data),
+            NextValue(ip_address, sink.ip_address),
+            NextValue(port, sink.src_port),
+            NextValue(asked, time),
+            NextValue(at, 0),
+            If(
+                sink.valid,
+                If(is_question != sink.last, *refuse).Elif(is_question, NextState("ANSWER")).Else(*takes_tables),
+            ),
+        )
+        fsm.act("SKIP", sink.ready.eq(1), If(sink.valid & sink.last, NextState("HEAD")))
+        fsm.act("AGAIN", sink.ready.eq(1), If(sink.valid & sink.last, NextState("ANSWER")))
+        kind = Mux(is_question, Constant(KIND_IDENTITY, BYTE), Constant(KIND_TABLES_TAKEN, BYTE))
+        answer = {
+            "ANSWER": (Cat(kind, Constant(0, BYTE), head[16:]), NextState("ANSWER_SEQUENCE")),
+            "ANSWER_SEQUENCE": (sequence, If(is_question, NextState("ANSWER_WORDS")).Else(NextState("ANSWER_CHECK"))),
+            "ANSWER_WORDS": (content, [NextValue(at, at + 1), If(at + 1 == words, NextState("ANSWER_CHECK"))]),
+            "ANSWER_CHECK": (crc.value, NextState("HEAD")),
+        }
+        for state, (data, after) in answer.items():
+            ends = state == "ANSWER_CHECK"
+            last = [source.last.eq(ends), source.last_be.eq(ends << (WORD_BYTES - 1))]
+            fsm.act(state, source.valid.eq(1), source.data.eq(data), *last, If(source.ready, after))
+
+    def take_tables(self, tables, head, sequence):
+        """What becomes of a packet of tables with this head and, in this cycle, sequence number.
+
+        A fragment is the next of its image, or the one before once more, whose answer was lost, or the first of another image.
+        """
+        sink = self.sink
+        empty, index, count = head[BYTE:][:2], head[16:24], head[24:]
+        image, taken, has_image, is_open = Signal(SEQUENCE_BITS), Signal(BYTE), Signal(), Signal()
+        octet, is_last_word, ends = Signal(max=WORD_BYTES), Signal(), Signal()
+        self.comb += [
+            is_last_word.eq(sink.last & (index + 1 == count)),
+            ends.eq(octet == WORD_BYTES - 1 - Mux(is_last_word, empty, 0)),
+        ]
+        self.fsm.act(
+            "TABLES",
+            tables.valid.eq(sink.valid),
+            choose(tables.data, octet, [sink.data[BYTE * at :][:BYTE] for at in range(WORD_BYTES)]),
+            tables.last.eq(is_last_word & ends),
+            If(
+                tables.valid & tables.ready,
+                NextValue(is_open, ~tables.last),
+                NextValue(octet, octet + 1),
+                If(
+                    ends,
+                    sink.ready.eq(1),
+                    NextValue(octet, 0),
+                    If(sink.last, NextValue(taken, taken + 1), NextState("ANSWER")),
+                ),
+            ),
+        )
+        # An image that was given up ends, so that the core refuses it.
+        self.fsm.act(
+            "CLOSE",
+            tables.valid.eq(1),
+            tables.last.eq(1),
+            If(tables.ready, NextValue(is_open, 0), NextState("TABLES")),
+        )
+        is_same = has_image & (image == sink.data)
+        begins = [
+            NextValue(image, sink.data),
+            NextValue(has_image, 1),
+            NextValue(taken, 0),
+            If(is_open, NextState("CLOSE")).Else(NextState("TABLES")),
+        ]
+        refuse = [self.refused.eq(1), NextState("SKIP")]
+        return [
+            If(index >= count, *refuse)
+            .Elif(is_same & (index == taken), NextState("TABLES"))
+            .Elif(is_same & (index + 1 == taken), NextState("AGAIN"))
+            .Elif(~is_same & (index == 0), *begins)
+            .Else(*refuse)
+        ]
+
+
 class DermisUDP(LiteXModule):
     """A core between the two directions of a UDP port of LiteEth with words of 32 bits.
 
     Codes in packets have 2 or 4 bytes, forces 32 bits, or 16 with an exponent per packet. The counters of `FrameReceiver` are CSRs.
+    `bus` is a master for the registers of a core whose tables are written, else None; without a processor it is connected to
+    `core.bus`.
 
     Raises `CoreError` for what the core has not, with field, value and what would be right.
     """
@@ -566,6 +756,7 @@ class DermisUDP(LiteXModule):
         require_one_array(core)
         require_choice("code_bytes", code_bytes, (2, 4))
         require_choice("force_bits", force_bits, (MANTISSA_BITS, WORD_BITS))
+        self.cycles = Cycles()
         self.requesters = Requesters()
         self.receiver = FrameReceiver(core.taxels, core.code_bits, code_bytes)
         if force_bits == MANTISSA_BITS:
@@ -575,10 +766,22 @@ class DermisUDP(LiteXModule):
         else:
             counts = fragment_words(core.words)
         self.sender = ResultSender(counts, self.requesters, udp_port)
+        identity = {
+            "version": VERSION,
+            **{name: core.constants[name] for name in ("scene", "array", "clock_Hz", "force_triples", "status_triples")},
+            "code_bytes": code_bytes,
+            "force_bits": force_bits,
+            "writable_tables": core.writable_tables,
+            **self.receiver.counters,
+        }
+        self.writer = TablesWriter(core.tables_register) if core.writable_tables else None
+        self.bus = self.writer and self.writer.bus
+        self.requests = Requests(identity, self.cycles.count, udp_port, self.writer and self.writer.sink)
         # The longest paths of LiteEth and of block RAMs end here.
         self.arriving = stream.Buffer(self.receiver.sink.description)
         self.codes = stream.Buffer(self.receiver.source.description)
         self.leaving = stream.Buffer(self.sender.source.description, pipe_ready=True)
+        self.arbiter = packets.Arbiter([self.sender.source, self.requests.source], self.leaving.sink)
 
         # # #
 
@@ -599,7 +802,9 @@ class DermisUDP(LiteXModule):
             self.codes.source.connect(core.sink),
             self.receiver.requester.connect(self.requesters.written, omit={"ready"}),
             self.requesters.write_id.eq(self.receiver.next_id),
-            self.sender.source.connect(self.leaving.sink),
+            self.receiver.time.eq(self.cycles.count),
+            self.receiver.others.connect(self.requests.sink),
+            self.receiver.others_refused.eq(self.requests.refused),
             self.leaving.source.connect(port.sink),
         ]
         for name, counter in self.receiver.counters.items():
