@@ -22,7 +22,7 @@ pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT
 pub use error::LinkError;
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{image_bytes, payloads, scene_hash, supports};
+pub use identity::{image_bytes, payloads, require_one_answer, scene_hash, supports};
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 

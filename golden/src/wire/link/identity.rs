@@ -27,16 +27,7 @@ impl Identity {
     pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
         let (sensor, board) = (&plan.scene.sensor, &plan.board);
         let scene = &plan.scene;
-        let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
-        if scene.input.longest_average() > 0 {
-            return refuse("input.average", scene.input.longest_average().to_string());
-        }
-        if scene.input.running_zero().is_some() {
-            return refuse("input.zero", "running".to_string());
-        }
-        if plan.chooses() {
-            return refuse("partition.case", scene.partition.case.to_string());
-        }
+        require_one_answer(plan)?;
         let payloads = payloads(plan).into_iter().chain(image_bytes(plan).map(|bytes| ("tables", bytes)));
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
             return Err(LinkError::TooLong { scene: plan.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
@@ -58,6 +49,11 @@ impl Identity {
         })
     }
 
+    /// The same with all requests left out but those to which `supports` says yes.
+    pub fn with_requests(self, supports: impl Fn(Kind) -> bool) -> Identity {
+        Identity { left_out: REQUESTS.into_iter().filter(|&kind| !supports(kind)).map(bit).sum(), ..self }
+    }
+
     /// Whether the board scans its array.
     pub fn scans(&self) -> bool {
         self.left_out & SCANS != 0
@@ -67,6 +63,25 @@ impl Identity {
     pub fn supports(&self, kind: Kind) -> bool {
         self.left_out & bit(kind) == 0
     }
+}
+
+/// Refuses a plan of which a request that is repeated would count twice, or has another number of beats than the one before.
+///
+/// # Errors
+/// [`LinkError::Unsupported`]: the scene averages, its zero runs, or it chooses its case per frame.
+pub fn require_one_answer(plan: &Plan) -> Result<(), LinkError> {
+    let scene = &plan.scene;
+    let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
+    if scene.input.longest_average() > 0 {
+        return refuse("input.average", scene.input.longest_average().to_string());
+    }
+    if scene.input.running_zero().is_some() {
+        return refuse("input.zero", "running".to_string());
+    }
+    if plan.chooses() {
+        return refuse("partition.case", scene.partition.case.to_string());
+    }
+    Ok(())
 }
 
 /// Whether a board of this plan answers requests of this type. The serial engine has no resultants: logic cells are few, so
