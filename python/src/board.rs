@@ -6,8 +6,7 @@ use std::time::Duration;
 use dermis_golden::data::frame::Frame as Stress;
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
-use dermis_golden::spec::link_kind::LinkKind;
-use dermis_sim::link::{open, require_uart, HostError, Session};
+use dermis_sim::link::{open_board, HostError, Session};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
@@ -24,17 +23,15 @@ pyo3::create_exception!(
     "A board cannot be used: a port that fails, no answer, a board that was built for another scene."
 );
 
-/// The session with the board behind a port.
-type Port = Session<Box<dyn serialport::SerialPort>>;
-
-/// A board behind a serial port, which reconstructs with a scene's hardware.
+/// A board behind a serial port, or a core behind Ethernet, which reconstructs with a scene's hardware.
 ///
 /// The port belongs to it until it is closed, at the end of a `with` block or with its last reference.
 ///
 /// Parameters
 /// ----------
 /// port : str
-///     Path of the port, such as "/dev/ttyUSB0", or of the pseudo-terminal of `dermis board`.
+///     Path of the port, such as "/dev/ttyUSB0", or of the pseudo-terminal of `dermis board`; or "udp:192.168.1.50", the address of
+///     a core behind Ethernet, whose results have the time at which the core had the frame in time_ns, if the frame has none.
 /// scene : Scene
 ///     The scene for which the board was built.
 /// baud : int, optional
@@ -58,7 +55,7 @@ type Port = Session<Box<dyn serialport::SerialPort>>;
 #[pyclass(frozen, module = "dermis")]
 pub struct Board {
     /// `None` once it is closed.
-    session: Mutex<Option<(Port, StreamChecks)>>,
+    session: Mutex<Option<(Session, StreamChecks)>>,
     scene: Py<Scene>,
 }
 
@@ -91,7 +88,8 @@ impl Board {
             let result = answer.decode(&session.model, &readings).map_err(fixed)?;
             let mut result = result.ok_or_else(|| PyRuntimeError::new_err("the answer has no forces"))?;
             checks.add(std::slice::from_ref(&readings), result.resultant_N, &mut result.diagnostics());
-            Ok(Reconstruction::new(Arc::new(result), frame.time_ns, &scene.spec().sensor))
+            let time_ns = frame.time_ns.or(answer.acquired.map(|acquired| acquired.time_ns));
+            Ok(Reconstruction::new(Arc::new(result), time_ns, &scene.spec().sensor))
         })
     }
 }
@@ -118,12 +116,10 @@ impl Board {
             tare.0.check(spec).map_err(input)?;
         }
         let session = py.detach(|| {
-            require_uart(spec, "host").map_err(input)?;
             let model = Model::new(spec).map_err(fixed)?;
-            let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok).map_err(input)?;
-            let client = open(port, baud, timeout).map_err(|error| failure(error.into()))?;
+            let board = open_board(port, &model, baud, timeout, "host").map_err(failure)?;
             let checks = StreamChecks::new(&model, cross_check.map_or(CheckPace::Beside, CheckPace::Every));
-            let session = Session::new(client, model, None, tare.map(|tare| tare.0.as_ref()), true, check);
+            let session = Session::new(board, model, None, tare.map(|tare| tare.0.as_ref()), true, check);
             Ok::<_, PyErr>((session.map_err(failure)?, checks))
         })?;
         Ok(Board { session: Mutex::new(Some(session)), scene })
@@ -167,7 +163,7 @@ impl Board {
     fn link_errors(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
         py.detach(|| {
             let session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
-            let errors = session.as_ref().ok_or_else(closed)?.0.client.link_errors;
+            let errors = session.as_ref().ok_or_else(closed)?.0.board.link_errors();
             Ok((errors.repeated, errors.damaged))
         })
     }

@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{anyhow, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::cache;
@@ -23,7 +23,7 @@ use crate::cosim::hardware::{DeviceTimeout, Hardware};
 use crate::cosim::verilator::VerilatorError;
 use crate::flow::tools::ToolError;
 use crate::jobs::Interrupted;
-use crate::link::{HostError, IdentityError, PseudoTerminal};
+use crate::link::{HostError, IdentityError, NetworkCore, PseudoTerminal};
 use crate::output::write;
 use crate::report;
 
@@ -85,12 +85,16 @@ enum Command {
     Calibrate(super::calibrate::Arguments),
     /// Send frames to a board and receive forces.
     Host(super::host::Arguments),
-    /// Simulate a board on a pseudo-terminal, to run `dermis host` without hardware.
-    #[command(after_help = "Example:
-  dermis board eight-by-eight       prints the port for `dermis host --port`, and runs until interrupted")]
+    /// Simulate a board on a pseudo-terminal, or a core behind Ethernet, to run `dermis host` without hardware.
+    #[command(after_help = "Examples:
+  dermis board eight-by-eight                         prints the port for `dermis host --port`, and runs until interrupted
+  dermis board eight-by-eight --udp 127.0.0.1:56850   a core behind Ethernet, in software: the bit-true model answers")]
     Board {
         /// Built-in name or path of a scene.
         scene: String,
+        /// Answer the UDP packets of a core behind Ethernet at this address, in place of a simulated board; port 0 takes a free one.
+        #[arg(long, value_name = "ADDRESS:PORT")]
+        udp: Option<std::net::SocketAddr>,
         #[command(flatten)]
         target: BoardOverride,
     },
@@ -237,7 +241,16 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Block(arguments) => Ok((super::block::run(arguments, build_dir)?, true)),
         Command::Boards(arguments) => Ok((super::boards::run(arguments)?, true)),
         Command::Host(arguments) => super::host::run(arguments),
-        Command::Board { scene, target } => {
+        Command::Board { scene, udp: Some(address), target } => {
+            let scene = target.apply(Scene::load(scene)?);
+            let core = NetworkCore::start(Model::new(&scene)?, &address.to_string())
+                .map_err(|error| anyhow!("--udp {address}: {error}"))?;
+            print(&format!("udp:{}\n", core.address()))?;
+            say!("{}: the bit-true model answers, with the clock of the hardware", scene.name);
+            core.wait()?;
+            Ok((String::new(), true))
+        }
+        Command::Board { scene, udp: None, target } => {
             let scene = target.apply(Scene::load(scene)?);
             let terminal = PseudoTerminal::of(&Hardware::new(Model::new(&scene)?, build_dir)?)?;
             print(&format!("{}\n", terminal.path().display()))?;
@@ -295,7 +308,6 @@ fn print(text: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use anyhow::anyhow;
     use dermis_golden::spec::board::Board;
     use std::io::ErrorKind;
 

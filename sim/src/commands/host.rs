@@ -1,7 +1,6 @@
 //! `dermis host`: sends frames to a board over a serial port and reads back forces.
 
 use std::fs;
-use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -13,7 +12,7 @@ use dermis_golden::engine::CrossCheck;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Diagnostics;
 use dermis_golden::spec::scene::Scene;
-use dermis_golden::wire::link::{Counters, Identity, Kind};
+use dermis_golden::wire::link::{Identity, Kind};
 use dermis_golden::write::write;
 
 use super::inputs::{frames_of, resolve, BoardOverride};
@@ -32,9 +31,12 @@ pub struct Arguments {
     frames: Vec<String>,
     #[command(flatten)]
     layout: LayoutArguments,
-    /// Serial port of the board.
-    #[arg(long, value_name = "PATH")]
-    port: String,
+    /// Serial port of the board, or udp:HOST or udp:HOST:PORT of a core behind Ethernet.
+    #[arg(long, value_name = "PATH|udp:HOST", required_unless_present = "udp")]
+    port: Option<String>,
+    /// Address of a core behind Ethernet, as --port udp:HOST.
+    #[arg(long, value_name = "HOST[:PORT]", conflicts_with_all = ["port", "baud", "scans", "save"])]
+    udp: Option<String>,
     /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
     #[arg(long, required_if_eq("stream", "true"))]
     scene: Option<String>,
@@ -79,6 +81,7 @@ const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB0 --scene sensor-1            all shipped frames, resultants
   dermis host --port /dev/ttyUSB0 --forces --check press.json
   dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
+  dermis host --udp 192.168.1.50 --scene sensor-1 --check                 a core behind Ethernet
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
   dermis host --port /dev/ttyUSB0 --scene hand.toml --tables left-hand.toml press.json
   dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 10 --save readings     a board that scans its array
@@ -111,14 +114,18 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let specimen = specimen.map(|specimen| model.with_tables(&specimen, version)).transpose()?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
-    let simulated = is_pseudo_terminal(&arguments.port);
+    let port = match &arguments.udp {
+        Some(address) => format!("udp:{address}"),
+        None => arguments.port.clone().unwrap_or_default(),
+    };
+    let simulated = is_pseudo_terminal(&port);
     if simulated && arguments.baud.is_some() {
-        say!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
+        say!("{port}: a pseudo-terminal has no bit rate: --baud has no effect");
     }
     let timeout = Duration::from_millis(arguments.timeout);
-    let client = open_board(&arguments.port, &model, arguments.baud, timeout, "host")?;
-    let mut session = Session::new(client, model, specimen, tare.as_ref(), arguments.forces, arguments.check)?;
-    let before = session.client.counters()?;
+    let board = open_board(&port, &model, arguments.baud, timeout, "host")?;
+    let mut session = Session::new(board, model, specimen, tare.as_ref(), arguments.forces, arguments.check)?;
+    let before = session.board.counters()?;
     let begun = Instant::now();
     let ids = (1..=arguments.scans.unwrap_or(1)).map(|number| format!("scan-{number}"));
     let sent = match (arguments.stream, scans) {
@@ -138,9 +145,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
     };
     let rate = sent.answered as f64 / begun.elapsed().as_secs_f64();
-    let after = session.client.counters()?;
+    let after = session.board.counters()?;
     let rate = Rate { rate, simulated };
-    let summary = summary(&session.identity, sent.answered, &rate, session.client.link_errors, &before, &after);
+    let errors = session.board.link_errors();
+    let summary = summary(&session.identity, sent.answered, &rate, errors, &after.since(&before));
     if arguments.stream {
         say!("{}", summary.trim_end());
     }
@@ -179,7 +187,7 @@ fn refuse(arguments: &Arguments, scene: Option<&Scene>, scans: bool) -> Result<(
 }
 
 /// Asks for a scan and saves its readings.
-fn scanned<P: Read + Write>(session: &mut Session<P>, id: &str, save: Option<&Path>) -> Result<(Frame, Answer)> {
+fn scanned(session: &mut Session, id: &str, save: Option<&Path>) -> Result<(Frame, Answer)> {
     let (readings, answer) = session.scan(id)?;
     if let Some(folder) = save {
         write(&folder.join(format!("{id}.json")), readings.to_json().as_bytes())?;
@@ -188,10 +196,10 @@ fn scanned<P: Read + Write>(session: &mut Session<P>, id: &str, save: Option<&Pa
 }
 
 /// Asks for one result after the other.
-fn send<P: Read + Write, R>(
-    session: &mut Session<P>,
+fn send<R>(
+    session: &mut Session,
     requests: &[R],
-    mut ask: impl FnMut(&mut Session<P>, &R) -> Result<(Frame, Answer)>,
+    mut ask: impl FnMut(&mut Session, &R) -> Result<(Frame, Answer)>,
 ) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), requests.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
@@ -242,15 +250,14 @@ fn summary(
     count: usize,
     rate: &Rate,
     errors: LinkErrors,
-    before: &Counters,
-    after: &Counters,
+    dropped: &[(&'static str, u32)],
 ) -> String {
-    let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
+    let dropped: Vec<String> = dropped.iter().map(|(name, count)| format!("{count} {name}")).collect();
     format!(
         "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}{}\n\
          frames          {count}, {rate}\n\
          host            {} requests sent again, {} answers damaged\n\
-         board dropped   {} framing, {} CRC, {} unknown type, {} length, {} overrun\n",
+         board dropped   {}\n",
         identity.rows,
         identity.cols,
         identity.input_bits,
@@ -259,10 +266,6 @@ fn summary(
         if identity.supports(Kind::FrameForResultants) { "" } else { ", sends forces, which the host sums" },
         errors.repeated,
         errors.damaged,
-        since(|c| c.framing),
-        since(|c| c.crc),
-        since(|c| c.unknown_type),
-        since(|c| c.length),
-        since(|c| c.overrun),
+        dropped.join(", "),
     )
 }

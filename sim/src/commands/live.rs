@@ -59,8 +59,9 @@ pub struct Arguments {
     /// Model that computes the forces.
     #[arg(long, value_parser = software_engine(), default_value = "golden", conflicts_with = "board")]
     engine: EngineName,
-    /// Serial port of a board that computes the forces in place of a model, at the bit rate of the scene's board.
-    #[arg(long, value_name = "PATH")]
+    /// Serial port of a board that computes the forces in place of a model, at the bit rate of the scene's board; or udp:HOST or
+    /// udp:HOST:PORT of a core behind Ethernet.
+    #[arg(long, value_name = "PATH|udp:HOST")]
     board: Option<String>,
     /// Standard deviation of the noise on the finger's frames over the largest |b|.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0005, conflicts_with_all = ["stream", "recording"])]
@@ -109,8 +110,8 @@ impl Arguments {
         let Some(port) = &self.board else { return stream_engine(scene, self.engine) };
         note_hardware(scene)?;
         let model = Model::new(scene)?;
-        let client = open_board(port, &model, None, BOARD_TIMEOUT, "live --board")?;
-        Ok(Box::new(BoardEngine::new(Session::new(client, model, None, None, true, false)?)))
+        let board = open_board(port, &model, None, BOARD_TIMEOUT, "live --board")?;
+        Ok(Box::new(BoardEngine::new(Session::new(board, model, None, None, true, false)?)))
     }
 }
 

@@ -37,8 +37,8 @@ pub struct Arguments {
     /// File to write [default: <build-dir>/<specimen>/tables.bin].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Serial port of a board, which is to hold the tables.
-    #[arg(long, value_name = "PATH")]
+    /// Serial port of a board, which is to hold the tables, or udp:HOST or udp:HOST:PORT of a core behind Ethernet.
+    #[arg(long, value_name = "PATH|udp:HOST")]
     port: Option<String>,
     /// Bit rate of the port; default: that of the hardware's board.
     #[arg(long, value_name = "BIT/S", requires = "port")]
@@ -71,8 +71,8 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
     write(&path, &image)?;
     let report = LoadReport::new(&model, &image, &path, port.as_deref());
     if let Some(port) = port {
-        let client = open_board(port, &hardware, *baud, TIMEOUT, "load --port")?;
-        Session::new(client, hardware, Some(model), None, false, false)?;
+        let board = open_board(port, &hardware, *baud, TIMEOUT, "load --port")?;
+        Session::new(board, hardware, Some(model), None, false, false)?;
     }
     Ok(if *json { serde_json::to_string(&report)? + "\n" } else { report::load(&report) })
 }

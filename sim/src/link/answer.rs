@@ -11,7 +11,10 @@ use dermis_golden::result::checks::Checks;
 use dermis_golden::result::flags::{frame_flags, Feature, Flag, FlagSet};
 use dermis_golden::result::reconstruct::{Diagnostics, FoundContact, MissingTaxel, Reconstruction, SuspectTaxel};
 use dermis_golden::wire::link::{beats_of_bytes, Sums, BEAT_BYTES};
+use dermis_golden::wire::udp::shortened;
 use serde::Serialize;
+
+use super::core_clock::Acquired;
 
 /// A board's answer to a frame, in LSBs.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +33,10 @@ pub struct Answer {
     pub difference: Option<Option<String>>,
     /// Time at which the answer was complete.
     pub received_at: SystemTime,
+    /// When the frame entered the core, of one that says it.
+    pub acquired: Option<Acquired>,
+    /// Whether the forces are mantissas of 16 bits, which are rounded.
+    pub short_forces: bool,
 }
 
 impl Answer {
@@ -50,7 +57,8 @@ impl Answer {
             Some(forces) => Some(Sums::of(forces, sensor.cols)),
             None => Some(Sums::of_bytes(front)?),
         };
-        Some(Answer { sums, forces, labels, status, codes, difference: None, received_at: SystemTime::now() })
+        let (difference, received_at) = (None, SystemTime::now());
+        Some(Answer { sums, forces, labels, status, codes, difference, received_at, acquired: None, short_forces: false })
     }
 
     /// The first difference from the bit-true model's result for `codes`, `None` if equal. What the model does not see is
@@ -59,6 +67,8 @@ impl Answer {
         let trace = model.run(codes);
         let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
         let (forces, labels) = trace.beats.split_at(model.force_triples());
+        let short = self.short_forces.then(|| beats_of(&shortened(forces.as_flattened())));
+        let forces = short.as_deref().unwrap_or(forces);
         let pairs = self.forces.iter().flatten().zip(forces).enumerate();
         let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
         if let Some((index, (got, expected))) = differing.next() {
@@ -141,6 +151,11 @@ impl Answer {
         let of_others = of_frame.into_iter().chain(checks.flags(&model.scene)).collect::<FlagSet>();
         Ok((model.status_flags(&statuses, of_taxels) | of_others).iter().collect())
     }
+}
+
+/// Beats of numbers, three to each.
+fn beats_of(numbers: &[i32]) -> Vec<[i32; 3]> {
+    numbers.as_chunks().0.to_vec()
 }
 
 /// An answer in physical units; an output line of `--stream`.
@@ -244,7 +259,9 @@ mod tests {
         let sums = Some(Sums::of(&trace.beats, model.scene.sensor.cols));
         let status = Status::all(&trace.status).flat_map(changed).collect();
         let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
-        let answer = Answer { sums, forces: None, labels, status, codes, difference: None, received_at };
+        let (forces, difference, acquired) = (None, None, None);
+        let answer =
+            Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces: false };
         let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
         [answer, whole].map(|answer| PhysicalAnswer::new(model, frame, &answer).unwrap())
     }
@@ -295,6 +312,8 @@ mod tests {
             codes: Vec::new(),
             difference: None,
             received_at: SystemTime::UNIX_EPOCH,
+            acquired: None,
+            short_forces: false,
         };
         assert_eq!(answer(trace.status.clone()).compare_with_model(&model, &codes), None);
         for field in status_fields() {

@@ -7,19 +7,11 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
 
 use super::answer::Answer;
+use super::board::{Board, LinkErrors, PacketCounters};
 use super::error::{HostError, IdentityError};
 
 /// Number of times a request is sent before it fails.
-const ATTEMPTS: u32 = 8;
-
-/// Transmission errors that were corrected by repetition.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LinkErrors {
-    /// Number of requests sent again.
-    pub repeated: u64,
-    /// Number of answers, or fragments of them, that failed their check.
-    pub damaged: u64,
-}
+pub(super) const ATTEMPTS: u32 = 8;
 
 /// A board behind a port. Reads of the port must time out after a few milliseconds.
 pub struct Client<P> {
@@ -28,8 +20,7 @@ pub struct Client<P> {
     timeout: Duration,
     decoder: Decoder,
     sequence: u8,
-    /// Transmission errors so far.
-    pub link_errors: LinkErrors,
+    link_errors: LinkErrors,
 }
 
 impl<P: Read + Write> Client<P> {
@@ -37,50 +28,6 @@ impl<P: Read + Write> Client<P> {
     pub fn new(port: P, name: &str, timeout: Duration) -> Self {
         let (decoder, link_errors) = (Decoder::default(), LinkErrors::default());
         Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, link_errors }
-    }
-
-    /// Reads the board's identification and checks that it was built for `model`.
-    ///
-    /// # Errors
-    /// No answer, another version, another scene.
-    pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
-        let bytes = self.request(Kind::Identify, Vec::new())?;
-        check_identity(model, &bytes).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })
-    }
-
-    /// Reads the board's packet counters.
-    ///
-    /// # Errors
-    /// No answer.
-    pub fn counters(&mut self) -> Result<Counters, HostError> {
-        let bytes = self.request(Kind::ReadCounters, Vec::new())?;
-        let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
-        Counters::of_bytes(&bytes).ok_or(wrong)
-    }
-
-    /// Sends a frame and waits for its forces or resultants; to a board that scans its array, a request without `codes`.
-    ///
-    /// # Errors
-    /// No answer.
-    pub fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
-        let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
-        let bytes = self.request(kind, codes_to_bytes(codes, model.formats().code_bits))?;
-        let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
-        Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
-    }
-
-    /// Writes the tables of `model` into the board, `forces` being what it answers a frame with, and asks with a frame of zeros,
-    /// or of the next scan, whether they are whole.
-    ///
-    /// # Errors
-    /// No answer; other tables than those of `model` afterwards.
-    pub fn load(&mut self, model: &Model, forces: bool) -> Result<(), HostError> {
-        self.request(Kind::Tables, model.image())?;
-        let codes = if model.code_beats() > 0 { 0 } else { model.scene.sensor.taxels() };
-        let answer = self.frame(model, &vec![0; codes], forces)?;
-        let wants = model.tables_version;
-        let has = answer.tables().find(|tables| *tables != wants.to_string());
-        has.map_or(Ok(()), |has| Err(HostError::Tables { port: self.name.clone(), has, wants }))
     }
 
     /// Sends a request, repeatedly if necessary, until it is answered.
@@ -161,6 +108,41 @@ impl<P: Read + Write> Client<P> {
     }
 }
 
+impl<P: Read + Write> Board for Client<P> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
+        let bytes = self.request(Kind::Identify, Vec::new())?;
+        check_identity(model, &bytes).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })
+    }
+
+    fn counters(&mut self) -> Result<PacketCounters, HostError> {
+        let bytes = self.request(Kind::ReadCounters, Vec::new())?;
+        let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
+        let Counters { taken, framing, crc, unknown_type, length, overrun } = Counters::of_bytes(&bytes).ok_or(wrong)?;
+        let named = [("framing", framing), ("CRC", crc), ("unknown type", unknown_type), ("length", length), ("overrun", overrun)];
+        let dropped = named.map(|(name, count)| (name, count.into())).to_vec();
+        Ok(PacketCounters { taken: taken.into(), dropped, bits: u16::BITS })
+    }
+
+    fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
+        let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
+        let bytes = self.request(kind, codes_to_bytes(codes, model.formats().code_bits))?;
+        let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
+        Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
+    }
+
+    fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
+        self.request(Kind::Tables, image.to_vec()).map(drop)
+    }
+
+    fn link_errors(&self) -> LinkErrors {
+        self.link_errors
+    }
+}
+
 /// Whether a port only has nothing to read, or no room, yet.
 fn waits(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
@@ -182,12 +164,9 @@ pub fn check_identity(model: &Model, bytes: &[u8]) -> Result<Identity, IdentityE
     if has.scene == wants {
         return Ok(has);
     }
-    let describe = |rows: usize, cols: usize, bits: u32, hash: u32| {
-        format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
-    };
     Err(IdentityError::OtherScene {
-        has: describe(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
+        has: IdentityError::scene(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
         scene: model.scene.name.clone(),
-        wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
+        wants: IdentityError::scene(sensor.rows, sensor.cols, model.formats().code_bits, wants),
     })
 }

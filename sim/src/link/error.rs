@@ -28,6 +28,21 @@ pub enum HostError {
         /// Timeout of each attempt in ms.
         milliseconds: u128,
     },
+    /// No valid answer of a core behind Ethernet after several attempts.
+    #[error(
+        "{port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a Dermis core, \
+         configured, at this address?"
+    )]
+    NoCore {
+        /// The address.
+        port: String,
+        /// The request.
+        what: &'static str,
+        /// Number of attempts.
+        attempts: u32,
+        /// Timeout of each attempt in ms.
+        milliseconds: u128,
+    },
     /// The board is another one.
     #[error("port {port}: {reason}")]
     Identity {
@@ -85,4 +100,11 @@ pub enum IdentityError {
         /// Its length in bytes.
         bytes: usize,
     },
+}
+
+impl IdentityError {
+    /// The description of a scene.
+    pub(super) fn scene(rows: usize, cols: usize, bits: u32, hash: u32) -> String {
+        format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
+    }
 }

@@ -13,21 +13,21 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::wire::link::{Identity, Kind};
-use serialport::SerialPort;
-
 use super::answer::Answer;
+use super::board::{load, Board};
 use super::client::Client;
 use super::error::HostError;
 use super::host_uart::require_uart;
+use super::network::NetworkClient;
 use crate::device_error::device_error;
 
 /// Longest wait of a read of the port for a byte.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
 
 /// A connection to an identified board, with the model of its scene.
-pub struct Session<P> {
+pub struct Session {
     /// The board.
-    pub client: Client<P>,
+    pub board: Box<dyn Board + Send>,
     /// The bit-true model.
     pub model: Model,
     /// The board's identification.
@@ -38,27 +38,27 @@ pub struct Session<P> {
     check: bool,
 }
 
-impl<P: std::io::Read + std::io::Write> Session<P> {
+impl Session {
     /// Identifies the board and checks that it was built for `hardware`. With `specimen`, the model of that hardware with other
     /// tables, writes these into the board.
     ///
     /// # Errors
     /// No answer, another packet version, another scene, tables that are not whole afterwards.
     pub fn new(
-        mut client: Client<P>,
+        mut board: Box<dyn Board + Send>,
         hardware: Model,
         specimen: Option<Model>,
         tare: Option<&Frame>,
         forces: bool,
         check: bool,
     ) -> Result<Self> {
-        let identity = client.identify(&hardware)?;
+        let identity = board.identify(&hardware)?;
         if let Some(specimen) = &specimen {
-            client.load(specimen, !identity.supports(Kind::FrameForResultants))?;
+            load(board.as_mut(), specimen, !identity.supports(Kind::FrameForResultants))?;
         }
         let model = specimen.unwrap_or(hardware);
         let offset = tare.map(|tare| offset(&model.scene, model.input(), tare)).transpose()?;
-        Ok(Session { client, model, identity, offset, forces, check })
+        Ok(Session { board, model, identity, offset, forces, check })
     }
 
     /// The readings to send for a frame, so that after the scene's own zero the tare frame has been subtracted once; 0
@@ -76,7 +76,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
             bail!("hardware.source = adc-scan: the board scans its array and takes no frames");
         }
         let frame = self.subtract_tare(frame);
-        let codes = self.model.readings(std::slice::from_ref(&frame))?;
+        let codes = self.sent_codes(self.model.readings(std::slice::from_ref(&frame))?);
         let answer = self.ask(&codes)?;
         let answer = self.checked(answer, &codes);
         Ok((frame, answer))
@@ -108,9 +108,15 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         }
     }
 
+    /// Codes rounded down to the bits that are sent.
+    fn sent_codes(&self, codes: Vec<i32>) -> Vec<i32> {
+        let left_out = self.board.bits_left_out();
+        codes.into_iter().map(|code| code >> left_out << left_out).collect()
+    }
+
     fn ask(&mut self, codes: &[i32]) -> Result<Answer, HostError> {
         let forces = self.asks_forces();
-        self.client.frame(&self.model, codes, forces)
+        self.board.frame(&self.model, codes, forces)
     }
 
     /// The answer compared with the model if requested, with the forces that the user wants.
@@ -124,15 +130,15 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
 }
 
 /// A board as an engine, which takes no blocks of several frames; its session must ask for forces.
-pub struct BoardEngine<P> {
+pub struct BoardEngine {
     /// The model of the board's hardware.
     model: Model,
-    session: RefCell<Session<P>>,
+    session: RefCell<Session>,
 }
 
-impl<P: std::io::Read + std::io::Write> BoardEngine<P> {
+impl BoardEngine {
     /// The board of a session.
-    pub fn new(session: Session<P>) -> Self {
+    pub fn new(session: Session) -> Self {
         BoardEngine { model: session.model.clone(), session: RefCell::new(session) }
     }
 
@@ -143,7 +149,7 @@ impl<P: std::io::Read + std::io::Write> BoardEngine<P> {
     }
 }
 
-impl<P: std::io::Read + std::io::Write> Engine for BoardEngine<P> {
+impl Engine for BoardEngine {
     fn scene(&self) -> &Scene {
         &self.model.scene
     }
@@ -178,28 +184,36 @@ fn less(frame: &Frame, offset: &[f64]) -> Frame {
     frame
 }
 
-/// Opens the port of a board with the hardware of `model`, at its bit rate unless `baud` gives another; `command` is that of
-/// the user.
+/// What a port of a core behind Ethernet begins with.
+const UDP: &str = "udp:";
+
+/// Opens the port of a board with the hardware of `model`: a serial port at its bit rate unless `baud` gives another, or
+/// `udp:HOST` or `udp:HOST:PORT` of a core behind Ethernet; `command` is that of the user. Requests are repeated after `timeout`
+/// without an answer.
 ///
 /// # Errors
-/// A link that is no serial port, a board without one, and as [`open`].
-pub(crate) fn open_board(
+/// A link that is no serial port, a board without one, a port that does not exist, is in use, or does not support the bit rate.
+pub fn open_board(
     port: &str,
     model: &Model,
     baud: Option<u32>,
     timeout: Duration,
     command: &str,
-) -> Result<Client<Box<dyn SerialPort>>> {
+) -> Result<Box<dyn Board + Send>> {
+    if let Some(address) = port.strip_prefix(UDP) {
+        let address = address.strip_prefix("//").unwrap_or(address);
+        return Ok(Box::new(NetworkClient::open(address, timeout)?));
+    }
     require_uart(&model.scene, command)?;
     let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok)?;
-    Ok(open(port, baud, timeout)?)
+    Ok(Box::new(open(port, baud, timeout)?))
 }
 
-/// Opens a serial port at `baud` bit/s; requests are repeated after `timeout` without an answer.
+/// Opens a serial port at `baud` bit/s.
 ///
 /// # Errors
 /// A port that does not exist, is in use, or does not support the bit rate.
-pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn SerialPort>>, HostError> {
+pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn serialport::SerialPort>>, HostError> {
     let opened = serialport::new(port, baud).timeout(READ_TIMEOUT).open();
     let opened = opened.map_err(|error| HostError::Port { port: port.to_owned(), reason: error.to_string() })?;
     Ok(Client::new(opened, port, timeout))

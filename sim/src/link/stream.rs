@@ -1,6 +1,6 @@
 //! `dermis host --stream`: frames and answers as lines of JSON; of a board that scans its array, answers alone.
 
-use std::io::{BufRead, Read, Write};
+use std::io::{BufRead, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
@@ -23,8 +23,12 @@ use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
 #[derive(Serialize)]
 struct Reply {
     id: Value,
-    /// Nanoseconds since 1970 when the frame was acquired: as its line states, else when it was sent or asked for.
+    /// Nanoseconds since 1970 when the frame was acquired: as its line states, else when it entered the core, of one that says it,
+    /// else when it was sent or asked for.
     time_ns: i64,
+    /// By how many ns the time at which it entered the core may differ from the true one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_error_ns: Option<u64>,
     /// Seconds since 1970 when the frame was sent, and when its answer was complete.
     sent_s: f64,
     answered_s: f64,
@@ -41,14 +45,17 @@ impl Reply {
         model: &Model,
         checks: &mut StreamChecks,
         id: Value,
-        (time_ns, sent): (i64, SystemTime),
+        (stated_ns, sent): (Option<i64>, SystemTime),
         readings: &Frame,
         answer: &Answer,
     ) -> Result<Reply> {
         let mut physical = PhysicalAnswer::new(model, readings, answer)?;
         checks.add(std::slice::from_ref(readings), physical.resultant_N, &mut physical.diagnostics());
         let (sent_s, answered_s) = (seconds(sent), seconds(answer.received_at));
-        Ok(Reply { id, time_ns, sent_s, answered_s, readings: None, answer: physical })
+        let acquired = answer.acquired.filter(|_| stated_ns.is_none());
+        let time_ns = stated_ns.unwrap_or_else(|| acquired.map_or(nanoseconds(sent), |acquired| acquired.time_ns));
+        let time_error_ns = acquired.map(|acquired| acquired.error_ns);
+        Ok(Reply { id, time_ns, time_error_ns, sent_s, answered_s, readings: None, answer: physical })
     }
 }
 
@@ -76,8 +83,8 @@ pub(crate) struct FramesSent {
 ///
 /// # Errors
 /// A board that does not answer, streams that fail.
-pub(crate) fn run<P: Read + Write>(
-    session: &mut Session<P>,
+pub(crate) fn run(
+    session: &mut Session,
     layout: Stated,
     input: &mut dyn BufRead,
     output: &mut dyn Write,
@@ -118,8 +125,8 @@ pub(crate) fn run<P: Read + Write>(
 }
 
 /// The answer to one line, none to a comment and a header, or its id (null if it cannot be parsed) with the error.
-fn answer<P: Read + Write>(
-    session: &mut Session<P>,
+fn answer(
+    session: &mut Session,
     checks: &mut StreamChecks,
     (frames, times): (&mut Frames, &mut Acquisition),
     bytes: &[u8],
@@ -128,8 +135,8 @@ fn answer<P: Read + Write>(
     let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
     let Some(line) = frame else { return Ok(None) };
     let sent = SystemTime::now();
-    let time_ns = times.time_ns(line.frame.time_ns, nanoseconds(sent));
-    match reply(session, checks, &line.id, (time_ns, sent), &line.frame) {
+    let stated_ns = line.frame.time_ns.map(|stated| times.time_ns(Some(stated), nanoseconds(sent)));
+    match reply(session, checks, &line.id, (stated_ns, sent), &line.frame) {
         Ok(mut reply) => {
             reply.answer.diagnostics().raise(line.flag());
             Ok(Some(reply))
@@ -138,11 +145,11 @@ fn answer<P: Read + Write>(
     }
 }
 
-fn reply<P: Read + Write>(
-    session: &mut Session<P>,
+fn reply(
+    session: &mut Session,
     checks: &mut StreamChecks,
     id: &Value,
-    times: (i64, SystemTime),
+    times: (Option<i64>, SystemTime),
     frame: &Frame,
 ) -> Result<Reply> {
     let (frame, answer) = session.request(frame)?;
@@ -153,8 +160,8 @@ fn reply<P: Read + Write>(
 ///
 /// # Errors
 /// A board that does not answer, a stream that fails.
-pub(crate) fn run_scans<P: Read + Write>(
-    session: &mut Session<P>,
+pub(crate) fn run_scans(
+    session: &mut Session,
     scans: impl Iterator<Item = String>,
     output: &mut dyn Write,
 ) -> Result<FramesSent> {
@@ -164,7 +171,7 @@ pub(crate) fn run_scans<P: Read + Write>(
         let asked = SystemTime::now();
         let (readings, answer) = session.scan(&id)?;
         let reply =
-            Reply::new(&session.model, &mut checks, id.into(), (nanoseconds(asked), asked), &readings, &answer)?;
+            Reply::new(&session.model, &mut checks, id.into(), (None, asked), &readings, &answer)?;
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;

@@ -2,10 +2,7 @@
 
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{payloads, supports, Kind};
-use serde::Deserialize;
-
-/// The packets, as the host's and the core's side in Python read them too.
-const LAYOUT: &str = include_str!("../../../python/litex/dermis_litex/packets.json");
+use dermis_golden::wire::udp::{LAYOUT, WORD_BYTES};
 
 /// Bit rate in bit/s.
 pub(super) const BIT_RATE: u32 = 1_000_000_000;
@@ -16,28 +13,17 @@ const HEADER_BYTES: usize = 20 + 8;
 const OVERHEAD_BYTES: usize = HEADER_BYTES + 8 + 14 + 4 + 12;
 /// Ethernet pads its payload, which begins with those headers, to so many bytes.
 const LEAST_BYTES: usize = 46;
-/// Bytes of a code in a packet, and of a word of a packet.
+/// Bytes of a code in a packet.
 const CODE_BYTES: usize = 2;
-const WORD_BYTES: usize = 4;
 
-/// The numbers of the format.
-#[derive(Deserialize)]
-struct Layout {
-    header_words: usize,
-    check_words: usize,
-    fragment_words: usize,
-}
-
-impl Layout {
-    /// Bytes on the wire of the packets with a payload of so many words.
-    fn wire_bytes(&self, words: usize) -> usize {
-        let packet_bytes = |words: usize| {
-            let payload = WORD_BYTES * (self.header_words + words + self.check_words);
-            payload.max(LEAST_BYTES - HEADER_BYTES) + OVERHEAD_BYTES
-        };
-        let (whole, rest) = (words / self.fragment_words, words % self.fragment_words);
-        whole * packet_bytes(self.fragment_words) + if rest > 0 { packet_bytes(rest) } else { 0 }
-    }
+/// Bytes on the wire of the packets with a payload of so many words behind `header_words`.
+fn wire_bytes(header_words: usize, words: usize) -> usize {
+    let packet_bytes = |words: usize| {
+        let payload = WORD_BYTES * (header_words + words + LAYOUT.check_words);
+        payload.max(LEAST_BYTES - HEADER_BYTES) + OVERHEAD_BYTES
+    };
+    let (whole, rest) = (words / LAYOUT.fragment_words, words % LAYOUT.fragment_words);
+    whole * packet_bytes(LAYOUT.fragment_words) + if rest > 0 { packet_bytes(rest) } else { 0 }
 }
 
 /// Time in ms of so many bytes.
@@ -47,11 +33,11 @@ fn wire_ms(bytes: usize) -> f64 {
 
 /// Bits of a force, and the time in ms of each of [`payloads`], `None` for what the core does not send.
 pub(super) fn times(model: &Model) -> Vec<(u32, Vec<Option<f64>>)> {
-    let layout: Layout = serde_json::from_str(LAYOUT).unwrap_or_else(|error| unreachable!("packets.json: {error}"));
     let [_, (_, resultants), (_, forces)] = payloads(model);
     let taxels = model.scene.sensor.taxels();
-    let codes = Some(wire_ms(layout.wire_bytes((CODE_BYTES * taxels).div_ceil(WORD_BYTES))));
-    let whole = |bytes: usize| wire_ms(layout.wire_bytes(bytes / WORD_BYTES));
+    let codes = Some(wire_ms(wire_bytes(LAYOUT.header_words, (CODE_BYTES * taxels).div_ceil(WORD_BYTES))));
+    let result_bytes = |words: usize| wire_bytes(LAYOUT.result_header_words, words);
+    let whole = |bytes: usize| wire_ms(result_bytes(bytes / WORD_BYTES));
     // Sums of forces are made by a board's link; the core sends records, or forces.
     let records = model.sends_resultants().then(|| whole(resultants));
     if !supports(model, Kind::FrameForForces) {
@@ -59,7 +45,7 @@ pub(super) fn times(model: &Model) -> Vec<(u32, Vec<Option<f64>>)> {
     }
     // Packets of two mantissas in a word, then those of the status.
     let (mantissas, status) = ((3 * taxels).div_ceil(2), forces / WORD_BYTES - 3 * taxels);
-    let short = wire_ms(layout.wire_bytes(mantissas) + layout.wire_bytes(status));
+    let short = wire_ms(result_bytes(mantissas) + result_bytes(status));
     vec![(32, vec![codes, records, Some(whole(forces))]), (16, vec![codes, records, Some(short)])]
 }
 
@@ -71,13 +57,16 @@ mod tests {
     #[test]
     fn times_by_hand() {
         let times = |name: &str| times(&Model::new(&Scene::builtin(name).unwrap()).unwrap());
-        // 64 codes in 32 words, and 3 more of header and CRC-32; 192 forces and 9 words of status; 96 words of mantissas.
-        let ms = |payloads: &[usize]| Some(wire_ms(payloads.iter().map(|words| 4 * (words + 3) + 66).sum()));
-        let codes = ms(&[32]);
-        let wanted = [(32, ms(&[192 + 9])), (16, ms(&[96, 9]))];
+        // 64 codes in 32 words, and 3 more of header and CRC-32; 192 forces and 9 words of status; 96 words of mantissas, each with 5
+        // more, which have the time too.
+        let ms = |more: usize, payloads: &[usize]| {
+            Some(wire_ms(payloads.iter().map(|words| 4 * (words + more) + 66).sum()))
+        };
+        let codes = ms(3, &[32]);
+        let wanted = [(32, ms(5, &[192 + 9])), (16, ms(5, &[96, 9]))];
         assert_eq!(times("eight-by-eight"), wanted.map(|(bits, forces)| (bits, vec![codes, None, forces])));
         assert_eq!(wire_ms(125), 1e-3);
         // 2304 codes in 1152 words: three packets of 360 and one of 72.
-        assert_eq!(times("sensor-4")[0].1[0], ms(&[360, 360, 360, 72]));
+        assert_eq!(times("sensor-4")[0].1[0], ms(3, &[360, 360, 360, 72]));
     }
 }

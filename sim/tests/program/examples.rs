@@ -25,6 +25,8 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("dermis live sensor-1 --board /dev/ttyUSB0", SOURCE),
     ("dermis live sensor-1 --listen 192.168.1.7:8317", PAGE),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
+    ("dermis host --udp 192.168.1.50 --scene sensor-1 --check", "network.rs"),
+    ("dermis board eight-by-eight --udp 127.0.0.1:56850", "has no end; network.rs"),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers", BOARD),

@@ -41,7 +41,7 @@ fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
     let client = open(&terminal.path().to_string_lossy(), BAUD, Duration::from_millis(1000)).unwrap();
     let model = model();
     let frames = Frame::shipped(&model.scene);
-    let mut session = Session::new(client, model, None, None, false, true).unwrap();
+    let mut session = Session::new(Box::new(client), model, None, None, false, true).unwrap();
     let mut dropped = 0;
     for round in 0..2 {
         for frame in &frames {
@@ -50,15 +50,17 @@ fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
             dropped += usize::from(answer.dropped_before());
         }
     }
-    let counters = session.client.counters().unwrap();
-    let errors = session.client.link_errors;
+    let counters = session.board.counters().unwrap();
+    let errors = session.board.link_errors();
+    let [framing, crc, unknown_type, length, overrun] =
+        ["framing", "CRC", "unknown type", "length", "overrun"].map(|reason| counters.dropped_for(reason));
     // Every repeated request was dropped and counted by the board, or its answer was damaged.
-    let drops = counters.framing + counters.crc + counters.unknown_type + counters.length;
+    let drops = framing + crc + unknown_type + length;
     assert_eq!(errors.repeated, u64::from(drops) + errors.damaged, "{counters:?}, {errors:?}");
-    assert!(counters.framing > 0 && counters.crc > 0 && errors.damaged > 0, "{counters:?}, {errors:?}");
+    assert!(framing > 0 && crc > 0 && errors.damaged > 0, "{counters:?}, {errors:?}");
     // Requests accepted: identification, counters, the frames, and repetitions after damaged answers.
     assert_eq!(u64::from(counters.taken), 2 + 2 * frames.len() as u64 + errors.damaged, "{counters:?}, {errors:?}");
-    assert_eq!(counters.overrun, 0);
+    assert_eq!(overrun, 0);
     // The answer after a dropped frame packet has the flag.
     assert!(dropped > 0, "{counters:?}");
 }
@@ -140,7 +142,7 @@ fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let terminal = PseudoTerminal::of(&Hardware::new(model.clone(), &build).unwrap()).unwrap();
     let baud = LinkKind::Uart.bit_rate(&model.board).unwrap();
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
-    let mut session = Session::new(client, model, None, None, false, true).unwrap();
+    let mut session = Session::new(Box::new(client), model, None, None, false, true).unwrap();
     let (_, answer) = session.request(&Frame::shipped(&scene)[0]).unwrap();
     assert_eq!((answer.difference, answer.forces), (Some(None), None));
     assert_ne!(answer.sums.map_or(0, |sums| sums.fz), 0);
@@ -173,10 +175,10 @@ fn tables_are_written_over_a_noisy_channel() {
     for version in 1..6 {
         let client = open(&port, BAUD, Duration::from_millis(1000)).unwrap();
         let own = model.with_tables(&left, version).unwrap();
-        let mut session = Session::new(client, model.clone(), Some(own), None, true, true).unwrap();
+        let mut session = Session::new(Box::new(client), model.clone(), Some(own), None, true, true).unwrap();
         let (_, answer) = session.request(&press).unwrap();
         assert_eq!(answer.difference, Some(None), "version {version}");
-        repeated += session.client.link_errors.repeated;
+        repeated += session.board.link_errors().repeated;
     }
     assert!(repeated > 0);
 

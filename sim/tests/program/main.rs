@@ -18,6 +18,7 @@ mod host;
 mod live;
 mod live_sources;
 mod lost_bytes;
+mod network;
 mod page;
 mod printed;
 mod recording;
