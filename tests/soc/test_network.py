@@ -5,7 +5,9 @@ import json
 import os
 import random
 import shutil
+import socket
 import subprocess
+import threading
 import zlib
 from collections import Counter
 
@@ -214,6 +216,7 @@ def test_a_core_says_what_it_is_and_when_it_had_a_frame(wire):
     registers = json.loads((wire.folder / "registers.json").read_text())["constants"]
     constants = ("scene", "array", "clock_Hz", "force_triples", "status_triples")
     wanted = {name: registers[name] for name in constants} | {"version": VERSION, "code_bytes": 4, "force_bits": 32}
+    wanted["fragment_words"] = FRAGMENT_WORDS
     own_ps = lambda cycles: (cycles + RESET_CYCLES) * 2 * wire.half_period_ps
     offsets = []
     for at, (received_ps, (answered_ps, frame)) in enumerate(zip([wire.received[1], wire.received[3]], back[2:4], strict=True)):
@@ -290,6 +293,62 @@ def test_tables_over_ethernet_are_those_of_the_specimen(wire):
     own, after, again = [forces_and_version(wire, result) for result in results]
     assert own == (wire.result[: wire.force_words], 0, False)
     assert after == again == (specimen, VERSION_OF_TABLES, False) and after[0] != own[0]
+
+
+class Bridge:
+    """The simulation, whose core programs reach at a UDP port of the loopback; time stands still where nothing happens."""
+
+    def __init__(self, wire):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.address = "127.0.0.1:%d" % self.socket.getsockname()[1]
+        self.host = None
+        command = [wire.program, "-", str(wire.half_period_ps), "2000"]
+        self.simulation = subprocess.Popen(
+            command, cwd=wire.program.parent, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+
+    def __enter__(self):
+        self.threads = [threading.Thread(target=own, daemon=True) for own in (self.to_core, self.to_host)]
+        for thread in self.threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.simulation.kill()
+        self.simulation.wait()
+
+    def play(self, frame):
+        self.simulation.stdin.write(f"0 0 {frame.hex()}\n")
+
+    def to_core(self):
+        while self.simulation.poll() is None:
+            payload, self.host = self.socket.recvfrom(2048)
+            self.play(on_the_wire(datagram(payload)))
+
+    def to_host(self):
+        for line in self.simulation.stdout:
+            name, *words = line.split()
+            if name != "frame":
+                continue
+            frame = bytes.fromhex(words[1])
+            if ARP in Ether(frame[8:-4]):
+                self.play(ARP_REPLY)
+            else:
+                self.socket.sendto(payload_of(frame), self.host)
+
+
+def test_the_host_and_the_core_understand_each_other(wire, tmp_path):
+    """`dermis host` with the core behind LiteEth under Verilator: frames, then tables of a specimen, compared with the model."""
+    frame = tmp_path / "press.csv"
+    frame.write_text("0.01,0.02,0.01\n0.02,0.06,0.03\n0.01,0.04,0.02\n0,0.01,0\n")
+    host = [DERMIS, "host", "--scene", HARDWARE, "--check", "--forces", "--timeout", "5000"]
+    with Bridge(wire) as bridge:
+        for more in ([], ["--tables", SPECIMEN, "--tables-version", str(VERSION_OF_TABLES)]):
+            done = subprocess.run([*host, "--udp", bridge.address, *more, frame], capture_output=True, text=True, timeout=600)
+            assert done.returncode == 0, done.stdout + done.stderr
+            assert done.stdout.count("against model   equal, every bit") == 1, done.stdout
+            assert "board dropped   0 ignored, 0 refused, 0 damaged, 0 overrun, 0 cut" in done.stdout
 
 
 def test_a_ping_is_answered(wire):

@@ -26,6 +26,8 @@ const CLIPPED: u8 = 1;
 const PADDED: u8 = 2;
 /// Place of the exponent in a short result's flags.
 const EXPONENT_AT: u32 = 3;
+/// Most packets of a payload.
+const MOST: usize = u8::MAX as usize;
 /// Bits of a mantissa.
 const MANTISSA_BITS: u32 = 16;
 
@@ -49,7 +51,7 @@ pub struct Layout {
     pub result_header_words: usize,
     /// Words behind the payload.
     pub check_words: usize,
-    /// Most words of a payload.
+    /// Most words of a payload, of a core that is not built with another number.
     pub fragment_words: usize,
     /// A sequence number so much older than the newest is late.
     pub late: u32,
@@ -167,17 +169,17 @@ impl Packet {
         (index < count).then(|| Packet { kind, flags, index, count, sequence, cycles, words: words.to_vec() })
     }
 
-    /// The packets of a payload; `flags` are those of the last one.
+    /// The packets of `words` with the head of this one, at most `fragment_words` in each; its flags are those of the last.
     ///
     /// # Errors
     /// More words than 255 packets hold.
-    pub fn all(kind: Kind, sequence: u32, cycles: u64, words: &[u32], flags: u8) -> Result<Vec<Packet>, TooLong> {
-        let fragments = words.chunks(LAYOUT.fragment_words);
+    pub fn split(&self, words: &[u32], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
+        let fragments = words.chunks(fragment_words);
         let bytes = words.len() * WORD_BYTES;
-        let count = u8::try_from(fragments.len()).map_err(|_| TooLong { bytes })?;
+        let count = u8::try_from(fragments.len()).map_err(|_| TooLong { bytes, most: MOST * WORD_BYTES * fragment_words })?;
         let packet = |(index, words): (u8, &[u32])| {
-            let flags = if index + 1 == count { flags } else { 0 };
-            Packet { kind, flags, index, count, sequence, cycles, words: words.to_vec() }
+            let flags = if index + 1 == count { self.flags } else { 0 };
+            Packet { flags, index, count, words: words.to_vec(), ..*self }
         };
         Ok(std::iter::zip(0.., fragments).map(packet).collect())
     }
@@ -186,18 +188,25 @@ impl Packet {
     ///
     /// # Errors
     /// More codes than 255 packets hold.
-    pub fn frame(sequence: u32, codes: &[i32], code_bytes: usize, shift: u32) -> Result<Vec<Packet>, TooLong> {
+    pub fn frame(
+        sequence: u32,
+        codes: &[i32],
+        (code_bytes, shift): (usize, u32),
+        fragment_words: usize,
+    ) -> Result<Vec<Packet>, TooLong> {
         let bytes = codes.iter().flat_map(|code| (code >> shift).to_le_bytes().into_iter().take(code_bytes));
-        Packet::all(Kind::Frame, sequence, 0, &words_of_bytes(&bytes.collect::<Vec<u8>>()), 0)
+        let words = words_of_bytes(&bytes.collect::<Vec<u8>>());
+        Packet { kind: Kind::Frame, ..Packet::question(sequence) }.split(&words, fragment_words)
     }
 
     /// The packets of an image of tables.
     ///
     /// # Errors
     /// More bytes than 255 packets hold.
-    pub fn tables(sequence: u32, image: &[u8]) -> Result<Vec<Packet>, TooLong> {
+    pub fn tables(sequence: u32, image: &[u8], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
         let none = image.len().next_multiple_of(WORD_BYTES) - image.len();
-        Packet::all(Kind::Tables, sequence, 0, &words_of_bytes(image), none as u8)
+        let head = Packet { kind: Kind::Tables, flags: none as u8, ..Packet::question(sequence) };
+        head.split(&words_of_bytes(image), fragment_words)
     }
 
     /// The words of its payload; of mantissas, the forces that they are.
@@ -219,16 +228,16 @@ fn force_of(mantissa: i32, exponent: u32) -> i32 {
     (i64::from(mantissa) << exponent).min(i64::from(i32::MAX)) as i32
 }
 
-/// Forces as a host has them of a core that sends mantissas of 16 bits.
+/// Forces as a host has them of a core that sends mantissas of 16 bits, two in each of the `fragment_words` of a packet.
 ///
 /// ```
 /// use dermis_golden::wire::udp::shortened;
 ///
-/// assert_eq!(shortened(&[5, -3, 32_767]), [5, -3, 32_767]);
+/// assert_eq!(shortened(&[5, -3, 32_766], 360), [5, -3, 32_766]);
 /// // The largest force of a packet decides how many of the low bits are none.
-/// assert_eq!(shortened(&[5, -3, 131_000]), [8, 0, 131_000]);
+/// assert_eq!(shortened(&[5, -3, 131_000], 360), [8, 0, 131_000]);
 /// ```
-pub fn shortened(forces: &[i32]) -> Vec<i32> {
+pub fn shortened(forces: &[i32], fragment_words: usize) -> Vec<i32> {
     let block = |forces: &[i32]| {
         // What is added when a force is rounded up is in its size already.
         let sizes = forces.iter().map(|force| (force ^ force >> 31) as u32).map(|size| size + (size >> (MANTISSA_BITS - 1)));
@@ -237,7 +246,7 @@ pub fn shortened(forces: &[i32]) -> Vec<i32> {
         let rounded = move |force: &i32| (i64::from(*force) + i64::from(1u32 << exponent >> 1)) >> exponent;
         forces.iter().map(move |force| force_of(rounded(force) as i32, exponent)).collect::<Vec<i32>>()
     };
-    forces.chunks(2 * LAYOUT.fragment_words).flat_map(block).collect()
+    forces.chunks(2 * fragment_words).flat_map(block).collect()
 }
 
 /// Words of bytes, the last one filled up with 0.
@@ -247,10 +256,12 @@ fn words_of_bytes(bytes: &[u8]) -> Vec<u32> {
 
 /// A payload is longer than its packets can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("{bytes} bytes, of which 255 packets hold {}", 255 * WORD_BYTES * LAYOUT.fragment_words)]
+#[error("{bytes} bytes, of which 255 packets hold {most}")]
 pub struct TooLong {
     /// Its bytes.
     pub bytes: usize,
+    /// Most bytes.
+    pub most: usize,
 }
 
 /// What a core is.
@@ -363,7 +374,7 @@ mod tests {
         let words: Vec<u32> = (0..800).map(|k| k * 0x0101_0101).collect();
         for kind in Kind::ALL {
             let cycles = if kind.is_result() { 0x0123_4567_89ab_cdef } else { 0 };
-            let packets = Packet::all(kind, 7, cycles, &words, 1).unwrap();
+            let packets = Packet { kind, flags: 1, cycles, ..Packet::question(7) }.split(&words, 360).unwrap();
             assert_eq!(packets.iter().map(|packet| packet.words.len()).collect::<Vec<_>>(), [360, 360, 80]);
             for packet in packets {
                 let mut bytes = packet.to_bytes();
@@ -377,7 +388,7 @@ mod tests {
             }
         }
         assert_eq!(Packet::of_bytes(&[]), None);
-        let too_long = Packet::tables(1, &vec![0; 255 * 1440 + 1]).unwrap_err();
+        let too_long = Packet::tables(1, &vec![0; 255 * 1440 + 1], 360).unwrap_err();
         assert_eq!(too_long.to_string(), "367201 bytes, of which 255 packets hold 367200");
     }
 
@@ -393,7 +404,10 @@ mod tests {
     #[test]
     fn results_are_whole_in_any_order_and_old_parts_are_given_up() {
         let words: Vec<u32> = (0..720).collect();
-        let of = |sequence: u32| Packet::all(Kind::Result, sequence, 9, &words, CLIPPED).unwrap();
+        let of = |sequence| {
+            let head = Packet { kind: Kind::Result, flags: CLIPPED, cycles: 9, ..Packet::question(sequence) };
+            head.split(&words, 360).unwrap()
+        };
         let mut answers = Answers::default();
         let whole = |sequence| Answer::Result { sequence, cycles: 9, words: words.clone(), clipped: true };
         let [first, second] = [of(1), of(2)];
@@ -421,10 +435,11 @@ mod tests {
     fn short_forces_are_read_as_the_core_rounds_them() {
         // Exponent 3, an odd number of forces.
         let words = vec![0x0001_fffe, 0x0000_7fff];
-        let packet = Packet { flags: 3 << EXPONENT_AT | PADDED, ..Packet::all(Kind::ShortResult, 1, 0, &words, 0).unwrap().remove(0) };
+        let flags = 3 << EXPONENT_AT | PADDED;
+        let packet = Packet { kind: Kind::ShortResult, flags, words, ..Packet::question(1) };
         assert_eq!(packet.payload(), [-16i32 as u32, 8, 0x7fff * 8]);
         for forces in [vec![i32::MAX, i32::MIN, 77, -1], (-900..900).map(|k| k * 12_345).collect()] {
-            let own = shortened(&forces);
+            let own = shortened(&forces, 360);
             for (block, short) in std::iter::zip(forces.chunks(720), own.chunks(720)) {
                 let most = block.iter().map(|force| force.unsigned_abs()).max().unwrap();
                 let bound = f64::from(most) * (2f64.powi(-15) + 2f64.powi(-29));

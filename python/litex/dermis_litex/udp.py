@@ -771,6 +771,7 @@ class DermisUDP(LiteXModule):
             **{name: core.constants[name] for name in ("scene", "array", "clock_Hz", "force_triples", "status_triples")},
             "code_bytes": code_bytes,
             "force_bits": force_bits,
+            "fragment_words": FRAGMENT_WORDS,
             "writable_tables": core.writable_tables,
             **self.receiver.counters,
         }

@@ -35,8 +35,8 @@ pub struct Answer {
     pub received_at: SystemTime,
     /// When the frame entered the core, of one that says it.
     pub acquired: Option<Acquired>,
-    /// Whether the forces are mantissas of 16 bits, which are rounded.
-    pub short_forces: bool,
+    /// Words of a packet of forces that are mantissas of 16 bits, which are rounded; `None` for forces as they are.
+    pub short_forces: Option<usize>,
 }
 
 impl Answer {
@@ -58,7 +58,8 @@ impl Answer {
             None => Some(Sums::of_bytes(front)?),
         };
         let (difference, received_at) = (None, SystemTime::now());
-        Some(Answer { sums, forces, labels, status, codes, difference, received_at, acquired: None, short_forces: false })
+        let (acquired, short_forces) = (None, None);
+        Some(Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces })
     }
 
     /// The first difference from the bit-true model's result for `codes`, `None` if equal. What the model does not see is
@@ -67,7 +68,7 @@ impl Answer {
         let trace = model.run(codes);
         let (cols, taxels) = (model.scene.sensor.cols, model.scene.sensor.taxels());
         let (forces, labels) = trace.beats.split_at(model.force_triples());
-        let short = self.short_forces.then(|| beats_of(&shortened(forces.as_flattened())));
+        let short = self.short_forces.map(|words| beats_of(&shortened(forces.as_flattened(), words)));
         let forces = short.as_deref().unwrap_or(forces);
         let pairs = self.forces.iter().flatten().zip(forces).enumerate();
         let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
@@ -259,9 +260,8 @@ mod tests {
         let sums = Some(Sums::of(&trace.beats, model.scene.sensor.cols));
         let status = Status::all(&trace.status).flat_map(changed).collect();
         let (labels, codes, received_at) = (Vec::new(), Vec::new(), SystemTime::UNIX_EPOCH);
-        let (forces, difference, acquired) = (None, None, None);
-        let answer =
-            Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces: false };
+        let (forces, difference, acquired, short_forces) = (None, None, None, None);
+        let answer = Answer { sums, forces, labels, status, codes, difference, received_at, acquired, short_forces };
         let whole = Answer { forces: Some(trace.beats), ..answer.clone() };
         [answer, whole].map(|answer| PhysicalAnswer::new(model, frame, &answer).unwrap())
     }
@@ -313,7 +313,7 @@ mod tests {
             difference: None,
             received_at: SystemTime::UNIX_EPOCH,
             acquired: None,
-            short_forces: false,
+            short_forces: None,
         };
         assert_eq!(answer(trace.status.clone()).compare_with_model(&model, &codes), None);
         for field in status_fields() {

@@ -33,8 +33,11 @@ pub struct NetworkClient {
     repeated: u64,
     host_clock: HostClock,
     clock: CoreClock,
+    /// Bytes of a code.
     code_bytes: usize,
     bits_left_out: u32,
+    /// Most words of a payload.
+    fragment_words: usize,
     short_forces: bool,
 }
 
@@ -71,6 +74,7 @@ impl NetworkClient {
             clock: CoreClock::new(1),
             code_bytes: 0,
             bits_left_out: 0,
+            fragment_words: LAYOUT.fragment_words,
             short_forces: false,
         })
     }
@@ -91,9 +95,7 @@ impl NetworkClient {
     ) -> Result<(T, [i64; 2]), HostError> {
         for attempt in 0..ATTEMPTS {
             self.repeated += u64::from(attempt > 0);
-            if renews || attempt == 0 {
-                self.sequence = self.sequence.wrapping_add(u32::from(renews));
-            }
+            self.sequence = self.sequence.wrapping_add(u32::from(renews));
             let own = packets(self.sequence).map_err(|error| self.failed(&error))?;
             let sent_ns = self.host_clock.now_ns();
             for packet in own {
@@ -185,6 +187,7 @@ impl Board for NetworkClient {
         self.clock = CoreClock::new(core.word("clock_Hz"));
         self.code_bytes = core.word("code_bytes") as usize;
         self.bits_left_out = code_bits.saturating_sub(u8::BITS * core.word("code_bytes"));
+        self.fragment_words = (core.word("fragment_words") as usize).clamp(1, LAYOUT.fragment_words);
         self.short_forces = core.word("force_bits") == SHORT_BITS;
         for _ in 0..QUESTIONS {
             let (core, [sent_ns, answered_ns]) = self.ask()?;
@@ -218,8 +221,8 @@ impl Board for NetworkClient {
     }
 
     fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
-        let (code_bytes, shift) = (self.code_bytes, self.bits_left_out);
-        let packets = |sequence| Packet::frame(sequence, codes, code_bytes, shift);
+        let (form, fragment_words) = ((self.code_bytes, self.bits_left_out), self.fragment_words);
+        let packets = |sequence| Packet::frame(sequence, codes, form, fragment_words);
         let result = |answer, wanted| match answer {
             Whole::Result { sequence, cycles, words, .. } if sequence == wanted => Some((cycles, words)),
             _ => None,
@@ -231,15 +234,17 @@ impl Board for NetworkClient {
         let answer = Answer::of_bytes(model, &bytes, true);
         let answer =
             answer.ok_or(HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() })?;
-        Ok(Answer { short_forces: self.short_forces, acquired: self.clock.at(cycles), ..answer })
+        let short_forces = self.short_forces.then_some(fragment_words);
+        Ok(Answer { short_forces, acquired: self.clock.at(cycles), ..answer })
     }
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
         self.sequence = self.sequence.wrapping_add(1);
-        let count = Packet::tables(self.sequence, image).map_err(|error| self.failed(&error))?.len();
+        let words = self.fragment_words;
+        let count = Packet::tables(self.sequence, image, words).map_err(|error| self.failed(&error))?.len();
         for index in 0..count {
             // The same number again: the core has taken a fragment whose answer was lost.
-            let packet = |sequence| Packet::tables(sequence, image).map(|mut all| vec![all.swap_remove(index)]);
+            let packet = |sequence| Packet::tables(sequence, image, words).map(|mut all| vec![all.swap_remove(index)]);
             let taken = |answer, wanted| match answer {
                 Whole::TablesTaken { sequence, index: own } => (sequence == wanted && usize::from(own) == index).then_some(()),
                 _ => None,

@@ -149,6 +149,7 @@ impl Core {
             "status_triples" => self.model.status_triples() as u32,
             "code_bytes" => CODE_BYTES as u32,
             "force_bits" => u32::BITS,
+            "fragment_words" => LAYOUT.fragment_words as u32,
             "writable_tables" => self.model.has_writable_tables().into(),
             "time_low" => cycles as u32,
             "time_high" => (cycles >> u32::BITS) as u32,
@@ -221,6 +222,7 @@ impl Core {
         let beats = trace.beats.iter().chain(&trace.status);
         let words: Vec<u32> = beats.flatten().map(|word| *word as u32).collect();
         // A result of the largest array has fewer packets than can be.
-        Packet::all(Kind::Result, sequence, cycles, &words, clipped.into()).unwrap_or_default()
+        let head = Packet { kind: Kind::Result, flags: clipped.into(), cycles, ..Packet::question(sequence) };
+        head.split(&words, LAYOUT.fragment_words).unwrap_or_default()
     }
 }
