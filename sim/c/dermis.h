@@ -176,7 +176,7 @@ typedef enum {
    */
   DERMIS_STATUS_DAMAGED = 3,
   /**
-   * The board was built for another scene or version.
+   * The board was built for another scene or version, or does not answer.
    */
   DERMIS_STATUS_BOARD = 4,
   /**
@@ -206,6 +206,11 @@ typedef enum {
    */
   DERMIS_ANSWER_OTHER = 3,
 } dermis_answer;
+
+/**
+ * A board that answers. One thread at a time may use it.
+ */
+typedef struct dermis_board dermis_board;
 
 /**
  * The host end of a board's link. One thread at a time may use it.
@@ -507,6 +512,38 @@ dermis_status dermis_stream_push_at(dermis_stream *stream,
                                     size_t count,
                                     int64_t time_ns,
                                     dermis_result **result);
+
+/**
+ * Open the board at a port that was built for a scene. It belongs to the caller: dermis_board_free; the scene may be freed before
+ * it. After an error *board is NULL.
+ *
+ * port is the path of a serial port, such as "/dev/ttyUSB0", at the bit rate of the scene's board, or "udp:192.168.1.50", the
+ * address of a core behind Ethernet. A request is made again after timeout_ms without an answer, up to eight times.
+ * cross_check is that of dermis_stream_new: the frames that are answered are a stream.
+ *
+ * DERMIS_STATUS_BOARD: no answer, or a board of another scene or version.
+ */
+dermis_status dermis_board_open(const dermis_scene *scene,
+                                const char *port,
+                                uint64_t timeout_ms,
+                                uint64_t cross_check,
+                                dermis_board **board);
+
+/**
+ * Close a board; NULL is allowed. Results that it gave stay valid.
+ */
+void dermis_board_free(dermis_board *board);
+
+/**
+ * Send a frame and wait for its forces: count = rows * cols values, as for dermis_reconstruct. *result belongs to the caller:
+ * dermis_result_free; it is NULL after an error. Of a core behind Ethernet dermis_result_time says when the core had the frame,
+ * nanoseconds since 1970, and error_ns, which may be NULL, by how much that may be wrong; of another board error_ns is 0.
+ */
+dermis_status dermis_board_frame(dermis_board *board,
+                                 const double *stress_MPa,
+                                 size_t count,
+                                 dermis_result **result,
+                                 uint64_t *error_ns);
 
 /**
  * Make the host end of the link of a board that was built for a scene. It belongs to the caller: dermis_link_free; the scene

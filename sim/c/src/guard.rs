@@ -25,7 +25,7 @@ pub enum dermis_status {
     Absent = 2,
     /// Bytes from the link are not a valid packet; the next ones are read.
     Damaged = 3,
-    /// The board was built for another scene or version.
+    /// The board was built for another scene or version, or does not answer.
     Board = 4,
     /// A defect of Dermis.
     Internal = 5,

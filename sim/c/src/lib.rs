@@ -4,6 +4,7 @@
 //! stress, doubles ── dermis_reconstruct ── dermis_result ── forces, contacts, flags
 //!        ├── dermis_reconstruct_many ── arrays of the caller
 //!        ├── dermis_stream_push, frame by frame ──────────────────────────┤
+//!        ├── dermis_board_frame ── serial port, or core behind Ethernet ──┤
 //!        └── dermis_link_frame ── bytes ── port, board ── bytes ── dermis_link_receive ──┘
 //! ```
 //! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says is
@@ -18,6 +19,7 @@
 //! | [`batch`] | frames that do not depend on each other |
 //! | [`stress`] | the stress that forces on the surface cause |
 //! | [`mod@stream`] | frames in the order of time |
+//! | [`board`] | a board, or a core behind Ethernet, that answers |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
 // Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
 #![allow(
@@ -31,6 +33,7 @@
 #![allow(clippy::missing_safety_doc)]
 
 pub mod batch;
+pub mod board;
 pub mod guard;
 pub mod link;
 pub mod result;

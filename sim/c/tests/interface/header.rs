@@ -18,7 +18,7 @@ fn header(change: impl Fn(String) -> String) -> String {
     let changed = tempfile::tempdir().unwrap();
     let mut builder = Builder::new().with_config(config);
     // In the order of use.
-    for name in ["guard", "scene", "result", "batch", "stress", "stream", "link"] {
+    for name in ["guard", "scene", "result", "batch", "stress", "stream", "board", "link"] {
         let text = fs::read_to_string(folder().join(format!("src/{name}.rs"))).unwrap();
         let path = changed.path().join(format!("{name}.rs"));
         fs::write(&path, change(text)).unwrap();

@@ -4,6 +4,7 @@
 #![allow(non_snake_case)]
 
 mod batch;
+mod board;
 mod example;
 mod header;
 mod input;
