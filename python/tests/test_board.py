@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -28,6 +29,23 @@ def port() -> Iterator[str]:
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as board:
         yield board.stdout.readline().strip()
         board.kill()
+
+
+def test_a_core_behind_ethernet_answers_and_says_when_it_had_the_frame() -> None:
+    command = [os.environ["DERMIS"], "board", SCENE, "--udp", "127.0.0.1:0"]
+    scene = dermis.Scene.from_name(SCENE)
+    stress = scene.generate(random=1, seed=2)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as core:
+        address = core.stdout.readline().strip()
+        assert address.startswith("udp:127.0.0.1:")
+        with dermis.Board(address, scene, check=True, cross_check=0) as board:
+            for _ in range(3):
+                before = time.time_ns()
+                result = board.reconstruct(stress)
+                # On the loopback a frame takes less than a millisecond; a busy machine may take longer.
+                assert before - 10**8 < result.time_ns < time.time_ns() + 10**8
+                assert np.array_equal(result.forces_N, scene.reconstruct(stress, "fixed", cross_check=0).forces_N)
+        core.kill()
 
 
 def test_a_board_answers_every_frame(port: str) -> None:

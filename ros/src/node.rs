@@ -10,8 +10,11 @@ use anyhow::{anyhow, Context, Result};
 use dermis_golden::data::recording::message::DiagnosticArray;
 use dermis_golden::data::text::Stated;
 use dermis_golden::engine::{CheckPace, CheckedEngine};
+use dermis_golden::fixed::Model;
+use dermis_golden::spec::scene::Scene;
 use dermis_sim::engine::{EngineName, SharedEngine};
 use dermis_sim::jobs::Interrupt;
+use dermis_sim::link::{open_board, BoardEngine, Session};
 use dermis_sim::recording::header;
 use dermis_sim::say;
 use dermis_sim::stream::{
@@ -24,6 +27,9 @@ use crate::messages::{self, Messages};
 use crate::patches::{Patch, PatchFile};
 use crate::source::Reopened;
 use crate::topics::{self, PatchTopics};
+
+/// Time without a board's answer after which a request is sent again.
+const BOARD_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// An engine that several patches may have.
 type Engine = Arc<CheckedEngine<SharedEngine>>;
@@ -40,6 +46,11 @@ impl Engines {
         let mut built: BTreeMap<(String, Option<String>, EngineName), Engine> = BTreeMap::new();
         let mut all = Vec::new();
         for (index, patch) in file.patches.iter().enumerate() {
+            if let Some(port) = &patch.fields.board {
+                let board = board(port, &patch.scene).with_context(|| format!("patch[{index}].board"))?;
+                all.push(Arc::new(CheckedEngine::new(Box::new(board) as Box<SharedEngine>)));
+                continue;
+            }
             let key = (patch.path.clone(), patch.fields.estimator.clone(), patch.engine);
             let engine = match built.get(&key) {
                 Some(engine) => Arc::clone(engine),
@@ -51,6 +62,13 @@ impl Engines {
         }
         Ok(Engines(all))
     }
+}
+
+/// The board at a port, which was built for a scene.
+fn board(port: &str, scene: &Scene) -> Result<BoardEngine> {
+    let model = Model::new(scene)?;
+    let board = open_board(port, &model, None, BOARD_TIMEOUT, "host")?;
+    Ok(BoardEngine::new(Session::new(board, model, None, None, true, false)?))
 }
 
 /// What a patch publishes.
@@ -167,16 +185,16 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
         .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
         .collect();
-    let share = (threads as f64 / patches as f64).min(1.0);
+    let share = (threads.max(1) as f64 / patches as f64).min(1.0);
     std::thread::scope(|scope| {
         let reporting = scope.spawn(|| report(&outlets, &changes, &reports, &running));
-        let workers: Vec<_> = (0..threads)
-            .map(|worker| {
-                let own: Vec<&Own> = all.iter().skip(worker).step_by(threads).collect();
-                let stop = &stop;
-                scope.spawn(move || work(stop, file, &own, share))
-            })
-            .collect();
+        // A board keeps its worker waiting: it has one of its own.
+        let (boards, computed): (Vec<&Own>, Vec<&Own>) = all.iter().partition(|own| own.patch.fields.board.is_some());
+        let divided = (0..threads).map(|worker| computed.iter().copied().skip(worker).step_by(threads).collect());
+        let groups: Vec<Vec<&Own>> = divided.chain(boards.iter().map(|own| vec![*own])).collect();
+        let stop = &stop;
+        let workers: Vec<_> =
+            groups.into_iter().map(|own| scope.spawn(move || work(stop, file, &own, share))).collect();
         let failed = workers.into_iter().filter_map(|worker| worker.join().err()).count();
         running.store(false, Ordering::Release);
         let reported = reporting.join().map_err(|_| anyhow!("the thread of the diagnostics has ended"));
@@ -214,7 +232,10 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
             None if share >= 1.0 => CheckPace::Beside,
             None => CheckPace::Never,
         };
-        let faster = Faster::of_stream(&patch.scene, patch.engine, None);
+        let faster = match patch.fields.board {
+            Some(_) => Vec::new(),
+            None => Faster::of_stream(&patch.scene, patch.engine, None),
+        };
         let estimators = Estimators::new(engine, faster, pace, None, Clock::default()).with_share(share);
         let source = Reopened::new(patch, Arc::clone(&own.outlet.state));
         let input = (Box::new(source) as Box<dyn std::io::Read + Send>, patch.fields.source.clone());

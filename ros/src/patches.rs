@@ -110,10 +110,11 @@ impl PatchFile {
         Ok(PatchFile { node, patches })
     }
 
-    /// Number of workers.
+    /// Number of workers, among which the patches without a board are divided.
     pub fn threads(&self) -> usize {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.node.threads.unwrap_or_else(cores).min(self.patches.len())
+        let computed = self.patches.iter().filter(|patch| patch.fields.board.is_none()).count();
+        self.node.threads.unwrap_or_else(cores).min(computed)
     }
 }
 
@@ -186,6 +187,16 @@ impl Patch {
             scene = scene.estimated_by(*kind);
         }
         let engine = EngineName::software(&fields.engine).with_context(|| at.to_owned())?;
+        if let Some(board) = &fields.board {
+            let stated = [("estimator", fields.estimator.is_some()), ("engine", engine != EngineName::Golden)];
+            if let Some((name, _)) = stated.into_iter().find(|(_, stated)| *stated) {
+                return Err(wrong(
+                    &field(name),
+                    "stated",
+                    &format!("left out: the board at {board} computes the forces"),
+                ));
+            }
+        }
         let origin = match Path::new(&fields.source).extension().is_some_and(|extension| extension == "mcap") {
             true => Origin::Recording(folder.join(&fields.source)),
             false => match fields.source.parse().map_err(|error: String| wrong(&field("source"), error, SOURCE))? {

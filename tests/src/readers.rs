@@ -15,6 +15,7 @@ use dermis_golden::spec::board::Board;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
 use dermis_golden::wire::link::Decoder;
+use dermis_golden::wire::udp::{Answers, Packet};
 use dermis_hdl::manifest;
 use dermis_sim::live::request;
 
@@ -29,6 +30,7 @@ pub const TARGETS: [(&str, Target); 18] = [
     ("calibration", calibration),
     ("manifest", manifests),
     ("packets", packets),
+    ("datagrams", datagrams),
     ("import.tekscan", |bytes| recording("fuzz.asf", Format::Tekscan, bytes)),
     ("import.lst", |bytes| recording("fuzz.lst", Format::Lst, bytes)),
     ("import.npy", |bytes| recording("fuzz.npy", Format::Npy, bytes)),
@@ -161,6 +163,20 @@ fn packets(bytes: &[u8]) -> bool {
         let found: Vec<_> = packet.to_wire().iter().filter_map(|byte| again.next(*byte)).collect();
         assert_eq!(found, [Ok(packet)]);
         any = true;
+    }
+    any
+}
+
+/// A sequence of packets of UDP, each behind its length in two bytes.
+fn datagrams(bytes: &[u8]) -> bool {
+    let (mut answers, mut any, mut rest) = (Answers::default(), false, bytes);
+    while let Some((length, behind)) = rest.split_first_chunk() {
+        let (own, behind) = behind.split_at(behind.len().min(u16::from_le_bytes(*length).into()));
+        if let Some(packet) = Packet::of_bytes(own) {
+            assert_eq!(packet.to_bytes(), own);
+        }
+        any |= answers.add(own).is_some();
+        rest = behind;
     }
     any
 }

@@ -28,6 +28,8 @@ const PADDED: u8 = 2;
 const EXPONENT_AT: u32 = 3;
 /// Most packets of a payload.
 const MOST: usize = u8::MAX as usize;
+/// Most results of which parts are kept: a core has two frames at a time.
+const MOST_OPEN: usize = 8;
 /// Bits of a mantissa.
 const MANTISSA_BITS: u32 = 16;
 
@@ -85,15 +87,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Kind; 7] = [
-        Kind::Frame,
-        Kind::Result,
-        Kind::ShortResult,
-        Kind::Identify,
-        Kind::Identity,
-        Kind::Tables,
-        Kind::TablesTaken,
-    ];
+    const ALL: [Kind; 7] =
+        [Kind::Frame, Kind::Result, Kind::ShortResult, Kind::Identify, Kind::Identity, Kind::Tables, Kind::TablesTaken];
 
     fn number(self) -> u8 {
         match self {
@@ -154,7 +149,8 @@ impl Packet {
         if u32::from_le_bytes(*check) != crc32fast::hash(body) || !body.len().is_multiple_of(WORD_BYTES) {
             return None;
         }
-        let words = body.chunks_exact(WORD_BYTES).map(|word| word.iter().rev().fold(0, |all, b| all << 8 | u32::from(*b)));
+        let words =
+            body.chunks_exact(WORD_BYTES).map(|word| word.iter().rev().fold(0, |all, b| all << 8 | u32::from(*b)));
         let words: Vec<u32> = words.collect();
         let (&[head, sequence], words) = words.split_first_chunk()?;
         let [number, flags, index, count] = head.to_le_bytes();
@@ -166,7 +162,15 @@ impl Packet {
             }
             false => (0, words),
         };
-        (index < count).then(|| Packet { kind, flags, index, count, sequence, cycles, words: words.to_vec() })
+        (index < count && words.len() <= LAYOUT.fragment_words).then(|| Packet {
+            kind,
+            flags,
+            index,
+            count,
+            sequence,
+            cycles,
+            words: words.to_vec(),
+        })
     }
 
     /// The packets of `words` with the head of this one, at most `fragment_words` in each; its flags are those of the last.
@@ -176,7 +180,8 @@ impl Packet {
     pub fn split(&self, words: &[u32], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
         let fragments = words.chunks(fragment_words);
         let bytes = words.len() * WORD_BYTES;
-        let count = u8::try_from(fragments.len()).map_err(|_| TooLong { bytes, most: MOST * WORD_BYTES * fragment_words })?;
+        let count =
+            u8::try_from(fragments.len()).map_err(|_| TooLong { bytes, most: MOST * WORD_BYTES * fragment_words })?;
         let packet = |(index, words): (u8, &[u32])| {
             let flags = if index + 1 == count { self.flags } else { 0 };
             Packet { flags, index, count, words: words.to_vec(), ..*self }
@@ -218,14 +223,14 @@ impl Packet {
         let halves = self.words.iter().flat_map(|word| [*word as i16, (word >> MANTISSA_BITS) as i16]);
         let forces = halves.map(|mantissa| force_of(i32::from(mantissa), exponent) as u32);
         let mut forces: Vec<u32> = forces.collect();
-        forces.truncate(forces.len() - usize::from(self.flags & PADDED != 0));
+        forces.truncate(forces.len().saturating_sub(usize::from(self.flags & PADDED != 0)));
         forces
     }
 }
 
-/// A force of a mantissa; one near 2³¹ that was rounded up is the largest.
+/// A force of a mantissa; one near 2³¹ that was rounded up is the largest, and so is what no core sends.
 fn force_of(mantissa: i32, exponent: u32) -> i32 {
-    (i64::from(mantissa) << exponent).min(i64::from(i32::MAX)) as i32
+    (i64::from(mantissa) << exponent).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }
 
 /// Forces as a host has them of a core that sends mantissas of 16 bits, two in each of the `fragment_words` of a packet.
@@ -240,7 +245,8 @@ fn force_of(mantissa: i32, exponent: u32) -> i32 {
 pub fn shortened(forces: &[i32], fragment_words: usize) -> Vec<i32> {
     let block = |forces: &[i32]| {
         // What is added when a force is rounded up is in its size already.
-        let sizes = forces.iter().map(|force| (force ^ force >> 31) as u32).map(|size| size + (size >> (MANTISSA_BITS - 1)));
+        let sizes =
+            forces.iter().map(|force| (force ^ force >> 31) as u32).map(|size| size + (size >> (MANTISSA_BITS - 1)));
         let bits = u32::BITS - sizes.fold(0, |all, size| all | size).leading_zeros();
         let exponent = bits.saturating_sub(MANTISSA_BITS - 1);
         let rounded = move |force: &i32| (i64::from(*force) + i64::from(1u32 << exponent >> 1)) >> exponent;
@@ -277,7 +283,8 @@ impl CoreIdentity {
     /// Of the words in a packet; `None` for another number of words.
     pub fn of_words(words: &[u32]) -> Option<CoreIdentity> {
         let names = LAYOUT.identity.iter().map(String::as_str);
-        (words.len() == LAYOUT.identity.len()).then(|| CoreIdentity(std::iter::zip(names, words.iter().copied()).collect()))
+        (words.len() == LAYOUT.identity.len())
+            .then(|| CoreIdentity(std::iter::zip(names, words.iter().copied()).collect()))
     }
 
     /// The words of the packet.
@@ -352,6 +359,9 @@ impl Answers {
             Kind::Result | Kind::ShortResult => {
                 // A result that lacks a packet is given up once it is old.
                 self.fragments.retain(|own, _| sequence.wrapping_sub(*own) <= LAYOUT.late);
+                if self.fragments.len() >= MOST_OPEN && !self.fragments.contains_key(&sequence) {
+                    self.fragments.pop_first();
+                }
                 let own = self.fragments.entry(sequence).or_default();
                 own.insert(index, packet.payload());
                 if own.len() < usize::from(count) {
@@ -371,7 +381,7 @@ mod tests {
 
     #[test]
     fn packets_are_read_as_they_were_written_and_damaged_ones_are_none() {
-        let words: Vec<u32> = (0..800).map(|k| k * 0x0101_0101).collect();
+        let words: Vec<u32> = (0..800u32).map(|k| k.wrapping_mul(0x0101_0101)).collect();
         for kind in Kind::ALL {
             let cycles = if kind.is_result() { 0x0123_4567_89ab_cdef } else { 0 };
             let packets = Packet { kind, flags: 1, cycles, ..Packet::question(7) }.split(&words, 360).unwrap();
@@ -420,6 +430,9 @@ mod tests {
         assert_eq!(answers.add(&of(3 + LAYOUT.late + 1)[0].to_bytes()), None);
         assert_eq!(answers.fragments.len(), 1);
         assert_eq!((answers.add(b"rubbish"), answers.damaged), (None, 1));
+        // What is not whole is bounded, whatever comes.
+        (0..100).for_each(|k| drop(answers.add(&of(1000 + k)[0].to_bytes())));
+        assert_eq!(answers.fragments.len(), MOST_OPEN);
     }
 
     #[test]

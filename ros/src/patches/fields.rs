@@ -100,6 +100,8 @@ pub struct PatchFields {
     pub pose: Option<Pose>,
     /// Name of the estimator; if not stated the best one that keeps up.
     pub estimator: Option<String>,
+    /// Serial port of the board that computes its forces, or `udp:HOST` of a core behind Ethernet; if not stated an engine does.
+    pub board: Option<String>,
     /// Name of the engine.
     #[serde(default = "golden")]
     pub engine: String,

@@ -45,6 +45,19 @@ fn a_wrong_file_is_refused_with_line_field_and_value() {
 }
 
 #[test]
+fn a_patch_with_a_board_has_no_estimator_and_no_worker_of_the_others() {
+    let board = |more: &str| PatchFile::parse(&format!("{PATCH}board = \"udp:192.168.1.50\"\n{more}"), Path::new(""));
+    let file = board("").unwrap();
+    assert_eq!((file.patches[0].fields.board.as_deref(), file.threads()), (Some("udp:192.168.1.50"), 0));
+    for (more, wanted) in
+        [("estimator = \"search\"\n", "patch[0].estimator"), ("engine = \"fixed\"\n", "patch[0].engine")]
+    {
+        let error = board(more).unwrap_err().to_string();
+        assert!(error.starts_with(wanted) && error.contains("the board at udp:192.168.1.50"), "{error}");
+    }
+}
+
+#[test]
 fn angles_are_about_fixed_axes() {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let turned = |rpy_rad| Pose { parent: base(), xyz_m: [0.0; 3], rpy_rad }.quaternion();

@@ -121,8 +121,15 @@ impl<P: Read + Write> Board for Client<P> {
     fn counters(&mut self) -> Result<PacketCounters, HostError> {
         let bytes = self.request(Kind::ReadCounters, Vec::new())?;
         let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
-        let Counters { taken, framing, crc, unknown_type, length, overrun } = Counters::of_bytes(&bytes).ok_or(wrong)?;
-        let named = [("framing", framing), ("CRC", crc), ("unknown type", unknown_type), ("length", length), ("overrun", overrun)];
+        let Counters { taken, framing, crc, unknown_type, length, overrun } =
+            Counters::of_bytes(&bytes).ok_or(wrong)?;
+        let named = [
+            ("framing", framing),
+            ("CRC", crc),
+            ("unknown type", unknown_type),
+            ("length", length),
+            ("overrun", overrun),
+        ];
         let dropped = named.map(|(name, count)| (name, count.into())).to_vec();
         Ok(PacketCounters { taken: taken.into(), dropped, bits: u16::BITS })
     }

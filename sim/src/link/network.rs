@@ -179,7 +179,9 @@ impl Board for NetworkClient {
     fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
         require_one_answer(model).map_err(|error| self.failed(&error))?;
         if model.code_beats() > 0 {
-            return Err(self.failed(&"hardware.source = adc-scan: a core behind Ethernet takes frames and scans no array"));
+            return Err(
+                self.failed(&"hardware.source = adc-scan: a core behind Ethernet takes frames and scans no array")
+            );
         }
         let (core, _) = self.ask()?;
         check(model, &core).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })?;
@@ -232,8 +234,11 @@ impl Board for NetworkClient {
         self.clock.add(sent_ns, cycles, answered_ns);
         let bytes: Vec<u8> = words.into_iter().flat_map(u32::to_le_bytes).collect();
         let answer = Answer::of_bytes(model, &bytes, true);
-        let answer =
-            answer.ok_or(HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() })?;
+        let answer = answer.ok_or(HostError::Answer {
+            port: self.name.clone(),
+            what: kind.answer().name(),
+            bytes: bytes.len(),
+        })?;
         let short_forces = self.short_forces.then_some(fragment_words);
         Ok(Answer { short_forces, acquired: self.clock.at(cycles), ..answer })
     }
@@ -246,7 +251,9 @@ impl Board for NetworkClient {
             // The same number again: the core has taken a fragment whose answer was lost.
             let packet = |sequence| Packet::tables(sequence, image, words).map(|mut all| vec![all.swap_remove(index)]);
             let taken = |answer, wanted| match answer {
-                Whole::TablesTaken { sequence, index: own } => (sequence == wanted && usize::from(own) == index).then_some(()),
+                Whole::TablesTaken { sequence, index: own } => {
+                    (sequence == wanted && usize::from(own) == index).then_some(())
+                }
                 _ => None,
             };
             self.request("tables", false, &packet, &taken)?;

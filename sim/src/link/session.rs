@@ -1,8 +1,15 @@
 //! A connection to an identified board, with the model of its scene.
 
-use std::cell::RefCell;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use super::answer::Answer;
+use super::board::{load, Board};
+use super::client::Client;
+use super::error::HostError;
+use super::host_uart::require_uart;
+use super::network::NetworkClient;
+use crate::device_error::device_error;
 use anyhow::{anyhow, bail, Result};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::tare::require_readings;
@@ -13,13 +20,6 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::wire::link::{Identity, Kind};
-use super::answer::Answer;
-use super::board::{load, Board};
-use super::client::Client;
-use super::error::HostError;
-use super::host_uart::require_uart;
-use super::network::NetworkClient;
-use crate::device_error::device_error;
 
 /// Longest wait of a read of the port for a byte.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
@@ -133,18 +133,18 @@ impl Session {
 pub struct BoardEngine {
     /// The model of the board's hardware.
     model: Model,
-    session: RefCell<Session>,
+    session: Mutex<Session>,
 }
 
 impl BoardEngine {
     /// The board of a session.
     pub fn new(session: Session) -> Self {
-        BoardEngine { model: session.model.clone(), session: RefCell::new(session) }
+        BoardEngine { model: session.model.clone(), session: Mutex::new(session) }
     }
 
     fn result(&self, frames: &[Frame]) -> Result<Reconstruction> {
         let [frame] = frames else { bail!("{} frames: a board takes one for each result", frames.len()) };
-        let (readings, answer) = self.session.borrow_mut().request(frame)?;
+        let (readings, answer) = self.session.lock().unwrap_or_else(PoisonError::into_inner).request(frame)?;
         answer.decode(&self.model, &readings)?.ok_or_else(|| anyhow!("the answer has no forces"))
     }
 }

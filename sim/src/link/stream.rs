@@ -170,8 +170,7 @@ pub(crate) fn run_scans(
     for id in scans {
         let asked = SystemTime::now();
         let (readings, answer) = session.scan(&id)?;
-        let reply =
-            Reply::new(&session.model, &mut checks, id.into(), (None, asked), &readings, &answer)?;
+        let reply = Reply::new(&session.model, &mut checks, id.into(), (None, asked), &readings, &answer)?;
         let reply = Reply { readings: Some(readings.stress_MPa), ..reply };
         sent.equal &= reply.answer.equal != Some(false);
         sent.answered += 1;

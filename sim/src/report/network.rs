@@ -59,9 +59,8 @@ mod tests {
         let times = |name: &str| times(&Model::new(&Scene::builtin(name).unwrap()).unwrap());
         // 64 codes in 32 words, and 3 more of header and CRC-32; 192 forces and 9 words of status; 96 words of mantissas, each with 5
         // more, which have the time too.
-        let ms = |more: usize, payloads: &[usize]| {
-            Some(wire_ms(payloads.iter().map(|words| 4 * (words + more) + 66).sum()))
-        };
+        let ms =
+            |more: usize, payloads: &[usize]| Some(wire_ms(payloads.iter().map(|words| 4 * (words + more) + 66).sum()));
         let codes = ms(3, &[32]);
         let wanted = [(32, ms(5, &[192 + 9])), (16, ms(5, &[96, 9]))];
         assert_eq!(times("eight-by-eight"), wanted.map(|(bits, forces)| (bits, vec![codes, None, forces])));

@@ -116,7 +116,10 @@ fn over_a_network_with_faults_every_answer_of_each_core_is_right_and_every_fault
             let [lost, doubled, altered, overtaken] = network.end();
             assert!(lost > 0 && doubled > 0 && altered > 0 && overtaken > 0);
             let damaged = errors.damaged + u64::from(counters.dropped_for("damaged"));
-            assert!(damaged > 0 && errors.repeated > 0 && counters.dropped_for("ignored") > 0, "{errors:?} {counters:?}");
+            assert!(
+                damaged > 0 && errors.repeated > 0 && counters.dropped_for("ignored") > 0,
+                "{errors:?} {counters:?}"
+            );
             assert_eq!(counters.dropped_for("refused"), 0, "{counters:?}");
         })
     });
@@ -152,8 +155,9 @@ fn tables_are_written_over_a_network_with_faults() {
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     // So many taxels that an image has several packets.
     let sensor = "rows = 16\ncols = 16\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n";
-    let hand =
-        format!("name = \"hand\"\n[sensor]\n{sensor}[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n");
+    let hand = format!(
+        "name = \"hand\"\n[sensor]\n{sensor}[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n"
+    );
     std::fs::write(path("hand.toml"), &hand).unwrap();
     std::fs::write(path("left.toml"), format!("{hand}[search]\nnoise_floor_MPa = 0.05\n")).unwrap();
     let model = Model::new(&Scene::load(&path("hand.toml")).unwrap()).unwrap();
@@ -214,7 +218,8 @@ fn the_program_sends_checks_and_streams_over_a_network() {
 
     let line = format!("{{\"id\": 1, \"stress_MPa\": {:?}}}\n", vec![0.25; 64]);
     let timed = line.replace("\"id\"", "\"time_ns\": 1790000000000000000, \"id\"");
-    let streamed = run(&["host", "--port", &port, "--scene", "eight-by-eight", "--stream", "--check"], &(line + &timed));
+    let streamed =
+        run(&["host", "--port", &port, "--scene", "eight-by-eight", "--stream", "--check"], &(line + &timed));
     assert_eq!(streamed.status.code(), Some(0), "{}", text(&streamed.stderr));
     let shown = text(&streamed.stdout);
     let lines: Vec<serde_json::Value> = shown.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -228,13 +233,19 @@ fn the_program_sends_checks_and_streams_over_a_network() {
 
     let other = run(&["host", "--udp", address, "--scene", "sensor-1"], "");
     assert_eq!(other.status.code(), Some(2));
-    assert!(text(&other.stderr).contains("the board was built for another scene: 8×8 taxels"), "{}", text(&other.stderr));
+    assert!(
+        text(&other.stderr).contains("the board was built for another scene: 8×8 taxels"),
+        "{}",
+        text(&other.stderr)
+    );
     core.kill().unwrap();
     core.wait().unwrap();
 
     let nobody = run(&["host", "--udp", address, "--scene", "eight-by-eight", "--timeout", "20"], "");
     assert_eq!(nobody.status.code(), Some(2));
-    let message = format!("error: udp:{address}: no answer to identify, sent 8 times with a timeout of 20 ms each: is it a Dermis core");
+    let message = format!(
+        "error: udp:{address}: no answer to identify, sent 8 times with a timeout of 20 ms each: is it a Dermis core"
+    );
     assert!(text(&nobody.stderr).contains(&message), "{}", text(&nobody.stderr));
     let wrong = run(&["host", "--udp", "no such host", "--scene", "eight-by-eight"], "");
     assert_eq!(wrong.status.code(), Some(2));

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | scene, frame, calibration, manifest, recordings, lines, requests | seeds of `corpus/`, mutated bytes and words | error in plain words or value, no panic |
 //! | frame.json | the same | a frame that is read, written and read again is the same |
-//! | packets | the same | a packet that is found is found again after encoding |
+//! | packets, datagrams | the same | a packet that is found is found again after encoding |
 //! | whole | random scenes, random and invalid frames | error or finite forces, in floating and fixed point |
 //!
 //! No input takes longer than [`LONGEST`], and reading allocates at most [`BYTES_PER_BYTE`] per byte of text plus

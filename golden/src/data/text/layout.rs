@@ -331,8 +331,7 @@ impl<'s> Table<'s> {
     /// Checks that at least half of the lines with numbers have readings.
     fn check(&self, first: usize, layout: &Layout) -> Result<(), NoReadings> {
         let rows = self.rows[first..].iter().filter(|row| row.numeric);
-        let unfit: Vec<Option<NoReadings>> =
-            rows.map(|row| layout.readings_of(&row.line, &row.cells).err()).collect();
+        let unfit: Vec<Option<NoReadings>> = rows.map(|row| layout.readings_of(&row.line, &row.cells).err()).collect();
         match unfit.iter().flatten().count() * 2 > unfit.len() {
             true => unfit.into_iter().flatten().next().map_or(Ok(()), Err),
             false => Ok(()),

@@ -47,7 +47,10 @@ fn a_core_behind_ethernet_answers_with_the_forces_of_the_model_and_their_time() 
             dermis_result_free(result);
         }
         assert_eq!(sum_N, wanted.resultant_N);
-        assert!(error_ns > 0 && (before - error_ns as i64..=now_ns() + error_ns as i64).contains(&time_ns), "{time_ns} ± {error_ns}");
+        assert!(
+            error_ns > 0 && (before - error_ns as i64..=now_ns() + error_ns as i64).contains(&time_ns),
+            "{time_ns} ± {error_ns}"
+        );
     }
     // Of a wrong frame there is no result, and the next one is answered.
     let mut result = null_mut();
