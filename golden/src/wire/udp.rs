@@ -399,7 +399,7 @@ mod tests {
         }
         assert_eq!(Packet::of_bytes(&[]), None);
         let too_long = Packet::tables(1, &vec![0; 255 * 1440 + 1], 360).unwrap_err();
-        assert_eq!(too_long.to_string(), "367201 bytes, of which 255 packets hold 367200");
+        assert_eq!(too_long.to_string(), "367204 bytes, of which 255 packets hold 367200");
     }
 
     /// By another implementation: `python/litex` and zlib.

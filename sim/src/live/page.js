@@ -38,12 +38,14 @@ class ArrayMap {
       text(svg(this.svg, "text", { class: "axis", x: at[0], y: at[1], "font-size": 0.45 }), axis);
     }
     this.missing = svg(this.svg, "path", { class: "missing" });
+    this.trails = svg(this.svg, "path", { class: "trails" });
     this.arrows = svg(this.svg, "path", { class: "arrows" });
     this.contact = svg(this.svg, "path", { class: "contact" });
     this.bars = svg(this.svg, "path", { class: "bars" });
   }
 
-  draw(stress, peak, forces, longest, contacts, largest) {
+  draw(stress, peak, forces, longest, contacts, largest, trails = "") {
+    this.trails.setAttribute("d", trails);
     const cells = this.shades.map(sign => sign.map(() => ""));
     let crosses = "";
     for (let k = 0; k < stress.length; k++) {
@@ -96,6 +98,22 @@ function table(picture, contacts) {
   });
 }
 
+/** Where the contacts of the newest result have been in the last seconds. */
+function trails(tracks) {
+  const trail = ({ number }) => history.flatMap(h => h.tracks.filter(([own]) => own === number).map(([, x, y]) => [x, y]));
+  return tracks.map(track => trail(track).map(([x, y], k) => `${k ? "L" : "M"}${x.toFixed(2)} ${y.toFixed(2)}`).join("")).join("");
+}
+
+/** What is known of the contacts over time; `period` is that of the results in s. */
+function tell(tracks, period) {
+  text(at("tracks"), tracks.map(t => {
+    const speed = Math.hypot(...t.velocity_mm) / period;
+    const ratio = t.load_ratio.toFixed(2) + (t.load_ratio_sigma == null ? "" : ` ± ${t.load_ratio_sigma.toFixed(2)}`);
+    return `contact ${t.number}, for ${(t.age * period).toFixed(1)} s: ${t.moving ? "moves, " : ""}${speed.toFixed(1)} mm/s, shear over normal `
+      + `force ${ratio}` + (t.slip_ratio == null ? "" : `, before it last moved up to ${t.slip_ratio.toFixed(2)}`);
+  }).join("; "));
+}
+
 const plot = at("plot"), lines = {};
 for (const y of [10, 80, 150]) svg(plot, "line", { x1: 46, x2: 598, y1: y, y2: y });
 const marks = [14, 84, 150].map(y => svg(plot, "text", { x: 2, y }));
@@ -121,23 +139,27 @@ const most = values => values.reduce((most, value) => Math.max(most, Math.abs(va
 /** Draws a picture; the time is in seconds. */
 function draw(picture, now) {
   const { result, truth, contacts, stress_MPa: stress } = picture;
+  const tracks = result.tracks || [];
   const sums = [result.resultant_N, ...contacts.map(c => c.force_N), ...(truth ? [truth.resultant_N] : [])];
   history.push({
     drawn: now, received: picture.received_s, sequence: picture.sequence,
     found: result.resultant_N, true: truth && truth.resultant_N, peak: most(stress),
+    tracks: tracks.map(t => [t.number, ...place(t.centre_mm)]),
     longest: most([...lengths(result.forces_N), ...lengths(truth || {})]),
     largest: most(sums.map(([x, y]) => Math.hypot(x, y))),
   });
   history = history.filter(h => now - h.drawn <= SECONDS);
   const [peak, longest, largest] = ["peak", "longest", "largest"].map(key => most(history.map(h => h[key])));
-  found.draw(stress, peak, result.forces_N, longest, contacts, largest);
+  found.draw(stress, peak, result.forces_N, longest, contacts, largest, trails(tracks));
   at("true").hidden = at("dashed").hidden = !truth;
   if (truth) real.draw(stress, peak, truth, longest, [], largest);
   text(at("scale"), `Full colour ${digits(peak)} MPa: pressure red, tension blue. Longest thin arrow ${digits(longest)} N, `
     + `a taxel's tangential force; thick arrow: a contact's, up to ${digits(largest)} N, with one standard deviation. `
-    + `Scales: the largest of the last ${SECONDS} s. Dot: the first taxel, row 0 and column 0; x to the right, y down, `
+    + `Thin line: where a contact was in the last ${SECONDS} s. Scales: the largest of the last ${SECONDS} s. Dot: the first taxel, row 0 and column 0; x to the right, y down, `
     + `normal forces positive in pressure.`);
   table(picture, contacts);
+  const [first, last] = [history[0], history.at(-1)], count = last.sequence - first.sequence;
+  tell(tracks, count > 0 ? (last.received - first.received) / count : NaN);
   const flags = result.flags.join();
   if (at("flags").dataset.flags !== flags) {
     at("flags").dataset.flags = flags;

@@ -149,6 +149,8 @@ fn the_mouse_is_a_finger_whose_true_forces_stand_beside_those_found() {
             real: document.querySelector('#true .arrows').getAttribute('d'),
             contactArrow: document.querySelector('#found .contact').getAttribute('d'),
             bars: document.querySelector('#found .bars').getAttribute('d'),
+            trails: document.querySelector('#found .trails').getAttribute('d'),
+            tracks: document.querySelector('#tracks').innerText,
             plotted: [...document.querySelectorAll('#plot polyline')].map(l => l.getAttribute('points').split(' ').length),
             hidden: document.querySelector('#true').hidden, state: document.querySelector('#state').innerText })",
     );
@@ -159,6 +161,13 @@ fn the_mouse_is_a_finger_whose_true_forces_stand_beside_those_found() {
     let columns: Vec<f64> = serde_json::from_value(shown["columns"].clone()).unwrap();
     let column = |c: usize| (0..8).map(|r| columns[8 * r + c]).fold(0.0, f64::max);
     assert!(column(5) > 0.6 && column(5) > 2.0 * column(0), "{shown}");
+    // The contact's path leads from the middle, 4, to the right.
+    let trail = shown["trails"].as_str().unwrap();
+    let right = trail.split(['M', 'L']).filter_map(|point| point.split(' ').next()?.parse::<f64>().ok());
+    let right: Vec<f64> = right.collect();
+    assert!(right.len() > 3 && right[right.len() - 1] > right[0] + 1.0, "{shown}");
+    let tracks = shown["tracks"].as_str().unwrap();
+    assert!(tracks.starts_with("contact ") && tracks.contains(" mm/s, shear over normal force 0."), "{shown}");
     for path in ["arrows", "real", "contactArrow", "bars"] {
         assert!(shown[path].as_str().unwrap().starts_with('M'), "{path}: {shown}");
     }
