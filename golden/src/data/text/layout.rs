@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 use super::cells::{point, Digits, Separator};
-use super::columns::{Columns, Found};
+use super::columns::{is_known, Columns, Found};
 use super::time::TimeUnit;
 use super::{reading, Line, NoReadings};
 
@@ -59,6 +59,10 @@ pub struct Layout {
     pub first_line: usize,
     /// Number of the line with the names or numbers of the columns, if there is one.
     names_line: Option<usize>,
+    /// The first line may have the numbers of the columns, and no line follows that would show it.
+    pub(super) may_be_numbers: bool,
+    /// A column that seems to be a time in a form that is not read, from 0, and its first cell.
+    unread: Option<(usize, String)>,
 }
 
 /// A line split at a separator.
@@ -147,6 +151,13 @@ impl Layout {
         cells.iter().skip(self.first).take(self.readings).any(|cell| self.digits.hide_a_lost_digit(cell))
     }
 
+    /// The last cell of a line, if it may be the begin of a longer one.
+    pub(super) fn cut_cell<'t>(&self, line: &'t str) -> Option<Cow<'t, str>> {
+        let mut cells = self.split(line);
+        let is_reading = cells.len() == self.first + self.readings;
+        cells.pop().filter(|cell| !is_reading || self.digits.may_be_cut(cell))
+    }
+
     /// Whether the other layout reads lines alike: all but the number of the first line.
     pub(super) fn is_like(&self, other: &Layout) -> bool {
         (self.separator, self.cells, self.first) == (other.separator, other.cells, other.first)
@@ -165,10 +176,14 @@ impl Layout {
         Some(line.number) == self.names_line || 2 * numbers < self.readings
     }
 
-    /// Whether the readings of a line are the numbers of their columns, 0, 1, 2 …, as pandas writes them in a header.
-    pub(super) fn has_numbers_of_columns(&self, line: &Line) -> bool {
-        let readings = self.readings_of(line, &self.split(line.text)).unwrap_or_default();
-        readings.len() > 2 && readings.iter().enumerate().all(|(column, reading)| *reading == column as f64)
+    /// Whether a line of its own shows which of its cells are the readings: it has no other ones.
+    pub(super) fn is_sure(&self) -> bool {
+        self.readings == self.cells && !self.may_be_numbers
+    }
+
+    /// Whether the other layout reads lines alike, times too.
+    pub(super) fn reads_as(&self, other: &Layout) -> bool {
+        self.is_like(other) && (self.time, self.form) == (other.time, other.form)
     }
 }
 
@@ -208,7 +223,8 @@ impl<'s> Table<'s> {
         let before = first.checked_sub(1).map(|before| &self.rows[before].cells);
         let mut names = before.filter(|names| names.len() == self.cells);
         let data = self.body(first).count();
-        if self.is_numbered(first, readings) && data > lines && (data - 1).is_multiple_of(lines) {
+        let is_numbered = self.is_numbered(first, readings);
+        if is_numbered && data > lines && (data - 1).is_multiple_of(lines) {
             names = Some(&self.rows[first].cells);
             first += 1;
         }
@@ -239,6 +255,8 @@ impl<'s> Table<'s> {
             blocks: form == Form::Grid && self.has_blocks(first, lines),
             first_line: self.rows[first].line.number,
             names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].line.number),
+            may_be_numbers: is_numbered && data == 1,
+            unread: found.unread.and_then(|column| Some((column, self.body(first).next()?[column].to_string()))),
         };
         self.check(first, &layout)?;
         Ok(layout)
@@ -306,18 +324,25 @@ impl<'s> Table<'s> {
         Ok(found)
     }
 
-    /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … of nine and more.
+    /// Whether the line `first` has the numbers of the columns of readings, from 0 or 1 on, and names of the others; from 1 on
+    /// without names of nine and more.
     fn is_numbered(&self, first: usize, readings: usize) -> bool {
         let cells = &self.rows[first].cells;
         let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
-        let others = cells.iter().filter(|cell| cell.parse::<usize>().is_err());
-        let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
-        let names = others.clone().filter(|cell| is_name(cell)).count();
         let counts = |from: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + from);
-        others.clone().all(|cell| cell.is_empty() || is_name(cell))
-            && numbers.len() > 1
-            && (names > 0 || numbers.len() == readings)
-            && (counts(0) || readings >= 9 && counts(1))
+        if numbers.len() != readings || readings < 2 || !(counts(0) || counts(1)) {
+            return false;
+        }
+        let is_text = |cell: &str| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
+        // A name stands over cells of another kind, a label over labels.
+        let is_name = |column: usize| {
+            let mut below = self.body(first + 1).map(|cells| &cells[column]);
+            is_text(&cells[column])
+                && (is_known(&cells[column]) || below.any(|cell| !cell.is_empty() && !is_text(cell)))
+        };
+        let mut others = (0..cells.len()).filter(|column| cells[*column].parse::<usize>().is_err());
+        let names = others.clone().filter(|column| is_name(*column)).count();
+        others.all(|column| cells[column].is_empty() || is_name(column)) && (names > 0 || counts(0) || readings >= 9)
     }
 
     /// Whether frames of `lines` lines stand apart, by blank lines or headings.
@@ -331,8 +356,7 @@ impl<'s> Table<'s> {
     /// Checks that at least half of the lines with numbers have readings.
     fn check(&self, first: usize, layout: &Layout) -> Result<(), NoReadings> {
         let rows = self.rows[first..].iter().filter(|row| row.numeric);
-        let unfit: Vec<Option<NoReadings>> =
-            rows.map(|row| layout.readings_of(&row.line, &row.cells).err()).collect();
+        let unfit: Vec<Option<NoReadings>> = rows.map(|row| layout.readings_of(&row.line, &row.cells).err()).collect();
         match unfit.iter().flatten().count() * 2 > unfit.len() {
             true => unfit.into_iter().flatten().next().map_or(Ok(()), Err),
             false => Ok(()),
@@ -362,6 +386,12 @@ impl fmt::Display for Layout {
             Form::Line => "a frame per line".to_owned(),
             Form::Grid => format!("a grid of {} lines per frame", self.lines),
         };
-        write!(f, "{form}, separated by {}{mark}{header}{time}, readings in columns {a} to {b}", self.separator)
+        write!(f, "{form}, separated by {}{mark}{header}{time}, readings in columns {a} to {b}", self.separator)?;
+        match &self.unread {
+            Some((column, cell)) => {
+                write!(f, "; no time is read from column {}, {cell:?}: ISO 8601 and numbers are", column + 1)
+            }
+            None => Ok(()),
+        }
     }
 }
