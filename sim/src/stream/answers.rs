@@ -414,6 +414,83 @@ mod tests {
     }
 
     #[test]
+    fn the_last_piece_without_an_end_is_no_line() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let (one, two) = (csv(&frames[0]), csv(&frames[1]));
+        for cut in [1, 3] {
+            let input = one.clone() + &two[..two.len() - cut];
+            let (counts, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
+            assert_eq!((counts.answered, counts.refused), (1, 1));
+            let reason = "the last line has no end, and may be cut within a number";
+            assert_eq!((&answers[1]["line"], answers[1]["error"].as_str()), (&Value::from(2), Some(reason)));
+        }
+    }
+
+    #[test]
+    fn words_behind_which_no_frame_stands_are_refused() {
+        let (counts, answers) = answers(&scene(), EngineName::Golden, "no device\nno device\n".into(), ALL, true);
+        assert_eq!((counts.answered, counts.refused), (0, 2));
+        assert_eq!(answers[0]["error"], "no numbers, wanted 64 of 8x8 taxels");
+        assert_eq!(answers[0]["line"], 1);
+    }
+
+    /// Lines that do not show their layout one by one wait for those that follow, and keep their order, numbers and times.
+    #[test]
+    fn lines_with_a_time_are_answered_in_order() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let line = |k: usize| format!("{},{}", 100 + 10 * k, csv(&frames[k % 2]));
+        for lines in [2, 3, 12] {
+            let input = "ms,".to_owned() + &(1..=64).map(|k| k.to_string()).collect::<Vec<_>>().join(",") + "\n";
+            let input = input + &(0..lines).map(line).collect::<String>();
+            let (counts, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
+            assert_eq!((counts.answered, counts.refused), (lines as u64, 0));
+            let numbers: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
+            assert!(numbers.into_iter().eq(2..lines as u64 + 2));
+            let times: Vec<i64> = answers.iter().map(|answer| answer["time_ns"].as_i64().unwrap()).collect();
+            assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "{times:?}");
+            let alone = super::tests::answers(&scene, EngineName::Golden, csv(&frames[1]), ALL, true).1;
+            assert_eq!(answers[1]["resultant_N"], alone[0]["resultant_N"]);
+        }
+    }
+
+    /// Lines that wait, and their source that waits for an answer.
+    struct Patient(Vec<u8>, Receiver<()>);
+
+    impl Read for Patient {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            if self.0.is_empty() {
+                // Half a minute where nothing answers.
+                let _ = self.1.recv_timeout(Duration::from_secs(30));
+                return Ok(0);
+            }
+            let bytes = (&self.0[..]).read(buffer)?;
+            self.0.drain(..bytes);
+            Ok(bytes)
+        }
+    }
+
+    #[test]
+    fn a_line_that_no_other_follows_is_answered_soon() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let engine = engine_of(&scene, EngineName::Golden);
+        let (sender, receiver) = channel();
+        let text = format!("t_ms,{}\n7,{}", vec!["p"; 64].join(","), csv(&frames[0]));
+        let input: Box<dyn Read + Send> = Box::new(Patient(text.into_bytes(), receiver));
+        let begun = std::time::Instant::now();
+        let mut answered = None;
+        let mut output = |outcome: &Outcome| {
+            if let Outcome::Answer(_) = outcome {
+                answered = Some(begun.elapsed());
+                let _ = sender.send(());
+            }
+            Ok(())
+        };
+        let counts = run(Estimators::only(&*engine, CheckPace::Never), (input, "memory"), ALL, &mut output).unwrap();
+        assert_eq!((counts.answered, counts.refused), (1, 0));
+        assert!(answered.unwrap() < Duration::from_secs(20), "{answered:?}");
+    }
+
+    #[test]
     fn a_block_of_frames_gives_one_result_and_brief_leaves_out_the_taxels() {
         let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
         scene.input.average = 1;

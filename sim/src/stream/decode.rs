@@ -6,7 +6,7 @@ use std::io::{Read, Result};
 const PIECE: usize = 8192;
 
 /// How characters are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 enum Units {
     /// One byte each, or several: handed on as they are.
     Bytes,

@@ -121,13 +121,17 @@ impl Frame {
     }
 }
 
+/// Endings of files with frames in lines, of numbers or of JSON.
+const LINES: [&str; 3] = ["csv", "ndjson", "jsonl"];
+
 /// The file's name without its ending.
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// Whether a file has frames in lines.
 fn is_csv(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+    path.extension().is_some_and(|extension| LINES.iter().any(|own| extension.eq_ignore_ascii_case(own)))
 }
 
 /// Text, file, its stem, scene.
@@ -138,7 +142,7 @@ fn parser(path: &Path) -> Result<Parser, FrameError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("json") => Ok(json::parse),
-        Some("csv") => Ok(csv::parse),
+        Some(extension) if LINES.contains(&extension) => Ok(csv::parse),
         _ => Err(FrameError::UnknownKind { file: path.display().to_string() }),
     }
 }

@@ -272,6 +272,18 @@ impl Digits {
         }
     }
 
+    /// Whether the number in a cell would with one more character be written as the others and differ from `wanted` by `most`.
+    pub(super) fn would_be(&self, cell: &str, wanted: f64, most: f64) -> bool {
+        let text = point(cell);
+        let with = |(at, character): (usize, char)| {
+            let longer = format!("{}{character}{}", &text[..at], &text[at..]);
+            self.reading(&longer).is_ok_and(|value| (value - wanted).abs() <= most)
+        };
+        // A number has one byte for each character.
+        let places = (0..=text.len()).filter(|at| text.is_char_boundary(*at));
+        places.flat_map(|at| "0123456789.-e".chars().map(move |character| (at, character))).any(with)
+    }
+
     /// Whether the number in a cell, which is read, may be the begin of a longer one.
     pub(super) fn may_be_cut(&self, cell: &str) -> bool {
         let text = point(cell);

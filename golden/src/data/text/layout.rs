@@ -11,6 +11,11 @@ use super::{reading, Line, NoReadings};
 /// Lines from which a layout is found.
 const LOOKED_AT: usize = 256;
 
+/// Changes of a reading, over the largest of all others: from this one on it may be due to a character that is lost, if the number
+/// with that character would have changed by this much at most.
+const FAR: f64 = 8.0;
+const NEAR: f64 = 2.0;
+
 /// How frames stand in a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
@@ -149,6 +154,24 @@ impl Layout {
     /// Whether a reading among the cells of a line would be another number without one of its digits, and be read.
     pub(super) fn hides_a_lost_digit(&self, cells: &[Cow<str>]) -> bool {
         cells.iter().skip(self.first).take(self.readings).any(|cell| self.digits.hide_a_lost_digit(cell))
+    }
+
+    /// Whether one of a line's readings has changed from that `before` by far more than all others, and its number would with one
+    /// more character be nearly that before.
+    pub(super) fn may_lack_a_character(&self, cells: &[Cow<str>], before: &[f64], readings: &[f64]) -> bool {
+        if before.len() != readings.len() {
+            return false;
+        }
+        let changes = before.iter().zip(readings).map(|(before, now)| (now - before).abs());
+        let (mut largest, mut second, mut place) = (0.0, 0.0f64, 0);
+        for (taxel, change) in changes.enumerate().filter(|(_, change)| !change.is_nan()) {
+            if change > largest {
+                (largest, second, place) = (change, largest, taxel);
+            } else {
+                second = second.max(change);
+            }
+        }
+        largest > FAR * second && self.digits.would_be(&cells[self.first + place], before[place], NEAR * second)
     }
 
     /// The last cell of a line, if it may be the begin of a longer one.
@@ -290,7 +313,11 @@ impl<'s> Table<'s> {
             None if got == taxels || own >= taxels => Ok(of(Form::Line)),
             None if got == cols || own == cols => Ok(of(Form::Grid)),
             Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
-            None => Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row")),
+            None => {
+                // Which of them is an index or a time, a row alone does not show.
+                let hint = if own > cols { "; --columns A..B says which are the readings of a row" } else { "" };
+                Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
+            }
         }
     }
 

@@ -19,8 +19,8 @@
 //! | decimals | where zeros at the end show that their number is fixed; a cell with fewer or more has lost or gained characters |
 //! | digits before the decimal mark | where zeros in front show that their number is fixed; where others have one, a cell has one too |
 //!
-//! A digit that a whole number has lost shows nowhere. Where lines of a stream show that the link loses characters, those near them
-//! are doubted ([`Reader::is_doubtful`]).
+//! A digit that a whole number has lost shows nowhere in its line. Where lines of a stream show that the link loses characters, those
+//! near them are doubted, and so is a frame in which one reading has changed as a lost character would change it ([`Reader`]).
 //!
 //! | in | a cell is |
 //! |---|---|
@@ -44,6 +44,7 @@ pub use cells::{reading, Separator};
 pub use layout::{Form, Layout, Stated};
 pub(crate) use reader::without_nan;
 pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
+pub(crate) use time::number_ns;
 pub use time::{is_date, TimeUnit};
 
 use std::fmt;

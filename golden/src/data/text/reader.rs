@@ -36,6 +36,8 @@ pub struct TextFrame {
     pub readings: Vec<f64>,
     /// The true force in N, [x, y, normal], of a line of JSON that states it.
     pub resultant_N: Option<[f64; 3]>,
+    /// Whether a reading may be another one than that which was sent: see [`Reader`].
+    pub doubtful: bool,
 }
 
 /// What a line brought.
@@ -95,6 +97,31 @@ type Owned = (usize, String);
 const HALF_DAY_NS: i64 = 43_200_000_000_000;
 
 /// Turns lines into frames of one array.
+///
+/// The readings of a frame may be others than those that were sent, [`TextFrame::doubtful`], where numbers are written so that a
+/// digit that is lost does not show, as it does in a fixed number of decimals or in numbers that are filled with zeros, and
+///
+/// - one of the last hundred lines has lost characters, or
+/// - one reading has changed by far more than all others, and with one more character its number would be nearly that before.
+///
+/// ```
+/// use dermis_golden::data::text::{Line, Read, Reader, Stated};
+///
+/// let doubtful = |lines: [&str; 3]| {
+///     let mut reader = Reader::new([2, 2], Stated::default());
+///     let read = |(k, text)| reader.push(Line { number: k + 1, text });
+///     matches!(lines.into_iter().enumerate().flat_map(read).last(), Some(Read::Frame(frame)) if frame.doubtful)
+/// };
+/// // The second line has lost a separator; the third may have lost a digit of 12.
+/// assert!(doubtful(["12,3,4,5", "12,34,5", "2,3,4,5"]));
+/// assert!(!doubtful(["12,3,4,5", "12,3,4,5", "12,4,4,5"]));
+/// assert!(!doubtful(["0012,0003,0004,0005", "0012,00030004,0005", "0002,0003,0004,0005"]));
+/// // The first reading may have been 0.161295.
+/// assert!(doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.61295,0.202,0.312,0.401"]));
+/// // All change, or one by what no character explains.
+/// assert!(!doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.61295,0.402,0.612,0.801"]));
+/// assert!(!doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.83295,0.202,0.312,0.401"]));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Reader {
     shape: [usize; 2],
@@ -128,6 +155,8 @@ pub struct Reader {
     last: usize,
     /// Number of the last line that has lost characters.
     cut: Option<usize>,
+    /// Readings of the last frame of a line.
+    before: Vec<f64>,
     /// Whether numbers of the lines so far are written so that a lost digit does not show.
     hides: bool,
 }
@@ -231,6 +260,7 @@ impl Reader {
             time_ns,
             last: 0,
             cut,
+            before: Vec::new(),
             hides: false,
         }
     }
@@ -240,24 +270,8 @@ impl Reader {
         self.layout.as_ref()
     }
 
-    /// Whether the readings of the last line may be others than those that were sent: one of the last hundred lines has lost
-    /// characters, and a digit that is lost from these numbers does not show. Written with a fixed number of decimals, or filled
-    /// with zeros, they are not in doubt.
-    ///
-    /// ```
-    /// use dermis_golden::data::text::{Line, Reader, Stated};
-    ///
-    /// let doubtful = |lines: [&str; 3]| {
-    ///     let mut reader = Reader::new([2, 2], Stated::default());
-    ///     lines.into_iter().enumerate().for_each(|(k, text)| drop(reader.push(Line { number: k + 1, text })));
-    ///     reader.is_doubtful()
-    /// };
-    /// // The second line has lost a separator; the third may have lost a digit of 12.
-    /// assert!(doubtful(["12,3,4,5", "12,34,5", "2,3,4,5"]));
-    /// assert!(!doubtful(["12,3,4,5", "12,3,4,5", "2,3,4,5"]));
-    /// assert!(!doubtful(["0012,0003,0004,0005", "0012,00030004,0005", "0002,0003,0004,0005"]));
-    /// ```
-    pub fn is_doubtful(&self) -> bool {
+    /// Whether a digit may be lost where one of the last lines has lost characters.
+    fn is_after_loss(&self) -> bool {
         self.hides && self.cut.is_some_and(|line| self.last - line <= DOUBTED)
     }
 
@@ -478,6 +492,8 @@ impl Reader {
             Ok((readings, time_ns)) => {
                 self.other.clear();
                 self.hides |= layout.hides_a_lost_digit(&cells);
+                let doubtful = self.is_after_loss() || layout.may_lack_a_character(&cells, &self.before, &readings);
+                self.before.clone_from(&readings);
                 Read::Frame(TextFrame {
                     first_line: line.number,
                     line: line.number,
@@ -485,6 +501,7 @@ impl Reader {
                     time_ns,
                     readings,
                     resultant_N: None,
+                    doubtful,
                 })
             }
             Err(reason) => self.of_another_layout(layout, line, reason),
@@ -562,6 +579,7 @@ impl Reader {
             time_ns: request.time_ns.or(of_cell),
             readings,
             resultant_N: request.resultant_N,
+            doubtful: self.is_after_loss(),
         })
     }
 
@@ -600,6 +618,7 @@ impl Reader {
                     time_ns: self.time_ns.take(),
                     readings: rows.concat(),
                     resultant_N: None,
+                    doubtful: self.is_after_loss(),
                 }),
                 Err(reason) => Read::LeftOut(LeftOut { id: Value::Null, reason }),
             });

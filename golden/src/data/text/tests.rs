@@ -167,8 +167,12 @@ fn what_can_be_read_in_two_ways_is_refused_until_it_is_stated() {
     // More lines that do not fit than fit are of another array.
     assert_eq!(
         refused("1,2,3\n1,2,3\n1,2,3,4\n", [2, 2], &none),
-        "line 1: 3 values, wanted 4 of a frame or 2 of a row"
+        "line 1: 3 values, wanted 4 of a frame or 2 of a row; --columns A..B says which are the readings of a row"
     );
+    // A grid with an index in front.
+    let grid = "0,1,2,3\n1,4,5,6\n0,2,3,4\n1,5,6,7\n";
+    assert!(refused(grid, [2, 3], &none).ends_with("--columns A..B says which are the readings of a row"));
+    assert_eq!(readings(&frames(grid, [2, 3], &columns(2, 4)).unwrap())[1], [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
     // What is skipped is not looked at.
     assert_eq!(readings(&frames("5,6,7,8\n1,2,3,4\n", [2, 2], &Stated { skip_rows: 1, ..none }).unwrap()).len(), 1);
 }
@@ -436,4 +440,38 @@ fn a_last_line_without_an_end_is_named_where_its_last_number_may_be_cut() {
     // What a fixed number of decimals shows whole, and JSON.
     assert_eq!(end("1.50,2.00,3.00,4.00\n1.50,2.00,3.00,12.25"), None);
     assert_eq!(end("{\"stress_MPa\": [1, 2, 3, 4]}"), None);
+}
+
+/// Numbers of a press that moves and grows, as they are written in as few characters as they need.
+fn press(frame: usize) -> Vec<String> {
+    let at = [3.0 + 0.02 * frame as f64, 4.0 - 0.01 * frame as f64];
+    let load = 0.4 * (0.05 * frame as f64).sin().max(0.0);
+    let value = |taxel: usize| {
+        let [x, y] = [(taxel % 8) as f64 - at[0], (taxel / 8) as f64 - at[1]];
+        let noise = 1e-3 * ((frame * 31 + taxel * 17) % 13) as f64 / 13.0;
+        (1e6 * (load * (-0.3 * (x * x + y * y)).exp() + noise)).round() / 1e6
+    };
+    (0..64).map(|taxel| format!("{}", value(taxel))).collect()
+}
+
+#[test]
+fn a_lost_digit_that_moves_the_point_is_doubted_and_no_press_is() {
+    let lines: Vec<Vec<String>> = (0..400).map(press).collect();
+    let doubtful = |lines: &[Vec<String>]| -> Vec<usize> {
+        let texts: Vec<String> = lines.iter().map(|cells| cells.join(",")).collect();
+        streamed(&texts, [8, 8]).iter().filter(|frame| frame.doubtful).map(|frame| frame.line).collect()
+    };
+    assert_eq!(doubtful(&lines), [0; 0]);
+    // The digit behind the point of the largest reading.
+    for frame in (10..50).step_by(3) {
+        let mut cut = lines.clone();
+        let value = |cell: &String| cell.parse::<f64>().unwrap();
+        let largest = (0..64).max_by(|a, b| value(&lines[frame][*a]).total_cmp(&value(&lines[frame][*b]))).unwrap();
+        let cell = &mut cut[frame][largest];
+        cell.remove(cell.find('.').unwrap() + 1);
+        if (value(cell) - value(&lines[frame][largest])).abs() > 0.1 {
+            let cell = cell.clone();
+            assert!(doubtful(&cut).contains(&(frame + 1)), "{frame}: {cell}");
+        }
+    }
 }
