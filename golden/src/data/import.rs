@@ -338,7 +338,11 @@ fn check_counts(recording: &Recording, largest: f64, bits: u32, source: &Source)
         if let Some(place) = counts.iter().position(|count| *count > largest) {
             let [row, col] = [place / recording.cols, place % recording.cols];
             let field = format!("frame {}, row {row}, column {col}", frame.number);
-            return Err(source.field(&field, counts[place], format!("at most {largest}, the largest count of {bits} bits (--bits)")));
+            return Err(source.field(
+                &field,
+                counts[place],
+                format!("at most {largest}, the largest count of {bits} bits (--bits)"),
+            ));
         }
     }
     Ok(())

@@ -81,11 +81,11 @@ impl Frame {
         if let Some(recording) = Recording::named(path) {
             return recording.load(scene);
         }
-        if is_csv(path) {
-            let text = read(path, &file)?;
+        let text = parser(path).and_then(|_| read(path, &file))?;
+        if is_csv(path) || is_lines_of_json(&text) {
             return csv::parse_all(&text, &file, &stem(path), scene, stated);
         }
-        Ok(vec![Frame::load(path, scene)?])
+        Ok(vec![Frame::parse(path, &text, scene)?])
     }
 
     /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
@@ -132,6 +132,14 @@ fn stem(path: &Path) -> String {
 /// Whether a file has frames in lines.
 fn is_csv(path: &Path) -> bool {
     path.extension().is_some_and(|extension| LINES.iter().any(|own| extension.eq_ignore_ascii_case(own)))
+}
+
+/// Whether a text has several lines, each an object of JSON, as a stream has them, and not one object.
+fn is_lines_of_json(text: &str) -> bool {
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let is_object =
+        |line: &str| line.trim_start_matches(MARK).trim_start().starts_with('{') && line.trim_end().ends_with('}');
+    text.trim_end().contains('\n') && lines.all(is_object)
 }
 
 /// Text, file, its stem, scene.

@@ -89,9 +89,9 @@ fn field<'a>(text: &'a str, key: &str, source: &Source) -> Result<&'a str, Impor
 fn header(text: &str, source: &Source) -> Result<Header, ImportError> {
     let descr = field(text, "descr", source)?;
     let quoted = descr.strip_prefix(['\'', '"']).and_then(|rest| rest.split(['\'', '"']).next());
-    let number = quoted.and_then(number).ok_or_else(|| {
-        source.field("descr", literal(descr), "an integer, float or boolean type, such as '<f4'")
-    })?;
+    let number = quoted
+        .and_then(number)
+        .ok_or_else(|| source.field("descr", literal(descr), "an integer, float or boolean type, such as '<f4'"))?;
     let order = field(text, "fortran_order", source)?;
     let fortran = match (order.starts_with("True"), order.starts_with("False")) {
         (true, _) => true,

@@ -148,7 +148,8 @@ impl Header {
     fn wrong_count(&self, frames: usize) -> Option<String> {
         let (first, last) = self.ends[0].zip(self.ends[1]).filter(|(first, last)| first <= last)?;
         let stated = last - first + 1;
-        (frames != stated).then(|| format!("the header states frames {first} to {last}, which are {stated}, not {frames}"))
+        (frames != stated)
+            .then(|| format!("the header states frames {first} to {last}, which are {stated}, not {frames}"))
     }
 
     /// Takes a key and its value; one that is not used is none.

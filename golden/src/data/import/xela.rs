@@ -69,8 +69,7 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
             left_out.push(format!("line {line}: without sensor {name}"));
             continue;
         };
-        let own: Sensor =
-            serde_json::from_str(own.get()).map_err(|_| wrong("data, taxels, model and calibrated"))?;
+        let own: Sensor = serde_json::from_str(own.get()).map_err(|_| wrong("data, taxels, model and calibrated"))?;
         let calibrated = match &first {
             Some(first) => first.calibrated,
             None => {

@@ -52,7 +52,9 @@ impl Header {
             "Sensel Width" => self.pitch_mm[0] = Some(pitch()?),
             "Sensel Height" => self.pitch_mm[1] = Some(pitch()?),
             "Units" => self.unit = Some(unit(source, key, value)?),
-            "Est. Load" if of == "N" => self.force_N = point(value).parse().ok().filter(|force: &f64| force.is_finite()),
+            "Est. Load" if of == "N" => {
+                self.force_N = point(value).parse().ok().filter(|force: &f64| force.is_finite())
+            }
             _ => {}
         }
         Ok(())
@@ -149,7 +151,8 @@ mod tests {
     #[test]
     fn a_file_that_a_spreadsheet_has_saved_is_the_same() {
         let text = file(&[[10.5, 0.0, 0.0, 0.0], [0.0, 20.0, 30.25, 0.0]]);
-        let saved = text.replace(',', ";").replace('.', ",").replace("made-up,XSN", "made-up.XSN").replace("Est,", "Est.");
+        let saved =
+            text.replace(',', ";").replace('.', ",").replace("made-up,XSN", "made-up.XSN").replace("Est,", "Est.");
         let [whole, saved] =
             [text, saved].map(|text| import("mat.csv", text.as_bytes(), &Settings::default()).unwrap());
         assert_eq!(saved.frames, whole.frames);

@@ -314,11 +314,18 @@ impl<'s> Table<'s> {
             None if got == cols || own == cols => Ok(of(Form::Grid)),
             Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
             None => {
-                // Which of them is an index or a time, a row alone does not show.
-                let hint = if own > cols { "; --columns A..B says which are the readings of a row" } else { "" };
+                let numbered = own > cols && self.numbers_rows(rows);
+                let hint = if numbered { "; --columns A..B says which are the readings of a row" } else { "" };
                 Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
             }
         }
+    }
+
+    /// Whether the first column has the numbers of rows, from 0 or 1 on, anew in each frame or not.
+    fn numbers_rows(&self, rows: usize) -> bool {
+        let numbers = || self.body(0).map(|cells| cells[0].parse::<usize>().ok()).enumerate();
+        let count = |first: usize, anew: usize| numbers().all(|(k, number)| number == Some(first + k % anew));
+        self.body(0).count() > 1 && [0, 1].into_iter().any(|first| count(first, rows) || count(first, usize::MAX))
     }
 
     /// The columns of the readings and of the time in the lines from `first` on.

@@ -4,15 +4,15 @@
 //! text ── lines ── layout, decided once ── cells ── readings, time
 //! ```
 //!
-//! Layout is a property of the file, not of a line: it is found from many lines where there are many ([`Layout::of_lines`]), from
-//! the first where there is a stream, and can be stated where a guess would be wrong ([`Stated`]). A line of another layout
-//! holds no frame and is left out, with its number and the reason.
+//! Layout is a property of the file, not of a line: it is found from many lines where there are many ([`Layout::of_lines`]), of a
+//! stream from the first, or from up to eight where that leaves it open ([`Reader`]), and can be stated where a guess would be wrong
+//! ([`Stated`]). A line of another layout holds no frame and is left out, with its number and the reason.
 //!
 //! | property | found from |
 //! |---|---|
 //! | separator | semicolons, tabs, commas or blanks: the first with which lines have the number of cells that the array asks for |
 //! | decimal mark | a point; a comma where cells have one and it is not the separator |
-//! | header | lines before the first readings; names, or the numbers 0, 1, 2 … that pandas writes |
+//! | header | lines before the first readings; names, or the numbers of columns, as pandas writes them |
 //! | columns before or after the readings | names of the header, else what they hold: a time that rises, an index, a text |
 //! | a separator behind each line | an empty last cell in every line, one too many |
 //! | a frame per line, or a grid of one line per row | the number of cells |

@@ -167,7 +167,7 @@ fn what_can_be_read_in_two_ways_is_refused_until_it_is_stated() {
     // More lines that do not fit than fit are of another array.
     assert_eq!(
         refused("1,2,3\n1,2,3\n1,2,3,4\n", [2, 2], &none),
-        "line 1: 3 values, wanted 4 of a frame or 2 of a row; --columns A..B says which are the readings of a row"
+        "line 1: 3 values, wanted 4 of a frame or 2 of a row"
     );
     // A grid with an index in front.
     let grid = "0,1,2,3\n1,4,5,6\n0,2,3,4\n1,5,6,7\n";
