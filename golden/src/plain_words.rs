@@ -71,6 +71,46 @@ impl Display for JsonError {
     }
 }
 
+/// What the reader of TOML says of a text, and the line of it, from 1.
+///
+/// ```
+/// use dermis_golden::plain_words::of_toml;
+///
+/// let of = |text: &str| of_toml(text, &toml::from_str::<toml::Table>(text).unwrap_err());
+/// assert_eq!(of("a = 1\nb = 2\na = 3\n"), (3, "a is there twice".to_owned()));
+/// ```
+pub fn of_toml(text: &str, error: &toml::de::Error) -> (usize, String) {
+    let span = error.span().unwrap_or_default();
+    let line = 1 + text.bytes().take(span.start).filter(|byte| *byte == b'\n').count();
+    match text.get(span).filter(|_| error.message().contains("duplicate key")) {
+        Some(key) => (line, format!("{} is there twice", key.trim())),
+        None => (line, plain(error.message())),
+    }
+}
+
+/// A text without the number that the operating system gives an error, as `(os error 2)`; the words before it say the same.
+///
+/// ```
+/// use dermis_golden::plain_words::without_numbers;
+///
+/// let text = std::fs::File::open("absent").unwrap_err().to_string();
+/// assert_eq!(without_numbers(&text), "No such file or directory");
+/// assert_eq!(without_numbers("(os error) of a(os error 7), (os error 12)b"), "(os error) of a(os error 7),b");
+/// ```
+pub fn without_numbers(text: &str) -> String {
+    const START: &str = " (os error ";
+    let mut parts = text.split(START);
+    let mut plain = parts.next().unwrap_or("").to_owned();
+    for part in parts {
+        let number = part.split_once(')').filter(|(number, _)| number.bytes().all(|byte| byte.is_ascii_digit()));
+        match number {
+            Some((_, rest)) => plain += rest,
+            None => plain = plain + START + part,
+        }
+    }
+    plain
+}
+
 /// A message of the readers of JSON and TOML in plain words.
 ///
 /// ```

@@ -11,6 +11,7 @@ use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
 
 use anyhow::{anyhow, Result};
+use dermis_golden::plain_words::without_numbers;
 
 /// Writes to standard output, and on to what reads it; whether anything does.
 ///
@@ -24,10 +25,11 @@ pub fn write(output: &mut dyn Write, bytes: &[u8]) -> Result<bool> {
     }
 }
 
-/// Writes a line to standard error, if that takes it.
+/// Writes a line to standard error, if that takes it; without the numbers of the operating system's errors, which have words.
 pub fn line(text: Arguments) {
     // In one piece, so that the lines of threads do not mix.
-    let _ = std::io::stderr().lock().write_all(format!("{text}\n").as_bytes());
+    let text = without_numbers(&format!("{text}\n"));
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// Writes a line to standard error, if that takes it; takes what `format!` takes.

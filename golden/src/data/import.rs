@@ -132,7 +132,9 @@ impl DeviceFigure {
 /// # Errors
 /// Any [`ImportError`] but those of writing.
 pub fn load(path: &Path, settings: &Settings) -> Result<Imported, ImportError> {
-    import(&path.display().to_string(), &read(path, LARGEST_FILE)?, settings)
+    let mut imported = import(&path.display().to_string(), &read(path, LARGEST_FILE)?, settings)?;
+    imported.summary.path = std::fs::canonicalize(path).ok().map(|path| path.display().to_string());
+    Ok(imported)
 }
 
 /// Imports the content of a file called `file`.
@@ -198,6 +200,7 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
     let stress: Vec<&[f64]> = complete.iter().map(|frame| frame.stress_MPa.as_slice()).collect();
     let summary = Summary {
         file: Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy().into_owned()),
+        path: None,
         name,
         format: recording.format,
         device: recording.device.clone(),
@@ -209,6 +212,7 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         layout: recording.layout.clone(),
         lines_left_out: recording.left_out.clone(),
         cut: recording.cut.clone(),
+        may_be_cut: recording.may_be_cut.clone(),
         missing_as_zero: settings.missing_as_zero,
         correction: settings.correction,
         unit,
@@ -256,6 +260,9 @@ impl Settings {
 fn parse(file: &str, bytes: &[u8], settings: &Settings, source: &Source) -> Result<Recording, ImportError> {
     if bytes.starts_with(format::HDF5_MAGIC) {
         return Err(ImportError::Hdf5 { file: file.to_string() });
+    }
+    if format::is_npz(bytes) {
+        return Err(ImportError::Npz { file: file.to_string() });
     }
     let format = settings.format.or_else(|| Format::of(file, bytes));
     let wanted = triaxial::Wanted { size: settings.size, sensor: settings.sensor.as_deref() };
@@ -316,7 +323,29 @@ fn scale(
     let bits = settings.bits.or(recording.bits);
     let bits = bits.ok_or_else(|| source.missing("the width of a count", "give its bits with --bits"))?;
     // At most 32 bits.
-    Ok((unit, ((1u64 << bits) - 1) as f64 / full_scale_MPa))
+    let largest = ((1u64 << bits) - 1) as f64;
+    check_counts(recording, largest, bits, source)?;
+    Ok((unit, largest / full_scale_MPa))
+}
+
+/// Checks that no count is above the largest one that so many bits have.
+///
+/// # Errors
+/// The first that is, with its frame and place.
+fn check_counts(recording: &Recording, largest: f64, bits: u32, source: &Source) -> Result<(), ImportError> {
+    for frame in &recording.frames {
+        let counts = frame.stated.as_ref().unwrap_or(&frame.values);
+        if let Some(place) = counts.iter().position(|count| *count > largest) {
+            let [row, col] = [place / recording.cols, place % recording.cols];
+            let field = format!("frame {}, row {row}, column {col}", frame.number);
+            return Err(source.field(
+                &field,
+                counts[place],
+                format!("at most {largest}, the largest count of {bits} bits (--bits)"),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The readings of all sensels that exist in the window.

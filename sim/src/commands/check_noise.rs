@@ -3,7 +3,7 @@
 use std::io::BufReader;
 use std::path::Path;
 
-use anyhow::{anyhow, ensure, Context, Result};
+use anyhow::{anyhow, bail, ensure, Context, Result};
 use clap::{value_parser, Args};
 use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
@@ -13,7 +13,9 @@ use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
 use super::scene_file::{has_file, state, Measured};
 use crate::progress::Progress;
-use crate::stream::{line, Source};
+use crate::stream::decode::Decoded;
+use crate::stream::line::{self, Piece};
+use crate::stream::Source;
 
 /// Digits of the noise that is written.
 const DIGITS: i32 = 3;
@@ -46,25 +48,33 @@ impl NoiseArguments {
         let Some(source) = &self.stream else { return Ok(scene) };
         let (input, name) = open(source, &scene, self.baud)?;
         let bar = Progress::steps(&format!("{}: frames without load", scene.name), u64::from(self.frames));
-        let (mut input, mut bytes, mut frames) = (BufReader::new(input), Vec::new(), Vec::new());
+        let (mut input, mut bytes) = (BufReader::new(Decoded::new(input)), Vec::new());
+        let (mut frames, wanted) = (Vec::new(), self.frames as usize);
         let mut lines = line::Frames::new(&scene.sensor, self.layout.stated());
         for number in 1.. {
-            if frames.len() == self.frames as usize {
+            if frames.len() >= wanted {
                 break;
             }
-            let read = line::read(&mut input, &mut bytes).with_context(|| name.clone())?;
-            ensure!(read.is_some(), "{name}: ends after {} of {} frames (--frames)", frames.len(), self.frames);
-            ensure!(read == Some(true), "{name}: line {number}: over {} bytes", line::LONGEST_LINE);
-            if !bytes.iter().all(u8::is_ascii_whitespace) {
-                let read = lines.frame(&bytes, number);
-                if let Some(note) = lines.note() {
-                    bar.say(&format!("{name}: {note}"));
-                }
-                let read = read.map_err(|none| anyhow!("{name}: line {number}: {}", none.reason))?;
-                frames.extend(read.map(|line| line.frame));
-                bar.set(frames.len() as u64);
+            let piece = line::read(&mut input, &mut bytes).with_context(|| name.clone())?;
+            let brought = match piece {
+                None => lines.finish(),
+                Some(Piece::Line) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
+                Some(Piece::Line) => lines.push(&bytes, number),
+                // What waits comes with the end.
+                Some(Piece::Open) => continue,
+                Some(piece) => bail!("{name}: line {number}: {}", piece.refusal().unwrap_or_default()),
+            };
+            if let Some(note) = lines.note() {
+                bar.say(&format!("{name}: {note}"));
             }
+            for (number, read) in brought {
+                frames.push(read.map_err(|none| anyhow!("{name}: line {number}: {}", none.reason))?.frame);
+            }
+            bar.set(frames.len().min(wanted) as u64);
+            let ended = piece.is_none() && frames.len() < wanted;
+            ensure!(!ended, "{name}: ends after {} of {wanted} frames (--frames)", frames.len());
         }
+        frames.truncate(wanted);
         drop(bar);
         let found = noise_MPa(&scene, &Input::new(&scene)?, &frames).map_err(|error| anyhow!("{name}: {error}"))?;
         let noise_MPa = rounded(found);

@@ -118,7 +118,7 @@ impl FromStr for Pitch {
 pub fn run(arguments: &Arguments) -> Result<String> {
     let file = arguments.file.display().to_string();
     if arguments.file.exists() {
-        bail!("{file}: exists already; dermis check {file} says what it contains");
+        bail!("{file}: exists already; dermis check {} says what it contains", shown(&file));
     }
     let stdin = std::io::stdin();
     let text = match stdin.is_terminal() {
@@ -128,7 +128,16 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     // Refused here with the field's name, rather than written.
     Golden::new(&Scene::parse(&text, &file)?).map_err(|error| anyhow!("{file}: {error}"))?;
     write(&arguments.file, text.as_bytes())?;
-    Ok(format!("{file}\nnext: dermis check {file}\n"))
+    Ok(format!("{file}\nnext: dermis check {}\n", shown(&file)))
+}
+
+/// A path as a shell takes it.
+fn shown(path: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%=".contains(c);
+    match path.chars().all(is_plain) {
+        true => path.to_owned(),
+        false => format!("'{}'", path.replace('\'', "'\\''")),
+    }
 }
 
 /// Where missing values come from.
@@ -182,13 +191,13 @@ impl Asker<'_> {
 }
 
 /// Axes, signs and the first taxel, as the guide's page "your sensor" has them.
-const AXES: &str = "\
-            column 0   1   2
-     row 0         o---.---.--> x    o: the first reading of a frame, row 0 and column 0
-         1         |   .   .         seen from above: x to the right, from column to column;
-         2         v   .   .         y down, from row to row
-                   y                 normal stress and force are positive in pressure, forces act on the cover
-";
+const AXES: [&str; 5] = [
+    "            column 0   1   2",
+    "     row 0         o---.---.--> x    o: the first reading of a frame, row 0 and column 0",
+    "         1         |   .   .         seen from above: x to the right, from column to column;",
+    "         2         v   .   .         y down, from row to row",
+    "                   y                 normal stress and force are positive in pressure, forces act on the cover",
+];
 
 /// The scene as a commented file.
 fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
@@ -206,7 +215,7 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let mut text =
         "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
             .to_owned();
-    AXES.lines().for_each(|line| text += &format!("# {line}\n"));
+    AXES.iter().for_each(|line| text += &format!("# {line}\n"));
     let number = |value: f64| Some(format!("{value:?}"));
     for (table, lines) in [
         (

@@ -1,6 +1,6 @@
 //! `dermis host --stream`: frames and answers as lines of JSON; of a board that scans its array, answers alone.
 
-use std::io::{BufRead, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
@@ -16,8 +16,9 @@ use super::error::HostError;
 use super::session::Session;
 use crate::output::write;
 use crate::stream::acquisition::Acquisition;
-use crate::stream::line::{self, Frames, NoFrame};
-use crate::stream::{nanoseconds, seconds, LONGEST_LINE};
+use crate::stream::decode::Decoded;
+use crate::stream::line::{self, Frames, LineFrame, NoFrame, Piece};
+use crate::stream::{nanoseconds, seconds};
 
 /// An output line with an answer.
 #[derive(Serialize)]
@@ -92,54 +93,65 @@ pub(crate) fn run(
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     let (mut bytes, mut checks) = (Vec::new(), StreamChecks::new(&session.model, CheckPace::Beside));
     let (mut times, mut frames) = (Acquisition::default(), Frames::new(&session.model.scene.sensor, layout));
+    let mut input = BufReader::new(Decoded::new(input));
     for number in 1.. {
-        let text =
-            match line::read(input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))? {
-                None => break,
-                Some(false) => Err((Value::Null, anyhow!("over {LONGEST_LINE} bytes"))),
-                Some(true) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
-                Some(true) => answer(session, &mut checks, (&mut frames, &mut times), &bytes, number),
-            };
+        let piece =
+            line::read(&mut input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))?;
+        let mut brought = match piece {
+            None => frames.finish(),
+            Some(Piece::Line) if bytes.iter().all(u8::is_ascii_whitespace) => Vec::new(),
+            Some(Piece::Line) => frames.push(&bytes, number),
+            Some(piece) => {
+                let reason = piece.refusal().unwrap_or_default();
+                [frames.settle(), vec![(number, Err(NoFrame { id: Value::Null, reason }))]].concat()
+            }
+        };
+        // Who waits for an answer sends no further line.
+        if frames.is_waiting() && input.buffer().is_empty() {
+            brought.extend(frames.settle());
+        }
         if let Some(note) = frames.note() {
             say!("standard input: {note}");
         }
-        let text = match text {
-            Ok(None) => continue,
-            Ok(Some(reply)) => {
-                sent.equal &= reply.answer.equal != Some(false);
-                sent.answered += 1;
-                serde_json::to_string(&reply)?
+        for (number, frame) in brought {
+            let text = match answer(session, &mut checks, &mut times, frame) {
+                Ok(reply) => {
+                    sent.equal &= reply.answer.equal != Some(false);
+                    sent.answered += 1;
+                    serde_json::to_string(&reply)?
+                }
+                // Without a working board no further line can be answered.
+                Err((_, error)) if error.is::<HostError>() => return Err(error),
+                Err((id, error)) => {
+                    sent.refused += 1;
+                    serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
+                }
+            };
+            if !write(output, format!("{text}\n").as_bytes())? {
+                return Ok(sent);
             }
-            // Without a working board no further line can be answered.
-            Err((_, error)) if error.is::<HostError>() => return Err(error),
-            Err((id, error)) => {
-                sent.refused += 1;
-                serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
-            }
-        };
-        if !write(output, format!("{text}\n").as_bytes())? {
+        }
+        if piece.is_none() {
             break;
         }
     }
     Ok(sent)
 }
 
-/// The answer to one line, none to a comment and a header, or its id (null if it cannot be parsed) with the error.
+/// The answer to the frame of a line, or the line's id (null if it cannot be parsed) with the error.
 fn answer(
     session: &mut Session,
     checks: &mut StreamChecks,
-    (frames, times): (&mut Frames, &mut Acquisition),
-    bytes: &[u8],
-    number: u64,
-) -> Result<Option<Reply>, (Value, anyhow::Error)> {
-    let frame = frames.frame(bytes, number).map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
-    let Some(line) = frame else { return Ok(None) };
+    times: &mut Acquisition,
+    frame: Result<LineFrame, NoFrame>,
+) -> Result<Reply, (Value, anyhow::Error)> {
+    let line = frame.map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
     let sent = SystemTime::now();
     let stated_ns = line.frame.time_ns.map(|stated| times.time_ns(Some(stated), nanoseconds(sent)));
     match reply(session, checks, &line.id, (stated_ns, sent), &line.frame) {
         Ok(mut reply) => {
             reply.answer.diagnostics().raise(line.flag());
-            Ok(Some(reply))
+            Ok(reply)
         }
         Err(error) => Err((line.id, error)),
     }

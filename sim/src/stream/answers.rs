@@ -1,18 +1,20 @@
 //! Reconstruction of a stream: one result or refusal per line, in the order of the lines.
 
+use std::collections::VecDeque;
 use std::fmt;
 use std::io::Write;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use dermis_golden::data::frame::{Forces, Frame};
 use dermis_golden::data::text::Stated;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use serde::{Serialize, Serializer};
+use serde_json::Value;
 
 use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
-use super::line::{self, LineFrame};
+use super::line::{self, Brought, LineFrame, NoFrame};
 use super::queue::Policy;
 use super::reader::Received;
 use super::zero::{ZeroRequest, Zeros, ZERO_FRAMES};
@@ -155,11 +157,26 @@ pub fn as_lines(output: &mut dyn Write, brief: bool) -> impl FnMut(&Outcome) -> 
     }
 }
 
+/// Lines after which those are answered in any case that wait for one that shows their layout.
+const MOST_WAITING: usize = 64;
+
+/// When a line was read.
+#[derive(Clone, Copy)]
+struct Stamp {
+    line: u64,
+    time: SystemTime,
+    at: Duration,
+}
+
 /// The state of a stream.
 pub(super) struct Stream<'a> {
     estimators: Estimators<'a>,
     /// Frames of the lines.
     frames: line::Frames,
+    /// When the lines were read that have not been answered, or need no answer.
+    read: VecDeque<Stamp>,
+    /// Since when lines wait that show no layout.
+    waiting: Option<Instant>,
     /// Why the next result has another estimator than the last one.
     change: Option<String>,
     /// Flags that the lines of a block that is not complete raise.
@@ -173,7 +190,12 @@ impl<'a> Stream<'a> {
     pub(super) fn new(estimators: Estimators<'a>, stated: Stated, zero: ZeroRequest) -> Stream<'a> {
         let frames = line::Frames::new(&estimators.scene().sensor, stated);
         let (flags, zeros, counts) = (Vec::new(), Zeros::new(zero), Counts::default());
-        Stream { estimators, frames, change: None, flags, zeros, counts }
+        Stream { estimators, frames, read: VecDeque::new(), waiting: None, change: None, flags, zeros, counts }
+    }
+
+    /// Since when lines wait for those that follow to show their layout.
+    pub(super) fn waiting(&self) -> Option<Instant> {
+        self.waiting
     }
 
     /// Sets the number of lines dropped so far.
@@ -192,17 +214,67 @@ impl<'a> Stream<'a> {
         output(&Outcome::Note(&format!("the best estimator that keeps up, of {all}")))
     }
 
-    /// Hands on what a line gave; nothing for a frame that does not complete its block. `full` lines so far found the queue full.
+    /// Hands on what a line gave, it or lines before that waited; nothing for a frame that does not complete its block. `full` lines so
+    /// far found the queue full.
     pub(super) fn answer(&mut self, received: &Received, full: u64, output: &mut Output) -> std::io::Result<()> {
-        let frame = self.frame(received);
-        let notes =
-            [self.frames.note(), frame.as_ref().ok().and_then(Option::as_ref).and_then(|own| self.zero(&own.frame))];
-        for note in notes.iter().flatten() {
-            output(&Outcome::Note(note))?;
+        let Received { number: line, time, at, .. } = *received;
+        self.read.push_back(Stamp { line, time, at });
+        let brought = match &received.bytes {
+            Ok(bytes) if self.read.len() <= MOST_WAITING => self.frames.push(bytes, line),
+            Ok(bytes) => [self.frames.settle(), self.frames.push(bytes, line)].concat(),
+            Err(reason) => {
+                let reason = reason.clone();
+                [self.frames.settle(), vec![(line, Err(NoFrame { id: Value::Null, reason }))]].concat()
+            }
+        };
+        self.hand_on(brought, full, output)
+    }
+
+    /// No line follows for now: hands on what those gave that wait.
+    pub(super) fn settle(&mut self, output: &mut Output) -> std::io::Result<()> {
+        let brought = self.frames.settle();
+        self.hand_on(brought, 0, output)
+    }
+
+    /// No line follows: hands on what those gave that wait, and names lines that no frame has made a header.
+    pub(super) fn finish(&mut self, output: &mut Output) -> std::io::Result<()> {
+        let brought = self.frames.finish();
+        self.hand_on(brought, 0, output)
+    }
+
+    fn hand_on(&mut self, brought: Vec<Brought>, full: u64, output: &mut Output) -> std::io::Result<()> {
+        if let Some(note) = self.frames.note() {
+            output(&Outcome::Note(&note))?;
         }
-        let result = frame.and_then(|frame| {
-            let Some(line) = frame else { return Ok(None) };
-            let time_ns = self.counts.acquisition.time_ns(line.frame.time_ns, nanoseconds(received.time));
+        for (line, frame) in brought {
+            while self.read.front().is_some_and(|stamp| stamp.line < line) {
+                self.read.pop_front();
+            }
+            // A line that was a header is named at the end.
+            let at_end = Stamp { line, time: SystemTime::now(), at: self.estimators.clock().now() };
+            let stamp = self.read.front().copied().filter(|stamp| stamp.line == line).unwrap_or(at_end);
+            self.one(stamp, frame.map_err(|none| none.reason), full, output)?;
+        }
+        match self.frames.is_waiting() {
+            true => self.waiting = Some(Instant::now()),
+            false => (self.waiting, self.read) = (None, VecDeque::new()),
+        }
+        Ok(())
+    }
+
+    /// Hands on what the frame of a line gave.
+    fn one(
+        &mut self,
+        Stamp { line, time, at }: Stamp,
+        frame: Result<LineFrame, String>,
+        full: u64,
+        output: &mut Output,
+    ) -> std::io::Result<()> {
+        if let Some(note) = frame.as_ref().ok().and_then(|own| self.zero(&own.frame)) {
+            output(&Outcome::Note(&note))?;
+        }
+        let result = frame.and_then(|line| {
+            let time_ns = self.counts.acquisition.time_ns(line.frame.time_ns, nanoseconds(time));
             self.flags.extend(line.flag());
             let frame = self.zeros.apply(Frame { time_ns: Some(time_ns), ..line.frame });
             self.estimators.push(frame).map_err(|error| {
@@ -210,7 +282,6 @@ impl<'a> Stream<'a> {
                 typed(error).to_string()
             })
         });
-        let line = received.number;
         let (frames, mut result) = match result {
             Ok(None) => return Ok(()),
             Ok(Some(complete)) => complete,
@@ -224,8 +295,8 @@ impl<'a> Stream<'a> {
         let change = self.change.take();
         let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
         let estimator = self.estimators.name();
-        self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(received.at));
-        let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
+        self.counts.answer(estimator, self.estimators.clock().now().saturating_sub(at));
+        let [received_s, answered_s] = [time, SystemTime::now()].map(seconds);
         output(&Outcome::Answer(Answer {
             sequence,
             line,
@@ -238,7 +309,7 @@ impl<'a> Stream<'a> {
             times_ns: &times_ns,
             result: &result,
         }))?;
-        let Some(Note { text, changed }) = self.estimators.after(line, received.at, full) else { return Ok(()) };
+        let Some(Note { text, changed }) = self.estimators.after(line, at, full) else { return Ok(()) };
         output(&Outcome::Note(&text))?;
         self.change = changed.then_some(text);
         Ok(())
@@ -256,12 +327,6 @@ impl<'a> Stream<'a> {
             }
             Err(error) => Some(format!("the zero stays: {error}")),
         }
-    }
-
-    /// The frame in a line; `None` for a comment and a header.
-    fn frame(&mut self, received: &Received) -> Result<Option<LineFrame>, String> {
-        let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
-        self.frames.frame(bytes, received.number).map_err(|none| none.reason)
     }
 }
 
@@ -285,7 +350,6 @@ mod tests {
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
-    use serde_json::Value;
     use std::io::Read;
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};
@@ -347,6 +411,83 @@ mod tests {
                 assert!(answer["answered_s"].as_f64() >= answer["received_s"].as_f64());
             }
         }
+    }
+
+    #[test]
+    fn the_last_piece_without_an_end_is_no_line() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let (one, two) = (csv(&frames[0]), csv(&frames[1]));
+        for cut in [1, 3] {
+            let input = one.clone() + &two[..two.len() - cut];
+            let (counts, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
+            assert_eq!((counts.answered, counts.refused), (1, 1));
+            let reason = "the last line has no end, and may be cut within a number";
+            assert_eq!((&answers[1]["line"], answers[1]["error"].as_str()), (&Value::from(2), Some(reason)));
+        }
+    }
+
+    #[test]
+    fn words_behind_which_no_frame_stands_are_refused() {
+        let (counts, answers) = answers(&scene(), EngineName::Golden, "no device\nno device\n".into(), ALL, true);
+        assert_eq!((counts.answered, counts.refused), (0, 2));
+        assert_eq!(answers[0]["error"], "no numbers, wanted 64 of 8x8 taxels");
+        assert_eq!(answers[0]["line"], 1);
+    }
+
+    /// Lines that do not show their layout one by one wait for those that follow, and keep their order, numbers and times.
+    #[test]
+    fn lines_with_a_time_are_answered_in_order() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let line = |k: usize| format!("{},{}", 100 + 10 * k, csv(&frames[k % 2]));
+        for lines in [2, 3, 12] {
+            let input = "ms,".to_owned() + &(1..=64).map(|k| k.to_string()).collect::<Vec<_>>().join(",") + "\n";
+            let input = input + &(0..lines).map(line).collect::<String>();
+            let (counts, answers) = answers(&scene, EngineName::Golden, input, ALL, true);
+            assert_eq!((counts.answered, counts.refused), (lines as u64, 0));
+            let numbers: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
+            assert!(numbers.into_iter().eq(2..lines as u64 + 2));
+            let times: Vec<i64> = answers.iter().map(|answer| answer["time_ns"].as_i64().unwrap()).collect();
+            assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "{times:?}");
+            let alone = super::tests::answers(&scene, EngineName::Golden, csv(&frames[1]), ALL, true).1;
+            assert_eq!(answers[1]["resultant_N"], alone[0]["resultant_N"]);
+        }
+    }
+
+    /// Lines that wait, and their source that waits for an answer.
+    struct Patient(Vec<u8>, Receiver<()>);
+
+    impl Read for Patient {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            if self.0.is_empty() {
+                // Half a minute where nothing answers.
+                let _ = self.1.recv_timeout(Duration::from_secs(30));
+                return Ok(0);
+            }
+            let bytes = (&self.0[..]).read(buffer)?;
+            self.0.drain(..bytes);
+            Ok(bytes)
+        }
+    }
+
+    #[test]
+    fn a_line_that_no_other_follows_is_answered_soon() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let engine = engine_of(&scene, EngineName::Golden);
+        let (sender, receiver) = channel();
+        let text = format!("t_ms,{}\n7,{}", vec!["p"; 64].join(","), csv(&frames[0]));
+        let input: Box<dyn Read + Send> = Box::new(Patient(text.into_bytes(), receiver));
+        let begun = std::time::Instant::now();
+        let mut answered = None;
+        let mut output = |outcome: &Outcome| {
+            if let Outcome::Answer(_) = outcome {
+                answered = Some(begun.elapsed());
+                let _ = sender.send(());
+            }
+            Ok(())
+        };
+        let counts = run(Estimators::only(&*engine, CheckPace::Never), (input, "memory"), ALL, &mut output).unwrap();
+        assert_eq!((counts.answered, counts.refused), (1, 0));
+        assert!(answered.unwrap() < Duration::from_secs(20), "{answered:?}");
     }
 
     #[test]

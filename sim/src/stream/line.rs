@@ -1,9 +1,10 @@
 //! Lines of bounded length, and the frame in a line.
 
+use std::borrow::Cow;
 use std::io::{self, BufRead, Read as _};
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::text::{Form, Layout, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
+use dermis_golden::data::text::{decoded, Form, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::sensor::Sensor;
 use serde_json::Value;
@@ -12,13 +13,13 @@ use serde_json::Value;
 pub const LONGEST_LINE: u64 = 4 << 20;
 
 /// The frame in a line.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LineFrame {
     /// Null if the line has none.
     pub(crate) id: Value,
     /// With the time that the line states.
     pub(crate) frame: Frame,
-    /// Whether a digit may be lost, [`Reader::is_doubtful`].
+    /// Whether a digit may be lost, [`TextFrame::doubtful`].
     pub(crate) doubtful: bool,
 }
 
@@ -30,19 +31,44 @@ impl LineFrame {
 }
 
 /// Why a line holds no frame, with its id if that could be read.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NoFrame {
     pub(crate) id: Value,
     pub(crate) reason: String,
 }
 
-/// Reads a line into `line`; `None` at the end, `Some(false)` if the line is too long: it is skipped to its end.
-pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Option<bool>> {
+/// How a line was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Piece {
+    /// With its end.
+    Line,
+    /// It is too long, and skipped to its end.
+    TooLong,
+    /// The input ends within it.
+    Open,
+}
+
+impl Piece {
+    /// Why it is no line.
+    pub(crate) fn refusal(self) -> Option<String> {
+        match self {
+            Piece::Line => None,
+            Piece::TooLong => Some(format!("over {LONGEST_LINE} bytes")),
+            Piece::Open => Some("the last line has no end, and may be cut within a number".to_owned()),
+        }
+    }
+}
+
+/// Reads a line into `line`; `None` at the end.
+pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Option<Piece>> {
     line.clear();
     // Bounded, so that an endless line cannot exhaust the memory.
     let read = (&mut *input).take(LONGEST_LINE + 1).read_until(b'\n', line)?;
-    if read as u64 <= LONGEST_LINE || line.last() == Some(&b'\n') {
-        return Ok((read > 0).then_some(true));
+    match line.last() {
+        None => return Ok(None),
+        Some(b'\n') => return Ok(Some(Piece::Line)),
+        Some(_) if read as u64 <= LONGEST_LINE => return Ok(Some(Piece::Open)),
+        Some(_) => (),
     }
     line.clear();
     loop {
@@ -51,69 +77,108 @@ pub(crate) fn read(input: &mut dyn BufRead, line: &mut Vec<u8>) -> io::Result<Op
         let used = end.map_or(part.len(), |end| end + 1);
         input.consume(used);
         if end.is_some() || used == 0 {
-            return Ok(Some(false));
+            return Ok(Some(Piece::TooLong));
         }
     }
 }
 
-/// The frames of a stream's lines, of JSON or of numbers: [`dermis_golden::data::text`]. Each line is a frame, and the first one with
-/// numbers decides their layout.
+/// The frame in a line of this number, or why there is none.
+pub(crate) type Brought = (u64, Result<LineFrame, NoFrame>);
+
+/// The frames of a stream's lines, of JSON or of numbers: [`dermis_golden::data::text`]. Each line is a frame, and the first ones with
+/// numbers decide their layout.
 pub(crate) struct Frames {
     reader: Reader,
     sensor: Sensor,
-    /// The layout of the lines so far.
-    layout: Option<Layout>,
-    note: Option<String>,
+    /// The layout of the lines so far, in words.
+    layout: Option<String>,
+    notes: Vec<String>,
 }
 
 impl Frames {
     /// Of lines whose layout is `stated`, but for the form: each is a frame.
     pub(crate) fn new(sensor: &Sensor, stated: Stated) -> Frames {
         let reader = Reader::new([sensor.rows, sensor.cols], Stated { form: Some(Form::Line), ..stated });
-        Frames { reader, sensor: sensor.clone(), layout: None, note: None }
+        Frames { reader, sensor: sensor.clone(), layout: None, notes: Vec::new() }
     }
 
-    /// What is to be said of the last line: a header, or a layout that is not plain.
+    /// What is to be said of the last lines: headers, or a layout that is not plain.
     pub(crate) fn note(&mut self) -> Option<String> {
-        self.note.take()
+        let notes = std::mem::take(&mut self.notes);
+        (!notes.is_empty()).then(|| notes.join("; "))
     }
 
-    /// The frame in a line and its id; `number` names a frame without one. `None` for a comment and a header.
-    pub(crate) fn frame(&mut self, line: &[u8], number: u64) -> Result<Option<LineFrame>, NoFrame> {
-        let text = std::str::from_utf8(line).map_err(|error| NoFrame { id: Value::Null, reason: error.to_string() })?;
-        // A line of its own: it brings one thing at most.
-        let line = usize::try_from(number).unwrap_or(usize::MAX);
-        let read = self.reader.push(Line { number: line, text }).pop();
-        if let Some(layout) = self.reader.layout().filter(|layout| self.layout.as_ref() != Some(*layout)) {
+    /// Whether lines wait for those that follow to show the layout.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.reader.is_waiting()
+    }
+
+    /// The next line, and what it brought, it or lines before that waited; nothing for a comment, a header, and a line that waits.
+    pub(crate) fn push(&mut self, line: &[u8], number: u64) -> Vec<Brought> {
+        let text = match std::str::from_utf8(line) {
+            Ok(text) => text.into(),
+            Err(_) => Cow::Owned(decoded(line)),
+        };
+        let own = usize::try_from(number).unwrap_or(usize::MAX);
+        let read = self.reader.push(Line { number: own, text: &text });
+        self.brought(read, number)
+    }
+
+    /// No line follows for now: what those bring that wait.
+    pub(crate) fn settle(&mut self) -> Vec<Brought> {
+        let read = self.reader.settle();
+        self.brought(read, 0)
+    }
+
+    /// No line follows: what those bring that wait, and lines that were a header if frames had followed.
+    pub(crate) fn finish(&mut self) -> Vec<Brought> {
+        let read = self.reader.finish();
+        self.brought(read, 0)
+    }
+
+    /// What lines brought, the last of which is `number`.
+    fn brought(&mut self, read: Vec<Read>, number: u64) -> Vec<Brought> {
+        let mut brought = Vec::new();
+        for read in read {
+            match read {
+                Read::Header(line) => self.notes.push(format!("line {line} is a header")),
+                Read::LeftOut(LeftOut { id, reason }) => {
+                    let line = reason.line.map_or(number, |line| line as u64);
+                    let reason = NoReadings { line: None, ..reason }.to_string();
+                    brought.push((line, Err(NoFrame { id, reason })));
+                }
+                Read::Frame(frame) => brought.push((frame.line as u64, self.frame(frame))),
+            }
+        }
+        let layout = self.reader.layout().map(|layout| {
             // What stands above the line was not the header of a file.
             let mut shown = layout.clone();
             shown.first_line = 1;
-            self.note = (!layout.is_plain()).then(|| format!("lines from {number} on: {shown}"));
-            self.layout = Some(layout.clone());
+            (shown.to_string(), layout.is_plain())
+        });
+        if let Some((shown, is_plain)) = layout.filter(|(shown, _)| self.layout.as_ref() != Some(shown)) {
+            if !is_plain {
+                let first = brought.first().map_or(number, |(line, _)| *line);
+                self.notes.push(format!("lines from {first} on: {shown}"));
+            }
+            self.layout = Some(shown);
         }
-        match read {
-            None => Ok(None),
-            Some(Read::Header) => {
-                self.note = Some(format!("line {number} is a header"));
-                Ok(None)
+        brought
+    }
+
+    fn frame(&self, frame: TextFrame) -> Result<LineFrame, NoFrame> {
+        let TextFrame { id, readings, time_ns, resultant_N, line, doubtful, .. } = frame;
+        let name = match &id {
+            Value::Null => format!("line {line}"),
+            Value::String(name) => name.clone(),
+            other => other.to_string(),
+        };
+        match Frame::from_stress(&name, &self.sensor, readings) {
+            Ok(frame) => {
+                let frame = Frame { resultant_N, time_ns, ..frame };
+                Ok(LineFrame { id, frame, doubtful })
             }
-            Some(Read::LeftOut(LeftOut { id, reason })) => {
-                Err(NoFrame { id, reason: NoReadings { line: None, ..reason }.to_string() })
-            }
-            Some(Read::Frame(TextFrame { id, readings, time_ns, resultant_N, .. })) => {
-                let name = match &id {
-                    Value::Null => format!("line {number}"),
-                    Value::String(name) => name.clone(),
-                    other => other.to_string(),
-                };
-                match Frame::from_stress(&name, &self.sensor, readings) {
-                    Ok(frame) => {
-                        let frame = Frame { resultant_N, time_ns, ..frame };
-                        Ok(Some(LineFrame { id, frame, doubtful: self.reader.is_doubtful() }))
-                    }
-                    Err(error) => Err(NoFrame { id, reason: error.to_string() }),
-                }
-            }
+            Err(error) => Err(NoFrame { id, reason: error.to_string() }),
         }
     }
 }
@@ -128,8 +193,12 @@ mod tests {
 
     /// The frame of a line that is the only one.
     fn frame(text: &str, number: u64) -> Result<(Value, Frame), NoFrame> {
-        let read = Frames::new(&small(), Stated::default()).frame(text.as_bytes(), number).map(Option::unwrap);
-        read.map(|LineFrame { id, frame, .. }| (id, frame))
+        let mut frames = Frames::new(&small(), Stated::default());
+        let mut read = frames.push(text.as_bytes(), number);
+        read.extend(frames.finish());
+        let [(line, own)] = <[Brought; 1]>::try_from(read).unwrap();
+        assert_eq!(line, number);
+        own.map(|LineFrame { id, frame, .. }| (id, frame))
     }
 
     #[test]
@@ -169,28 +238,46 @@ mod tests {
             assert!(reason.starts_with(wanted), "{text}: {reason}");
         }
         let mut frames = Frames::new(&small(), Stated::default());
-        assert_eq!((frames.frame(b"a,b,c,d", 1), frames.note().as_deref()), (Ok(None), Some("line 1 is a header")));
-        assert_eq!((frames.frame(b"# a remark", 2), frames.note()), (Ok(None), None));
-        assert!(frames.frame(b"1;2;3;4", 3).unwrap().is_some());
+        assert_eq!((frames.push(b"a,b,c,d", 1), frames.note().as_deref()), (vec![], Some("line 1 is a header")));
+        assert_eq!((frames.push(b"# a remark", 2), frames.note()), (vec![], None));
+        assert!(matches!(frames.push(b"1;2;3;4", 3)[..], [(3, Ok(_))]));
         let layout = "lines from 3 on: a frame per line, separated by semicolons, readings in columns 1 to 4";
         assert_eq!(frames.note().as_deref(), Some(layout));
-        let other = frames.frame(b"1,2,3,4", 4).unwrap_err().reason;
+        let [(4, Err(other))] = &frames.push(b"1,2,3,4", 4)[..] else { panic!() };
         assert_eq!(
-            other,
+            other.reason,
             "1 values, wanted 4; this line is separated by commas, those before are separated by semicolons"
         );
+        // Latin-1.
+        assert!(matches!(frames.push(b"1;2;3;4\xb0C", 5)[..], [(5, Err(_))]));
+    }
+
+    #[test]
+    fn lines_that_wait_are_brought_in_order_with_their_layout() {
+        let mut frames = Frames::new(&small(), Stated::default());
+        for (number, line) in [&b"100,1,2,3,4"[..], b"110,2,1,3,4", b"120,1,2,3,4"].into_iter().enumerate() {
+            assert_eq!(frames.push(line, number as u64 + 1), vec![]);
+        }
+        assert!(frames.is_waiting());
+        let times: Vec<(u64, Option<i64>)> =
+            frames.settle().into_iter().map(|(line, own)| (line, own.unwrap().frame.time_ns)).collect();
+        assert_eq!(times, [(1, Some(100_000_000)), (2, Some(110_000_000)), (3, Some(120_000_000))]);
+        let layout =
+            "lines from 1 on: a frame per line, separated by commas, time in column 1 (ms), readings in columns 2 to 5";
+        assert_eq!((frames.is_waiting(), frames.note().as_deref()), (false, Some(layout)));
     }
 
     #[test]
     fn a_line_that_is_too_long_is_skipped() {
         let long = "1,".repeat(LONGEST_LINE as usize) + "\n";
-        let text = format!("first\n{long}last");
+        let text = format!("first\n{long}second\nlast");
         let (mut input, mut line) = (text.as_bytes(), Vec::new());
-        assert_eq!(read(&mut input, &mut line).unwrap(), Some(true));
-        assert_eq!(read(&mut input, &mut line).unwrap(), Some(false));
+        assert_eq!(read(&mut input, &mut line).unwrap(), Some(Piece::Line));
+        assert_eq!(read(&mut input, &mut line).unwrap(), Some(Piece::TooLong));
         assert!(line.is_empty());
-        assert_eq!(read(&mut input, &mut line).unwrap(), Some(true));
-        assert_eq!(line, b"last");
+        assert_eq!(read(&mut input, &mut line).unwrap(), Some(Piece::Line));
+        assert_eq!(line, b"second\n");
+        assert_eq!(read(&mut input, &mut line).unwrap(), Some(Piece::Open));
         assert_eq!(read(&mut input, &mut line).unwrap(), None);
     }
 }

@@ -7,7 +7,8 @@ use std::time::{Duration, SystemTime};
 
 use anyhow::{anyhow, bail, Result};
 
-use super::line;
+use super::decode::Decoded;
+use super::line::{self, Piece};
 use super::queue::{Bell, Policy, Queue, Taken};
 use super::rate::Clock;
 use super::stop::Stop;
@@ -20,8 +21,8 @@ pub(super) struct Received {
     pub(super) time: SystemTime,
     /// The same by the stream's clock.
     pub(super) at: Duration,
-    /// `None` if it is too long.
-    pub(super) bytes: Option<Vec<u8>>,
+    /// Or why it is no line.
+    pub(super) bytes: std::result::Result<Vec<u8>, String>,
 }
 
 /// The lines of an input, read by a thread of their own.
@@ -77,13 +78,13 @@ impl Lines {
 
 /// Reads all lines into the queue; blank ones only count.
 fn read_all(input: Box<dyn Read + Send>, clock: &Clock, queue: &Queue<Received>) -> std::io::Result<()> {
-    let (mut input, mut line) = (BufReader::new(input), Vec::new());
+    let (mut input, mut line) = (BufReader::new(Decoded::new(input)), Vec::new());
     for number in 1.. {
-        let Some(complete) = line::read(&mut input, &mut line)? else { break };
-        if complete && line.iter().all(u8::is_ascii_whitespace) {
+        let Some(piece) = line::read(&mut input, &mut line)? else { break };
+        if piece != Piece::TooLong && line.iter().all(u8::is_ascii_whitespace) {
             continue;
         }
-        let bytes = complete.then(|| std::mem::take(&mut line));
+        let bytes = piece.refusal().map_or_else(|| Ok(std::mem::take(&mut line)), Err);
         if !queue.push(Received { number, time: SystemTime::now(), at: clock.now(), bytes }) {
             break;
         }

@@ -182,7 +182,8 @@ impl<P: Read> Read for Serial<P> {
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => (),
                 Ok(bytes) if !self.begun && bytes > 0 => {
                     // The end itself stays: the line counts, as a blank one.
-                    let Some(end) = buffer[..bytes].iter().position(|byte| *byte == b'\n') else { continue };
+                    let is_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
+                    let Some(end) = buffer[..bytes].iter().position(is_end) else { continue };
                     buffer.copy_within(end..bytes, 0);
                     self.begun = true;
                     return Ok(bytes - end);
@@ -244,9 +245,12 @@ mod tests {
     #[test]
     fn a_serial_port_is_read_from_its_first_end_of_a_line_on() {
         // The first piece has lost the begin of its first number.
-        for (bytes, wanted) in
-            [("1,0.02\r\n0.01,0.02\n", "\n0.01,0.02\n"), ("\n0.01,0.02\n", "\n0.01,0.02\n"), ("1,0.02", "")]
-        {
+        for (bytes, wanted) in [
+            ("1,0.02\r\n0.01,0.02\n", "\r\n0.01,0.02\n"),
+            ("1,0.02\r0.01,0.02\r", "\r0.01,0.02\r"),
+            ("\n0.01,0.02\n", "\n0.01,0.02\n"),
+            ("1,0.02", ""),
+        ] {
             for size in [1, 4, 64] {
                 let mut serial = Serial { port: bytes.as_bytes(), begun: false };
                 let (mut read, mut buffer) = (Vec::new(), vec![0; size]);

@@ -9,7 +9,8 @@
 //! dropped, by its policy, and harms no other stream.
 
 use std::io::{Error as IoError, ErrorKind, Read, Result as IoResult};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{channel, RecvTimeoutError};
+use std::time::Duration;
 
 use anyhow::{Error, Result};
 
@@ -19,6 +20,9 @@ use super::queue::{Bell, Policy, Taken};
 use super::reader::Lines;
 use super::stop::Stop;
 use super::zero::ZeroRequest;
+
+/// How long lines wait for further ones that show their layout.
+const QUIET: Duration = Duration::from_millis(200);
 
 /// A stream that is answered together with others.
 pub struct Member<'a> {
@@ -82,11 +86,21 @@ impl Running<'_> {
     fn next(&mut self, output: &mut Output) -> Next {
         let Taken { item, full, ended } = self.lines.take();
         self.stream.dropped(if self.options.policy == Policy::Latest { full } else { 0 });
-        let Some(received) = item else { return if ended { Next::Ended } else { Next::More } };
-        match self.stream.answer(&received, if self.options.live { full } else { 0 }, output) {
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Next::Closed,
-            Err(error) => Next::Failed(error.into()),
-            Ok(()) => Next::More,
+        let (done, next) = match item {
+            Some(received) => {
+                (self.stream.answer(&received, if self.options.live { full } else { 0 }, output), Next::More)
+            }
+            None if ended => (self.stream.finish(output), Next::Ended),
+            None => (Ok(()), Next::More),
+        };
+        done.map_or_else(Next::of_error, |()| next)
+    }
+
+    /// Answers lines that have waited for further ones, where none has come for some time.
+    fn settle(&mut self, output: &mut Output) -> Next {
+        match self.stream.waiting().is_some_and(|since| since.elapsed() >= QUIET) {
+            true => self.stream.settle(output).map_or_else(Next::of_error, |()| Next::More),
+            false => Next::More,
         }
     }
 
@@ -119,7 +133,19 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
         running.push(Some(Running { stream, lines, options }));
     }
     while done.iter().any(Option::is_none) && !stop.stopped() {
-        let Ok(index) = rung.recv() else { break };
+        let waits = running.iter().flatten().any(|own| own.stream.waiting().is_some());
+        let heard = if waits { rung.recv_timeout(QUIET) } else { rung.recv().map_err(RecvTimeoutError::from) };
+        for (index, own) in running.iter_mut().enumerate().filter(|_| waits) {
+            match own.as_mut().map_or(Next::More, |own| own.settle(&mut |outcome| output(index, outcome))) {
+                Next::More => (),
+                how => done[index] = own.take().map(|own| own.end(how)),
+            }
+        }
+        let index = match heard {
+            Ok(index) => index,
+            Err(RecvTimeoutError::Timeout) => continue,
+            Err(RecvTimeoutError::Disconnected) => break,
+        };
         let Some(own) = running[index].as_mut().filter(|_| done[index].is_none() && !stop.stopped()) else { continue };
         match own.next(&mut |outcome| output(index, outcome)) {
             Next::More => (),
@@ -141,6 +167,15 @@ enum Next {
     Closed,
     /// An outcome cannot be written.
     Failed(Error),
+}
+
+impl Next {
+    fn of_error(error: IoError) -> Next {
+        match error.kind() {
+            ErrorKind::BrokenPipe => Next::Closed,
+            _ => Next::Failed(error.into()),
+        }
+    }
 }
 
 #[cfg(test)]

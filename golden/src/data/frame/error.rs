@@ -25,13 +25,13 @@ pub enum FrameError {
         limit: u64,
     },
     /// A folder has no frame.
-    #[error("{file}: has no frames; their file names end in .json, .csv or .mcap")]
+    #[error("{file}: has no frames; their file names end in .csv, .ndjson, .jsonl, .json or .mcap")]
     NoFrames {
         /// Path as given.
         file: String,
     },
-    /// The file name ends in none of `.json`, `.csv` and `.mcap`.
-    #[error("{file}: a frame's file name ends in .json, .csv or .mcap")]
+    /// The file name ends in none of `.csv`, `.ndjson`, `.jsonl`, `.json` and `.mcap`.
+    #[error("{file}: a frame's file name ends in .csv, .ndjson, .jsonl, .json or .mcap")]
     UnknownKind {
         /// Path as given.
         file: String,

@@ -81,11 +81,11 @@ impl Frame {
         if let Some(recording) = Recording::named(path) {
             return recording.load(scene);
         }
-        if is_csv(path) {
-            let text = read(path, &file)?;
+        let text = parser(path).and_then(|_| read(path, &file))?;
+        if is_csv(path) || is_lines_of_json(&text) {
             return csv::parse_all(&text, &file, &stem(path), scene, stated);
         }
-        Ok(vec![Frame::load(path, scene)?])
+        Ok(vec![Frame::parse(path, &text, scene)?])
     }
 
     /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
@@ -121,13 +121,25 @@ impl Frame {
     }
 }
 
+/// Endings of files with frames in lines, of numbers or of JSON.
+const LINES: [&str; 3] = ["csv", "ndjson", "jsonl"];
+
 /// The file's name without its ending.
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// Whether a file has frames in lines.
 fn is_csv(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+    path.extension().is_some_and(|extension| LINES.iter().any(|own| extension.eq_ignore_ascii_case(own)))
+}
+
+/// Whether a text has several lines, each an object of JSON, as a stream has them, and not one object.
+fn is_lines_of_json(text: &str) -> bool {
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let is_object =
+        |line: &str| line.trim_start_matches(MARK).trim_start().starts_with('{') && line.trim_end().ends_with('}');
+    text.trim_end().contains('\n') && lines.all(is_object)
 }
 
 /// Text, file, its stem, scene.
@@ -138,7 +150,7 @@ fn parser(path: &Path) -> Result<Parser, FrameError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("json") => Ok(json::parse),
-        Some("csv") => Ok(csv::parse),
+        Some(extension) if LINES.contains(&extension) => Ok(csv::parse),
         _ => Err(FrameError::UnknownKind { file: path.display().to_string() }),
     }
 }

@@ -72,6 +72,24 @@ fn a_frame_that_lacks_too_many_readings_is_named_by_its_line() {
 }
 
 #[test]
+fn lines_of_json_are_frames_whatever_the_file_is_called() {
+    let folder = tempfile::tempdir().unwrap();
+    let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 1.0 };
+    let scene = Scene::of_sensor(&sensor, "small");
+    let text = "{\"stress_MPa\": [1, 2, 3, 4]}\n{\"stress_MPa\": [2, 3, 4, 5], \"time_ns\": 7}\n";
+    for name in ["a.ndjson", "b.jsonl", "c.json", "d.csv"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let frames = Frame::load_all(&path, Some(&scene)).unwrap();
+        assert_eq!((frames.len(), frames[1].stress_MPa[0], frames[1].time_ns), (2, 2.0, Some(7)), "{name}");
+    }
+    // One object over several lines is a frame.
+    let path = folder.path().join("one.json");
+    std::fs::write(&path, "{\n\"stress_MPa\":\n[1, 2, 3, 4]\n}\n").unwrap();
+    assert_eq!(Frame::load_all(&path, Some(&scene)).unwrap().len(), 1);
+}
+
+#[test]
 fn bad_json_is_refused_with_its_place() {
     let cases = [
         (r#""stress_MPa":[1,2,3]"#, "stress_MPa has 3 values, wanted 4"),

@@ -6,6 +6,7 @@ use super::error::{ImportError, Source};
 use super::format::Format;
 use super::loggers;
 use super::recording::{RawFrame, Recording, LARGEST_READING};
+use super::units::Unit;
 use crate::data::text::{frames, is_date, Stated};
 
 /// Reads a recording of the stated size and layout.
@@ -28,12 +29,15 @@ pub(super) fn parse(
         if let Some(large) = frame.readings.iter().find(|value| value.abs() > LARGEST_READING) {
             return Err(source.line(frame.line, &large.to_string(), "a number up to 1e9 in magnitude"));
         }
-        let time_s = frame.time_ns.map(|ns| (ns - start_ns) as f64 * 1e-9);
+        // Divided, so that they come out as the decimal fractions they are.
+        let time_s = frame.time_ns.map(|ns| (ns - start_ns) as f64 / 1e9);
         own.push(RawFrame { number: index + 1, time_s, values: frame.readings, stated: None, device: None });
     }
     let layout = read.layout.map(|layout| layout.to_string());
     let left_out = read.left_out.iter().map(|left_out| left_out.reason.to_string()).collect();
     let device = logger.as_ref().map(|own| own.name.to_owned());
-    let unit = logger.and_then(|own| own.unit);
-    Ok(Recording { device, unit, layout, left_out, ..Recording::bare(Format::Csv, shape, own) })
+    // Lines of JSON state it in the name of their field.
+    let unit = logger.and_then(|own| own.unit).or(layout.is_none().then_some(Unit::MegaPa));
+    let may_be_cut = read.may_be_cut;
+    Ok(Recording { device, unit, layout, left_out, may_be_cut, ..Recording::bare(Format::Csv, shape, own) })
 }

@@ -5,6 +5,7 @@ use crate::data::frame::FrameError;
 use crate::data::text::NoReadings;
 use crate::spec::scene::SceneError;
 use crate::write::FileError;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// A recording cannot be imported.
@@ -37,6 +38,20 @@ pub enum ImportError {
     Hdf5 {
         /// Path as given.
         file: String,
+    },
+    /// An archive of arrays of NumPy, of any names and shapes.
+    #[error("{file}: .npz, an archive of several arrays, is not read; in Python: numpy.save(\"frames.npy\", numpy.load({file:?})[\"NAME\"]) writes the array NAME; then import frames.npy")]
+    Npz {
+        /// Path as given.
+        file: String,
+    },
+    /// The folder has the import of another file, or files that no import wrote.
+    #[error("{}: has {other} already; --out names another folder, --name another name", folder.display())]
+    Taken {
+        /// The folder.
+        folder: PathBuf,
+        /// What it has.
+        other: String,
     },
     /// A text holds no frames of the array.
     #[error("{}", reason.in_file(file))]

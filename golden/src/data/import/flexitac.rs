@@ -89,6 +89,10 @@ mod tests {
             (within.frames.len(), &within.summary.lines_left_out[..]),
             (2, &["4 bytes before byte 4".to_owned()][..])
         );
+        // Four whole frames behind the rest of one are recognised.
+        let long = [&file()[4..], &file(), &file()].concat();
+        let within = read(&long, Some([2, 3]), Settings::default()).unwrap();
+        assert_eq!((within.frames.len(), within.summary.lines_left_out.len()), (8, 1));
         // It ends within one.
         let cut = read(&file()[..20], Some([2, 3]), Settings::default()).unwrap_err().to_string();
         assert!(cut.contains("frame 3 has 2 of 6 counts; --partial takes the 2 frames before that"), "{cut}");

@@ -11,6 +11,7 @@ use crate::data::frame::Frame;
 use crate::data::recording::message::{Header, Image, Time};
 use crate::data::recording::{frame_messages, Kind, RecordingError, RecordingFile, Stamp};
 use crate::data::text::decoded;
+use crate::plain_words::JsonError;
 use crate::spec::scene::Scene;
 use crate::write::{replace, write, FileError};
 use std::fs::File;
@@ -32,12 +33,16 @@ impl Summary {
 }
 
 impl Imported {
-    /// Writes scene, frames and summary into `folder`, which is made if needed; returns the path of the scene. Files of
-    /// an earlier import with the same name are replaced.
+    /// Writes scene, frames and summary into `folder`, which is made if needed; returns the path of the scene. An earlier import
+    /// of the same file is replaced.
     ///
     /// # Errors
+    /// [`ImportError::Taken`] for a folder with the import of another file, or with files of that name that no import wrote;
     /// [`ImportError::File`] for a folder or file that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<PathBuf, ImportError> {
+        if let Some(other) = self.other_in(folder) {
+            return Err(ImportError::Taken { folder: folder.to_owned(), other });
+        }
         std::fs::create_dir_all(folder).map_err(FileError::at(folder))?;
         replace(&self.summary.recording(folder), |file| self.record(file.try_clone()?).map_err(Error::other))?;
         // Numbers, texts and lists of them can always be written as JSON.
@@ -46,6 +51,23 @@ impl Imported {
         let scene = folder.join(&self.summary.name).with_added_extension("toml");
         write(&scene, self.scene_text.as_bytes())?;
         Ok(scene)
+    }
+
+    /// What else than an import of the same file a folder has in the place of this one.
+    fn other_in(&self, folder: &Path) -> Option<String> {
+        let path = folder.join(SUMMARY);
+        if path.exists() {
+            // What cannot be read is none that an import has completed.
+            let summary: Summary = serde_json::from_slice(&super::read(&path, LARGEST_SUMMARY).ok()?).ok()?;
+            let is_same = match (&summary.path, &self.summary.path) {
+                (Some(own), Some(other)) => own == other,
+                _ => summary.file == self.summary.file,
+            };
+            let file = summary.path.unwrap_or(summary.file);
+            return (!is_same).then(|| format!("the import of {file}"));
+        }
+        let scene = format!("{}.toml", self.summary.name);
+        folder.join(&scene).exists().then(|| format!("a file {scene} that no import wrote"))
     }
 
     /// Writes the frames: in each the time from the start where it is known, else 0.
@@ -77,7 +99,7 @@ impl Imported {
             file: file.clone(),
             line: error.line(),
             column: error.column(),
-            message: error.to_string(),
+            message: JsonError::new(&error).message,
         })?;
         let path = folder.join(&summary.name).with_added_extension("toml");
         let scene_text = decoded(&super::read(&path, LARGEST_SUMMARY)?);

@@ -5,12 +5,19 @@ use std::path::Path;
 use super::loggers;
 use serde::{Deserialize, Serialize};
 
+/// First bytes of a ZIP archive, which an `.npz` file is.
+const ZIP_MAGIC: &[u8] = b"PK\x03\x04";
+/// Bytes in front of the name of an archive's first file.
+const ZIP_NAME: usize = 30;
 /// First bytes of an HDF5 file.
 pub(super) const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Begin of a frame of a FlexiTac.
 pub(super) const MARK: &[u8] = b"\xaa\x55";
 /// Frames by which a file is recognised.
 const RECOGNISED_BY: usize = 3;
+/// Longest frame of a FlexiTac that is looked for in a file that begins within one, and the marks that are tried.
+const LONGEST_FRAME: usize = 1 << 16;
+const MOST_MARKS: usize = 64;
 /// First bytes of a NumPy file.
 pub(super) const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -88,6 +95,9 @@ impl Format {
         if head.lines().next().is_some_and(is_xela_message) {
             return Some(Format::Xela);
         }
+        if head.lines().next().is_some_and(is_frame) {
+            return Some(Format::Csv);
+        }
         if frame_bytes(bytes).is_some() {
             return Some(Format::Flexitac);
         }
@@ -96,21 +106,36 @@ impl Format {
         }
         let extension = Path::new(file).extension()?.to_str()?.to_ascii_lowercase();
         match extension.as_str() {
-            "csv" | "tsv" | "txt" | "dat" => Some(Format::Csv),
+            "csv" | "tsv" | "txt" | "dat" | "ndjson" | "jsonl" => Some(Format::Csv),
             _ => None,
         }
     }
 }
 
-/// Bytes of a FlexiTac's frame behind its mark, if a file begins with some of equal length.
+/// Bytes of a FlexiTac's frame behind its mark, if a file has some of equal length at its begin; it may begin within a frame.
 pub(super) fn frame_bytes(bytes: &[u8]) -> Option<usize> {
-    let body = bytes.strip_prefix(MARK)?;
-    let is_begin = |start: usize| bytes[start..].starts_with(MARK);
-    let ends = body.windows(MARK.len()).enumerate().filter(|(_, own)| *own == MARK).map(|(at, _)| at);
-    // The mark may stand within a frame.
-    ends.filter(|own| *own > 0).find(|own| {
-        (1..RECOGNISED_BY).all(|k| k * (own + MARK.len()) < bytes.len() && is_begin(k * (own + MARK.len())))
-    })
+    let marks = |bytes: &[u8], most: usize| -> Vec<usize> {
+        let all = bytes.windows(MARK.len()).take(most).enumerate().filter(|(_, own)| *own == MARK);
+        all.map(|(at, _)| at).take(MOST_MARKS).collect()
+    };
+    let of = |start: usize| {
+        let own = &bytes[start..];
+        let is_begin = |at: usize| own[at..].starts_with(MARK);
+        // The mark may stand within a frame. A file that begins within one has less than that before it.
+        let ends = marks(&own[MARK.len()..], usize::MAX).into_iter().filter(|length| *length > 0);
+        let whole = ends.map(|length| (length, length + MARK.len())).filter(|(_, frame)| start < *frame);
+        let mut repeated = whole.filter(|(_, frame)| {
+            let needed = RECOGNISED_BY + usize::from(start > 0);
+            (1..needed).all(|k| k * frame < own.len() && is_begin(k * frame))
+        });
+        repeated.next().map(|(length, _)| length)
+    };
+    marks(bytes, LONGEST_FRAME).into_iter().find_map(of)
+}
+
+/// Whether a line is a frame in JSON, as streams have them.
+fn is_frame(line: &str) -> bool {
+    line.trim_start_matches('\u{feff}').trim_start().starts_with('{') && line.contains("\"stress_MPa\"")
 }
 
 /// Whether a line is the header of PaXini's CSV.
@@ -123,4 +148,10 @@ pub(super) fn is_xela_message(line: &str) -> bool {
     line.trim_start().starts_with('{')
         && line.contains("\"message\"")
         && (line.contains("\"taxels\"") || line.contains("Welcome"))
+}
+
+/// Whether a file is an archive of arrays of NumPy.
+pub(super) fn is_npz(bytes: &[u8]) -> bool {
+    let first = bytes.get(ZIP_NAME..).unwrap_or(&[]);
+    bytes.starts_with(ZIP_MAGIC) && first[..first.len().min(256)].windows(4).any(|own| own == b".npy")
 }

@@ -19,6 +19,9 @@ const LARGEST_FILL: usize = 16;
 /// Largest difference of Σ b·area from the printed force by which a unit is recognised.
 const UNIT_TOLERANCE: f64 = 0.05;
 
+/// How lines above the number of a picture begin.
+const HEADING: [&str; 6] = ["Page ", "File:", "Sensor area:", "Sensor size:", "MV over", "novel "];
+
 /// The table of a page.
 struct Page {
     number: usize,
@@ -41,13 +44,14 @@ struct Header {
 pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportError> {
     let mut header = Header::default();
     let mut pages: Vec<Page> = Vec::new();
-    // Whether the lines that follow belong to a table.
-    let mut open = false;
+    // Whether the lines that follow belong to a table, and whether to the heading of a page.
+    let (mut open, mut heading) = (false, false);
     let unfinished = unfinished(text);
     for (line, text) in
         text.split('\n').enumerate().map(|(index, line)| (index + 1, line.trim_end_matches(['\r', '\x0c'])))
     {
         if text.contains("Pict-No") {
+            heading = false;
             let number = text.split("Pict-No.:").nth(1).and_then(|rest| rest.split_whitespace().next());
             open = match number.and_then(|number| number.parse().ok()) {
                 Some(number) => {
@@ -57,6 +61,8 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
                 None => false,
             };
         } else if text.trim().is_empty() || !open {
+            // Of the table of a page that is skipped no line is like these.
+            heading |= HEADING.iter().any(|start| text.trim_start().starts_with(start));
             head_line(text, &mut header, source)?;
         } else if let Some(page) = pages.last_mut() {
             // What is left of a number can be another one.
@@ -65,6 +71,8 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     }
     // A table ends with its line of forces.
     let cut = pages.pop_if(|_| open).map(|page| format!("the table of picture {} is not complete", page.number));
+    let without_table = || heading.then(|| "the heading of the last page has no table below it".to_owned());
+    let cut = cut.or_else(without_table);
     if cut.is_some() && pages.is_empty() {
         return Ok(Recording { cut, ..Recording::bare(Format::Lst, [0, 0], Vec::new()) });
     }

@@ -89,22 +89,36 @@ fn field<'a>(text: &'a str, key: &str, source: &Source) -> Result<&'a str, Impor
 fn header(text: &str, source: &Source) -> Result<Header, ImportError> {
     let descr = field(text, "descr", source)?;
     let quoted = descr.strip_prefix(['\'', '"']).and_then(|rest| rest.split(['\'', '"']).next());
-    let number = quoted.and_then(number).ok_or_else(|| {
-        source.field("descr", descr.split(',').next().unwrap_or(""), "an integer, float or boolean type, such as '<f4'")
-    })?;
+    let number = quoted
+        .and_then(number)
+        .ok_or_else(|| source.field("descr", literal(descr), "an integer, float or boolean type, such as '<f4'"))?;
     let order = field(text, "fortran_order", source)?;
     let fortran = match (order.starts_with("True"), order.starts_with("False")) {
         (true, _) => true,
         (_, true) => false,
-        _ => return Err(source.field("fortran_order", order, "True or False")),
+        _ => return Err(source.field("fortran_order", literal(order), "True or False")),
     };
     let shape = field(text, "shape", source)?;
-    let wrong = || source.field("shape", shape.split(')').next().unwrap_or(""), "two or three whole numbers above 0");
+    let wrong = || source.field("shape", literal(shape), "two or three whole numbers above 0 in brackets");
     let inner = shape.strip_prefix('(').and_then(|rest| rest.split_once(')')).ok_or_else(wrong)?.0;
     let numbers = inner.split(',').map(str::trim).filter(|number| !number.is_empty());
     let shape: Vec<usize> =
         numbers.map(|n| n.parse().ok().filter(|n| *n > 0).ok_or_else(wrong)).collect::<Result<_, _>>()?;
     Ok(Header { number, fortran, shape })
+}
+
+/// The value at the begin of a text, to the comma behind it or the end of the dictionary, brackets within it closed.
+fn literal(text: &str) -> &str {
+    let mut depth = 0;
+    let is_end = |c: char| {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => (),
+        }
+        depth <= 0 && matches!(c, ',' | '}')
+    };
+    text[..text.find(is_end).unwrap_or(text.len())].trim()
 }
 
 /// The numbers of a type such as `<f4`.

@@ -3,7 +3,7 @@
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::units::Unit;
-use crate::data::text;
+use crate::data::text::{self, Separator};
 
 /// Largest magnitude of a reading, in any unit; beyond it sums would lose their meaning.
 pub(super) const LARGEST_READING: f64 = 1e9;
@@ -58,6 +58,8 @@ pub(super) struct Recording {
     pub left_out: Vec<String>,
     /// Where the file ends too early, in words; the frames are those that are whole.
     pub cut: Option<String>,
+    /// That the last line of a plain text has no end and may be cut, in words.
+    pub may_be_cut: Option<String>,
     pub frames: Vec<RawFrame>,
 }
 
@@ -77,6 +79,7 @@ impl Recording {
             layout: None,
             left_out: Vec::new(),
             cut: None,
+            may_be_cut: None,
             frames,
         }
     }
@@ -93,6 +96,14 @@ pub(super) fn sensel(source: &Source, line: usize, column: usize, cell: &str) ->
     match cell.trim() {
         cell if text::reading(cell).is_some_and(f64::is_nan) => Ok(f64::NAN),
         cell => reading(source, line, column, cell),
+    }
+}
+
+/// What separates the cells of a line, of a device or of a spreadsheet that has saved its file.
+pub(super) fn separator(text: &str) -> Separator {
+    match text.contains(';') {
+        true => Separator::Semicolon,
+        false => Separator::Comma,
     }
 }
 

@@ -46,6 +46,9 @@ pub struct Summary {
     pub name: String,
     /// Name of the recording's file, without its folder.
     pub file: String,
+    /// Path of that file, where it was read from one: an import of another file of the same name does not replace this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
     /// Its format.
     pub format: Format,
     /// The device, as the file names it.
@@ -71,6 +74,9 @@ pub struct Summary {
     /// Where the file ends too early, in words; the frames are those that are whole.
     #[serde(default)]
     pub cut: Option<String>,
+    /// That the last line of a plain text has no end and may be cut within a number, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub may_be_cut: Option<String>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
     /// Zero, sign and orientation that were corrected.

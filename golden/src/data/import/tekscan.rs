@@ -9,6 +9,7 @@
 //! | `SECONDS_PER_FRAME` | times, unless a frame's line has its own |
 //! | `SATURATION_PRESSURE` | full scale, if in the unit of the readings |
 //! | `SENSOR_TYPE` | name of the device |
+//! | `START_FRAME`, `END_FRAME` | number of frames: with fewer or more the file is cut |
 //!
 //! A frame starts with `Frame N`, in the CSV with time and `Raw Sum=` behind it, and has `ROWS` lines; `@@` ends the
 //! file: without it the file is cut. A spreadsheet that has saved the file again has filled its lines with empty cells, or separates by
@@ -19,9 +20,9 @@
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, separator, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
-use crate::data::text::{point, Separator};
+use crate::data::text::point;
 
 /// Width of Tekscan's counts.
 const BITS: u32 = 8;
@@ -38,6 +39,8 @@ struct Header {
     period_s: Option<f64>,
     saturation: Option<String>,
     device: Option<String>,
+    /// First and last frame.
+    ends: [Option<usize>; 2],
 }
 
 /// Reads a recording.
@@ -49,6 +52,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     };
     let shape = [size(header.rows, "ROWS")?, size(header.cols, "COLS")?];
     let (frames, cut) = frames(lines, shape, header.period_s, unfinished(text), source)?;
+    let cut = cut.into_iter().chain(header.wrong_count(frames.len())).reduce(|a, b| format!("{a}; {b}"));
     let [x, y] = header.pitch_mm;
     Ok(Recording {
         device: header.device,
@@ -115,15 +119,6 @@ fn row(text: &str, line: usize, cols: usize, values: &mut Vec<f64>, source: &Sou
     Ok(())
 }
 
-/// What separates the cells of a line.
-fn separator(text: &str) -> Separator {
-    if text.contains(';') {
-        Separator::Semicolon
-    } else {
-        Separator::Comma
-    }
-}
-
 /// Reads the header up to `ASCII_DATA`.
 fn header<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, source: &Source) -> Result<Header, ImportError> {
     let mut header = Header::default();
@@ -149,6 +144,14 @@ fn header<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, source: &Sourc
 }
 
 impl Header {
+    /// That a file has fewer or more frames than its header states, in words.
+    fn wrong_count(&self, frames: usize) -> Option<String> {
+        let (first, last) = self.ends[0].zip(self.ends[1]).filter(|(first, last)| first <= last)?;
+        let stated = last - first + 1;
+        (frames != stated)
+            .then(|| format!("the header states frames {first} to {last}, which are {stated}, not {frames}"))
+    }
+
     /// Takes a key and its value; one that is not used is none.
     fn key(&mut self, key: &str, value: &str, source: &Source) -> Result<(), ImportError> {
         let length = || millimetres(value).ok_or_else(|| source.field(key, value, LENGTHS));
@@ -164,6 +167,8 @@ impl Header {
                 self.period_s = Some(seconds.ok_or_else(|| source.field(key, value, "a number above 0"))?);
             }
             "SATURATION_PRESSURE" => self.saturation = Some(value.to_string()),
+            "START_FRAME" => self.ends[0] = value.parse().ok(),
+            "END_FRAME" => self.ends[1] = value.parse().ok(),
             "SENSOR_TYPE" => self.device = Some(format!("Tekscan {value}")),
             _ => {}
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::estimate::float::Golden;
+use std::path::PathBuf;
 
 const ISCAN: &[u8] = include_bytes!("../../../data/recordings/iscan-finger.csv");
 const FSCAN: &[u8] = include_bytes!("../../../data/recordings/fscan-walk.asf");
@@ -264,9 +265,9 @@ fn plain_csv_with_times_names_and_missing_values() {
     assert_eq!(read("0,1,2,3,4,5\n6,7,8,9,10,11\n").frames[0].stress_MPa, plain.frames[1].stress_MPa);
     for text in [
         "# a remark\ntime;a;b;c;d;e;f\n0,5;0,25;1;2;3;;5\n",
-        "0.5\t0.25\t1\t2\t3\tNaN\t5\n",
-        "0.5  0.25 1 2   3 B 5\n",
-        "0.5,0.25,1,2,3,,5",
+        "0.5\t0.25\t1\t2\t3\tNaN\t5\n0.6\t0.25\t1\t2\t3\tNaN\t5\n",
+        "0.5  0.25 1 2   3 B 5\n0.6  0.25 1 2   3 B 5\n",
+        "0.5,0.25,1,2,3,,5\n0.6,0.25,1,2,3,,5",
     ] {
         let imported = read(text);
         assert_eq!(imported.frames[0].stress_MPa, [0.25, 1.0, 2.0, 3.0, 0.0, 5.0], "{text}");
@@ -470,4 +471,111 @@ fn arrays_larger_than_a_scene_are_cropped_around_the_contact_or_refused() {
     );
     let unloaded = message("large.csv", ["0"; 60 * 60].join(",").as_bytes(), &settings);
     assert!(unloaded.contains("the contact is missing"), "{unloaded}");
+}
+
+/// A file in its folder, by the way of the program.
+fn saved(path: &Path, settings: &Settings, folder: &Path) -> Result<PathBuf, String> {
+    load(path, settings).and_then(|imported| imported.save(folder)).map_err(|error| error.to_string())
+}
+
+#[test]
+fn an_import_replaces_none_of_another_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("other")).unwrap();
+    let lines = Settings { size: Some([2, 2]), ..stated() };
+    for name in ["my log.csv", "my-log.csv", "other/my-log.csv"] {
+        std::fs::write(at(name), "1,2,3,4\n").unwrap();
+    }
+    let out = at("recordings/my-log");
+    saved(&at("my-log.csv"), &lines, &out).unwrap();
+    // The same file once more, changed or not.
+    std::fs::write(at("my-log.csv"), "1,2,3,4\n5,6,7,8\n").unwrap();
+    saved(&at("my-log.csv"), &lines, &out).unwrap();
+    for name in ["my log.csv", "other/my-log.csv"] {
+        let error = saved(&at(name), &lines, &out).unwrap_err();
+        assert!(error.contains("has the import of") && error.contains("my-log.csv already; --out"), "{error}");
+    }
+    assert_eq!(Imported::open(&out).unwrap().frames.len(), 2);
+    // A scene of the user's own.
+    std::fs::write(at("my-log.toml"), "").unwrap();
+    let error = saved(&at("my-log.csv"), &lines, folder.path()).unwrap_err();
+    assert!(error.contains("has a file my-log.toml that no import wrote already"), "{error}");
+}
+
+#[test]
+fn counts_above_those_of_the_stated_bits_are_refused() {
+    let settings = Settings { unit: Some(Unit::Raw), bits: Some(10), size: Some([2, 2]), ..counts() };
+    let of = |last: &str, more: Settings| {
+        let settings = Settings { pitch_mm: Some([4.0, 4.0]), ..more };
+        import("a.csv", format!("1,2,3,4\n1,2,{last},4\n").as_bytes(), &settings).map_err(|error| error.to_string())
+    };
+    assert!(of("1023", settings.clone()).is_ok());
+    let error = of("1024", settings.clone()).unwrap_err();
+    assert_eq!(
+        error,
+        "a.csv: frame 2, row 1, column 0 = 1024 is not allowed; it must be at most 1023, the largest count of 10 bits (--bits)"
+    );
+    // As the file has them, whatever is corrected.
+    let correction = Correction { zero_frames: Some(1), ..Correction::default() };
+    assert_eq!(of("1024", Settings { correction, ..settings }).unwrap_err(), error);
+}
+
+#[test]
+fn a_file_of_tekscan_with_other_frames_than_its_header_states_is_cut() {
+    let walk = decoded(FSCAN);
+    let stated = |last: &str| walk.replace("END_FRAME 12", &format!("END_FRAME {last}"));
+    let error = message("walk.asf", stated("205").as_bytes(), &Settings::default());
+    assert!(
+        error.contains("the header states frames 1 to 205, which are 205, not 12; --partial takes the 12"),
+        "{error}"
+    );
+    assert!(message("walk.asf", stated("11").as_bytes(), &Settings::default()).contains("which are 11, not 12"));
+    let partial = Settings { partial: true, ..Settings::default() };
+    assert_eq!(import("walk.asf", stated("205").as_bytes(), &partial).unwrap().frames.len(), 12);
+}
+
+#[test]
+fn a_file_of_emed_that_ends_in_the_heading_of_a_page_is_cut() {
+    let text = decoded(EMED);
+    let heading = text.split("Pict-No.: 33").next().unwrap();
+    let error = message("a.lst", heading.as_bytes(), &Settings::default());
+    assert!(
+        error.contains("the heading of the last page has no table below it; --partial takes the 3 frames"),
+        "{error}"
+    );
+}
+
+#[test]
+fn lines_of_json_are_frames_in_megapascal() {
+    let text = "{\"stress_MPa\": [0.01, 0.02, 0.05, 0.04], \"time_ns\": 0}\n{\"stress_MPa\": [0.01, 0.02, 0.03, 0.04], \"t\": 0.5}\n";
+    for file in ["l.ndjson", "l.jsonl", "l.json", "l"] {
+        let settings = Settings { size: Some([2, 2]), pitch_mm: Some([4.0, 4.0]), ..Settings::default() };
+        let imported = import(file, text.as_bytes(), &settings).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((imported.summary.unit, imported.frames.len()), (Unit::MegaPa, 2));
+        assert_eq!((imported.frames[1].stress_MPa[3], imported.summary.frames[1].time_s), (0.04, Some(0.5)));
+    }
+}
+
+#[test]
+fn what_is_no_array_is_named_as_it_is_written() {
+    let header = |text: &str| {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(u16::try_from(text.len()).unwrap().to_le_bytes());
+        bytes.extend(text.bytes());
+        message("a.npy", &bytes, &stated())
+    };
+    let cases = [
+        ("{'descr': [('a', '<f4'), ('b', '<f4')], 'fortran_order': False}", "descr = [('a', '<f4'), ('b', '<f4')] is"),
+        ("{'descr': '<f4', 'fortran_order': 'no', 'shape': (2, 2)}", "fortran_order = 'no' is"),
+        ("{'descr': '<f4', 'fortran_order': False, 'shape': (2, -2)}", "shape = (2, -2) is"),
+        ("{'descr': '<f4', 'fortran_order': False, 'shape': 5, }", "shape = 5 is"),
+    ];
+    for (text, wanted) in cases {
+        let error = header(text);
+        assert!(error.contains(wanted), "{error}");
+    }
+    let archive = [b"PK\x03\x04".as_slice(), &[0; 26], b"arr_0.npy"].concat();
+    let error = message("a.npz", &archive, &stated());
+    assert!(error.contains("numpy.save(\"frames.npy\", numpy.load(\"a.npz\")[\"NAME\"])"), "{error}");
 }

@@ -11,14 +11,17 @@
 //!
 //! Of each taxel z is taken, the normal force; without calibration counts, whose zero is not 0 (`--zero first:N`).
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
-use serde_json::{Map, Value};
+use serde_json::value::RawValue;
 
 use super::error::{ImportError, Source};
 use super::format::Format;
 use super::recording::{is_reading, RawFrame, Recording};
 use super::triaxial::Wanted;
 use super::units::Unit;
+use crate::data::text::number_ns;
 
 /// Values of a taxel: x, y, z.
 const AXES: usize = 3;
@@ -42,11 +45,11 @@ struct First {
 
 /// Reads a recording of the wanted sensor.
 pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Recording, ImportError> {
-    let (mut frames, mut left_out, mut start_s) = (Vec::new(), Vec::new(), None);
+    let (mut frames, mut left_out, mut start_ns) = (Vec::new(), Vec::new(), None);
     let mut first: Option<First> = None;
     for (index, text) in text.lines().enumerate().filter(|(_, text)| !text.trim().is_empty()) {
         let line = index + 1;
-        let message: Map<String, Value> = match serde_json::from_str(text) {
+        let message: BTreeMap<String, &RawValue> = match serde_json::from_str(text) {
             Ok(message) => message,
             Err(error) => {
                 left_out.push(format!("line {line}: no JSON object, from column {} on", error.column()));
@@ -66,7 +69,7 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
             left_out.push(format!("line {line}: without sensor {name}"));
             continue;
         };
-        let own = Sensor::deserialize(own).map_err(|_| wrong("data, taxels, model and calibrated"))?;
+        let own: Sensor = serde_json::from_str(own.get()).map_err(|_| wrong("data, taxels, model and calibrated"))?;
         let calibrated = match &first {
             Some(first) => first.calibrated,
             None => {
@@ -77,11 +80,12 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
         };
         let all = values(&own, calibrated).filter(|all| all.len() == AXES * own.taxels);
         let all = all.ok_or_else(|| wrong("x, y and z of each taxel"))?;
-        let time_s = message.get("time").and_then(Value::as_f64).filter(|time| time.is_finite());
-        let start_s = *start_s.get_or_insert(time_s.unwrap_or(0.0));
+        // As it is written: a floating-point number rounds the digits of a date.
+        let time_ns = message.get("time").and_then(|time| number_ns(time.get(), 0));
+        let start_ns = *start_ns.get_or_insert(time_ns.unwrap_or(0));
         frames.push(RawFrame {
             number: frames.len() + 1,
-            time_s: time_s.map(|time| time - start_s),
+            time_s: time_ns.map(|time| time.saturating_sub(start_ns) as f64 / 1e9),
             values: all.chunks(AXES).map(|taxel| taxel[AXES - 1]).collect(),
             stated: None,
             device: None,
@@ -123,7 +127,7 @@ mod tests {
         format!(
             "{{\"message\": {number}, \"time\": {}, \"sensors\": 1, \"1\": {{\"data\": \"{}\", \"sensor\": \"1\", \
              \"taxels\": 4, \"model\": \"made-up\", \"calibrated\": {calibrated}}}}}\n",
-            1_700_000_000.0 + 0.5 * f64::from(number),
+            format_args!("1700000000.{number:02}"),
             data.join(",")
         )
     }
@@ -143,7 +147,7 @@ mod tests {
         let summary = &imported.summary;
         assert_eq!((summary.format, summary.unit), (Format::Xela, Unit::Raw));
         let stress: Vec<f64> = imported.frames[1].stress_MPa.iter().map(|b| (b * 1e4).round()).collect();
-        assert_eq!((stress, summary.frames[1].time_s), (vec![0.0, 100.0, 0.0, 1000.0], Some(0.5)));
+        assert_eq!((stress, summary.frames[1].time_s), (vec![0.0, 100.0, 0.0, 1000.0], Some(0.01)));
         let forces = message(1, [0; 4], "[9,9,0.5, 9,9,0, 9,9,1, 9,9,-0.25]");
         let imported = read(&forces, Some([2, 2]), None).unwrap();
         assert_eq!(imported.summary.unit, Unit::Newton);

@@ -8,12 +8,14 @@
 //! | `Units` | unit |
 //! | `Est. Load (N)` | normal force |
 //!
-//! Keys may have a colon behind them; others are not used. Empty cells behind a row are padding.
+//! Keys may have a colon behind them; others are not used. Empty cells behind a row are padding. A spreadsheet that has saved the file
+//! again separates by semicolons and writes decimal commas.
 
 use super::error::{ImportError, Source};
 use super::format::Format;
-use super::recording::{sensel, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
+use super::recording::{sensel, separator, side, unfinished, unit, DeviceFigure, RawFrame, Recording};
 use super::units::{millimetres, Unit, LENGTHS};
+use crate::data::text::point;
 
 /// A key without quotes and colon.
 fn cell(text: &str) -> &str {
@@ -34,7 +36,8 @@ struct Header {
 impl Header {
     /// Takes a line `key, value`.
     fn read(&mut self, line: &str, source: &Source) -> Result<(), ImportError> {
-        let mut cells = line.split(',').map(cell);
+        let cells = separator(line).cells(line);
+        let mut cells = cells.iter().map(|text| cell(text));
         let (key, value) = (cells.next().unwrap_or(""), cells.next().unwrap_or(""));
         let (name, of) =
             key.split_once('(').map_or((key, ""), |(name, unit)| (name.trim(), unit.trim_end_matches(')')));
@@ -49,7 +52,9 @@ impl Header {
             "Sensel Width" => self.pitch_mm[0] = Some(pitch()?),
             "Sensel Height" => self.pitch_mm[1] = Some(pitch()?),
             "Units" => self.unit = Some(unit(source, key, value)?),
-            "Est. Load" if of == "N" => self.force_N = value.parse().ok().filter(|force: &f64| force.is_finite()),
+            "Est. Load" if of == "N" => {
+                self.force_N = point(value).parse().ok().filter(|force: &f64| force.is_finite())
+            }
             _ => {}
         }
         Ok(())
@@ -70,7 +75,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     let (mut last, mut cut, unfinished) = (0, None, unfinished(text));
     'frames: while let Some((line, text)) = lines.next() {
         last = line;
-        if cell(text.split(',').next().unwrap_or("")) != "SENSELS" {
+        if cell(text.split([',', ';']).next().unwrap_or("")) != "SENSELS" {
             header.read(text, source)?;
             continue;
         }
@@ -89,12 +94,13 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
                 let allowed = format!("{rows} rows below SENSELS, not {row}");
                 return Err(source.line(line, "end of the frame", allowed));
             }
-            let cells: Vec<&str> = text.split(',').collect();
+            let separator = separator(text);
+            let cells = separator.cells(text);
             if cells.len() < cols || cells[cols..].iter().any(|cell| !cell.trim().is_empty()) {
-                return Err(source.line(line, text, format!("{cols} values separated by commas (Columns)")));
+                return Err(source.line(line, text, format!("{cols} values separated by {separator} (Columns)")));
             }
             for (column, text) in cells[..cols].iter().enumerate() {
-                values.push(sensel(source, line, column + 1, text)?);
+                values.push(sensel(source, line, column + 1, &point(text))?);
             }
         }
         let number = header.number.take().unwrap_or(frames.len() + 1);
@@ -140,6 +146,17 @@ mod tests {
         // 10 mmHg on 1.5 cm², as the device says.
         assert_eq!(summary.frames[0].device_N, Some(0.2));
         assert!(summary.frames[0].closure().unwrap().abs() < 1e-3, "{:?}", summary.frames[0]);
+    }
+
+    #[test]
+    fn a_file_that_a_spreadsheet_has_saved_is_the_same() {
+        let text = file(&[[10.5, 0.0, 0.0, 0.0], [0.0, 20.0, 30.25, 0.0]]);
+        let saved =
+            text.replace(',', ";").replace('.', ",").replace("made-up,XSN", "made-up.XSN").replace("Est,", "Est.");
+        let [whole, saved] =
+            [text, saved].map(|text| import("mat.csv", text.as_bytes(), &Settings::default()).unwrap());
+        assert_eq!(saved.frames, whole.frames);
+        assert_eq!(saved.summary.frames[0].device_N, Some(0.2));
     }
 
     #[test]

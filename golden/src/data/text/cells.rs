@@ -61,7 +61,7 @@ impl Separator {
             Separator::Semicolon => b';',
             Separator::Tab => b'\t',
             Separator::Comma => b',',
-            Separator::Blank => return line.split_whitespace().map(Cow::Borrowed).collect(),
+            Separator::Blank => return with_dates(line.split_whitespace().map(Cow::Borrowed).collect()),
         };
         if line.contains('"') {
             let mut reader = ReaderBuilder::new().delimiter(byte).has_headers(false).from_reader(line.as_bytes());
@@ -82,6 +82,21 @@ impl fmt::Display for Separator {
             Separator::Blank => "blanks",
         })
     }
+}
+
+/// Cells between blanks, a date and the time of day behind it as one.
+fn with_dates(mut cells: Vec<Cow<str>>) -> Vec<Cow<str>> {
+    let is_date = |cell: &str| {
+        let parts: Vec<&str> = cell.split(['-', '/', '.']).collect();
+        parts.len() == 3 && parts.iter().all(|part| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    let is_clock = |cell: &str| cell.contains(':') && cell.starts_with(|c: char| c.is_ascii_digit());
+    // Nearly all lines have neither.
+    while let Some(date) = (1..cells.len()).find(|&k| is_clock(&cells[k]) && is_date(&cells[k - 1])) {
+        let clock = cells.remove(date);
+        cells[date - 1] = format!("{} {clock}", cells[date - 1]).into();
+    }
+    cells
 }
 
 /// The reading in a cell: NaN where it is missing, `None` for anything else than a finite number or a missing reading.
@@ -110,8 +125,8 @@ fn of_trimmed(cell: &str) -> Option<f64> {
 pub(super) struct Digits {
     /// The decimal mark, where the numbers have one; a point where some have a comma.
     pub mark: Option<char>,
-    /// Number of decimals, where it is fixed: nearly all have as many, two or more, and some end with a zero, which the shortest form
-    /// of a number has not.
+    /// Number of decimals, where it is fixed: nearly all have as many, two or more, and more of them end with a zero, which the
+    /// shortest form of a number has not, than others have fewer and are as short as they can be.
     decimals: Option<usize>,
     /// Digits of an exponent, where nearly all numbers have one of as many digits, two or more.
     exponent: Option<usize>,
@@ -158,6 +173,11 @@ impl<'t> Number<'t> {
     fn is_padded(&self) -> bool {
         self.whole.len() > 1 && self.whole.starts_with('0')
     }
+
+    /// Whether it has a zero at its end that its value does not need; `0.0` and `1.0`, as Python writes whole numbers, have none.
+    fn is_filled(&self) -> bool {
+        self.decimals.len() > 1 && self.decimals.ends_with('0')
+    }
 }
 
 impl Digits {
@@ -177,11 +197,16 @@ impl Digits {
             let middle = lengths.get(lengths.len() / 2).copied().filter(|middle| *middle >= 2)?;
             (share(&|number| length(number) == middle) >= LIKE).then_some(middle)
         };
-        let zero_at_end = numbers.iter().any(|number| number.decimals.ends_with('0'));
+        // Numbers of a fixed length that were not cut are all filled or as long as most.
+        let decimals = fixed(|number| number.decimals.len()).filter(|most| {
+            let filled = numbers.iter().filter(|number| number.is_filled()).count();
+            let shortest = numbers.iter().filter(|number| number.decimals.len() < *most && !number.is_filled()).count();
+            filled > shortest
+        });
         let padded = share(&|number| number.is_padded()) > 1.0 - LIKE;
         Digits {
             mark,
-            decimals: fixed(|number| number.decimals.len()).filter(|_| zero_at_end),
+            decimals,
             exponent: fixed(|number| number.exponent.len()),
             bare_zero: numbers.iter().filter(|number| number.is_bare_zero()).count() > 1,
             padded,
@@ -244,6 +269,29 @@ impl Digits {
                 _ => Ok(value),
             },
             false => Ok(value),
+        }
+    }
+
+    /// Whether the number in a cell would with one more character be written as the others and differ from `wanted` by `most`.
+    pub(super) fn would_be(&self, cell: &str, wanted: f64, most: f64) -> bool {
+        let text = point(cell);
+        let with = |(at, character): (usize, char)| {
+            let longer = format!("{}{character}{}", &text[..at], &text[at..]);
+            self.reading(&longer).is_ok_and(|value| (value - wanted).abs() <= most)
+        };
+        // A number has one byte for each character.
+        let places = (0..=text.len()).filter(|at| text.is_char_boundary(*at));
+        places.flat_map(|at| "0123456789.-e".chars().map(move |character| (at, character))).any(with)
+    }
+
+    /// Whether the number in a cell, which is read, may be the begin of a longer one.
+    pub(super) fn may_be_cut(&self, cell: &str) -> bool {
+        let text = point(cell);
+        let number = Number::of(&text);
+        match (self.exponent, self.decimals) {
+            (Some(_), _) => number.exponent.is_empty(),
+            (None, Some(_)) => number.is_bare_zero(),
+            (None, None) => self.width.is_none() || !number.decimals.is_empty(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Which columns of a text hold the readings, and which the time.
 
 use super::cells::point;
-use super::time::TimeUnit;
+use super::time::{are_stray, seems_a_time, TimeUnit};
 
 /// Columns that a header may name beside the readings; units and numbers in names are left out before they are compared.
 const BESIDE: [&str; 26] = [
@@ -33,7 +33,7 @@ const BESIDE: [&str; 26] = [
     "user",
 ];
 /// Those of them that are times.
-const TIMES: [&str; 13] = [
+const TIMES: [&str; 15] = [
     "t",
     "time",
     "timestamp",
@@ -41,6 +41,8 @@ const TIMES: [&str; 13] = [
     "date",
     "seconds",
     "sec",
+    "minutes",
+    "hours",
     "millis",
     "micros",
     "elapsed",
@@ -68,6 +70,8 @@ pub(super) struct Found {
     pub first: usize,
     /// Column of the time and its unit.
     pub time: Option<(usize, TimeUnit)>,
+    /// A column that seems to be a time, and is not read.
+    pub unread: Option<usize>,
 }
 
 /// What one column beside the readings holds.
@@ -86,7 +90,8 @@ impl<'t> Columns<'t> {
     pub(super) fn find(&self, readings: usize, time: Option<usize>) -> Result<Found, String> {
         let beside = self.cells.len() - readings;
         if beside == 0 {
-            return time.map_or(Ok(Found { first: 0, time: None }), |column| self.at(0, readings, column));
+            let none = Ok(Found { first: 0, time: None, unread: None });
+            return time.map_or(none, |column| self.at(0, readings, column));
         }
         if let Some(first) = self.named(readings) {
             return self.with_time(first, readings, time);
@@ -98,22 +103,46 @@ impl<'t> Columns<'t> {
             ));
         }
         if time.is_none() && beside == 1 {
-            let ends = [0, readings].map(|column| self.beside(column));
-            match ends {
-                [None, Some(Beside::Time(_))] if self.rises(readings) => return self.with_time(0, readings, None),
-                [Some(Beside::Time(_) | Beside::Index), Some(Beside::Time(_) | Beside::Index)]
-                    if self.rises(0) && self.rises(readings) && !self.rises(readings / 2) =>
-                {
-                    let last = readings + 1;
-                    return Err(format!(
-                        "column 1 and column {last} both rise as a time does; --time-column 1 or --time-column {last} says which it is"
-                    ));
-                }
-                _ => (),
-            }
+            return self.with_time(self.first_of(readings)?, readings, None);
         }
         let first = if time.is_some_and(|time| time >= readings) { 0 } else { beside };
         self.with_time(first, readings, time)
+    }
+
+    /// First column of the readings where there is one more column, in front of them or behind.
+    ///
+    /// # Errors
+    /// Both are possible, or neither, in words.
+    fn first_of(&self, readings: usize) -> Result<usize, String> {
+        let last = readings;
+        let ends = [0, last].map(|column| self.beside(column));
+        // A date or a text is no reading; a number is one unless it rises from line to line.
+        let sure = ends.map(|end| match end {
+            Some(Beside::Text | Beside::Time(TimeUnit::Iso)) => true,
+            Some(Beside::Time(TimeUnit::Number { since_1970, .. })) => since_1970,
+            _ => false,
+        });
+        let rise = |strict| [0, last].map(|end| ends[usize::from(end == last)].is_some() && self.rises(end, strict));
+        // One that falls once is a time only where none rises all along.
+        let possible = if rise(true) == [false; 2] { rise(false) } else { rise(true) };
+        match (sure, possible) {
+            ([true, _], _) => Ok(1),
+            ([_, true], _) => Ok(0),
+            // Of two lines any column can rise.
+            (_, [true, _]) if self.cells[0].len() == 2 => Ok(1),
+            (_, [true, false]) => Ok(1),
+            (_, [false, true]) => Ok(0),
+            (_, [true, true]) if !self.rises(readings / 2, true) => Err(format!(
+                "column 1 and column {} both rise as a time does; --time-column 1 or --time-column {0} says which it is",
+                last + 1
+            )),
+            (_, [true, true]) => Ok(1),
+            (_, [false, false]) => Err(format!(
+                "{} values, wanted {readings}: one is too many, and neither the first nor the last rises from line to line as a time or an \
+                 index does; --columns 2..{0} or --columns 1..{readings} says which are readings",
+                last + 1
+            )),
+        }
     }
 
     /// First column of the readings by the names of the header: those that [`BESIDE`] and [`TIMES`] do not have, without a gap.
@@ -162,13 +191,21 @@ impl<'t> Columns<'t> {
         if let Some(column) = stated {
             return self.at(first, readings, column);
         }
-        let mut times = Vec::new();
+        let (mut times, mut unread) = (Vec::new(), None);
         for column in others {
+            let is_named = self.name(column).is_some_and(is_time);
             match self.beside(column) {
                 // A sum can rise as a time does.
                 _ if self.name(column).is_some_and(|name| !is_time(name) && BESIDE.contains(&plain(name).as_str())) => (),
                 Some(Beside::Time(unit)) => times.push((column, unit)),
+                Some(Beside::Text) if is_named || seems_a_time(self.cells[column][0]) => {
+                    unread.get_or_insert(column);
+                }
                 Some(_) => (),
+                // It is no reading by its name, and stands still.
+                None if is_named => {
+                    unread.get_or_insert(column);
+                }
                 None => {
                     return Err(format!(
                         "column {} is neither a time nor an index, and {} columns are one too many; --columns A..B says which are readings",
@@ -180,13 +217,13 @@ impl<'t> Columns<'t> {
         }
         let named = times.iter().copied().find(|(column, _)| self.name(*column).is_some_and(is_time));
         match times[..] {
-            [] => Ok(Found { first, time: None }),
-            [only] => Ok(Found { first, time: Some(only) }),
+            [] => Ok(Found { first, time: None, unread }),
+            [only] => Ok(Found { first, time: Some(only), unread: None }),
             [a, b, ..] if named.is_none() => {
                 let [a, b] = [a.0 + 1, b.0 + 1];
                 Err(format!("columns {a} and {b} both rise as a time does; --time-column says which it is"))
             }
-            _ => Ok(Found { first, time: named }),
+            _ => Ok(Found { first, time: named, unread: None }),
         }
     }
 
@@ -196,12 +233,17 @@ impl<'t> Columns<'t> {
         if let Some(column) = time {
             return self.at(first, readings, column);
         }
-        let mut others = (0..self.cells.len()).filter(|column| !(first..first + readings).contains(column));
+        let mut others = (0..self.cells.len()).filter(move |column| !(first..first + readings).contains(column));
         let is_clock = |column: &usize| match (self.name(*column), self.beside(*column)) {
             (name, Some(Beside::Time(unit))) if *column == 0 || name.is_some_and(is_time) => Some((*column, unit)),
             _ => None,
         };
-        Ok(Found { first, time: others.find_map(|column| is_clock(&column)) })
+        let time = others.clone().find_map(|column| is_clock(&column));
+        let seems = |column: &usize| {
+            self.beside(*column) == Some(Beside::Text)
+                && (self.name(*column).is_some_and(is_time) || seems_a_time(self.cells[*column][0]))
+        };
+        Ok(Found { first, time, unread: others.find(|column| time.is_none() && seems(column)) })
     }
 
     /// The readings from column `first` on and the time in `column`.
@@ -209,9 +251,11 @@ impl<'t> Columns<'t> {
         if (first..first + readings).contains(&column) {
             return Err(format!("--time-column {} is one of the readings", column + 1));
         }
-        let unit = self.cells.get(column).and_then(|cells| TimeUnit::of_column(cells, self.name(column)));
+        // Who states it has named it.
+        let name = self.name(column).or(Some(TIMES[0]));
+        let unit = self.cells.get(column).and_then(|cells| TimeUnit::of_column(cells, name));
         let unit = unit.ok_or_else(|| format!("--time-column {} holds no times that rise", column + 1))?;
-        Ok(Found { first, time: Some((column, unit)) })
+        Ok(Found { first, time: Some((column, unit)), unread: None })
     }
 
     /// Leaves out the last column.
@@ -225,26 +269,37 @@ impl<'t> Columns<'t> {
     /// What a column beside the readings holds; `None` if it looks like a reading.
     fn beside(&self, column: usize) -> Option<Beside> {
         let (cells, name) = (&self.cells[column], self.name(column));
-        if cells.iter().all(|cell| super::reading(&point(cell)).is_none()) && TimeUnit::of_column(cells, name).is_none()
-        {
+        let readings = || cells.iter().map(|cell| super::reading(&point(cell)));
+        let is_text = readings().any(|reading| reading.is_none())
+            && !readings().flatten().any(f64::is_finite)
+            && TimeUnit::of_column(cells, name).is_none();
+        if is_text {
             return Some(Beside::Text);
         }
         let whole: Option<Vec<i64>> = cells.iter().map(|cell| cell.parse().ok()).collect();
+        // Lines may be lost between two, or the count begin anew.
         let counts = whole.is_some_and(|whole| {
-            whole.windows(2).all(|pair| pair[1] == pair[0] + 1) && whole.len() > 1 && whole[0] < 1 << 24
+            let others = whole.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
+            are_stray(others, whole.len()) && whole.len() > 1 && (0..1 << 24).contains(&whole[0])
         });
+        let time = TimeUnit::of_column(cells, name.filter(|name| is_time(name)));
         match name.is_some_and(is_time) || !counts {
-            true => TimeUnit::of_column(cells, name).map(Beside::Time),
+            true => time.map(Beside::Time),
             false => Some(Beside::Index),
         }
     }
 
-    /// Whether a column rises from line to line, through three lines or more.
-    fn rises(&self, column: usize) -> bool {
-        let numbers: Vec<f64> = self.cells[column].iter().filter_map(|cell| point(cell).parse().ok()).collect();
-        numbers.len() > 2
-            && numbers.len() == self.cells[column].len()
-            && numbers.windows(2).all(|pair| pair[0] < pair[1])
+    /// Whether the numbers of a column rise from line to line: all, or most of them and with hardly one that falls or is missing.
+    fn rises(&self, column: usize, strict: bool) -> bool {
+        let cells = &self.cells[column];
+        let numbers: Vec<f64> = cells.iter().filter_map(|cell| point(cell).parse().ok()).collect();
+        let of_steps = |is: fn(&[f64]) -> bool| numbers.windows(2).filter(|pair| is(pair)).count();
+        let (up, down) = (of_steps(|pair| pair[0] < pair[1]), of_steps(|pair| pair[0] > pair[1]));
+        let strays = cells.len() - numbers.len() + down;
+        match strict {
+            true => numbers.len() > 1 && up + 1 == cells.len(),
+            false => numbers.len() > 1 && are_stray(strays, cells.len()) && 2 * up + 1 >= numbers.len(),
+        }
     }
 
     fn name(&self, column: usize) -> Option<&'t str> {
@@ -254,7 +309,9 @@ impl<'t> Columns<'t> {
     /// Whether the first column rises as a time does, and hardly another one.
     pub(super) fn begins_with_time(&self) -> bool {
         let others = 1..self.cells.len();
-        self.rises(0) && others.clone().filter(|&column| self.rises(column)).count() * 2 < others.len()
+        self.cells[0].len() > 2
+            && self.rises(0, true)
+            && others.clone().filter(|&column| self.rises(column, true)).count() * 2 < others.len()
     }
 }
 
@@ -263,6 +320,11 @@ fn plain(name: &str) -> String {
     let name = name.split(['(', '[']).next().unwrap_or("").to_lowercase();
     let words: String = name.chars().map(|c| if c.is_alphabetic() { c } else { ' ' }).collect();
     words.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a header names a column that is known to stand beside the readings.
+pub(super) fn is_known(name: &str) -> bool {
+    is_time(name) || BESIDE.contains(&plain(name).as_str())
 }
 
 fn is_time(name: &str) -> bool {

@@ -4,12 +4,17 @@ use std::borrow::Cow;
 use std::fmt;
 
 use super::cells::{point, Digits, Separator};
-use super::columns::{Columns, Found};
+use super::columns::{is_known, Columns, Found};
 use super::time::TimeUnit;
 use super::{reading, Line, NoReadings};
 
 /// Lines from which a layout is found.
 const LOOKED_AT: usize = 256;
+
+/// Changes of a reading, over the largest of all others: from this one on it may be due to a character that is lost, if the number
+/// with that character would have changed by this much at most.
+const FAR: f64 = 8.0;
+const NEAR: f64 = 2.0;
 
 /// How frames stand in a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +64,10 @@ pub struct Layout {
     pub first_line: usize,
     /// Number of the line with the names or numbers of the columns, if there is one.
     names_line: Option<usize>,
+    /// The first line may have the numbers of the columns, and no line follows that would show it.
+    pub(super) may_be_numbers: bool,
+    /// A column that seems to be a time in a form that is not read, from 0, and its first cell.
+    unread: Option<(usize, String)>,
 }
 
 /// A line split at a separator.
@@ -147,6 +156,31 @@ impl Layout {
         cells.iter().skip(self.first).take(self.readings).any(|cell| self.digits.hide_a_lost_digit(cell))
     }
 
+    /// Whether one of a line's readings has changed from that `before` by far more than all others, and its number would with one
+    /// more character be nearly that before.
+    pub(super) fn may_lack_a_character(&self, cells: &[Cow<str>], before: &[f64], readings: &[f64]) -> bool {
+        if before.len() != readings.len() {
+            return false;
+        }
+        let changes = before.iter().zip(readings).map(|(before, now)| (now - before).abs());
+        let (mut largest, mut second, mut place) = (0.0, 0.0f64, 0);
+        for (taxel, change) in changes.enumerate().filter(|(_, change)| !change.is_nan()) {
+            if change > largest {
+                (largest, second, place) = (change, largest, taxel);
+            } else {
+                second = second.max(change);
+            }
+        }
+        largest > FAR * second && self.digits.would_be(&cells[self.first + place], before[place], NEAR * second)
+    }
+
+    /// The last cell of a line, if it may be the begin of a longer one.
+    pub(super) fn cut_cell<'t>(&self, line: &'t str) -> Option<Cow<'t, str>> {
+        let mut cells = self.split(line);
+        let is_reading = cells.len() == self.first + self.readings;
+        cells.pop().filter(|cell| !is_reading || self.digits.may_be_cut(cell))
+    }
+
     /// Whether the other layout reads lines alike: all but the number of the first line.
     pub(super) fn is_like(&self, other: &Layout) -> bool {
         (self.separator, self.cells, self.first) == (other.separator, other.cells, other.first)
@@ -165,10 +199,14 @@ impl Layout {
         Some(line.number) == self.names_line || 2 * numbers < self.readings
     }
 
-    /// Whether the readings of a line are the numbers of their columns, 0, 1, 2 …, as pandas writes them in a header.
-    pub(super) fn has_numbers_of_columns(&self, line: &Line) -> bool {
-        let readings = self.readings_of(line, &self.split(line.text)).unwrap_or_default();
-        readings.len() > 2 && readings.iter().enumerate().all(|(column, reading)| *reading == column as f64)
+    /// Whether a line of its own shows which of its cells are the readings: it has no other ones.
+    pub(super) fn is_sure(&self) -> bool {
+        self.readings == self.cells && !self.may_be_numbers
+    }
+
+    /// Whether the other layout reads lines alike, times too.
+    pub(super) fn reads_as(&self, other: &Layout) -> bool {
+        self.is_like(other) && (self.time, self.form) == (other.time, other.form)
     }
 }
 
@@ -208,7 +246,8 @@ impl<'s> Table<'s> {
         let before = first.checked_sub(1).map(|before| &self.rows[before].cells);
         let mut names = before.filter(|names| names.len() == self.cells);
         let data = self.body(first).count();
-        if self.is_numbered(first, readings) && data > lines && (data - 1).is_multiple_of(lines) {
+        let is_numbered = self.is_numbered(first, readings);
+        if is_numbered && data > lines && (data - 1).is_multiple_of(lines) {
             names = Some(&self.rows[first].cells);
             first += 1;
         }
@@ -239,6 +278,8 @@ impl<'s> Table<'s> {
             blocks: form == Form::Grid && self.has_blocks(first, lines),
             first_line: self.rows[first].line.number,
             names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].line.number),
+            may_be_numbers: is_numbered && data == 1,
+            unread: found.unread.and_then(|column| Some((column, self.body(first).next()?[column].to_string()))),
         };
         self.check(first, &layout)?;
         Ok(layout)
@@ -272,8 +313,19 @@ impl<'s> Table<'s> {
             None if got == taxels || own >= taxels => Ok(of(Form::Line)),
             None if got == cols || own == cols => Ok(of(Form::Grid)),
             Some(form) => Err(format!("{own} values, wanted {}", of(form).1)),
-            None => Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row")),
+            None => {
+                let numbered = own > cols && self.numbers_rows(rows);
+                let hint = if numbered { "; --columns A..B says which are the readings of a row" } else { "" };
+                Err(format!("{own} values, wanted {taxels} of a frame or {cols} of a row{hint}"))
+            }
         }
+    }
+
+    /// Whether the first column has the numbers of rows, from 0 or 1 on, anew in each frame or not.
+    fn numbers_rows(&self, rows: usize) -> bool {
+        let numbers = || self.body(0).map(|cells| cells[0].parse::<usize>().ok()).enumerate();
+        let count = |first: usize, anew: usize| numbers().all(|(k, number)| number == Some(first + k % anew));
+        self.body(0).count() > 1 && [0, 1].into_iter().any(|first| count(first, rows) || count(first, usize::MAX))
     }
 
     /// The columns of the readings and of the time in the lines from `first` on.
@@ -306,18 +358,25 @@ impl<'s> Table<'s> {
         Ok(found)
     }
 
-    /// Whether the line `first` has names and numbers of columns: 0, 1, 2 …, or 1, 2, 3 … of nine and more.
+    /// Whether the line `first` has the numbers of the columns of readings, from 0 or 1 on, and names of the others; from 1 on
+    /// without names of nine and more.
     fn is_numbered(&self, first: usize, readings: usize) -> bool {
         let cells = &self.rows[first].cells;
         let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
-        let others = cells.iter().filter(|cell| cell.parse::<usize>().is_err());
-        let is_name = |cell: &Cow<str>| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
-        let names = others.clone().filter(|cell| is_name(cell)).count();
         let counts = |from: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + from);
-        others.clone().all(|cell| cell.is_empty() || is_name(cell))
-            && numbers.len() > 1
-            && (names > 0 || numbers.len() == readings)
-            && (counts(0) || readings >= 9 && counts(1))
+        if numbers.len() != readings || readings < 2 || !(counts(0) || counts(1)) {
+            return false;
+        }
+        let is_text = |cell: &str| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
+        // A name stands over cells of another kind, a label over labels.
+        let is_name = |column: usize| {
+            let mut below = self.body(first + 1).map(|cells| &cells[column]);
+            is_text(&cells[column])
+                && (is_known(&cells[column]) || below.any(|cell| !cell.is_empty() && !is_text(cell)))
+        };
+        let mut others = (0..cells.len()).filter(|column| cells[*column].parse::<usize>().is_err());
+        let names = others.clone().filter(|column| is_name(*column)).count();
+        others.all(|column| cells[column].is_empty() || is_name(column)) && (names > 0 || counts(0) || readings >= 9)
     }
 
     /// Whether frames of `lines` lines stand apart, by blank lines or headings.
@@ -361,6 +420,12 @@ impl fmt::Display for Layout {
             Form::Line => "a frame per line".to_owned(),
             Form::Grid => format!("a grid of {} lines per frame", self.lines),
         };
-        write!(f, "{form}, separated by {}{mark}{header}{time}, readings in columns {a} to {b}", self.separator)
+        write!(f, "{form}, separated by {}{mark}{header}{time}, readings in columns {a} to {b}", self.separator)?;
+        match &self.unread {
+            Some((column, cell)) => {
+                write!(f, "; no time is read from column {}, {cell:?}: ISO 8601 and numbers are", column + 1)
+            }
+            None => Ok(()),
+        }
     }
 }

@@ -4,23 +4,23 @@
 //! text ── lines ── layout, decided once ── cells ── readings, time
 //! ```
 //!
-//! Layout is a property of the file, not of a line: it is found from many lines where there are many ([`Layout::of_lines`]), from
-//! the first where there is a stream, and can be stated where a guess would be wrong ([`Stated`]). A line of another layout
-//! holds no frame and is left out, with its number and the reason.
+//! Layout is a property of the file, not of a line: it is found from many lines where there are many ([`Layout::of_lines`]), of a
+//! stream from the first, or from up to eight where that leaves it open ([`Reader`]), and can be stated where a guess would be wrong
+//! ([`Stated`]). A line of another layout holds no frame and is left out, with its number and the reason.
 //!
 //! | property | found from |
 //! |---|---|
 //! | separator | semicolons, tabs, commas or blanks: the first with which lines have the number of cells that the array asks for |
 //! | decimal mark | a point; a comma where cells have one and it is not the separator |
-//! | header | lines before the first readings; names, or the numbers 0, 1, 2 … that pandas writes |
+//! | header | lines before the first readings; names, or the numbers of columns, as pandas writes them |
 //! | columns before or after the readings | names of the header, else what they hold: a time that rises, an index, a text |
 //! | a separator behind each line | an empty last cell in every line, one too many |
 //! | a frame per line, or a grid of one line per row | the number of cells |
 //! | decimals | where zeros at the end show that their number is fixed; a cell with fewer or more has lost or gained characters |
 //! | digits before the decimal mark | where zeros in front show that their number is fixed; where others have one, a cell has one too |
 //!
-//! A digit that a whole number has lost shows nowhere. Where lines of a stream show that the link loses characters, those near them
-//! are doubted ([`Reader::is_doubtful`]).
+//! A digit that a whole number has lost shows nowhere in its line. Where lines of a stream show that the link loses characters, those
+//! near them are doubted, and so is a frame in which one reading has changed as a lost character would change it ([`Reader`]).
 //!
 //! | in | a cell is |
 //! |---|---|
@@ -44,6 +44,7 @@ pub use cells::{reading, Separator};
 pub use layout::{Form, Layout, Stated};
 pub(crate) use reader::without_nan;
 pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
+pub(crate) use time::number_ns;
 pub use time::{is_date, TimeUnit};
 
 use std::fmt;

@@ -1,6 +1,7 @@
 //! Texts as other programs write them; what is cut, changed in the middle, or can be read in two ways.
 
 use super::*;
+use crate::random::Random;
 
 fn read(text: &str, shape: [usize; 2]) -> TextFrames {
     frames(text, shape, &Stated::default()).unwrap_or_else(|error| panic!("{text:?}: {error}"))
@@ -139,9 +140,11 @@ fn what_can_be_read_in_two_ways_is_refused_until_it_is_stated() {
     assert!(refused(both, [2, 2], &none).contains("--time-column 1 or --time-column 5"));
     assert_eq!(readings(&frames(both, [2, 2], &time(5)).unwrap())[0], [0.1, 5.0, 2.0, 4.0]);
     // A column that is nothing known, and more than three.
-    assert!(
-        refused("5,1,2,3,4\n3,1,2,3,4\n4,1,2,3,4\n", [2, 2], &none).contains("--columns A..B says which are readings")
-    );
+    // One too many, in front or behind: a column of either end could be a reading.
+    for text in ["5,1,2,3,4\n3,1,2,3,4\n4,1,2,3,4\n", "5,1,2,3,4\n", "0,1,2,3,6\n0,1,2,3,6\n1,2,3,3,9\n1,2,3,4,8\n"] {
+        let refusal = refused(text, [2, 2], &none);
+        assert!(refusal.ends_with("--columns 2..5 or --columns 1..4 says which are readings"), "{refusal}");
+    }
     assert!(refused("9,9,9,9,9,1,2,3,4\n9,9,9,9,9,1,2,3,4\n", [2, 2], &none).contains("--columns A..B"));
     assert_eq!(readings(&frames("5,1,2,3,4\n", [2, 2], &columns(2, 5)).unwrap()), [[1.0, 2.0, 3.0, 4.0]]);
     // Commas as decimal marks and separators.
@@ -166,6 +169,10 @@ fn what_can_be_read_in_two_ways_is_refused_until_it_is_stated() {
         refused("1,2,3\n1,2,3\n1,2,3,4\n", [2, 2], &none),
         "line 1: 3 values, wanted 4 of a frame or 2 of a row"
     );
+    // A grid with an index in front.
+    let grid = "0,1,2,3\n1,4,5,6\n0,2,3,4\n1,5,6,7\n";
+    assert!(refused(grid, [2, 3], &none).ends_with("--columns A..B says which are the readings of a row"));
+    assert_eq!(readings(&frames(grid, [2, 3], &columns(2, 4)).unwrap())[1], [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
     // What is skipped is not looked at.
     assert_eq!(readings(&frames("5,6,7,8\n1,2,3,4\n", [2, 2], &Stated { skip_rows: 1, ..none }).unwrap()).len(), 1);
 }
@@ -186,7 +193,7 @@ fn a_stream_takes_the_layout_of_its_first_line_until_three_have_another() {
     let read: Vec<Read> =
         lines.iter().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
     let is_frame = |read: &Read| matches!(read, Read::Frame(_));
-    assert_eq!(read[0], Read::Header);
+    assert_eq!(read[0], Read::Header(1));
     assert_eq!(read.iter().map(is_frame).collect::<Vec<_>>(), [false, true, false, true, false, false, true]);
     let Read::LeftOut(left_out) = &read[2] else { panic!("{:?}", read[2]) };
     let reason = left_out.reason.to_string();
@@ -263,5 +270,208 @@ fn words_of_other_programs_for_a_missing_reading() {
     for word in ["-", "inf", "na na", "0x1F", "#REF!"] {
         let read = read(&format!("1,2,3,4\n1,{word},3,4\n"), [2, 2]);
         assert_eq!((read.frames.len(), read.left_out.len()), (1, 1), "{word}");
+    }
+}
+
+/// Numbers as Python prints those that are rounded to `decimals`.
+fn rounded(random: &mut Random, decimals: u32) -> String {
+    let scale = 10f64.powi(decimals as i32);
+    let idle = random.between(0.0, 1.0) < 0.2;
+    format!("{:?}", if idle { 0.0 } else { (random.between(0.0, 1.0) * scale).round() / scale })
+}
+
+#[test]
+fn no_line_of_rounded_numbers_is_left_out() {
+    let mut random = Random::new(59);
+    for (decimals, side) in (1..=4).flat_map(|decimals| (2..=6).map(move |side| (decimals, side))) {
+        let mut line = || (0..side * side).map(|_| rounded(&mut random, decimals)).collect::<Vec<_>>().join(",");
+        let lines: Vec<String> = (0..400).map(|_| line()).collect();
+        let whole = read(&(lines.join("\n") + "\n"), [side, side]);
+        assert_eq!((whole.frames.len(), whole.left_out_text()), (400, None), "{decimals} decimals, {side}×{side}");
+        let streamed = streamed(&lines, [side, side]);
+        assert_eq!(streamed, whole.frames, "{decimals} decimals, {side}×{side}");
+    }
+}
+
+/// The frames of lines as a stream brings them; panics where one is left out.
+fn streamed<T: AsRef<str>>(lines: &[T], shape: [usize; 2]) -> Vec<TextFrame> {
+    let mut reader = Reader::new(shape, Stated { form: Some(Form::Line), ..Stated::default() });
+    let numbered = lines.iter().enumerate();
+    let mut all: Vec<Read> =
+        numbered.flat_map(|(k, text)| reader.push(Line { number: k + 1, text: text.as_ref() })).collect();
+    all.extend(reader.finish());
+    let frame = |read: Read| match read {
+        Read::Frame(frame) => Some(frame),
+        Read::Header(_) => None,
+        Read::LeftOut(left_out) => panic!("{:?}: {}", lines[0].as_ref(), left_out.reason),
+    };
+    all.into_iter().filter_map(frame).collect()
+}
+
+/// Twenty lines of which a single one does not show what its columns hold.
+#[test]
+fn a_stream_has_the_layout_of_a_file() {
+    let of = |line: &dyn Fn(usize) -> String| (0..20).map(line).collect::<Vec<_>>();
+    let values = |k: usize| format!("{},{},{},{}", k % 7, 3 * k % 5, (7 - k % 8) % 3, 5 * k % 4);
+    let headed = |header: &str, lines: Vec<String>| [vec![header.to_owned()], lines].concat();
+    let seconds = |k: usize| format!("{:.2}", 12.5 + 0.01 * k as f64);
+    let cases = [
+        (of(&|k| format!("{},{}", seconds(k), values(k))), Some(10_000_000)),
+        (of(&|k| format!("{},{}", 100 + 10 * k, values(k))), Some(10_000_000)),
+        (of(&|k| format!("{},{}", 100_000 + 10_000 * k, values(k))), Some(10_000_000)),
+        (of(&|k| format!("{},{}", values(k), seconds(k))), Some(10_000_000)),
+        (of(&|k| format!("{k},{},{}", seconds(k), values(k))), Some(10_000_000)),
+        (of(&|k| format!("{k},{}", values(k))), None),
+        (headed("1,2,3,4", of(&|k| values(k + 1))), None),
+        (headed("time,1,2,3,4", of(&|k| format!("{},{}", seconds(k), values(k)))), Some(10_000_000)),
+        (headed("time_ms,1,2,3,4", of(&|k| format!("{k},{}", values(k)))), Some(1_000_000)),
+        (headed("t,a,b,c,d,sum", of(&|k| format!("{},{},9", seconds(k), values(k)))), Some(10_000_000)),
+        (of(&|k| format!("{},{},", seconds(k), values(k))), Some(10_000_000)),
+        (of(&|k| format!("left,{}", values(k))), None),
+    ];
+    for (lines, step_ns) in cases {
+        let whole = read(&(lines.join("\n") + "\n"), [2, 2]);
+        let streamed = streamed(&lines, [2, 2]);
+        assert_eq!(streamed, whole.frames, "{}", lines[0]);
+        let times: Vec<Option<i64>> = streamed.iter().take(2).map(|frame| frame.time_ns).collect();
+        assert_eq!(times[1].zip(times[0]).map(|(b, a)| b - a), step_ns, "{}", lines[0]);
+        let own = usize::from(lines.len() > 20 && lines[0] != "1,2,3,4");
+        assert_eq!(streamed.len() + own, lines.len(), "{}", lines[0]);
+    }
+}
+
+#[test]
+fn lines_of_a_stream_wait_only_where_they_leave_the_layout_open() {
+    let pushed = |lines: &[&str]| {
+        let mut reader = Reader::new([2, 2], Stated::default());
+        let frames = |read: Vec<Read>| read.iter().filter(|read| matches!(read, Read::Frame(_))).count();
+        let each: Vec<usize> =
+            lines.iter().enumerate().map(|(k, text)| frames(reader.push(Line { number: k + 1, text }))).collect();
+        (each, reader.is_waiting(), frames(reader.settle()))
+    };
+    assert_eq!(pushed(&["5,2,3,4", "1,2,3,4"]), (vec![1, 1], false, 0));
+    assert_eq!(pushed(&["0.1,5,2,3,4", "0.2,1,2,3,4"]), (vec![0, 0], true, 2));
+    // The second line shows that the first has the numbers of the columns, or is of another layout.
+    assert_eq!(pushed(&["0,1,2,3", "5,2,3,4"]), (vec![0, 1], false, 0));
+    assert_eq!(pushed(&["7,5,2,3,4", "5,2,3,4"]), (vec![0, 1], false, 0));
+    let long =
+        ["0.1,5,2,3,4", "0.2,1,2,3,4", "0.3,1,2,3,4", "0.4,1,2,3,4", "0.5,1,2,3,4", "0.6,1,2,3,4", "0.7,1,2,3,4"];
+    let longer = [&long[..], &["0.8,5,5,5,5", "0.9,5,5,5,5"]].concat();
+    assert_eq!(pushed(&longer), (vec![0, 0, 0, 0, 0, 0, 0, 8, 1], false, 0));
+    // One that no line follows is refused with both readings; those behind it show what it is.
+    let mut reader = Reader::new([2, 2], Stated::default());
+    assert!(reader.push(Line { number: 1, text: "0.1,5,2,3,4" }).is_empty());
+    let [Read::LeftOut(left_out)] = &reader.settle()[..] else { panic!() };
+    assert!(left_out.reason.to_string().contains("--columns 2..5 or --columns 1..4"), "{}", left_out.reason);
+    assert!(matches!(reader.push(Line { number: 2, text: "0.2,5,2,3,4" })[..], [Read::Frame(_)]));
+    // Readings that looked like a time until one fell: no further frame has another meaning.
+    let mut reader = Reader::new([2, 2], Stated::default());
+    let lines = ["1,5,2,3,11", "2,5,2,3,12", "1,5,2,3,11"];
+    let read: Vec<Vec<Read>> = lines
+        .iter()
+        .enumerate()
+        .map(|(k, text)| {
+            [reader.push(Line { number: k + 1, text }), if k > 0 { reader.settle() } else { vec![] }].concat()
+        })
+        .collect();
+    assert!(matches!(&read[2][..], [Read::LeftOut(own)] if own.reason.reason.contains("--columns")), "{read:?}");
+}
+
+#[test]
+fn words_are_a_header_only_where_a_frame_follows() {
+    let mut reader = Reader::new([2, 2], Stated::default());
+    assert_eq!(reader.push(Line { number: 1, text: "no device" }), [Read::Header(1)]);
+    assert_eq!(reader.push(Line { number: 2, text: "no device" }), [Read::Header(2)]);
+    let end = reader.finish();
+    let [Read::LeftOut(first), Read::LeftOut(_)] = &end[..] else { panic!("{end:?}") };
+    assert_eq!(first.reason.to_string(), "line 1: no numbers, wanted 4 of 2x2 taxels");
+    let mut reader = Reader::new([2, 2], Stated::default());
+    for (k, text) in ["p1,p2,p3,p4", "5,2,3,4"].into_iter().enumerate() {
+        reader.push(Line { number: k + 1, text });
+    }
+    assert!(reader.finish().is_empty());
+}
+
+#[test]
+fn times_that_are_missing_wrong_or_fall_leave_the_others() {
+    let lines = |times: &[&str]| times.iter().map(|time| format!("{time},1,2,3,4\n")).collect::<String>();
+    let times = |text: &str| {
+        let read = read(text, [2, 2]);
+        let own = read.frames.iter().map(|frame| frame.time_ns.map(|ns| ns / 1_000_000)).collect::<Vec<_>>();
+        (own, read.left_out_text())
+    };
+    assert_eq!(times(&lines(&["0.1", "", "0.3", "0.4"])), (vec![Some(100), None, Some(300), Some(400)], None));
+    let wrong = times(&lines(&["0.1", "0.2", "0.3s", "0.4"]));
+    assert_eq!(wrong.0, [Some(100), Some(200), Some(400)]);
+    assert_eq!(wrong.1.as_deref(), Some("1 left out: line 3, value 1: \"0.3s\" is no time as the others (s)"));
+    let falls = times(&("time,a,b,c,d\n".to_owned() + &lines(&["0.1", "0.2", "0.3", "0", "0.5"])));
+    assert_eq!(falls, (vec![Some(100), Some(200), Some(300), Some(0), Some(500)], None));
+    // Over midnight.
+    let day = 86_400_000;
+    assert_eq!(
+        times(&lines(&["23:59:59.9", "00:00:00.1", "00:00:00.2"])).0,
+        [Some(day - 100), Some(day + 100), Some(day + 200)]
+    );
+    // Date and time between blanks.
+    let blank = "2026-01-02 10:00:00.0 1 2 3 4\n2026-01-02 10:00:00.1 1 2 3 4\n";
+    let blank = read(blank, [2, 2]);
+    assert_eq!(blank.frames[1].time_ns.zip(blank.frames[0].time_ns).map(|(b, a)| b - a), Some(100_000_000));
+    // What is not read is named.
+    for time in ["1/2/2026 10:00:00 AM", "10h05"] {
+        let text = format!("time,a,b,c,d\n{time},1,2,3,4\n{time},1,2,3,5\n");
+        let layout = read_layout(&text);
+        assert!(layout.contains(&format!("no time is read from column 1, {time:?}")), "{layout}");
+    }
+    // Nanoseconds of a date are more than a floating-point number has.
+    let json = read("{\"stress_MPa\": [1, 2, 3, 4], \"timestamp\": 1732770000.010000001}\n", [2, 2]);
+    assert_eq!(json.frames[0].time_ns, Some(1_732_770_000_010_000_001));
+}
+
+fn read_layout(text: &str) -> String {
+    read(text, [2, 2]).layout.map(|layout| layout.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn a_last_line_without_an_end_is_named_where_its_last_number_may_be_cut() {
+    let end = |text: &str| read(text, [2, 2]).may_be_cut;
+    assert_eq!(end("1,2,3,4\n1,2,3,12\n"), None);
+    assert_eq!(end("1,2,3,4\n1,2,3,12").as_deref(), Some("line 2 has no end: its last value, \"12\", may be cut"));
+    assert_eq!(end("1,2\n3,4").as_deref(), Some("line 2 has no end: its last value, \"4\", may be cut"));
+    // What a fixed number of decimals shows whole, and JSON.
+    assert_eq!(end("1.50,2.00,3.00,4.00\n1.50,2.00,3.00,12.25"), None);
+    assert_eq!(end("{\"stress_MPa\": [1, 2, 3, 4]}"), None);
+}
+
+/// Numbers of a press that moves and grows, as they are written in as few characters as they need.
+fn press(frame: usize) -> Vec<String> {
+    let at = [3.0 + 0.02 * frame as f64, 4.0 - 0.01 * frame as f64];
+    let load = 0.4 * (0.05 * frame as f64).sin().max(0.0);
+    let value = |taxel: usize| {
+        let [x, y] = [(taxel % 8) as f64 - at[0], (taxel / 8) as f64 - at[1]];
+        let noise = 1e-3 * ((frame * 31 + taxel * 17) % 13) as f64 / 13.0;
+        (1e6 * (load * (-0.3 * (x * x + y * y)).exp() + noise)).round() / 1e6
+    };
+    (0..64).map(|taxel| format!("{}", value(taxel))).collect()
+}
+
+#[test]
+fn a_lost_digit_that_moves_the_point_is_doubted_and_no_press_is() {
+    let lines: Vec<Vec<String>> = (0..400).map(press).collect();
+    let doubtful = |lines: &[Vec<String>]| -> Vec<usize> {
+        let texts: Vec<String> = lines.iter().map(|cells| cells.join(",")).collect();
+        streamed(&texts, [8, 8]).iter().filter(|frame| frame.doubtful).map(|frame| frame.line).collect()
+    };
+    assert_eq!(doubtful(&lines), [0; 0]);
+    // The digit behind the point of the largest reading.
+    for frame in (10..50).step_by(3) {
+        let mut cut = lines.clone();
+        let value = |cell: &String| cell.parse::<f64>().unwrap();
+        let largest = (0..64).max_by(|a, b| value(&lines[frame][*a]).total_cmp(&value(&lines[frame][*b]))).unwrap();
+        let cell = &mut cut[frame][largest];
+        cell.remove(cell.find('.').unwrap() + 1);
+        if (value(cell) - value(&lines[frame][largest])).abs() > 0.1 {
+            let cell = cell.clone();
+            assert!(doubtful(&cut).contains(&(frame + 1)), "{frame}: {cell}");
+        }
     }
 }

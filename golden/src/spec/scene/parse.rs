@@ -7,7 +7,7 @@ use super::{
     Condition, FixedSpec, HardwareSpec, InputSpec, InverseKind, InverseSpec, MeanKind, Medium, OutputSpec,
     PartitionSpec, Scene, SceneError, SearchSpec, TableRange, ThresholdSpec, MAX_CONTACTS, SHORTEST_AVERAGE,
 };
-use crate::plain_words::plain;
+use crate::plain_words::of_toml;
 use crate::spec::partition::{subarrays, Case, Grid};
 use crate::spec::sensor::{Sensor, SensorError, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use serde_json::{json, Value as Json};
@@ -76,12 +76,8 @@ impl Scene {
 }
 
 fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
-    let end = error.span().map_or(0, |span| span.start.min(text.len()));
-    SceneError::Syntax {
-        file: origin.to_string(),
-        line: 1 + text.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count(),
-        message: plain(error.message()),
-    }
+    let (line, message) = of_toml(text, error);
+    SceneError::Syntax { file: origin.to_string(), line, message }
 }
 
 /// A scene's name.
