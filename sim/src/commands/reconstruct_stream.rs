@@ -128,6 +128,9 @@ impl StreamArguments {
         say!("{}: {answered} results, {rate:.1} per second; {counts}", scene.name);
         recorded?;
         interrupted.check().map_err(|_| Interrupted("the recording is complete"))?;
+        if let (0, Some((line, reason))) = (answered, &counts.first_refused) {
+            bail!("{name}: {refused} of {refused} lines were refused; line {line}: {reason}");
+        }
         if refused > 0 {
             bail!("{name}: {refused} of {} lines were refused", refused + answered);
         }

@@ -40,6 +40,8 @@ pub struct Counts {
     pub answered: u64,
     /// Lines without a frame, or whose frame has no result.
     pub refused: u64,
+    /// The first of them, and why.
+    pub first_refused: Option<(u64, String)>,
     /// Lines dropped by [`Policy::Latest`].
     pub dropped: u64,
     /// Largest time from a line to its result.
@@ -287,6 +289,7 @@ impl<'a> Stream<'a> {
             Ok(Some(complete)) => complete,
             Err(error) => {
                 self.counts.refused += 1;
+                self.counts.first_refused.get_or_insert_with(|| (line, error.clone()));
                 return output(&Outcome::Refusal(Refusal { line, error: &error }));
             }
         };

@@ -63,6 +63,28 @@ fn a_bad_line_is_answered_by_its_number_and_the_stream_goes_on() {
     assert!(stderr.ends_with("error: standard input: 1 of 4 lines were refused\n"), "{stderr}");
 }
 
+/// What a stream of this text gives: exit code, lines and the last line on standard error.
+fn streamed(text: &str) -> (Option<i32>, Vec<Value>, String) {
+    let mut child = dermis(&["--stream", "--brief"]);
+    child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let lines = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    (output.status.code(), lines, stderr.lines().last().unwrap_or_default().to_owned())
+}
+
+#[test]
+fn what_is_no_line_is_named_and_the_program_fails() {
+    let whole = line(&frames()[0]);
+    let (code, lines, error) = streamed(&(whole.clone() + whole.trim_end()));
+    assert_eq!((code, lines.len(), lines[1]["error"].is_string()), (Some(2), 2, true));
+    assert_eq!(error, "error: standard input: 1 of 2 lines were refused");
+    let (code, lines, error) = streamed("no device\n");
+    assert_eq!((code, lines.len()), (Some(2), 1));
+    assert_eq!(error, "error: standard input: 1 of 1 lines were refused; line 1: no numbers, wanted 64 of 8x8 taxels");
+}
+
 #[test]
 fn an_output_that_is_closed_ends_the_stream() {
     let mut child = dermis(&["--stream", "--brief"]);
