@@ -22,7 +22,7 @@ use dermis_sim::live::request;
 /// A reader, which returns whether it accepted the bytes.
 pub type Target = fn(&[u8]) -> bool;
 /// All readers, by the folder of their seeds.
-pub const TARGETS: [(&str, Target); 18] = [
+pub const TARGETS: [(&str, Target); 19] = [
     ("scene", scene),
     ("board", board),
     ("frame.json", json),
@@ -240,7 +240,7 @@ fn lines(bytes: &[u8]) -> bool {
                 any = true;
             }
             Read::LeftOut(left_out) => check_words(&left_out.reason.to_string(), bytes),
-            Read::Header => (),
+            Read::Header(_) => (),
         }
     }
     for frame in whole.iter().flat_map(|whole| &whole.frames) {
