@@ -52,7 +52,7 @@ pub(super) fn parse(text: &str, source: &Source) -> Result<Recording, ImportErro
     };
     let shape = [size(header.rows, "ROWS")?, size(header.cols, "COLS")?];
     let (frames, cut) = frames(lines, shape, header.period_s, unfinished(text), source)?;
-    let cut = cut.into_iter().chain(header.wrong_count(frames.len())).reduce(|a, b| format!("{a}; {b}"));
+    let cut = cut.or_else(|| header.wrong_count(frames.len()));
     let [x, y] = header.pitch_mm;
     Ok(Recording {
         device: header.device,
