@@ -240,7 +240,7 @@ mod tests {
         let mut frames = Frames::new(&small(), Stated::default());
         assert_eq!((frames.push(b"a,b,c,d", 1), frames.note().as_deref()), (vec![], Some("line 1 is a header")));
         assert_eq!((frames.push(b"# a remark", 2), frames.note()), (vec![], None));
-        assert!(matches!(frames.push(b"1;2;3;4", 3)[..], [(3, Ok(_))]));
+        assert!(matches!(frames.push(b"5;2;3;4", 3)[..], [(3, Ok(_))]));
         let layout = "lines from 3 on: a frame per line, separated by semicolons, readings in columns 1 to 4";
         assert_eq!(frames.note().as_deref(), Some(layout));
         let [(4, Err(other))] = &frames.push(b"1,2,3,4", 4)[..] else { panic!() };

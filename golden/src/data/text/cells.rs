@@ -281,7 +281,7 @@ impl Digits {
         };
         // A number has one byte for each character.
         let places = (0..=text.len()).filter(|at| text.is_char_boundary(*at));
-        places.flat_map(|at| "0123456789.-e".chars().map(move |character| (at, character))).any(with)
+        places.flat_map(|at| "0123456789.-".chars().map(move |character| (at, character))).any(with)
     }
 
     /// Whether the number in a cell, which is read, may be the begin of a longer one.

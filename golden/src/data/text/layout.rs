@@ -64,8 +64,10 @@ pub struct Layout {
     pub first_line: usize,
     /// Number of the line with the names or numbers of the columns, if there is one.
     names_line: Option<usize>,
-    /// The first line may have the numbers of the columns, and no line follows that would show it.
+    /// The first line has the numbers of the columns, unless a line follows that shows it to be a frame.
     pub(super) may_be_numbers: bool,
+    /// The readings of the only line are 0, 1, 2 … or 1, 2, 3 …
+    counts: bool,
     /// A column that seems to be a time in a form that is not read, from 0, and its first cell.
     unread: Option<(usize, String)>,
 }
@@ -201,7 +203,7 @@ impl Layout {
 
     /// Whether a line of its own shows which of its cells are the readings: it has no other ones.
     pub(super) fn is_sure(&self) -> bool {
-        self.readings == self.cells && !self.may_be_numbers
+        self.readings == self.cells && !self.counts
     }
 
     /// Whether the other layout reads lines alike, times too.
@@ -252,7 +254,9 @@ impl<'s> Table<'s> {
             first += 1;
         }
         let at_first = |reason: String| NoReadings::of_line(&self.rows[first].line, reason);
-        let found = self.columns(first, names, readings, stated).map_err(at_first)?;
+        let found = self
+            .columns(first, names, readings, stated)
+            .map_err(|reason| NoReadings { open: true, ..at_first(reason) })?;
         let of_readings: Vec<&str> = self
             .body(first)
             .flat_map(|cells| cells[found.first..found.first + readings].iter().map(Cow::as_ref))
@@ -279,6 +283,7 @@ impl<'s> Table<'s> {
             first_line: self.rows[first].line.number,
             names_line: names.and(first.checked_sub(1)).map(|before| self.rows[before].line.number),
             may_be_numbers: is_numbered && data == 1,
+            counts: data == 1 && self.counts(first, readings),
             unread: found.unread.and_then(|column| Some((column, self.body(first).next()?[column].to_string()))),
         };
         self.check(first, &layout)?;
@@ -359,12 +364,10 @@ impl<'s> Table<'s> {
     }
 
     /// Whether the line `first` has the numbers of the columns of readings, from 0 or 1 on, and names of the others; from 1 on
-    /// without names of nine and more.
+    /// without names of nine and more, or above numbers with decimals.
     fn is_numbered(&self, first: usize, readings: usize) -> bool {
         let cells = &self.rows[first].cells;
-        let numbers: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
-        let counts = |from: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + from);
-        if numbers.len() != readings || readings < 2 || !(counts(0) || counts(1)) {
+        if !self.counts(first, readings) {
             return false;
         }
         let is_text = |cell: &str| reading(&point(cell)).is_none() && TimeUnit::of_column(&[cell], None).is_none();
@@ -376,7 +379,20 @@ impl<'s> Table<'s> {
         };
         let mut others = (0..cells.len()).filter(|column| cells[*column].parse::<usize>().is_err());
         let names = others.clone().filter(|column| is_name(*column)).count();
-        others.all(|column| cells[column].is_empty() || is_name(column)) && (names > 0 || counts(0) || readings >= 9)
+        others.all(|column| cells[column].is_empty() || is_name(column)) && {
+            // Numbers from 1 on can be readings, but hardly where all others have decimals.
+            let from_zero = cells.iter().any(|cell| cell == "0");
+            let has_decimals = |cells: &Vec<Cow<str>>| cells.iter().any(|cell| cell.contains(['.', ',']));
+            let mut below = self.body(first + 1).peekable();
+            names > 0 || from_zero || readings >= 9 || below.peek().is_some() && below.all(has_decimals)
+        }
+    }
+
+    /// Whether the readings of the line `first` are 0, 1, 2 … or 1, 2, 3 …, and no other of its cells is a whole number.
+    fn counts(&self, first: usize, readings: usize) -> bool {
+        let numbers: Vec<usize> = self.rows[first].cells.iter().filter_map(|cell| cell.parse().ok()).collect();
+        let from = |first: usize| numbers.iter().enumerate().all(|(k, number)| *number == k + first);
+        numbers.len() == readings && readings > 1 && (from(0) || from(1))
     }
 
     /// Whether frames of `lines` lines stand apart, by blank lines or headings.

@@ -117,11 +117,13 @@ pub struct NoReadings {
     pub reason: String,
     /// Whether characters seem to be lost: more or fewer values than the lines before have, or a number that is cut.
     pub cut: bool,
+    /// Whether the columns can be read in several ways: further lines or an option may show which is right.
+    pub open: bool,
 }
 
 impl NoReadings {
     pub(crate) fn of_text(reason: impl Into<String>) -> NoReadings {
-        NoReadings { line: None, cell: None, reason: reason.into(), cut: false }
+        NoReadings { line: None, cell: None, reason: reason.into(), cut: false, open: false }
     }
 
     fn of_line(line: &Line, reason: impl Into<String>) -> NoReadings {

@@ -426,7 +426,8 @@ impl Reader {
                 self.hurried |= self.begin.len() >= BEGIN;
                 self.last = own.last().map_or(self.last, |(number, _)| *number);
                 let reason = |line: Line| {
-                    let alone = Layout::of_lines(&[line], self.shape, &self.stated).err();
+                    // What all lines leave open is more than what one does.
+                    let alone = Layout::of_lines(&[line], self.shape, &self.stated).err().filter(|own| !own.open);
                     NoReadings { line: Some(line.number), ..alone.unwrap_or_else(|| error.clone()) }
                 };
                 return lines.map(|line| Read::LeftOut(LeftOut { id: Value::Null, reason: reason(line) })).collect();
@@ -634,7 +635,7 @@ impl Reader {
         }
         let got = rows.len();
         let reason = format!("the frame ends after {got} of {wanted} rows");
-        let short = NoReadings { line: Some(before), cell: None, reason, cut: true };
+        let short = NoReadings { line: Some(before), cell: None, reason, cut: true, open: false };
         vec![Read::LeftOut(LeftOut {
             id: Value::Null,
             reason: rows.into_iter().find_map(Result::err).unwrap_or(short),

@@ -323,6 +323,7 @@ fn a_stream_has_the_layout_of_a_file() {
         (of(&|k| format!("{k},{},{}", seconds(k), values(k))), Some(10_000_000)),
         (of(&|k| format!("{k},{}", values(k))), None),
         (headed("1,2,3,4", of(&|k| values(k + 1))), None),
+        (headed("1,2,3,4", of(&|k| format!("0.{},0.2,0.1,0.{}", k % 7, 5 * k % 4))), None),
         (headed("time,1,2,3,4", of(&|k| format!("{},{}", seconds(k), values(k)))), Some(10_000_000)),
         (headed("time_ms,1,2,3,4", of(&|k| format!("{k},{}", values(k)))), Some(1_000_000)),
         (headed("t,a,b,c,d,sum", of(&|k| format!("{},{},9", seconds(k), values(k)))), Some(10_000_000)),
@@ -335,7 +336,8 @@ fn a_stream_has_the_layout_of_a_file() {
         assert_eq!(streamed, whole.frames, "{}", lines[0]);
         let times: Vec<Option<i64>> = streamed.iter().take(2).map(|frame| frame.time_ns).collect();
         assert_eq!(times[1].zip(times[0]).map(|(b, a)| b - a), step_ns, "{}", lines[0]);
-        let own = usize::from(lines.len() > 20 && lines[0] != "1,2,3,4");
+        let is_frame = lines[0] == "1,2,3,4" && !lines[1].contains('.');
+        let own = usize::from(lines.len() > 20 && !is_frame);
         assert_eq!(streamed.len() + own, lines.len(), "{}", lines[0]);
     }
 }
@@ -354,6 +356,16 @@ fn lines_of_a_stream_wait_only_where_they_leave_the_layout_open() {
     // The second line shows that the first has the numbers of the columns, or is of another layout.
     assert_eq!(pushed(&["0,1,2,3", "5,2,3,4"]), (vec![0, 1], false, 0));
     assert_eq!(pushed(&["7,5,2,3,4", "5,2,3,4"]), (vec![0, 1], false, 0));
+    assert_eq!(pushed(&["1,2,3,4", "0.5,0.2,0.3,0.4"]), (vec![0, 1], false, 0));
+    assert_eq!(pushed(&["1,2,3,4", "5,2,3,4"]), (vec![0, 2], false, 0));
+    assert_eq!(pushed(&["1,2,3,4"]), (vec![0], true, 1));
+    // What rises in front and behind in all of them is refused as in a file.
+    let both: Vec<String> = (0..8).map(|k| format!("{k}.5,5,2,3,{}", 2 * k)).collect();
+    let mut reader = Reader::new([2, 2], Stated::default());
+    let read: Vec<Read> =
+        both.iter().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+    let reason = |read: &Read| matches!(read, Read::LeftOut(own) if own.reason.reason.contains("--time-column 5"));
+    assert!(read.len() == 8 && read.iter().all(reason), "{read:?}");
     let long =
         ["0.1,5,2,3,4", "0.2,1,2,3,4", "0.3,1,2,3,4", "0.4,1,2,3,4", "0.5,1,2,3,4", "0.6,1,2,3,4", "0.7,1,2,3,4"];
     let longer = [&long[..], &["0.8,5,5,5,5", "0.9,5,5,5,5"]].concat();
