@@ -130,32 +130,41 @@ impl CoreClock {
 mod tests {
     use super::*;
 
+    /// What became of a clock that is asked.
+    struct Asked {
+        clock: CoreClock,
+        /// Largest error of its times in ns, once it has been asked for a while.
+        largest_ns: i64,
+        /// Whether every error was within what was said of it.
+        is_within: bool,
+    }
+
     /// A core whose clock of 100 MHz is `ppm` fast and begins at `START_NS`, asked each millisecond over a network with delays of
-    /// 20 to 420 µs in each direction, by far not alike: the largest error of its times in ns, and the clock.
-    fn asked(ppm: f64, questions: usize) -> (i64, CoreClock) {
+    /// 20 to 420 µs in each direction, by far not alike.
+    fn asked(ppm: f64, questions: usize) -> Asked {
         const START_NS: i64 = 1_790_000_000_000_000_000;
         let mut random = fastrand::Rng::with_seed(7);
-        let mut clock = CoreClock::new(100_000_000);
-        let mut largest = 0;
+        let mut all = Asked { clock: CoreClock::new(100_000_000), largest_ns: 0, is_within: true };
         for question in 0..questions {
             let [there, back] = [20e3, 120e3].map(|least| least + 300e3 * random.f64());
             let asked_ns = question as f64 * 1e6;
             let truth_ns = asked_ns + there;
             let cycles = (truth_ns * (1.0 + ppm * 1e-6) / 10.0) as u64;
-            clock.add(START_NS + asked_ns as i64, cycles, START_NS + (truth_ns + back) as i64);
-            let own = clock.at(cycles).unwrap();
+            all.clock.add(START_NS + asked_ns as i64, cycles, START_NS + (truth_ns + back) as i64);
+            let own = all.clock.at(cycles).unwrap();
             let error = own.time_ns - START_NS - truth_ns as i64;
-            assert!(error.unsigned_abs() <= own.error_ns + 20, "{question}: {error} ns, said {} ns", own.error_ns);
-            largest = if question >= 20 { largest.max(error.abs()) } else { largest };
+            // Times and cycles are rounded.
+            all.is_within &= error.unsigned_abs() <= own.error_ns + 20;
+            all.largest_ns = if question >= 20 { all.largest_ns.max(error.abs()) } else { 0 };
         }
-        (largest, clock)
+        all
     }
 
     #[test]
     fn the_time_of_a_cycle_is_within_the_error_that_is_said_and_within_a_tenth_of_a_millisecond() {
         for ppm in [-150.0, -20.0, 0.0, 20.0, 150.0] {
-            let (largest, clock) = asked(ppm, 2000);
-            assert!(largest < 100_000, "{ppm} ppm: {largest} ns");
+            let Asked { clock, largest_ns, is_within } = asked(ppm, 2000);
+            assert!(is_within && largest_ns < 100_000, "{ppm} ppm: {largest_ns} ns");
             let drift = clock.drift().unwrap();
             assert!((drift.ppm - ppm).abs() <= drift.error_ppm && drift.error_ppm < 300.0, "{ppm} ppm: {drift:?}");
             assert_eq!(clock.restarts, 0);
@@ -164,12 +173,14 @@ mod tests {
 
     #[test]
     fn a_core_that_was_reset_and_a_rate_that_no_oscillator_has_are_told() {
-        let (_, mut clock) = asked(0.0, 10);
+        let mut clock = asked(0.0, 10).clock;
         let now = clock.at(900_000).unwrap().time_ns + 5_000_000;
         clock.add(now, 12, now + 40_000);
         let own = clock.at(12).unwrap();
         assert_eq!((clock.restarts, own.time_ns, own.error_ns), (1, now + 20_000, 20_000));
-        assert!(asked(5000.0, 200).1.restarts > 0);
+        // Such a rate is seen as restarts, and before one the times are not what is said of them.
+        let wrong = asked(5000.0, 200);
+        assert!(wrong.clock.restarts > 0 && !wrong.is_within);
         assert_eq!((CoreClock::new(1).at(3), CoreClock::new(1).drift()), (None, None));
     }
 }

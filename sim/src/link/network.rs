@@ -117,7 +117,7 @@ impl NetworkClient {
         while asked.elapsed() < self.timeout {
             let count = match self.socket.recv(&mut bytes) {
                 Ok(count) => count,
-                // Nobody listens at the port: perhaps not yet.
+                // Nothing answers at the port: perhaps not yet.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
                     std::thread::sleep(READ_TIMEOUT);
                     continue;
