@@ -240,7 +240,7 @@ fn force_of(mantissa: i32, exponent: u32) -> i32 {
 ///
 /// assert_eq!(shortened(&[5, -3, 32_766], 360), [5, -3, 32_766]);
 /// // The largest force of a packet decides how many of the low bits are none.
-/// assert_eq!(shortened(&[5, -3, 131_000], 360), [8, 0, 131_000]);
+/// assert_eq!(shortened(&[5, -3, 131_000], 360), [4, -4, 131_000]);
 /// ```
 pub fn shortened(forces: &[i32], fragment_words: usize) -> Vec<i32> {
     let block = |forces: &[i32]| {
