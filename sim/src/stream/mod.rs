@@ -20,7 +20,7 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`decode`] | characters and ends of lines of other systems |
+//! | `decode` | characters and ends of lines of other systems |
 //! | [`line`] | a line of bounded length, and the frame in it |
 //! | [`queue`] | the queue between the two threads |
 //! | [`source`] | where lines come from |
