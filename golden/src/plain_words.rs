@@ -71,6 +71,11 @@ impl Display for JsonError {
     }
 }
 
+/// The line of a byte of a text, from 1; a byte behind its end is in the last one.
+pub fn line_of(text: &[u8], at: usize) -> usize {
+    1 + text.iter().take(at).filter(|byte| **byte == b'\n').count()
+}
+
 /// What the reader of TOML says of a text, and the line of it, from 1.
 ///
 /// ```
@@ -81,7 +86,7 @@ impl Display for JsonError {
 /// ```
 pub fn of_toml(text: &str, error: &toml::de::Error) -> (usize, String) {
     let span = error.span().unwrap_or_default();
-    let line = 1 + text.bytes().take(span.start).filter(|byte| *byte == b'\n').count();
+    let line = line_of(text.as_bytes(), span.start);
     match text.get(span).filter(|_| error.message().contains("duplicate key")) {
         Some(key) => (line, format!("{} is there twice", key.trim())),
         None => (line, plain(error.message())),

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{anyhow, bail, Context, Result};
-use dermis_golden::plain_words::plain;
+use dermis_golden::plain_words::of_toml;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
 use dermis_sim::stream::Source;
@@ -82,16 +82,15 @@ impl PatchFile {
 
     /// The file with this text, with paths relative to `folder`; errors have no file's name.
     pub(crate) fn parse(text: &str, folder: &Path) -> Result<PatchFile> {
-        let line = |at: usize| 1 + text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count();
         let read = toml::Deserializer::parse(text).map_err(|error| {
-            let at = error.span().map_or(1, |span| line(span.start));
-            anyhow!("line {at}: {}", plain(error.message()))
+            let (line, message) = of_toml(text, &error);
+            anyhow!("line {line}: {message}")
         })?;
         let Fields { node, patch } = serde_path_to_error::deserialize(read).map_err(|error| {
-            let at = error.inner().span().map_or(1, |span| line(span.start));
+            let (line, message) = of_toml(text, error.inner());
             match error.path().to_string().as_str() {
-                "." => anyhow!("line {at}: {}", plain(error.inner().message())),
-                path => anyhow!("line {at}, {path}: {}", plain(error.inner().message())),
+                "." => anyhow!("line {line}: {message}"),
+                path => anyhow!("line {line}, {path}: {message}"),
             }
         })?;
         node.check()?;

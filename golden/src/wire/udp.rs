@@ -149,9 +149,7 @@ impl Packet {
         if u32::from_le_bytes(*check) != crc32fast::hash(body) || !body.len().is_multiple_of(WORD_BYTES) {
             return None;
         }
-        let words =
-            body.chunks_exact(WORD_BYTES).map(|word| word.iter().rev().fold(0, |all, b| all << 8 | u32::from(*b)));
-        let words: Vec<u32> = words.collect();
+        let words = words_of_bytes(body);
         let (&[head, sequence], words) = words.split_first_chunk()?;
         let [number, flags, index, count] = head.to_le_bytes();
         let kind = Kind::ALL.into_iter().find(|kind| kind.number() == number)?;

@@ -3,7 +3,7 @@
 ```text
  UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
         PacketCheck, two frame buffers   a packet at a time, ShortForces before it
-              │     └── who asked, when, by id ──┘             │
+              │     └── who sent it, when, by id ──┘           │
               └──────────────── Requests ──────────────────────┘
             who are you; tables, to the core's registers over `bus`
 ```
@@ -638,11 +638,11 @@ class Requests(LiteXModule):
 
         # # #
 
-        head, sequence, asked = Signal(WORD_BITS), Signal(SEQUENCE_BITS), Signal(TIME_BITS)
+        head, sequence, request_time = Signal(WORD_BITS), Signal(SEQUENCE_BITS), Signal(TIME_BITS)
         ip_address, port = Signal(32), Signal(16)
         is_question = Signal()
         at, words, content = Signal(max=len(IDENTITY) + 1), Signal(max=len(IDENTITY) + 1), Signal(WORD_BITS)
-        identity = {**identity, "time_low": asked[:WORD_BITS], "time_high": asked[WORD_BITS:]}
+        identity = {**identity, "time_low": request_time[:WORD_BITS], "time_high": request_time[WORD_BITS:]}
         self.crc = crc = CRC32()
         self.comb += [
             is_question.eq(head[:BYTE] == KIND_IDENTIFY),
@@ -666,7 +666,7 @@ class Requests(LiteXModule):
             NextValue(sequence, sink.data),
             NextValue(ip_address, sink.ip_address),
             NextValue(port, sink.src_port),
-            NextValue(asked, time),
+            NextValue(request_time, time),
             NextValue(at, 0),
             If(
                 sink.valid,

@@ -11,14 +11,13 @@ use std::ffi::c_char;
 use std::slice::from_ref;
 use std::time::Duration;
 
-use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
 use dermis_sim::link::{open_board, HostError, Session};
 
 use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text, Error};
 use crate::result::dermis_result;
-use crate::scene::{dermis_scene, frames};
+use crate::scene::{dermis_scene, one_frame};
 use crate::stream::pace;
 
 /// A board that answers. One thread at a time may use it.
@@ -90,11 +89,7 @@ pub unsafe extern "C" fn dermis_board_frame(
             error_ns.write(0);
         }
         let dermis_board { session, checks } = unsafe { exclusive("board", board) }?;
-        let mut all: Vec<Frame> = unsafe { frames(&session.model.scene, stress_MPa, count) }?;
-        let (frame, others) = (all.pop(), all.len());
-        let frame = frame.filter(|_| others == 0).ok_or_else(|| {
-            Error::input(format!("count = {count} is not allowed; a board takes one frame at a time"))
-        })?;
+        let frame = unsafe { one_frame(&session.model.scene, stress_MPa, count, "a board") }?;
         let (readings, answer) = session.request(&frame).map_err(failed)?;
         let found = answer.decode(&session.model, &readings)?;
         let mut found = found.ok_or_else(|| Error::absent("forces"))?;

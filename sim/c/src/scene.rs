@@ -48,6 +48,26 @@ pub(crate) unsafe fn frames(scene: &Scene, stress_MPa: *const f64, count: usize)
     stress.chunks(taxels).enumerate().map(frame).collect()
 }
 
+/// The only frame of `count` values, that of `what`, such as "a stream".
+///
+/// # Errors
+/// As [`frames`]; several frames.
+///
+/// # Safety
+/// As [`frames`].
+pub(crate) unsafe fn one_frame(
+    scene: &Scene,
+    stress_MPa: *const f64,
+    count: usize,
+    what: &str,
+) -> Result<Frame, Error> {
+    let mut frames = unsafe { frames(scene, stress_MPa, count) }?;
+    let (frame, others) = (frames.pop(), frames.len());
+    frame
+        .filter(|_| others == 0)
+        .ok_or_else(|| Error::input(format!("count = {count} is not allowed; {what} takes one frame at a time")))
+}
+
 /// Load a scene by built-in name or by the path of its file, as the commands take it. The scene belongs to the caller:
 /// dermis_scene_free. After an error *scene is NULL.
 #[no_mangle]

@@ -14,9 +14,9 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_sim::engine::{typed, EngineName};
 
-use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text, Error};
+use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text};
 use crate::result::dermis_result;
-use crate::scene::{dermis_scene, frames};
+use crate::scene::{dermis_scene, one_frame};
 
 /// Cross-check in a thread of its own, always the newest result, so that no result waits for it.
 pub const DERMIS_CROSS_CHECK_BESIDE: u64 = 0xffff_ffff_ffff_ffff;
@@ -107,11 +107,7 @@ unsafe fn push(
         let result = unsafe { place("result", result) }?;
         result.write(std::ptr::null_mut());
         let dermis_stream { engine, checks } = unsafe { exclusive("stream", stream) }?;
-        let mut frames = unsafe { frames(engine.scene(), stress_MPa, count) }?;
-        let (frame, others) = (frames.pop(), frames.len());
-        let frame = frame.filter(|_| others == 0).ok_or_else(|| {
-            Error::input(format!("count = {count} is not allowed; a stream takes one frame at a time"))
-        })?;
+        let frame = unsafe { one_frame(engine.scene(), stress_MPa, count, "a stream") }?;
         if let Some((frames, found)) = checks.push(&**engine, Frame { time_ns, ..frame }).map_err(typed)? {
             let time_ns = Frame::time_of_result(&frames);
             result.write(dermis_result::of_model(found).at(time_ns).into_raw());

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 use dermis_golden::fixed::Model;
-use dermis_golden::wire::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
+use dermis_golden::wire::link::{codes_to_bytes, scene_hash, Counters, Decoder, Identity, Kind, Packet, VERSION};
 
 use super::answer::Answer;
 use super::board::{Board, LinkErrors, PacketCounters};
@@ -151,7 +151,7 @@ impl<P: Read + Write> Board for Client<P> {
 }
 
 /// Whether a port only has nothing to read, or no room, yet.
-fn waits(error: &std::io::Error) -> bool {
+pub(super) fn waits(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
@@ -166,14 +166,25 @@ pub fn check_identity(model: &Model, bytes: &[u8]) -> Result<Identity, IdentityE
         return Err(IdentityError::Version { has, wants: VERSION });
     }
     let has = Identity::of_bytes(bytes).ok_or(IdentityError::Length { bytes: bytes.len() })?;
-    let sensor = &model.scene.sensor;
-    let wants = dermis_golden::wire::link::scene_hash(model);
-    if has.scene == wants {
-        return Ok(has);
+    check_scene(model, [has.rows, has.cols, has.input_bits.into()], has.scene)?;
+    Ok(has)
+}
+
+/// Checks that the scene with this hash, of so many rows, columns and bits of a code, is that of `model`.
+///
+/// # Errors
+/// Another scene.
+pub(super) fn check_scene(model: &Model, [rows, cols, bits]: [u16; 3], hash: u32) -> Result<(), IdentityError> {
+    let (sensor, wants) = (&model.scene.sensor, scene_hash(model));
+    if hash == wants {
+        return Ok(());
     }
+    let describe = |rows: usize, cols: usize, bits: u32, hash: u32| {
+        format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
+    };
     Err(IdentityError::OtherScene {
-        has: IdentityError::scene(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
+        has: describe(rows.into(), cols.into(), bits.into(), hash),
         scene: model.scene.name.clone(),
-        wants: IdentityError::scene(sensor.rows, sensor.cols, model.formats().code_bits, wants),
+        wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
     })
 }

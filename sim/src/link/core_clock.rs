@@ -1,17 +1,17 @@
 //! The clock of a core beside the host's: when a cycle was, and how well that is known.
 //!
-//! A question is asked at a, answered at b, and the answer has the core's cycle c between: cycle c was in [a, b]. From one answer to
+//! A request is sent at a, answered at b, and the answer has the core's cycle c between: cycle c was in [a, b]. From one answer to
 //! the next the interval widens by what two oscillators can differ, [`DRIFT`], and is cut with the new one. So nothing is assumed of
 //! how long packets take in each direction.
 //!
 //! | | | |
 //! |---|---|---|
-//! | in: times of question and answer, cycle | ns since 1970, cycles since the core's reset | |
+//! | in: times of request and answer, cycle | ns since 1970, cycles since the core's reset | |
 //! | out: time of a cycle, its error | ns | half of the interval |
 
 use std::time::{Instant, SystemTime};
 
-use super::super::stream::nanoseconds;
+use crate::stream::nanoseconds;
 
 /// Largest difference of two oscillators, as a share of their rates: each within 100 ppm.
 const DRIFT: f64 = 200e-6;
@@ -130,27 +130,27 @@ impl CoreClock {
 mod tests {
     use super::*;
 
-    /// What became of a clock that is asked.
-    struct Asked {
+    /// What became of a clock that is polled.
+    struct Polled {
         clock: CoreClock,
-        /// Largest error of its times in ns, once it has been asked for a while.
+        /// Largest error of its times in ns, once it has been polled for a while.
         largest_ns: i64,
         /// Whether every error was within what was said of it.
         is_within: bool,
     }
 
-    /// A core whose clock of 100 MHz is `ppm` fast and begins at `START_NS`, asked each millisecond over a network with delays of
+    /// A core whose clock of 100 MHz is `ppm` fast and begins at `START_NS`, polled each millisecond over a network with delays of
     /// 20 to 420 µs in each direction, by far not alike.
-    fn asked(ppm: f64, questions: usize) -> Asked {
+    fn polled(ppm: f64, questions: usize) -> Polled {
         const START_NS: i64 = 1_790_000_000_000_000_000;
         let mut random = fastrand::Rng::with_seed(7);
-        let mut all = Asked { clock: CoreClock::new(100_000_000), largest_ns: 0, is_within: true };
+        let mut all = Polled { clock: CoreClock::new(100_000_000), largest_ns: 0, is_within: true };
         for question in 0..questions {
             let [there, back] = [20e3, 120e3].map(|least| least + 300e3 * random.f64());
-            let asked_ns = question as f64 * 1e6;
-            let truth_ns = asked_ns + there;
+            let request_ns = question as f64 * 1e6;
+            let truth_ns = request_ns + there;
             let cycles = (truth_ns * (1.0 + ppm * 1e-6) / 10.0) as u64;
-            all.clock.add(START_NS + asked_ns as i64, cycles, START_NS + (truth_ns + back) as i64);
+            all.clock.add(START_NS + request_ns as i64, cycles, START_NS + (truth_ns + back) as i64);
             let own = all.clock.at(cycles).unwrap();
             let error = own.time_ns - START_NS - truth_ns as i64;
             // Times and cycles are rounded.
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn the_time_of_a_cycle_is_within_the_error_that_is_said_and_within_a_tenth_of_a_millisecond() {
         for ppm in [-150.0, -20.0, 0.0, 20.0, 150.0] {
-            let Asked { clock, largest_ns, is_within } = asked(ppm, 2000);
+            let Polled { clock, largest_ns, is_within } = polled(ppm, 2000);
             assert!(is_within && largest_ns < 100_000, "{ppm} ppm: {largest_ns} ns");
             let drift = clock.drift().unwrap();
             assert!((drift.ppm - ppm).abs() <= drift.error_ppm && drift.error_ppm < 300.0, "{ppm} ppm: {drift:?}");
@@ -173,13 +173,13 @@ mod tests {
 
     #[test]
     fn a_core_that_was_reset_and_a_rate_that_no_oscillator_has_are_told() {
-        let mut clock = asked(0.0, 10).clock;
+        let mut clock = polled(0.0, 10).clock;
         let now = clock.at(900_000).unwrap().time_ns + 5_000_000;
         clock.add(now, 12, now + 40_000);
         let own = clock.at(12).unwrap();
         assert_eq!((clock.restarts, own.time_ns, own.error_ns), (1, now + 20_000, 20_000));
         // Such a rate is seen as restarts, and before one the times are not what is said of them.
-        let wrong = asked(5000.0, 200);
+        let wrong = polled(5000.0, 200);
         assert!(wrong.clock.restarts > 0 && !wrong.is_within);
         assert_eq!((CoreClock::new(1).at(3), CoreClock::new(1).drift()), (None, None));
     }

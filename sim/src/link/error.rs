@@ -101,10 +101,3 @@ pub enum IdentityError {
         bytes: usize,
     },
 }
-
-impl IdentityError {
-    /// The description of a scene.
-    pub(super) fn scene(rows: usize, cols: usize, bits: u32, hash: u32) -> String {
-        format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
-    }
-}

@@ -5,17 +5,16 @@ use std::net::UdpSocket;
 use std::time::{Duration, Instant, SystemTime};
 
 use dermis_golden::fixed::Model;
-use dermis_golden::wire::link::{require_one_answer, scene_hash, Identity, Kind};
+use dermis_golden::wire::link::{require_one_answer, Identity, Kind};
 use dermis_golden::wire::udp::{Answer as Whole, Answers, CoreIdentity, Packet, TooLong, LAYOUT};
 
 use super::answer::Answer;
 use super::board::{Board, LinkErrors, PacketCounters};
-use super::client::ATTEMPTS;
+use super::client::{check_scene, waits, ATTEMPTS};
 use super::core_clock::{CoreClock, Drift, HostClock};
 use super::error::{HostError, IdentityError};
+use crate::stream::DATAGRAM;
 
-/// Longest packet that a network brings in bytes.
-const LONGEST: usize = 1 << 16;
 /// Longest wait of a read of the socket, so that a timeout is noticed.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
 /// Questions for the identity before the first frame: with the quickest answer the core's time is known best.
@@ -112,9 +111,9 @@ impl NetworkClient {
 
     /// The answer that is wanted; `None` after the timeout.
     fn wait<T>(&mut self, wanted: &dyn Fn(Whole, u32) -> Option<T>) -> Result<Option<T>, HostError> {
-        let asked = Instant::now();
-        let mut bytes = vec![0; LONGEST];
-        while asked.elapsed() < self.timeout {
+        let begun = Instant::now();
+        let mut bytes = vec![0; DATAGRAM];
+        while begun.elapsed() < self.timeout {
             let count = match self.socket.recv(&mut bytes) {
                 Ok(count) => count,
                 // Nothing answers at the port: perhaps not yet.
@@ -147,28 +146,14 @@ impl NetworkClient {
     }
 }
 
-/// Whether a socket only has nothing to read yet.
-fn waits(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
-}
-
 /// Checks that a core was built for `model`.
 fn check(model: &Model, core: &CoreIdentity) -> Result<(), IdentityError> {
     if core.word("version") != LAYOUT.version {
         let version = |version: u32| version.try_into().unwrap_or(u16::MAX);
         return Err(IdentityError::Version { has: version(core.word("version")), wants: version(LAYOUT.version) });
     }
-    let sensor = &model.scene.sensor;
-    let wants = scene_hash(model);
-    if core.word("scene") == wants {
-        return Ok(());
-    }
-    let [rows, cols, bits, _] = core.word("array").to_le_bytes();
-    Err(IdentityError::OtherScene {
-        has: IdentityError::scene(rows.into(), cols.into(), bits.into(), core.word("scene")),
-        scene: model.scene.name.clone(),
-        wants: IdentityError::scene(sensor.rows, sensor.cols, model.formats().code_bits, wants),
-    })
+    let [rows, cols, bits, _] = core.word("array").to_le_bytes().map(u16::from);
+    check_scene(model, [rows, cols, bits], core.word("scene"))
 }
 
 impl Board for NetworkClient {
@@ -245,18 +230,14 @@ impl Board for NetworkClient {
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
         self.sequence = self.sequence.wrapping_add(1);
-        let words = self.fragment_words;
-        let count = Packet::tables(self.sequence, image, words).map_err(|error| self.failed(&error))?.len();
-        for index in 0..count {
+        let all = Packet::tables(self.sequence, image, self.fragment_words).map_err(|error| self.failed(&error))?;
+        for packet in all {
             // The same number again: the core has taken a fragment whose answer was lost.
-            let packet = |sequence| Packet::tables(sequence, image, words).map(|mut all| vec![all.swap_remove(index)]);
             let taken = |answer, wanted| match answer {
-                Whole::TablesTaken { sequence, index: own } => {
-                    (sequence == wanted && usize::from(own) == index).then_some(())
-                }
+                Whole::TablesTaken { sequence, index } => (sequence == wanted && index == packet.index).then_some(()),
                 _ => None,
             };
-            self.request("tables", false, &packet, &taken)?;
+            self.request("tables", false, &|_| Ok(vec![packet.clone()]), &taken)?;
         }
         Ok(())
     }

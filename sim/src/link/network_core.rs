@@ -12,10 +12,10 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::scene_hash;
 use dermis_golden::wire::udp::{CoreIdentity, Kind, Packet, LAYOUT, WORD_BYTES};
 
+use crate::stream::DATAGRAM;
+
 /// Longest wait for a packet, so that a request to stop is noticed.
 const WAIT: Duration = Duration::from_millis(20);
-/// Longest packet that a network brings in bytes.
-const LONGEST: usize = 1 << 16;
 /// Bytes of a code in a packet: all its bits are sent.
 const CODE_BYTES: usize = 4;
 const NS_PER_S: u128 = 1_000_000_000;
@@ -91,7 +91,7 @@ impl Core {
     }
 
     fn serve(&mut self, socket: &UdpSocket, stop: &AtomicBool) -> io::Result<()> {
-        let mut bytes = vec![0; LONGEST];
+        let mut bytes = vec![0; DATAGRAM];
         while !stop.load(Ordering::Relaxed) {
             let (count, from) = match socket.recv_from(&mut bytes) {
                 Ok(received) => received,

@@ -101,10 +101,7 @@ pub(crate) fn run(
             None => frames.finish(),
             Some(Piece::Line) if bytes.iter().all(u8::is_ascii_whitespace) => Vec::new(),
             Some(Piece::Line) => frames.push(&bytes, number),
-            Some(piece) => {
-                let reason = piece.refusal().unwrap_or_default();
-                [frames.settle(), vec![(number, Err(NoFrame { id: Value::Null, reason }))]].concat()
-            }
+            Some(piece) => frames.refuse(number, piece.refusal().unwrap_or_default()),
         };
         // Who waits for an answer sends no further line.
         if frames.is_waiting() && input.buffer().is_empty() {

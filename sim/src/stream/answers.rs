@@ -10,11 +10,10 @@ use dermis_golden::data::text::Stated;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use serde::{Serialize, Serializer};
-use serde_json::Value;
 
 use super::acquisition::Acquisition;
 use super::estimators::{Estimators, Note};
-use super::line::{self, Brought, LineFrame, NoFrame};
+use super::line::{self, Brought, LineFrame};
 use super::queue::Policy;
 use super::reader::Received;
 use super::zero::{ZeroRequest, Zeros, ZERO_FRAMES};
@@ -224,10 +223,7 @@ impl<'a> Stream<'a> {
         let brought = match &received.bytes {
             Ok(bytes) if self.read.len() <= MOST_WAITING => self.frames.push(bytes, line),
             Ok(bytes) => [self.frames.settle(), self.frames.push(bytes, line)].concat(),
-            Err(reason) => {
-                let reason = reason.clone();
-                [self.frames.settle(), vec![(line, Err(NoFrame { id: Value::Null, reason }))]].concat()
-            }
+            Err(reason) => self.frames.refuse(line, reason.clone()),
         };
         self.hand_on(brought, full, output)
     }
@@ -259,7 +255,10 @@ impl<'a> Stream<'a> {
         }
         match self.frames.is_waiting() {
             true => self.waiting = Some(Instant::now()),
-            false => (self.waiting, self.read) = (None, VecDeque::new()),
+            false => {
+                self.waiting = None;
+                self.read.clear();
+            }
         }
         Ok(())
     }
@@ -353,6 +352,7 @@ mod tests {
     use dermis_golden::engine::{CheckPace, CheckedEngine, Engine, EngineError, State};
     use dermis_golden::estimate::float::Golden;
     use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
+    use serde_json::Value;
     use std::io::Read;
     use std::path::Path;
     use std::sync::atomic::{AtomicU64, Ordering};

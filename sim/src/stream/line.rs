@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::io::{self, BufRead, Read as _};
 
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::text::{decoded, Form, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
+use dermis_golden::data::text::{decoded, Form, Layout, LeftOut, Line, NoReadings, Read, Reader, Stated, TextFrame};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::sensor::Sensor;
 use serde_json::Value;
@@ -90,8 +90,9 @@ pub(crate) type Brought = (u64, Result<LineFrame, NoFrame>);
 pub(crate) struct Frames {
     reader: Reader,
     sensor: Sensor,
-    /// The layout of the lines so far, in words.
-    layout: Option<String>,
+    /// The layout of the lines so far, and in words.
+    layout: Option<Layout>,
+    shown: Option<String>,
     notes: Vec<String>,
 }
 
@@ -99,7 +100,7 @@ impl Frames {
     /// Of lines whose layout is `stated`, but for the form: each is a frame.
     pub(crate) fn new(sensor: &Sensor, stated: Stated) -> Frames {
         let reader = Reader::new([sensor.rows, sensor.cols], Stated { form: Some(Form::Line), ..stated });
-        Frames { reader, sensor: sensor.clone(), layout: None, notes: Vec::new() }
+        Frames { reader, sensor: sensor.clone(), layout: None, shown: None, notes: Vec::new() }
     }
 
     /// What is to be said of the last lines: headers, or a layout that is not plain.
@@ -122,6 +123,13 @@ impl Frames {
         let own = usize::try_from(number).unwrap_or(usize::MAX);
         let read = self.reader.push(Line { number: own, text: &text });
         self.brought(read, number)
+    }
+
+    /// A piece that is no line, for this reason: what those before it bring that wait, then its refusal.
+    pub(crate) fn refuse(&mut self, number: u64, reason: String) -> Vec<Brought> {
+        let mut brought = self.settle();
+        brought.push((number, Err(NoFrame { id: Value::Null, reason })));
+        brought
     }
 
     /// No line follows for now: what those bring that wait.
@@ -150,20 +158,28 @@ impl Frames {
                 Read::Frame(frame) => brought.push((frame.line as u64, self.frame(frame))),
             }
         }
-        let layout = self.reader.layout().map(|layout| {
-            // What stands above the line was not the header of a file.
-            let mut shown = layout.clone();
-            shown.first_line = 1;
-            (shown.to_string(), layout.is_plain())
-        });
-        if let Some((shown, is_plain)) = layout.filter(|(shown, _)| self.layout.as_ref() != Some(shown)) {
-            if !is_plain {
-                let first = brought.first().map_or(number, |(line, _)| *line);
-                self.notes.push(format!("lines from {first} on: {shown}"));
-            }
-            self.layout = Some(shown);
+        if self.reader.layout() != self.layout.as_ref() {
+            self.layout = self.reader.layout().cloned();
+            let first = brought.first().map_or(number, |(line, _)| *line);
+            self.note_layout(first);
         }
         brought
+    }
+
+    /// Notes the layout of the lines from `first` on, unless in words it is that of those before.
+    fn note_layout(&mut self, first: u64) {
+        let Some(layout) = &self.layout else { return };
+        // What stands above the line was not the header of a file.
+        let mut shown = layout.clone();
+        shown.first_line = 1;
+        let shown = shown.to_string();
+        if self.shown.as_ref() == Some(&shown) {
+            return;
+        }
+        if !layout.is_plain() {
+            self.notes.push(format!("lines from {first} on: {shown}"));
+        }
+        self.shown = Some(shown);
     }
 
     fn frame(&self, frame: TextFrame) -> Result<LineFrame, NoFrame> {

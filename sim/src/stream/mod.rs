@@ -51,6 +51,7 @@ pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use rate::Clock;
 pub use source::Source;
+pub(crate) use source::DATAGRAM;
 pub use stop::Stop;
 pub use together::{run, run_together, run_until, Member, Outputs};
 pub use zero::{ZeroRequest, ZERO_FRAMES};

@@ -22,7 +22,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Wait for a byte of a serial port, after which it is tried again.
 const SERIAL_WAIT: Duration = Duration::from_millis(200);
 /// Largest datagram in bytes.
-const DATAGRAM: usize = 1 << 16;
+pub(crate) const DATAGRAM: usize = 1 << 16;
 
 /// A source as it is written.
 #[derive(Clone, Debug, PartialEq, Eq)]

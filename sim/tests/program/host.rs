@@ -66,9 +66,14 @@ fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
 }
 
 fn host(terminal: &PseudoTerminal, scene: &str, more: &[&str], input: &str) -> Output {
+    let port = terminal.path().to_string_lossy();
+    run(&[&["host", "--port", &port, "--scene", scene, "--timeout", "3000"], more].concat(), input)
+}
+
+/// Runs the program with this standard input.
+pub(super) fn run(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
-        .args(["host", "--port", &terminal.path().to_string_lossy(), "--scene", scene, "--timeout", "3000"])
-        .args(more)
+        .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -79,7 +84,7 @@ fn host(terminal: &PseudoTerminal, scene: &str, more: &[&str], input: &str) -> O
     child.wait_with_output().unwrap()
 }
 
-fn text(bytes: &[u8]) -> String {
+pub(super) fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 

@@ -1,8 +1,8 @@
 //! `dermis host` with a core behind Ethernet: the bit-true model behind a network that loses, doubles, reorders and alters packets.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, UdpSocket};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -12,6 +12,8 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 use dermis_sim::link::{open_board, NetworkCore, Session};
+
+use super::host::{run, text};
 
 /// On the loopback a packet takes some tens of microseconds.
 const TIMEOUT: Duration = Duration::from_millis(100);
@@ -187,22 +189,6 @@ fn board(scene: &str) -> (Child, String) {
     let mut line = String::new();
     BufReader::new(board.stdout.take().unwrap()).read_line(&mut line).unwrap();
     (board, line.trim().to_owned())
-}
-
-fn run(arguments: &[&str], input: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
-        .args(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
-    child.wait_with_output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 #[test]

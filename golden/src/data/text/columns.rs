@@ -124,7 +124,8 @@ impl<'t> Columns<'t> {
         });
         let rise = |strict| [0, last].map(|end| ends[usize::from(end == last)].is_some() && self.rises(end, strict));
         // One that falls once is a time only where none rises all along.
-        let possible = if rise(true) == [false; 2] { rise(false) } else { rise(true) };
+        let all_along = rise(true);
+        let possible = if all_along == [false; 2] { rise(false) } else { all_along };
         match (sure, possible) {
             ([true, _], _) => Ok(1),
             ([_, true], _) => Ok(0),
@@ -193,17 +194,16 @@ impl<'t> Columns<'t> {
         }
         let (mut times, mut unread) = (Vec::new(), None);
         for column in others {
-            let is_named = self.name(column).is_some_and(is_time);
             match self.beside(column) {
                 // A sum can rise as a time does.
                 _ if self.name(column).is_some_and(|name| !is_time(name) && BESIDE.contains(&plain(name).as_str())) => (),
                 Some(Beside::Time(unit)) => times.push((column, unit)),
-                Some(Beside::Text) if is_named || seems_a_time(self.cells[column][0]) => {
+                Some(Beside::Text) if self.seems_a_time(column) => {
                     unread.get_or_insert(column);
                 }
                 Some(_) => (),
                 // It is no reading by its name, and stands still.
-                None if is_named => {
+                None if self.name(column).is_some_and(is_time) => {
                     unread.get_or_insert(column);
                 }
                 None => {
@@ -239,10 +239,7 @@ impl<'t> Columns<'t> {
             _ => None,
         };
         let time = others.clone().find_map(|column| is_clock(&column));
-        let seems = |column: &usize| {
-            self.beside(*column) == Some(Beside::Text)
-                && (self.name(*column).is_some_and(is_time) || seems_a_time(self.cells[*column][0]))
-        };
+        let seems = |column: &usize| self.beside(*column) == Some(Beside::Text) && self.seems_a_time(*column);
         Ok(Found { first, time, unread: others.find(|column| time.is_none() && seems(column)) })
     }
 
@@ -256,6 +253,11 @@ impl<'t> Columns<'t> {
         let unit = self.cells.get(column).and_then(|cells| TimeUnit::of_column(cells, name));
         let unit = unit.ok_or_else(|| format!("--time-column {} holds no times that rise", column + 1))?;
         Ok(Found { first, time: Some((column, unit)), unread: None })
+    }
+
+    /// Whether a column of texts seems to be a time, by its name or by what it begins with.
+    fn seems_a_time(&self, column: usize) -> bool {
+        self.name(column).is_some_and(is_time) || seems_a_time(self.cells[column][0])
     }
 
     /// Leaves out the last column.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use toml::{Spanned, Table, Value};
 
 use super::error::BoardError;
-use crate::plain_words::of_toml;
+use crate::plain_words::{line_of, of_toml};
 use crate::spec::suggest::{distance, nearest};
 
 /// Fields of a board's file, and their allowed values in words.
@@ -62,13 +62,13 @@ pub(super) struct Reader {
 impl Reader {
     /// Reads the fields of `text`, which is that of `file`.
     pub fn new(file: &str, text: &str) -> Result<Reader, BoardError> {
-        let line = |at: usize| 1 + text.as_bytes()[..at.min(text.len())].iter().filter(|&&byte| byte == b'\n').count();
         let invalid = |line, reason| BoardError::Invalid { file: file.to_owned(), line, reason };
         let fields: BTreeMap<Spanned<String>, Value> = toml::from_str(text).map_err(|error| {
             let (line, reason) = of_toml(text, &error);
             invalid(line, reason)
         })?;
-        let lines = fields.keys().map(|key| (key.get_ref().clone(), line(key.span().start))).collect();
+        let line = |key: &Spanned<String>| line_of(text.as_bytes(), key.span().start);
+        let lines = fields.keys().map(|key| (key.get_ref().clone(), line(key))).collect();
         let table = fields.into_iter().map(|(key, value)| (key.into_inner(), value)).collect();
         let reader = Reader { file: file.to_owned(), table, lines };
         match reader.table.keys().find(|key| allowed(key).is_empty()) {

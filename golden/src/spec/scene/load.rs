@@ -1,6 +1,7 @@
 //! Loading scenes: built-in ones by name, others from files.
 
 use super::{Scene, SceneError};
+use crate::plain_words::line_of;
 use crate::spec::suggest::{distance, nearest};
 use std::io::Read;
 
@@ -105,8 +106,7 @@ fn read(path: &str) -> std::io::Result<String> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
     String::from_utf8(bytes).map_err(|error| {
-        let whole = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + whole.iter().filter(|byte| **byte == b'\n').count();
+        let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
         std::io::Error::new(std::io::ErrorKind::InvalidData, format!("line {line} is no text in UTF-8"))
     })
 }
