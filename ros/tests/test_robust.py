@@ -1,9 +1,12 @@
 """Patches that stall, flood, send rubbish or fail harm no other, and what is wrong in a patch file is said."""
 
+import os
+import subprocess
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 
-from conftest import COLS, ROWS, feed, line, node, run, wait
+from conftest import COLS, ROWS, SCENE, feed, line, node, run, wait
 from rosbags.typesys import Stores, get_typestore
 from test_topics import STATE, TYPES, Raw, key, session
 
@@ -89,6 +92,40 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
         assert values(found["good"])["dropped"] == "0" and int(values(found["again"])["source opened"]) >= 3
         zenoh_session.close()
     assert any("absent" in said and "tried again" in said for said in own.said)
+
+
+def test_a_core_behind_ethernet_that_dies_harms_no_other(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    store, patch = get_typestore(Stores.ROS2_JAZZY), '[[patch]]\nname = "{0}"\nscene = "scene.toml"\nsource = "{0}.pipe"\n'
+    with ExitStack() as stack:
+        cores = {}
+        for name in ("whole", "dying"):
+            command = [os.environ["DERMIS"], "board", str(scene), "--udp", "127.0.0.1:0"]
+            core = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True))
+            stack.callback(core.kill)
+            assert core.stdout is not None
+            cores[name] = core, core.stdout.readline().strip()
+        patches = "".join(patch.format(name) + f'board = "{port}"\n' for name, (_, port) in cores.items())
+        own = stack.enter_context(node(tmp_path, patches + patch.format("computed") + 'engine = "fixed"\n', "domain = 7"))
+        zenoh_session = session(own)
+        stack.callback(zenoh_session.close)
+        wrench = {name: Raw(zenoh_session, key(store, f"/{name}/wrench", TYPES["wrench"])) for name in (*cores, "computed")}
+        feed(tmp_path / "dying.pipe", [line(number) for number in range(20)], 20.0)
+        wait(lambda: wrench["dying"].samples)
+        cores["dying"][0].kill()
+        failing = threading.Thread(target=feed, args=(tmp_path / "dying.pipe", [line(number) for number in range(80)], 20.0), daemon=True)
+        failing.start()
+        for name in ("whole", "computed"):
+            samples = wrench[name].samples
+            feed(tmp_path / f"{name}.pipe", [line(0)] * 20, 50.0)
+            wait(lambda samples=samples: samples)
+            before = len(samples)
+            feed(tmp_path / f"{name}.pipe", [line(number) for number in range(100)], 50.0, lambda samples=samples: len(samples), 4)
+            wait(lambda samples=samples, before=before: len(samples) - before >= 100)
+            assert len(samples) - before == 100, name
+        own.wait_for("no answer to frame_for_forces")
+        failing.join(60.0)
 
 
 def refused(tmp_path: Path, text: str) -> str:
