@@ -9,6 +9,7 @@
 use std::fmt::Display;
 
 use dermis_golden::fixed::FixedError;
+use dermis_golden::plain_words::without_numbers;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -21,7 +22,7 @@ pyo3::create_exception!(
 
 /// The exception for input that cannot be used.
 pub fn input(error: impl Display) -> PyErr {
-    InputError::new_err(error.to_string())
+    InputError::new_err(without_numbers(&error.to_string()))
 }
 
 /// The exception for an argument out of range.

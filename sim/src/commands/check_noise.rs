@@ -7,13 +7,13 @@ use anyhow::{anyhow, bail, ensure, Context, Result};
 use clap::{value_parser, Args};
 use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
+use dermis_golden::data::text::Decoded;
 use dermis_golden::spec::scene::{Scene, SearchSpec};
 
 use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
 use super::scene_file::{has_file, state, Measured};
 use crate::progress::Progress;
-use crate::stream::decode::Decoded;
 use crate::stream::line::{self, Piece};
 use crate::stream::Source;
 

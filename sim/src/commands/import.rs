@@ -219,8 +219,8 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     if let Some(words) = &summary.cut {
         writeln!(text, "ends early      {words}")?;
     }
-    if let Some(words) = &summary.may_be_cut {
-        writeln!(text, "last line       {words}")?;
+    for words in &summary.in_doubt {
+        writeln!(text, "in doubt        {words}")?;
     }
     if summary.correction != Correction::default() {
         writeln!(text, "corrected       {}", summary.correction)?;

@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
 use dermis_golden::data::frame::Frame;
-use dermis_golden::data::text::Stated;
+use dermis_golden::data::text::{Decoded, Stated};
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
 use serde::Serialize;
@@ -16,7 +16,6 @@ use super::error::HostError;
 use super::session::Session;
 use crate::output::write;
 use crate::stream::acquisition::Acquisition;
-use crate::stream::decode::Decoded;
 use crate::stream::line::{self, Frames, LineFrame, NoFrame, Piece};
 use crate::stream::{nanoseconds, seconds};
 

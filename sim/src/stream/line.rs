@@ -19,7 +19,7 @@ pub(crate) struct LineFrame {
     pub(crate) id: Value,
     /// With the time that the line states.
     pub(crate) frame: Frame,
-    /// Whether a digit may be lost, [`TextFrame::doubtful`].
+    /// Whether a character may be lost, [`TextFrame::doubt`].
     pub(crate) doubtful: bool,
 }
 
@@ -183,7 +183,7 @@ impl Frames {
     }
 
     fn frame(&self, frame: TextFrame) -> Result<LineFrame, NoFrame> {
-        let TextFrame { id, readings, time_ns, resultant_N, line, doubtful, .. } = frame;
+        let TextFrame { id, readings, time_ns, resultant_N, line, doubt, .. } = frame;
         let name = match &id {
             Value::Null => format!("line {line}"),
             Value::String(name) => name.clone(),
@@ -192,7 +192,7 @@ impl Frames {
         match Frame::from_stress(&name, &self.sensor, readings) {
             Ok(frame) => {
                 let frame = Frame { resultant_N, time_ns, ..frame };
-                Ok(LineFrame { id, frame, doubtful })
+                Ok(LineFrame { id, frame, doubtful: doubt.is_some() })
             }
             Err(error) => Err(NoFrame { id, reason: error.to_string() }),
         }

@@ -20,7 +20,6 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | `decode` | characters and ends of lines of other systems |
 //! | [`line`] | a line of bounded length, and the frame in it |
 //! | [`queue`] | the queue between the two threads |
 //! | [`source`] | where lines come from |
@@ -33,7 +32,6 @@
 
 pub mod acquisition;
 pub mod answers;
-pub(crate) mod decode;
 pub mod estimators;
 pub(crate) mod line;
 pub mod queue;

@@ -6,8 +6,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use anyhow::{anyhow, bail, Result};
+use dermis_golden::data::text::Decoded;
 
-use super::decode::Decoded;
 use super::line::{self, Piece};
 use super::queue::{Bell, Policy, Queue, Taken};
 use super::rate::Clock;

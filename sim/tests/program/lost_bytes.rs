@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use dermis_golden::data::generator::draws::{DrawOptions, Draws};
+use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::result::errors::Errors;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::Scene;
@@ -32,6 +33,13 @@ const FORMATS: [Format; 4] = [
     }),
     ("as short as it is exact", 1.0, 100, |b| (b as f32).to_string()),
 ];
+/// Lines of a press.
+const PRESS: usize = 160;
+const OF_A_PRESS: [Format; 3] = [
+    ("kPa with a decimal", 1e-3, PRESS, |b| format!("{b:.1}")),
+    ("six digits at most", 1.0, PRESS, |b| ((1e6 * b).round() / 1e6).to_string()),
+    ("as short as it is exact", 1.0, PRESS, |b| b.to_string()),
+];
 
 /// What became of the lines of a stream.
 #[derive(Debug, Default)]
@@ -54,18 +62,37 @@ fn scene(folder: &Path, unit: f64) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// Drawn frames as lines of a format, each without one of its bytes, as a stream.
-fn run((_, unit, lines, text): Format, random: &mut Rng) -> Outcome {
+/// Frames that have nothing to do with one another: stress in MPa and forces in N.
+fn unrelated(scene: &Scene, frames: usize) -> Vec<(Vec<f64>, [f64; 3])> {
+    let options = DrawOptions { seed: SEED, peak_MPa: Some(PEAK_MPA), ..DrawOptions::default() };
+    let draws = Draws::new(scene, options).unwrap();
+    let frame = |number| draws.frame(number).unwrap();
+    (0..frames as u64).map(frame).map(|frame| (frame.exact_MPa, frame.total_N)).collect()
+}
+
+/// Frames of a press, one after the other.
+fn press(scene: &Scene, frames: usize) -> Vec<(Vec<f64>, [f64; 3])> {
+    let press = Press::new(Motion::Ramp).of_frames(frames, 0.0);
+    press.frames(scene, SEED).unwrap().into_iter().map(|own| (own.stress_MPa, own.resultant_N.unwrap())).collect()
+}
+
+/// Frames as lines of a format, each `every`th without one of its bytes, as a stream.
+fn run(
+    (_, unit, lines, text): Format,
+    every: usize,
+    of: fn(&Scene, usize) -> Vec<(Vec<f64>, [f64; 3])>,
+    random: &mut Rng,
+) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let path = scene(folder.path(), unit);
-    let options = DrawOptions { seed: SEED, peak_MPa: Some(PEAK_MPA), ..DrawOptions::default() };
-    let draws = Draws::new(&Scene::load(&path).unwrap(), options).unwrap();
-    let frames: Vec<_> = (0..lines as u64).map(|number| draws.frame(number).unwrap()).collect();
+    let frames = of(&Scene::load(&path).unwrap(), lines);
     let mut sent = String::new();
-    for frame in &frames {
-        let numbers: Vec<String> = frame.exact_MPa.iter().map(|b| text(b / unit)).collect();
+    for (number, (stress_MPa, _)) in frames.iter().enumerate() {
+        let numbers: Vec<String> = stress_MPa.iter().map(|b| text(b / unit)).collect();
         let mut line = numbers.join(",");
-        line.remove(random.usize(..line.len()));
+        if number % every == every - 1 {
+            line.remove(random.usize(..line.len()));
+        }
         sent += &(line + "\n");
     }
     let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
@@ -88,7 +115,7 @@ fn run((_, unit, lines, text): Format, random: &mut Rng) -> Outcome {
             continue;
         };
         let found: [f64; 3] = serde_json::from_value(found.clone()).unwrap();
-        let errors = Errors::new(frames[answer["line"].as_u64().unwrap() as usize - 1].total_N, found);
+        let errors = Errors::new(frames[answer["line"].as_u64().unwrap() as usize - 1].1, found);
         let wrong = [errors.tangential, errors.normal].iter().zip(RIGHT).any(|(e, right)| e.is_some_and(|e| e > right));
         let flags: Vec<&str> = answer["flags"].as_array().unwrap().iter().map(|flag| flag.as_str().unwrap()).collect();
         match flags[..] {
@@ -109,7 +136,7 @@ fn run((_, unit, lines, text): Format, random: &mut Rng) -> Outcome {
 fn a_link_that_loses_a_byte_of_each_line_makes_no_silent_error() {
     let mut random = Rng::with_seed(SEED);
     let outcomes = FORMATS.map(|format| {
-        let outcome = run(format, &mut random);
+        let outcome = run(format, 1, unrelated, &mut random);
         println!("{}: {outcome:?}", format.0);
         outcome
     });
@@ -117,4 +144,17 @@ fn a_link_that_loses_a_byte_of_each_line_makes_no_silent_error() {
     assert!(outcomes[0].by_lines_before > 0);
     // Numbers that show what they lose are not in doubt for it.
     assert!(outcomes[1].right > 0, "{outcomes:?}");
+}
+
+/// The same of a press, where lines that are whole stand between those that are cut, and nothing else shows what the link loses.
+#[test]
+fn a_link_that_loses_a_byte_now_and_then_makes_no_silent_error_in_a_press() {
+    let mut random = Rng::with_seed(SEED);
+    for (format, every) in OF_A_PRESS.into_iter().flat_map(|format| [1, 8, PRESS + 1].map(|every| (format, every))) {
+        let outcome = run(format, every, press, &mut random);
+        println!("{}, every {every}: {outcome:?}", format.0);
+        assert_eq!(outcome.silent, 0, "{}, every {every}: {outcome:?}", format.0);
+        // Nothing is lost.
+        assert!(every <= PRESS || outcome.right > PRESS / 2, "{}: {outcome:?}", format.0);
+    }
 }

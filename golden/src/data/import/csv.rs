@@ -23,6 +23,7 @@ pub(super) fn parse(
     })?;
     let stated = logger.as_ref().map_or(*layout, |own| own.stated(layout));
     let read = frames(text, shape, &stated).map_err(|reason| source.text(reason))?;
+    let in_doubt = read.may_be_cut.iter().cloned().chain(read.near_loss_text()).collect();
     let start_ns = read.frames.first().and_then(|frame| frame.time_ns).filter(|ns| is_date(*ns)).unwrap_or(0);
     let mut own = Vec::with_capacity(read.frames.len());
     for (index, frame) in read.frames.into_iter().enumerate() {
@@ -38,6 +39,5 @@ pub(super) fn parse(
     let device = logger.as_ref().map(|own| own.name.to_owned());
     // Lines of JSON state it in the name of their field.
     let unit = logger.and_then(|own| own.unit).or(layout.is_none().then_some(Unit::MegaPa));
-    let may_be_cut = read.may_be_cut;
-    Ok(Recording { device, unit, layout, left_out, may_be_cut, ..Recording::bare(Format::Csv, shape, own) })
+    Ok(Recording { device, unit, layout, left_out, in_doubt, ..Recording::bare(Format::Csv, shape, own) })
 }

@@ -58,8 +58,8 @@ pub(super) struct Recording {
     pub left_out: Vec<String>,
     /// Where the file ends too early, in words; the frames are those that are whole.
     pub cut: Option<String>,
-    /// That the last line of a plain text has no end and may be cut, in words.
-    pub may_be_cut: Option<String>,
+    /// Where numbers of a plain text may have lost digits, in words.
+    pub in_doubt: Vec<String>,
     pub frames: Vec<RawFrame>,
 }
 
@@ -79,7 +79,7 @@ impl Recording {
             layout: None,
             left_out: Vec::new(),
             cut: None,
-            may_be_cut: None,
+            in_doubt: Vec::new(),
             frames,
         }
     }

@@ -74,9 +74,9 @@ pub struct Summary {
     /// Where the file ends too early, in words; the frames are those that are whole.
     #[serde(default)]
     pub cut: Option<String>,
-    /// That the last line of a plain text has no end and may be cut within a number, in words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub may_be_cut: Option<String>,
+    /// Where numbers of a plain text may have lost digits, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub in_doubt: Vec<String>,
     /// Whether they are taxels that read 0; else they are dead taxels.
     pub missing_as_zero: bool,
     /// Zero, sign and orientation that were corrected.

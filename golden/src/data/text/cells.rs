@@ -128,7 +128,7 @@ pub(super) struct Digits {
     /// Number of decimals, where it is fixed: nearly all have as many, two or more, and more of them end with a zero, which the
     /// shortest form of a number has not, than others have fewer and are as short as they can be.
     decimals: Option<usize>,
-    /// Digits of an exponent, where nearly all numbers have one of as many digits, two or more.
+    /// Digits of an exponent, where nearly all numbers have one of as many digits, two or more, and not only because they are small.
     exponent: Option<usize>,
     /// A zero may stand without decimals.
     bare_zero: bool,
@@ -184,9 +184,14 @@ impl Digits {
     /// What the cells of some lines show.
     pub(super) fn of_cells<'t>(cells: impl Iterator<Item = &'t str> + Clone) -> Digits {
         let mark = ['.', ','].into_iter().find(|mark| cells.clone().any(|cell| cell.contains(*mark)));
-        let texts = cells.map(point);
-        let numbers: Vec<Cow<str>> = texts.filter(|cell| reading(cell).is_some_and(f64::is_finite)).collect();
-        let numbers: Vec<Number> = numbers.iter().map(|text| Number::of(text)).collect();
+        let texts: Vec<(Cow<str>, f64)> = cells
+            .map(point)
+            .filter_map(|text| reading(&text).filter(|value| value.is_finite()).map(|value| (text, value)))
+            .collect();
+        // Where exponents are only for the large and the small, these have none.
+        let is_plain = |value: f64| value == 0.0 || (1e-3..1e5).contains(&value.abs());
+        let needless = texts.iter().any(|(text, value)| is_plain(*value) && text.contains(['e', 'E']));
+        let numbers: Vec<Number> = texts.iter().map(|(text, _)| Number::of(text)).collect();
         let share = |is: &dyn Fn(&Number) -> bool| {
             numbers.iter().filter(|number| is(number)).count() as f64 / numbers.len() as f64
         };
@@ -203,16 +208,33 @@ impl Digits {
             let shortest = numbers.iter().filter(|number| number.decimals.len() < *most && !number.is_filled()).count();
             filled > shortest
         });
+        let exponent = fixed(|number| number.exponent.len()).filter(|_| decimals.is_some() || needless);
         let padded = share(&|number| number.is_padded()) > 1.0 - LIKE;
         Digits {
             mark,
             decimals,
-            exponent: fixed(|number| number.exponent.len()),
+            exponent,
             bare_zero: numbers.iter().filter(|number| number.is_bare_zero()).count() > 1,
             padded,
             width: fixed(|number| number.whole.len() + usize::from(number.signed)).filter(|_| padded),
             leading: share(&|number| !number.whole.is_empty()) >= LIKE,
         }
+    }
+
+    /// Numbers of JSON: a decimal point, and as short as they can be.
+    pub(super) fn of_json() -> Digits {
+        Digits { mark: Some('.'), ..Digits::default() }
+    }
+
+    /// The least by which numbers that are written as these can differ; 0 where they have exponents.
+    pub(super) fn step<'t>(&self, cells: impl Iterator<Item = &'t str>) -> f64 {
+        let decimals = |cell: &str| {
+            let text = point(cell);
+            let number = Number::of(&text);
+            number.exponent.is_empty().then_some(number.decimals.len())
+        };
+        let most = cells.map(decimals).try_fold(0, |most, own| Some(most.max(own?)));
+        most.map_or(0.0, |most| 10f64.powi(-(most as i32)))
     }
 
     /// The first cell with an ambiguous comma, a thousands separator or a decimal comma, where all cells with a comma are so: three
@@ -281,7 +303,8 @@ impl Digits {
         };
         // A number has one byte for each character.
         let places = (0..=text.len()).filter(|at| text.is_char_boundary(*at));
-        places.flat_map(|at| "0123456789.-".chars().map(move |character| (at, character))).any(with)
+        let characters = if self.mark.is_some() { "0123456789-." } else { "0123456789-" };
+        places.flat_map(|at| characters.chars().map(move |character| (at, character))).any(with)
     }
 
     /// Whether the number in a cell, which is read, may be the begin of a longer one.

@@ -11,11 +11,6 @@ use super::{reading, Line, NoReadings};
 /// Lines from which a layout is found.
 const LOOKED_AT: usize = 256;
 
-/// Changes of a reading, over the largest of all others: from this one on it may be due to a character that is lost, if the number
-/// with that character would have changed by this much at most.
-const FAR: f64 = 8.0;
-const NEAR: f64 = 2.0;
-
 /// How frames stand in a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
@@ -158,22 +153,9 @@ impl Layout {
         cells.iter().skip(self.first).take(self.readings).any(|cell| self.digits.hide_a_lost_digit(cell))
     }
 
-    /// Whether one of a line's readings has changed from that `before` by far more than all others, and its number would with one
-    /// more character be nearly that before.
-    pub(super) fn may_lack_a_character(&self, cells: &[Cow<str>], before: &[f64], readings: &[f64]) -> bool {
-        if before.len() != readings.len() {
-            return false;
-        }
-        let changes = before.iter().zip(readings).map(|(before, now)| (now - before).abs());
-        let (mut largest, mut second, mut place) = (0.0, 0.0f64, 0);
-        for (taxel, change) in changes.enumerate().filter(|(_, change)| !change.is_nan()) {
-            if change > largest {
-                (largest, second, place) = (change, largest, taxel);
-            } else {
-                second = second.max(change);
-            }
-        }
-        largest > FAR * second && self.digits.would_be(&cells[self.first + place], before[place], NEAR * second)
+    /// The cells of a line that are readings.
+    pub(super) fn readings_as_written<'t>(&self, line: &'t str) -> impl Iterator<Item = Cow<'t, str>> {
+        self.split(line).into_iter().skip(self.first).take(self.readings)
     }
 
     /// The last cell of a line, if it may be the begin of a longer one.

@@ -20,7 +20,8 @@
 //! | digits before the decimal mark | where zeros in front show that their number is fixed; where others have one, a cell has one too |
 //!
 //! A digit that a whole number has lost shows nowhere in its line. Where lines of a stream show that the link loses characters, those
-//! near them are doubted, and so is a frame in which one reading has changed as a lost character would change it ([`Reader`]).
+//! near them are doubted, and so is a frame in which a reading has changed as a lost character would change it ([`Reader`]); of a
+//! whole text such a frame is left out ([`frames`]).
 //!
 //! | in | a cell is |
 //! |---|---|
@@ -33,50 +34,28 @@
 
 mod cells;
 mod columns;
+mod decode;
+mod json;
 mod layout;
+mod lost;
 mod reader;
 #[cfg(test)]
 mod tests;
 mod time;
+mod whole;
 
 pub(crate) use cells::point;
 pub use cells::{reading, Separator};
+pub use decode::{decoded, Decoded};
+pub(crate) use json::without_nan;
 pub use layout::{Form, Layout, Stated};
-pub(crate) use reader::without_nan;
-pub use reader::{frames, LeftOut, Read, Reader, TextFrame, TextFrames};
+pub use lost::Doubt;
+pub use reader::{LeftOut, Read, Reader, TextFrame};
 pub(crate) use time::number_ns;
 pub use time::{is_date, TimeUnit};
+pub use whole::{frames, TextFrames};
 
 use std::fmt;
-
-/// The text of a file: UTF-8, or UTF-16 where its mark says so, else Latin-1; without the mark. Lines that end with a carriage return
-/// alone end with a line feed.
-///
-/// ```
-/// use dermis_golden::data::text::decoded;
-///
-/// let utf_16: Vec<u8> = "\u{feff}1\t2\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-/// assert_eq!(decoded(&utf_16), "1\t2\n");
-/// assert_eq!([decoded(b"1,2\r3,4\r"), decoded(b"5 \xb0C\r\n")], ["1,2\n3,4\n", "5 °C\r\n"]);
-/// ```
-pub fn decoded(bytes: &[u8]) -> String {
-    let utf_16 = |of: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
-        String::from_utf16_lossy(&units)
-    };
-    let text = match bytes {
-        [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
-        _ => match std::str::from_utf8(bytes) {
-            Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
-            Err(_) => bytes.iter().copied().map(char::from).collect(),
-        },
-    };
-    match text.contains('\r') && !text.contains('\n') {
-        true => text.replace('\r', "\n"),
-        false => text,
-    }
-}
 
 /// Characters of a cell that are shown in an error.
 const SHOWN: usize = 40;

@@ -2,14 +2,12 @@
 
 use std::borrow::Cow;
 
-use serde::Deserialize;
-use serde_json::value::RawValue;
 use serde_json::Value;
 
+use super::json::{self, without_nan, Request};
 use super::layout::has_numbers;
+use super::lost::{Doubt, LostCharacters};
 use super::time::{is_date, TimeUnit};
-use crate::plain_words::JsonError;
-
 use super::{reading, shown, Form, Layout, Line, NoReadings, Separator, Stated};
 
 /// Lines of another layout in a row after which a stream is taken to have it.
@@ -18,8 +16,6 @@ const CHANGES_AFTER: usize = 3;
 const BEGIN: usize = 8;
 /// Lines before the first frame that are kept, to be named if none comes.
 const MOST_HEADER: usize = 64;
-/// Lines after one that has lost characters in which one more may be lost where it does not show.
-const DOUBTED: usize = 100;
 
 /// A frame of a text.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +32,26 @@ pub struct TextFrame {
     pub readings: Vec<f64>,
     /// The true force in N, [x, y, normal], of a line of JSON that states it.
     pub resultant_N: Option<[f64; 3]>,
-    /// Whether a reading may be another one than that which was sent: see [`Reader`].
-    pub doubtful: bool,
+    /// Why a reading may be another one than that which was sent, if one may be: see [`Reader`].
+    pub doubt: Option<Doubt>,
+    /// Its lines, until they have been judged.
+    pub(super) written: String,
+}
+
+impl TextFrame {
+    /// That of a line, without readings.
+    fn of_line(line: &Line) -> TextFrame {
+        TextFrame {
+            first_line: line.number,
+            line: line.number,
+            id: Value::Null,
+            time_ns: None,
+            readings: Vec::new(),
+            resultant_N: None,
+            doubt: None,
+            written: line.text.to_owned(),
+        }
+    }
 }
 
 /// What a line brought.
@@ -60,36 +74,6 @@ pub struct LeftOut {
     pub reason: NoReadings,
 }
 
-/// All frames of a text.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TextFrames {
-    /// The layout; `None` if all lines are JSON.
-    pub layout: Option<Layout>,
-    /// The frames in their order.
-    pub frames: Vec<TextFrame>,
-    /// What holds none.
-    pub left_out: Vec<LeftOut>,
-    /// The last line has no end and may be cut within a number, in words.
-    pub may_be_cut: Option<String>,
-}
-
-/// A line of JSON.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Request<'t> {
-    #[serde(default)]
-    id: Value,
-    stress_MPa: Vec<Option<f64>>,
-    /// Seconds since any moment, milliseconds since 1970, or ISO 8601.
-    /// As it is written: a floating-point number would round the nanoseconds of a date.
-    #[serde(default, borrow, alias = "time", alias = "time_s", alias = "t")]
-    timestamp: Option<&'t RawValue>,
-    #[serde(default)]
-    time_ns: Option<i64>,
-    #[serde(default)]
-    resultant_N: Option<[f64; 3]>,
-}
-
 /// Number and text of a line.
 type Owned = (usize, String);
 
@@ -98,29 +82,39 @@ const HALF_DAY_NS: i64 = 43_200_000_000_000;
 
 /// Turns lines into frames of one array.
 ///
-/// The readings of a frame may be others than those that were sent, [`TextFrame::doubtful`], where numbers are written so that a
-/// digit that is lost does not show, as it does in a fixed number of decimals or in numbers that are filled with zeros, and
+/// The readings of a frame may be others than those that were sent, [`TextFrame::doubt`], where numbers are written so that a digit
+/// that is lost does not show, as it does in a fixed number of decimals or in numbers that are filled with zeros, and
 ///
-/// - one of the last hundred lines has lost characters, or
-/// - one reading has changed by far more than all others, and with one more character its number would be nearly that before.
+/// - a line at most a hundred lines away has lost characters, or
+/// - a reading has changed by far more than all others (of a grid: one for each of its lines), and with one more character its number
+///   would be nearly that before. The first frame is compared with the second, for which it waits; [`Reader::settle`] ends that.
 ///
 /// ```
 /// use dermis_golden::data::text::{Line, Read, Reader, Stated};
 ///
-/// let doubtful = |lines: [&str; 3]| {
-///     let mut reader = Reader::new([2, 2], Stated::default());
-///     let read = |(k, text)| reader.push(Line { number: k + 1, text });
-///     matches!(lines.into_iter().enumerate().flat_map(read).last(), Some(Read::Frame(frame)) if frame.doubtful)
+/// // The lines whose frames are in doubt.
+/// let doubted = |lines: [&str; 3]| -> Vec<usize> {
+///     let mut reader = Reader::new([3, 3], Stated::default());
+///     let mut read: Vec<Read> =
+///         lines.into_iter().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+///     read.extend(reader.finish());
+///     let doubted = read.iter().filter_map(|read| match read {
+///         Read::Frame(frame) if frame.doubt.is_some() => Some(frame.line),
+///         _ => None,
+///     });
+///     doubted.collect()
 /// };
-/// // The second line has lost a separator; the third may have lost a digit of 12.
-/// assert!(doubtful(["12,3,4,5", "12,34,5", "2,3,4,5"]));
-/// assert!(!doubtful(["12,3,4,5", "12,3,4,5", "12,4,4,5"]));
-/// assert!(!doubtful(["0012,0003,0004,0005", "0012,00030004,0005", "0002,0003,0004,0005"]));
-/// // The first reading may have been 0.161295.
-/// assert!(doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.61295,0.202,0.312,0.401"]));
+/// // The second line has lost a separator; the others may have lost a digit.
+/// assert_eq!(doubted(["12,3,4,5,1,2,3,4,9", "12,3,4,51,2,3,4,9", "2,3,4,5,1,2,3,4,9"]), [1, 3]);
+/// assert_eq!(doubted(["12,3,4,5,1,2,3,4,9", "12,3,4,5,1,2,3,4,9", "12,4,4,5,1,2,3,4,9"]), [0; 0]);
+/// // Filled with zeros, no number can have lost one.
+/// assert_eq!(doubted(["12,03,04,05,01,02,03,04,09", "12,03,0405,01,02,03,04,09", "02,03,04,05,01,02,03,04,09"]), [0; 0]);
+/// // The first reading was 12 or 13 before, or is it behind.
+/// assert_eq!(doubted(["12,3,4,5,1,2,3,4,9", "13,3,4,6,1,2,3,4,9", "2,3,4,6,1,2,3,5,9"]), [3]);
+/// assert_eq!(doubted(["2,3,4,5,1,2,3,4,9", "12,3,4,5,1,2,3,4,9", "13,3,4,6,1,2,3,4,9"]), [1]);
 /// // All change, or one by what no character explains.
-/// assert!(!doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.61295,0.402,0.612,0.801"]));
-/// assert!(!doubtful(["0.161,0.2,0.31,0.4", "0.161294,0.201,0.311,0.402", "0.83295,0.202,0.312,0.401"]));
+/// assert_eq!(doubted(["12,3,4,5,1,2,3,4,9", "13,3,4,6,1,2,3,4,9", "2,7,9,1,6,8,9,9,1"]), [0; 0]);
+/// assert_eq!(doubted(["12,3,4,5,1,2,3,4,9", "13,3,4,6,1,2,3,4,9", "29,3,4,6,1,2,3,5,9"]), [0; 0]);
 /// ```
 #[derive(Clone, Debug)]
 pub struct Reader {
@@ -153,94 +147,17 @@ pub struct Reader {
     time_ns: Option<i64>,
     /// Number of the last line that was not blank.
     last: usize,
-    /// Number of the last line that has lost characters.
-    cut: Option<usize>,
-    /// Readings of the last frame of a line.
-    before: Vec<f64>,
-    /// Whether numbers of the lines so far are written so that a lost digit does not show.
-    hides: bool,
-}
-
-/// Reads all frames of a text of an array of `[rows, cols]`.
-///
-/// ```
-/// use dermis_golden::data::text::{frames, Stated};
-///
-/// let text = "time,a,b,c,d\n0.00,1,2,3,4\n0.01,2,3,4\n0.02,3,4,5,6\n";
-/// let read = frames(text, [2, 2], &Stated::default())?;
-/// assert_eq!(read.frames[1].readings, [3.0, 4.0, 5.0, 6.0]);
-/// assert_eq!(read.frames[1].time_ns, Some(20_000_000));
-/// assert_eq!(read.left_out[0].reason.to_string(), "line 3: 4 values, wanted 5");
-/// # Ok::<(), dermis_golden::data::text::NoReadings>(())
-/// ```
-///
-/// # Errors
-/// No layout, or more than one, that fits; more lines without a frame than frames.
-pub fn frames(text: &str, shape: [usize; 2], stated: &Stated) -> Result<TextFrames, NoReadings> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let lines = Line::of_text(text, stated.skip_rows);
-    let is_json = |line: &Line| line.text.trim_start().starts_with('{');
-    let table: Vec<Line> = lines.iter().copied().filter(|line| !is_json(line)).collect();
-    let layout = match table.is_empty() && !lines.is_empty() {
-        true => None,
-        false => Some(Layout::of_lines(&table, shape, stated)?),
-    };
-    let mut reader = Reader::new(shape, Stated { skip_rows: 0, ..*stated });
-    reader.decided = true;
-    reader.blocks = layout.as_ref().map(|layout| layout.blocks);
-    let first_line = layout.as_ref().map_or(1, |layout| layout.first_line);
-    reader.layout.clone_from(&layout);
-    let last = lines.last().copied().filter(|_| !text.ends_with('\n'));
-    let mut read = TextFrames { layout, frames: Vec::new(), left_out: Vec::new(), may_be_cut: None };
-    // Before the first readings stands a header; a line of numbers there is one that does not fit.
-    let is_header = |line: &Line| {
-        line.number < first_line && !is_json(line) && read.layout.as_ref().is_none_or(|layout| layout.is_header(line))
-    };
-    let own: Vec<Line> = lines.into_iter().filter(|line| !is_header(line)).collect();
-    for line in own {
-        read.add(reader.push(line));
-    }
-    read.add(reader.finish());
-    read.may_be_cut = last.and_then(|last| read.cut_within(&last));
-    match read.left_out.first() {
-        Some(first) if read.left_out.len() > read.frames.len() => Err(first.reason.clone()),
-        None if read.frames.is_empty() => Err(NoReadings::of_text("no line with readings")),
-        _ => Ok(read),
-    }
-}
-
-impl TextFrames {
-    fn add(&mut self, read: Vec<Read>) {
-        for read in read {
-            match read {
-                Read::Frame(frame) => self.frames.push(frame),
-                Read::LeftOut(left_out) => self.left_out.push(left_out),
-                Read::Header(_) => (),
-            }
-        }
-    }
-
-    /// That a line without end, the last one, may be cut, in words: editors leave out the last end of a line too.
-    fn cut_within(&self, line: &Line) -> Option<String> {
-        let is_read = self.frames.last().is_some_and(|frame| frame.line == line.number);
-        let layout = self.layout.as_ref().filter(|_| is_read && !line.text.trim_start().starts_with('{'))?;
-        let cell = layout.cut_cell(line.text)?;
-        Some(format!("line {} has no end: its last value, {}, may be cut", line.number, shown(&cell)))
-    }
-
-    /// What was left out, in words: how many, and the first three; `None` if nothing was.
-    pub fn left_out_text(&self) -> Option<String> {
-        let named: Vec<String> = self.left_out.iter().take(3).map(|left_out| left_out.reason.to_string()).collect();
-        let more = if self.left_out.len() > named.len() { "; …" } else { "" };
-        (!named.is_empty()).then(|| format!("{} left out: {}{more}", self.left_out.len(), named.join("; ")))
-    }
+    /// Their lines.
+    written: String,
+    /// Finds numbers that have lost a character.
+    lost: LostCharacters,
 }
 
 impl Reader {
     /// Before the first line. The layout is found from the first line with readings; where that leaves it open, as beside a time,
     /// lines wait for those that follow.
     pub fn new(shape: [usize; 2], stated: Stated) -> Reader {
-        let (layout, blocks, time_ns, cut) = (None, None, None, None);
+        let (layout, blocks, time_ns) = (None, None, None);
         Reader {
             shape,
             stated,
@@ -259,10 +176,15 @@ impl Reader {
             first_line: 0,
             time_ns,
             last: 0,
-            cut,
-            before: Vec::new(),
-            hides: false,
+            written: String::new(),
+            lost: LostCharacters::default(),
         }
+    }
+
+    /// Of a text whose layout was found from many lines; `None` where all are JSON.
+    pub(super) fn of_layout(shape: [usize; 2], stated: Stated, layout: Option<Layout>) -> Reader {
+        let blocks = layout.as_ref().map(|layout| layout.blocks);
+        Reader { decided: true, blocks, layout, ..Reader::new(shape, Stated { skip_rows: 0, ..stated }) }
     }
 
     /// The layout, once it is found.
@@ -270,14 +192,9 @@ impl Reader {
         self.layout.as_ref()
     }
 
-    /// Whether a digit may be lost where one of the last lines has lost characters.
-    fn is_after_loss(&self) -> bool {
-        self.hides && self.cut.is_some_and(|line| self.last - line <= DOUBTED)
-    }
-
     /// Whether lines wait for those that follow; [`Reader::settle`] ends that.
     pub fn is_waiting(&self) -> bool {
-        self.waiting > 0
+        self.waiting > 0 || self.lost.is_waiting()
     }
 
     /// The next line; a blank line, a part of a frame or a line that waits brings nothing, the line that ends the waiting what all
@@ -292,7 +209,9 @@ impl Reader {
         let read = self.settled();
         // A header alone shows nothing of the lines behind it.
         self.hurried |= read.iter().any(|read| !matches!(read, Read::Header(_)));
-        self.note(read)
+        let mut read = self.note(read);
+        read.extend(self.lost.waiting());
+        read
     }
 
     /// The end of the text: what waits, what is left of a frame that is not complete, and a header behind which no frame stands.
@@ -308,13 +227,10 @@ impl Reader {
         read
     }
 
-    /// Remembers what lines brought.
+    /// Remembers what lines brought, and judges it.
     fn note(&mut self, read: Vec<Read>) -> Vec<Read> {
-        if read.iter().any(|read| matches!(read, Read::LeftOut(left_out) if left_out.reason.cut)) {
-            self.cut = Some(self.last);
-        }
         self.has_frames |= read.iter().any(|read| matches!(read, Read::Frame(_)));
-        read
+        self.lost.judge(read, self.last, self.layout.as_ref())
     }
 
     fn take(&mut self, line: Line) -> Vec<Read> {
@@ -322,10 +238,10 @@ impl Reader {
         if line.number <= self.stated.skip_rows || !line.may_hold_readings() {
             return Vec::new();
         }
-        if line.text.trim_start().starts_with('{') {
+        if json::is_json(line.text) {
             let mut read = self.settled();
             self.last = line.number;
-            self.hides = true;
+            self.lost.note_json();
             read.push(self.json_frame(&line));
             return read;
         }
@@ -492,18 +408,8 @@ impl Reader {
         match read.and_then(|readings| Ok((readings, self.time(layout, line, &cells)?))) {
             Ok((readings, time_ns)) => {
                 self.other.clear();
-                self.hides |= layout.hides_a_lost_digit(&cells);
-                let doubtful = self.is_after_loss() || layout.may_lack_a_character(&cells, &self.before, &readings);
-                self.before.clone_from(&readings);
-                Read::Frame(TextFrame {
-                    first_line: line.number,
-                    line: line.number,
-                    id: Value::Null,
-                    time_ns,
-                    readings,
-                    resultant_N: None,
-                    doubtful,
-                })
+                self.lost.note(layout, &cells);
+                Read::Frame(TextFrame { time_ns, readings, ..TextFrame::of_line(line) })
             }
             Err(reason) => self.of_another_layout(layout, line, reason),
         }
@@ -513,7 +419,7 @@ impl Reader {
     fn of_another_layout(&mut self, layout: &Layout, line: &Line, mut reason: NoReadings) -> Read {
         if let Some(own) = self.changed(layout, line) {
             // Those before were whole.
-            self.cut = None;
+            self.lost.forget_cut();
             self.layout = Some(own.clone());
             return self.line(&own, line);
         }
@@ -553,34 +459,18 @@ impl Reader {
 
     /// The frame in a line of JSON.
     fn json_frame(&mut self, line: &Line) -> Read {
-        let taxels = self.shape[0] * self.shape[1];
-        let left_out = |id: Value, reason: String, cut: bool| {
-            Read::LeftOut(LeftOut { id, reason: NoReadings { cut, ..NoReadings::of_line(line, reason) } })
-        };
         let text = without_nan(line.text);
-        let request: Request = match serde_json::from_str(&text) {
+        let request = match Request::of(&text, line.number, self.shape[0] * self.shape[1]) {
             Ok(request) => request,
-            Err(error) => {
-                let JsonError { column, message, .. } = JsonError::new(&error);
-                return left_out(Value::Null, format!("column {column}: {message}"), !error.is_data());
-            }
+            Err(left_out) => return Read::LeftOut(left_out),
         };
-        let got = request.stress_MPa.len();
-        if got != taxels {
-            return left_out(request.id, format!("stress_MPa has {got} values, wanted {taxels}"), true);
-        }
-        let cell = request.timestamp.map_or("", RawValue::get).trim_matches('"');
-        let unit = TimeUnit::of_column(&[cell], None);
-        let of_cell = unit.and_then(|unit| Some(self.over_midnight(unit, unit.ns(cell)?)));
-        let readings = request.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect();
+        let of_cell = request.time().map(|(unit, own)| self.over_midnight(unit, own));
         Read::Frame(TextFrame {
-            first_line: line.number,
-            line: line.number,
             id: request.id,
             time_ns: request.time_ns.or(of_cell),
-            readings,
+            readings: request.stress_MPa.into_iter().map(|reading| reading.unwrap_or(f64::NAN)).collect(),
             resultant_N: request.resultant_N,
-            doubtful: self.is_after_loss(),
+            ..TextFrame::of_line(line)
         })
     }
 
@@ -607,19 +497,21 @@ impl Reader {
                 Ok(row)
             });
         }
-        self.hides |= row.is_ok() && layout.hides_a_lost_digit(&cells);
+        if row.is_ok() {
+            self.lost.note(layout, &cells);
+        }
         self.rows.push(row);
+        self.written += line.text;
+        self.written.push('\n');
         if self.rows.len() == layout.lines {
-            let rows = std::mem::take(&mut self.rows);
+            let (rows, written) = (std::mem::take(&mut self.rows), std::mem::take(&mut self.written));
             read.push(match rows.into_iter().collect::<Result<Vec<_>, _>>() {
                 Ok(rows) => Read::Frame(TextFrame {
                     first_line: self.first_line,
-                    line: line.number,
-                    id: Value::Null,
                     time_ns: self.time_ns.take(),
                     readings: rows.concat(),
-                    resultant_N: None,
-                    doubtful: self.is_after_loss(),
+                    written,
+                    ..TextFrame::of_line(line)
                 }),
                 Err(reason) => Read::LeftOut(LeftOut { id: Value::Null, reason }),
             });
@@ -630,6 +522,7 @@ impl Reader {
     /// Ends a frame of a grid that is not complete, after the line `before`.
     fn cut(&mut self, wanted: usize, before: usize) -> Vec<Read> {
         let rows = std::mem::take(&mut self.rows);
+        self.written.clear();
         if rows.is_empty() {
             return Vec::new();
         }
@@ -646,26 +539,4 @@ impl Reader {
 /// Whether any separator finds numbers in a line.
 fn holds_numbers(line: &Line) -> bool {
     Separator::ALL.into_iter().any(|separator| has_numbers(&separator.cells(line.text)))
-}
-
-/// JSON with `null` for `NaN`, which Python writes and JSON does not have; texts in quotes stay.
-pub(crate) fn without_nan(text: &str) -> std::borrow::Cow<'_, str> {
-    if !text.contains("NaN") {
-        return text.into();
-    }
-    let (mut is_text, mut escaped, mut skip) = (false, false, 0);
-    let mut plain = String::with_capacity(text.len() + 16);
-    for (at, c) in text.char_indices() {
-        if skip > 0 {
-            skip -= 1;
-        } else if !is_text && text[at..].starts_with("NaN") {
-            plain += "null";
-            skip = 2;
-        } else {
-            plain.push(c);
-            is_text ^= c == '"' && !escaped;
-            escaped = is_text && c == '\\' && !escaped;
-        }
-    }
-    plain.into()
 }

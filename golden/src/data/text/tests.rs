@@ -454,36 +454,97 @@ fn a_last_line_without_an_end_is_named_where_its_last_number_may_be_cut() {
     assert_eq!(end("{\"stress_MPa\": [1, 2, 3, 4]}"), None);
 }
 
-/// Numbers of a press that moves and grows, as they are written in as few characters as they need.
-fn press(frame: usize) -> Vec<String> {
+/// Readings in MPa of a press that moves and grows, within 80 frames.
+fn press(frame: usize) -> Vec<f64> {
     let at = [3.0 + 0.02 * frame as f64, 4.0 - 0.01 * frame as f64];
-    let load = 0.4 * (0.05 * frame as f64).sin().max(0.0);
+    let load = 0.4 * (0.02 * frame as f64).sin().max(0.0);
     let value = |taxel: usize| {
         let [x, y] = [(taxel % 8) as f64 - at[0], (taxel / 8) as f64 - at[1]];
         let noise = 1e-3 * ((frame * 31 + taxel * 17) % 13) as f64 / 13.0;
-        (1e6 * (load * (-0.3 * (x * x + y * y)).exp() + noise)).round() / 1e6
+        load * (-0.3 * (x * x + y * y)).exp() + noise
     };
-    (0..64).map(|taxel| format!("{}", value(taxel))).collect()
+    (0..64).map(value).collect()
 }
 
+/// A way to write numbers.
+type Format = (&'static str, fn(f64) -> String);
+const FORMATS: [Format; 9] = [
+    ("fixed decimals", |b| format!("{b:.3}")),
+    ("exponents", |b| format!("{b:.4e}")),
+    ("as short as it is exact", |b| b.to_string()),
+    ("three decimals at most", |b| ((1e3 * b).round() / 1e3).to_string()),
+    ("six digits", |b| format!("{:.5e}", b).parse::<f64>().unwrap().to_string()),
+    ("kPa", |b| format!("{:.1}", 1e3 * b)),
+    ("counts", |b| format!("{:.0}", 5e3 * b)),
+    ("counts from 120 on", |b| format!("{:.0}", 120.0 + 3e3 * b)),
+    ("filled counts", |b| format!("{:04.0}", 3e3 * b)),
+];
+
+/// A way in which numbers of a frame stand in a text.
+type Lines = (&'static str, fn(&[String]) -> String);
+const LINES: [Lines; 3] = [
+    ("a frame per line", |cells| cells.join(",") + "\n"),
+    ("grid", |cells| cells.chunks(8).map(|row| row.join(" ") + "\n").collect()),
+    ("JSON", |cells| format!("{{\"stress_MPa\": [{}]}}\n", cells.join(", "))),
+];
+
+/// The frames of a text as a stream brings them, and as a whole file.
+fn both_ways(text: &str) -> [Vec<TextFrame>; 2] {
+    let mut reader = Reader::new([8, 8], Stated::default());
+    let mut all: Vec<Read> =
+        text.lines().enumerate().flat_map(|(k, text)| reader.push(Line { number: k + 1, text })).collect();
+    all.extend(reader.finish());
+    let frame = |read: Read| if let Read::Frame(frame) = read { Some(frame) } else { None };
+    // A text of which most is cut is refused.
+    let whole = frames(text, [8, 8], &Stated::default()).map_or(Vec::new(), |whole| whole.frames);
+    [all.into_iter().filter_map(frame).collect(), whole]
+}
+
+/// A character of every line, or of a line of every eighth frame, is lost: a reading that is wrong by 15 % of the largest, which
+/// is a few percent of a force, is doubted. And nothing is without a loss.
+/// (What a press changes in a frame hides a loss of less than five times that, until lines that are cut show what the link is.)
 #[test]
-fn a_lost_digit_that_moves_the_point_is_doubted_and_no_press_is() {
-    let lines: Vec<Vec<String>> = (0..400).map(press).collect();
-    let doubtful = |lines: &[Vec<String>]| -> Vec<usize> {
-        let texts: Vec<String> = lines.iter().map(|cells| cells.join(",")).collect();
-        streamed(&texts, [8, 8]).iter().filter(|frame| frame.doubtful).map(|frame| frame.line).collect()
-    };
-    assert_eq!(doubtful(&lines), [0; 0]);
-    // The digit behind the point of the largest reading.
-    for frame in (10..50).step_by(3) {
-        let mut cut = lines.clone();
-        let value = |cell: &String| cell.parse::<f64>().unwrap();
-        let largest = (0..64).max_by(|a, b| value(&lines[frame][*a]).total_cmp(&value(&lines[frame][*b]))).unwrap();
-        let cell = &mut cut[frame][largest];
-        cell.remove(cell.find('.').unwrap() + 1);
-        if (value(cell) - value(&lines[frame][largest])).abs() > 0.1 {
-            let cell = cell.clone();
-            assert!(doubtful(&cut).contains(&(frame + 1)), "{frame}: {cell}");
+fn a_lost_character_makes_no_wrong_frame_without_a_doubt() {
+    let presses: Vec<Vec<f64>> = (0..200).map(press).collect();
+    let mut random = Random::new(3);
+    let mut by_reading = 0;
+    let all = FORMATS.iter().flat_map(|format| LINES.map(|lines| (format, lines)));
+    // JSON has no zeros in front.
+    for ((name, write), (form, lines)) in all.filter(|(format, form)| (format.0, form.0) != ("filled counts", "JSON")) {
+        let texts: Vec<String> =
+            presses.iter().map(|b| lines(&b.iter().map(|b| write(*b)).collect::<Vec<_>>())).collect();
+        let [whole, _] = both_ways(&texts.concat());
+        assert_eq!(
+            (whole.len(), whole.iter().filter(|frame| frame.doubt.is_some()).count()),
+            (200, 0),
+            "{name}, {form}"
+        );
+        let largest = whole.iter().flat_map(|frame| &frame.readings).fold(0.0f64, |most, b| most.max(b.abs()));
+        for every in [1, 8] {
+            let lines_of_a_frame = texts[0].lines().count();
+            let mut lose = |frame: usize, text: &str| -> String {
+                let lost = |line: &str| {
+                    let mut line = line.to_owned();
+                    line.remove(random.between(0.0, line.len() as f64) as usize);
+                    line + "\n"
+                };
+                if frame % every == every - 1 {
+                    text.lines().map(lost).collect()
+                } else {
+                    text.to_owned()
+                }
+            };
+            let cut: String = texts.iter().enumerate().map(|(frame, text)| lose(frame, text)).collect();
+            for (way, frames) in ["stream", "file"].into_iter().zip(both_ways(&cut)) {
+                for frame in frames {
+                    let sent = &whole[(frame.line - 1) / lines_of_a_frame].readings;
+                    let wrong = frame.readings.iter().zip(sent).map(|(b, sent)| (b - sent).abs()).fold(0.0, f64::max);
+                    let silent = wrong > 0.15 * largest && frame.doubt.is_none();
+                    assert!(!silent, "{name}, {form}, {way}, every {every}: line {}, {wrong}", frame.line);
+                    by_reading += usize::from(matches!(frame.doubt, Some(Doubt::Reading { .. })));
+                }
+            }
         }
     }
+    assert!(by_reading > 100, "{by_reading}");
 }

@@ -1,4 +1,4 @@
-//! The bytes of a stream as UTF-8 in lines that end with a line feed.
+//! The bytes of a file or stream as UTF-8 in lines that end with a line feed.
 
 use std::io::{Read, Result};
 
@@ -16,7 +16,7 @@ enum Units {
 
 /// An input that is read as UTF-8 where its mark says UTF-16, each of whose lines ends with a line feed alone, whether it had a carriage
 /// return, a line feed or both.
-pub(crate) struct Decoded<R> {
+pub struct Decoded<R> {
     input: R,
     /// `None` before the first two bytes.
     units: Option<Units>,
@@ -31,7 +31,7 @@ pub(crate) struct Decoded<R> {
 
 impl<R: Read> Decoded<R> {
     /// The bytes of an input.
-    pub(crate) fn new(input: R) -> Decoded<R> {
+    pub fn new(input: R) -> Decoded<R> {
         Decoded { input, units: None, rest: Vec::new(), ready: Vec::new(), at: 0, end: None }
     }
 
@@ -55,6 +55,12 @@ impl<R: Read> Decoded<R> {
         };
         self.units = self.units.or(Some(units).filter(|_| !bytes.is_empty()));
         match units {
+            // Nearly all are so.
+            Units::Bytes if !bytes.contains(&b'\r') && self.end != Some(b'\r') => {
+                self.end =
+                    bytes.last().copied().filter(|byte| *byte == b'\n').or(self.end.filter(|_| bytes.is_empty()));
+                self.ready = bytes;
+            }
             Units::Bytes => bytes.into_iter().for_each(|byte| self.push(byte)),
             Units::Utf16(of) => {
                 let mut pairs = bytes.chunks_exact(2);
@@ -91,6 +97,25 @@ impl<R: Read> Read for Decoded<R> {
         let bytes = (&self.ready[self.at..]).read(buffer)?;
         self.at += bytes;
         Ok(bytes)
+    }
+}
+
+/// The text of a file: UTF-8, or UTF-16 where its mark says so, else Latin-1; without the mark, and each line ends with a line feed.
+///
+/// ```
+/// use dermis_golden::data::text::decoded;
+///
+/// let utf_16: Vec<u8> = "\u{feff}1\t2\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+/// assert_eq!(decoded(&utf_16), "1\t2\n");
+/// assert_eq!([decoded(b"1,2\r3,4\r"), decoded(b"5 \xb0C\r\n")], ["1,2\n3,4\n", "5 °C\n"]);
+/// ```
+pub fn decoded(bytes: &[u8]) -> String {
+    let mut lines = Vec::with_capacity(bytes.len());
+    // Bytes in memory can be read.
+    let _ = Decoded::new(bytes).read_to_end(&mut lines);
+    match String::from_utf8(lines) {
+        Ok(text) => text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text),
+        Err(other) => other.into_bytes().into_iter().map(char::from).collect(),
     }
 }
 
