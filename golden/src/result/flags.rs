@@ -255,7 +255,7 @@ flags! {
         },
     }
     TornFrame = 21 "torn-frame" {
-        raised_when: "in a stream, a part of the frame is that of the frame before to the bit, and the rest has changed (`torn_share` above 0.08 of the range); or one of the last 100 lines has lost characters, and a digit that this frame's numbers lose does not show; or one reading has changed by far more than all others, and with one more character its number would be nearly that before",
+        raised_when: "in a stream, a part of the frame is that of the frame before to the bit, and the rest has changed (`torn_share` above 0.08 of the range); or a line at most 100 away has lost characters, and a digit that this frame's numbers lose does not show; or one reading has changed by far more than all others, and with one more character its number would be nearly that before",
         remedy: "give frames that are whole: read them between two scans; write numbers with a fixed number of decimals (`%.4f`) or filled with zeros (`%04d`), so that what is lost shows, and lower the bit rate",
         raised_by: "streams of all engines",
         rule: |checks, _| checks.torn_share.is_some_and(|share| share > TORN),

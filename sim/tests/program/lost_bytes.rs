@@ -49,8 +49,8 @@ struct Outcome {
     right: usize,
     /// Wrong and without a flag.
     silent: usize,
-    /// Wrong and flagged for the lines before alone.
-    by_lines_before: usize,
+    /// Wrong, and flagged for what a lost character does alone.
+    torn: usize,
 }
 
 /// The scene, whose readings are in a `unit` in MPa, as a file in `folder`.
@@ -76,19 +76,15 @@ fn press(scene: &Scene, frames: usize) -> Vec<(Vec<f64>, [f64; 3])> {
     press.frames(scene, SEED).unwrap().into_iter().map(|own| (own.stress_MPa, own.resultant_N.unwrap())).collect()
 }
 
+/// What a stream answers to a line: its number, and force and flags of the result if it is not refused.
+type Answer = (usize, Option<([f64; 3], Vec<String>)>);
+
 /// Frames as lines of a format, each `every`th without one of its bytes, as a stream.
-fn run(
-    (_, unit, lines, text): Format,
-    every: usize,
-    of: fn(&Scene, usize) -> Vec<(Vec<f64>, [f64; 3])>,
-    random: &mut Rng,
-) -> Outcome {
-    let folder = tempfile::tempdir().unwrap();
-    let path = scene(folder.path(), unit);
-    let frames = of(&Scene::load(&path).unwrap(), lines);
+fn run(path: &str, frames: &[(Vec<f64>, [f64; 3])], format: Format, every: usize, random: &mut Rng) -> Vec<Answer> {
+    let (_, unit, _, text) = format;
     let mut sent = String::new();
-    for (number, (stress_MPa, _)) in frames.iter().enumerate() {
-        let numbers: Vec<String> = stress_MPa.iter().map(|b| text(b / unit)).collect();
+    for (number, (stress, _)) in frames.iter().enumerate() {
+        let numbers: Vec<String> = stress.iter().map(|b| text(b / unit)).collect();
         let mut line = numbers.join(",");
         if number % every == every - 1 {
             line.remove(random.usize(..line.len()));
@@ -96,8 +92,8 @@ fn run(
         sent += &(line + "\n");
     }
     let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
-        .args(["reconstruct", &path, "--stream", "--brief"])
-        .current_dir(folder.path())
+        .args(["reconstruct", path, "--stream", "--brief"])
+        .current_dir(Path::new(path).parent().unwrap())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -107,26 +103,35 @@ fn run(
     let writer = std::thread::spawn(move || input.write_all(sent.as_bytes()).unwrap());
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
+    let answer = |line: &str| {
+        let answer: Value = serde_json::from_str(line).unwrap();
+        let of = |field: &str| answer.get(field).cloned();
+        let force = of("resultant_N").map(|force| serde_json::from_value(force).unwrap());
+        let flags = of("flags").map(|flags| serde_json::from_value(flags).unwrap());
+        (answer["line"].as_u64().unwrap() as usize, force.zip(flags))
+    };
+    let answers: Vec<Answer> = String::from_utf8(output.stdout).unwrap().lines().map(answer).collect();
+    assert_eq!(answers.len(), frames.len());
+    answers
+}
+
+/// What became of lines whose forces are these.
+fn outcome(answers: &[Answer], forces: &[[f64; 3]]) -> Outcome {
     let mut outcome = Outcome::default();
-    for answer in String::from_utf8(output.stdout).unwrap().lines() {
-        let answer: Value = serde_json::from_str(answer).unwrap();
-        let Some(found) = answer.get("resultant_N") else {
+    for (line, result) in answers {
+        let Some((found, flags)) = result else {
             outcome.refused += 1;
             continue;
         };
-        let found: [f64; 3] = serde_json::from_value(found.clone()).unwrap();
-        let errors = Errors::new(frames[answer["line"].as_u64().unwrap() as usize - 1].1, found);
+        let errors = Errors::new(forces[line - 1], *found);
         let wrong = [errors.tangential, errors.normal].iter().zip(RIGHT).any(|(e, right)| e.is_some_and(|e| e > right));
-        let flags: Vec<&str> = answer["flags"].as_array().unwrap().iter().map(|flag| flag.as_str().unwrap()).collect();
-        match flags[..] {
+        match &flags[..] {
             [] if wrong => outcome.silent += 1,
             [] => outcome.right += 1,
-            [only] if wrong && only == Flag::TornFrame.name() => outcome.by_lines_before += 1,
+            [only] if wrong && only == Flag::TornFrame.name() => outcome.torn += 1,
             _ => outcome.flagged += 1,
         }
     }
-    let all = outcome.refused + outcome.flagged + outcome.right + outcome.silent + outcome.by_lines_before;
-    assert_eq!(all, lines, "{outcome:?}");
     outcome
 }
 
@@ -136,25 +141,42 @@ fn run(
 fn a_link_that_loses_a_byte_of_each_line_makes_no_silent_error() {
     let mut random = Rng::with_seed(SEED);
     let outcomes = FORMATS.map(|format| {
-        let outcome = run(format, 1, unrelated, &mut random);
+        let folder = tempfile::tempdir().unwrap();
+        let path = scene(folder.path(), format.1);
+        let frames = unrelated(&Scene::load(&path).unwrap(), format.2);
+        let forces: Vec<[f64; 3]> = frames.iter().map(|(_, force)| *force).collect();
+        let outcome = outcome(&run(&path, &frames, format, 1, &mut random), &forces);
         println!("{}: {outcome:?}", format.0);
         outcome
     });
     assert_eq!(outcomes.each_ref().map(|outcome| outcome.silent), [0; 4]);
-    assert!(outcomes[0].by_lines_before > 0);
+    assert!(outcomes[0].torn > 0);
     // Numbers that show what they lose are not in doubt for it.
     assert!(outcomes[1].right > 0, "{outcomes:?}");
 }
 
-/// The same of a press, where lines that are whole stand between those that are cut, and nothing else shows what the link loses.
+/// The same of a press, where lines that are whole stand between those that are cut: against the forces of the lines without a loss,
+/// none of which is doubted.
 #[test]
 fn a_link_that_loses_a_byte_now_and_then_makes_no_silent_error_in_a_press() {
-    let mut random = Rng::with_seed(SEED);
-    for (format, every) in OF_A_PRESS.into_iter().flat_map(|format| [1, 8, PRESS + 1].map(|every| (format, every))) {
-        let outcome = run(format, every, press, &mut random);
-        println!("{}, every {every}: {outcome:?}", format.0);
-        assert_eq!(outcome.silent, 0, "{}, every {every}: {outcome:?}", format.0);
-        // Nothing is lost.
-        assert!(every <= PRESS || outcome.right > PRESS / 2, "{}: {outcome:?}", format.0);
+    let (mut random, mut torn) = (Rng::with_seed(SEED), 0);
+    for format in OF_A_PRESS {
+        let folder = tempfile::tempdir().unwrap();
+        let path = scene(folder.path(), format.1);
+        let frames = press(&Scene::load(&path).unwrap(), format.2);
+        let whole = run(&path, &frames, format, usize::MAX, &mut random);
+        let is_torn = |(_, result): &Answer| {
+            result.as_ref().is_none_or(|(_, flags)| flags.iter().any(|flag| flag == Flag::TornFrame.name()))
+        };
+        assert_eq!(whole.iter().filter(|answer| is_torn(answer)).count(), 0, "{}", format.0);
+        let forces: Vec<[f64; 3]> = whole.iter().map(|(_, result)| result.as_ref().unwrap().0).collect();
+        for every in [1, 8] {
+            let outcome = outcome(&run(&path, &frames, format, every, &mut random), &forces);
+            println!("{}, every {every}: {outcome:?}", format.0);
+            assert_eq!(outcome.silent, 0, "{}, every {every}: {outcome:?}", format.0);
+            torn += outcome.torn;
+        }
     }
+    // Nothing else showed these.
+    assert!(torn > 0);
 }
