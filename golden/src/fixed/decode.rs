@@ -26,6 +26,7 @@ use crate::result::reconstruct::{
 };
 use crate::spec::mean_window::MeanNoise;
 use crate::spec::partition::Subarray;
+use crate::spec::sensor::Sensor;
 use crate::spec::sliding::most_frames;
 
 /// The mean of the frames of a result.
@@ -141,13 +142,7 @@ impl Model {
         let frame = &stress;
         let case = self.case_of(status)?;
         let codes = self.codes(frame)?;
-        if beats.len() != self.force_beats() {
-            return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
-        }
-        let expected = self.status_beats_of(case);
-        if status.len() != expected {
-            return Err(FixedError::Beats { what: "status", got: status.len(), expected });
-        }
+        self.check_beats(case, beats, status)?;
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
         let taxels = self.scene.sensor.taxels();
         let records = Records::new(self, beats, lsb);
@@ -177,12 +172,8 @@ impl Model {
         };
         let regions = self.by_contact.is_some().then(|| {
             // The contact of each status: the taxels of its label, or the record after that of no contact.
-            let own: Vec<Region> = match &records {
-                None => {
-                    let labels = labels_of_beats(&beats[taxels..], taxels);
-                    let of = |slot| (0..taxels).filter(|&taxel| labels[taxel] == slot + 1).collect();
-                    (0..all.len()).map(|slot| Region::of_taxels(sensor, &forces, of(slot))).collect()
-                }
+            let own = match &records {
+                None => regions_of_labels(sensor, &forces, &beats[taxels..], all.len()),
                 Some(records) => records.regions(),
             };
             let found = own.into_iter().zip(&all).filter(|(own, _)| own.taxel_count > 0);
@@ -195,52 +186,17 @@ impl Model {
         }
         let searched = all.iter().filter(|_| regions.is_none());
         for (part, status) in case.parts.iter().zip(searched) {
-            let StatusMu { condition, found, mu, estimate } = self.mu_of(status);
-            let received = Received { condition_met: condition, ..received(part) };
-            shear_spread = shear_spread.or(estimate.and_then(|estimate| estimate.shear_spread()));
-            let score = match estimate {
-                Some(estimate) => Some(estimate.found.objective),
-                None => found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
-            };
-            let mu_sigma = estimate.and_then(|estimate| estimate.sigma);
-            subarrays.push(SubarrayResult { mu_sigma, ..SubarrayResult::new(part, &received, mu, score) });
+            let (own, spread) = self.of_status(part, received(part), status);
+            shear_spread = shear_spread.or(spread);
+            subarrays.push(own);
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
         result.extra.regions = regions;
         if let Some(records) = &records {
-            // Without forces per taxel only the device knows whether there is a contact.
-            let none = all.iter().all(|status| status.raised.contains(Flag::NoContact));
-            result.flags.retain(|flag| none || *flag != Flag::NoContact);
-            result.resultant_N = resultant_N;
+            self.add_records(&mut result, records, &all);
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
-            result.extra.resultants = Some(match &result.extra.regions {
-                Some(regions) => {
-                    result.extra.wrench = Some(records.wrench());
-                    regions.iter().map(Region::resultant).collect()
-                }
-                None => {
-                    let resultants = records.resultants();
-                    for (own, of) in result.subarrays.iter_mut().zip(&resultants) {
-                        own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
-                    }
-                    resultants
-                }
-            });
         }
-        if self.scene.input.slides() {
-            // As the device says, which alone knows of its resets.
-            let window = all.first().and_then(|status| self.window_of(status));
-            result.extra.lag_frames = window.as_ref().map(|window| window.age);
-            let frames = all.first().map(|status| status.frames as usize);
-            result.extra.mean_frames = window.map(|window| window.frames_held()).or(frames);
-        }
-        if self.has_writable_tables() {
-            result.extra.tables_version = all.first().map(|status| status.tables_version as u16);
-        }
-        if self.chooses() {
-            let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
-            result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
-        }
+        self.add_state(&mut result, case, all.first());
         let network_misfit = self.misfit.as_ref().and_then(|misfit| misfit.of(&result, frame, noise_MPa));
         let newest = self.scene.input.newest(readings);
         let figures = result.figures(&self.scene, frame).with_readings(&self.input, newest);
@@ -251,6 +207,68 @@ impl Model {
             deviations.add(&mut result, &self.scene, frame, noise_MPa);
         }
         Ok(result)
+    }
+
+    /// Checks the numbers of beats.
+    fn check_beats(&self, case: &CasePlan, beats: &[[i32; 3]], status: &[[i32; 3]]) -> Result<(), FixedError> {
+        let numbers =
+            [("forces", beats.len(), self.force_beats()), ("status", status.len(), self.status_beats_of(case))];
+        match numbers.into_iter().find(|(_, got, expected)| got != expected) {
+            Some((what, got, expected)) => Err(FixedError::Beats { what, got, expected }),
+            None => Ok(()),
+        }
+    }
+
+    /// A subarray and its status, and how much the shear may be wrong, if the status tells.
+    fn of_status(&self, part: &Subarray, received: Received, status: &Status) -> (SubarrayResult, Option<f64>) {
+        let StatusMu { condition, found, mu, estimate } = self.mu_of(status);
+        let received = Received { condition_met: condition, ..received };
+        let score = match estimate {
+            Some(estimate) => Some(estimate.found.objective),
+            None => found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
+        };
+        let mu_sigma = estimate.and_then(|estimate| estimate.sigma);
+        let own = SubarrayResult { mu_sigma, ..SubarrayResult::new(part, &received, mu, score) };
+        (own, estimate.and_then(|estimate| estimate.shear_spread()))
+    }
+
+    /// Adds the forces that the device has summed up.
+    fn add_records(&self, result: &mut Reconstruction, records: &Records, statuses: &[Status]) {
+        // Without forces per taxel only the device knows whether there is a contact.
+        let none = statuses.iter().all(|status| status.raised.contains(Flag::NoContact));
+        result.flags.retain(|flag| none || *flag != Flag::NoContact);
+        result.resultant_N = records.resultant_N();
+        result.extra.resultants = Some(match &result.extra.regions {
+            Some(regions) => {
+                result.extra.wrench = Some(records.wrench());
+                regions.iter().map(Region::resultant).collect()
+            }
+            None => {
+                let resultants = records.resultants();
+                for (own, of) in result.subarrays.iter_mut().zip(&resultants) {
+                    own.shear_sigma_N = shear_sigma_N(own.mu_sigma, of.force_N[2]);
+                }
+                resultants
+            }
+        });
+    }
+
+    /// Adds what the first status says of the device: its mean, the version of its tables, the case that it took.
+    fn add_state(&self, result: &mut Reconstruction, case: &CasePlan, status: Option<&Status>) {
+        if self.scene.input.slides() {
+            // As the device says, which alone knows of its resets.
+            let window = status.and_then(|status| self.window_of(status));
+            result.extra.lag_frames = window.as_ref().map(|window| window.age);
+            let frames = status.map(|status| status.frames as usize);
+            result.extra.mean_frames = window.map(|window| window.frames_held()).or(frames);
+        }
+        if self.has_writable_tables() {
+            result.extra.tables_version = status.map(|status| status.tables_version as u16);
+        }
+        if self.chooses() {
+            let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
+            result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
+        }
     }
 
     /// The flags that the statuses of a frame raise; `condition-unmet` only by those whose μ `counts`, by their index.
@@ -293,4 +311,11 @@ impl Model {
         let case = self.cases().iter().find(|case| case.number() == number);
         case.ok_or(FixedError::Internal("the status names a case that was not built"))
     }
+}
+
+/// The contact of each of `statuses` from the labels of its taxels.
+fn regions_of_labels(sensor: &Sensor, forces: &Forces, beats: &[[i32; 3]], statuses: usize) -> Vec<Region> {
+    let labels = labels_of_beats(beats, sensor.taxels());
+    let of = |slot| (0..labels.len()).filter(|&taxel| labels[taxel] == slot + 1).collect();
+    (0..statuses).map(|slot| Region::of_taxels(sensor, forces, of(slot))).collect()
 }

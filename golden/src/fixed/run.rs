@@ -129,6 +129,22 @@ impl Model {
             Summed::Subarray => Record::of(sensor, case.parts[index].indices(sensor), &forces),
             Summed::Label => Record::of(sensor, (0..labels.len()).filter(|&taxel| labels[taxel] == index), &forces),
         };
+        let choice = if self.chooses() { choose::LATENCY } else { 0 };
+        Trace {
+            beats: match self.summed() {
+                None => forces.iter().map(|f| f.words).chain(labels_to_beats(&labels)).collect(),
+                Some(summed) => (0..self.records()).flat_map(|k| record(summed, k).beats(summed)).collect(),
+            },
+            status,
+            stages: self.streams(codes, chosen, &solved),
+            cycles: cycles.after_choice(self),
+            beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
+            timing,
+        }
+    }
+
+    /// The words of each stage that the engine has.
+    fn streams(&self, codes: &[i32], chosen: usize, solved: &[SubarrayTrace]) -> Vec<Stage> {
         let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
             name,
             words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
@@ -153,7 +169,6 @@ impl Model {
             quads("forces", |s| &s.found.values),
         ];
         split_values(&mut stages, self.formats().search_width);
-        let choice = if self.chooses() { choose::LATENCY } else { 0 };
         stages.retain(|stage| match stage.name {
             "choose" => self.chooses(),
             "search" => self.searches() || self.board.engine == EngineKind::Serial,
@@ -161,17 +176,7 @@ impl Model {
             "segment" | "window" | "shear" => self.by_contact.is_some(),
             _ => true,
         });
-        Trace {
-            beats: match self.summed() {
-                None => forces.iter().map(|f| f.words).chain(labels_to_beats(&labels)).collect(),
-                Some(summed) => (0..self.records()).flat_map(|k| record(summed, k).beats(summed)).collect(),
-            },
-            status,
-            stages: as_engine_streams(self.board.engine, stages),
-            cycles: cycles.after_choice(self),
-            beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
-            timing,
-        }
+        as_engine_streams(self.board.engine, stages)
     }
 }
 

@@ -192,7 +192,13 @@ impl Arguments {
 
 /// The lines of the printed summary, without the written files.
 fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result {
-    let Summary { window, codes, noise, .. } = summary;
+    of_file(text, summary, sensor)?;
+    of_frames(text, summary)
+}
+
+/// What was read of the file, and what not.
+fn of_file(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result {
+    let window = &summary.window;
     let [rows, cols] = summary.array;
     let device = summary.device.as_deref().unwrap_or("device not stated");
     writeln!(
@@ -250,6 +256,12 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
             numbers.join(", ")
         )?;
     }
+    Ok(())
+}
+
+/// What the frames hold.
+fn of_frames(text: &mut String, summary: &Summary) -> std::fmt::Result {
+    let Summary { codes, noise, .. } = summary;
     let count = summary.frames.len();
     let period = summary.frames.first().zip(summary.frames.get(1)).and_then(|(a, b)| Some(b.time_s? - a.time_s?));
     let period = period.map_or(String::new(), |seconds| format!(", {seconds:.4} s apart"));

@@ -60,7 +60,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = Training::default().rate)]
     rate: f64,
     /// How the shear is spread over the contacts: full (slip), mixed, even, or its share of the friction limit. Of the shipped
-    /// networks those of several contacts are of full slip.
+    /// networks that of eight-by-eight-contacts is of full slip.
     #[arg(long, default_value_t = Training::default().slip)]
     slip: Slip,
     /// How far the Poisson ratio of a bonded cover may be from the scene's.

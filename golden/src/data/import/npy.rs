@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `descr` | integers of 1 to 8 bytes, floats of 2, 4 and 8, booleans; little- and big-endian |
 //! | `fortran_order` | both |
-//! | `shape` | (frames, rows, cols), (rows, cols) for one frame, (frames, taxels) beside a stated size |
+//! | `shape` | (frames, rows, cols), (rows, cols) for one frame; beside a stated size also (frames, taxels), (rows, cols, frames) and (taxels, frames) |
 //!
 //! A value that is not a number is a missing reading. The header is read here and not by a general reader of
 //! Python literals: three fields of fixed kinds need no recursion and no allocation that a damaged header can inflate.
@@ -26,12 +26,14 @@ struct Header {
 pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> Result<Recording, ImportError> {
     let (text, data) = split(bytes).ok_or_else(|| source.field("the NumPy header", "cut off", "complete"))?;
     let header = header(&text, source)?;
-    let [count, rows, cols] = dimensions(&header.shape, size, source)?;
+    let order = Order::of(&header.shape, size, source)?;
+    let Order { frames: count, size: [rows, cols], .. } = order;
     let taxels = rows * cols;
     let frame_bytes = taxels.checked_mul(header.number.width);
     let wanted = frame_bytes.and_then(|bytes| bytes.checked_mul(count));
-    // Frames stand one after the other but in the order of Fortran.
-    let whole = frame_bytes.filter(|_| !header.fortran).map_or(0, |bytes| data.len() / bytes);
+    let steps = order.steps(&header.shape, header.fortran);
+    // Of those that do not stand one after the other none is whole.
+    let whole = frame_bytes.filter(|_| steps[0] == taxels).map_or(0, |bytes| data.len() / bytes);
     let cut = wanted.is_some_and(|wanted| data.len() < wanted).then(|| format!("the header states {count} frames"));
     let count = if cut.is_some() { whole } else { count };
     if cut.is_none() && wanted != Some(data.len()) {
@@ -45,14 +47,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         let mut values = Vec::with_capacity(taxels);
         for taxel in 0..taxels {
             let (row, col) = (taxel / cols, taxel % cols);
-            let index = match (header.fortran, header.shape.len()) {
-                (false, _) => frame * taxels + taxel,
-                (true, 3) => frame + count * (row + rows * col),
-                // One frame, or a line of taxels per frame.
-                (true, _) if count == 1 && header.shape == [rows, cols] => row + rows * col,
-                (true, _) => frame + count * taxel,
-            };
-            let number = value(index);
+            let number = value(frame * steps[0] + row * steps[1] + col * steps[2]);
             if !number.is_nan() && !is_reading(number) {
                 let place = format!("frame {}, row {row}, column {col}", frame + 1);
                 return Err(source.field(&place, number, "a number up to 1e9 in magnitude, or NaN"));
@@ -61,7 +56,8 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         }
         frames.push(RawFrame { number: frame + 1, time_s: None, values, stated: None, device: None });
     }
-    Ok(Recording { cut, ..Recording::bare(Format::Npy, [rows, cols], frames) })
+    let in_doubt = order.in_doubt(&header.shape, size);
+    Ok(Recording { cut, in_doubt, ..Recording::bare(Format::Npy, [rows, cols], frames) })
 }
 
 /// Text of the header, and the bytes behind it.
@@ -142,20 +138,105 @@ fn number(descr: &str) -> Option<NumberFormat> {
     Some(NumberFormat { kind, width, big_endian })
 }
 
-/// Frames, rows and columns of a shape.
-fn dimensions(shape: &[usize], size: Option<[usize; 2]>, source: &Source) -> Result<[usize; 3], ImportError> {
-    let wrong = |allowed: &str| source.field("shape", format!("{shape:?}"), allowed);
-    let sides = match (shape, size) {
-        ([frames, taxels], Some([rows, cols])) if rows * cols == *taxels => [*frames, rows, cols],
-        ([rows, cols], None) => [1, *rows, *cols],
-        ([frames, rows, cols], None) => [*frames, *rows, *cols],
-        ([rows, cols], Some(size)) if size == [*rows, *cols] => [1, *rows, *cols],
-        ([frames, rows, cols], Some(size)) if size == [*rows, *cols] => [*frames, *rows, *cols],
-        (_, Some(_)) => return Err(wrong("that of --size: (frames, rows, cols), (rows, cols) or (frames, taxels)")),
-        _ => return Err(wrong("(frames, rows, cols) or (rows, cols)")),
-    };
-    match sides[1].max(sides[2]) <= LARGEST_SIDE {
-        true => Ok(sides),
-        false => Err(wrong(&format!("at most {LARGEST_SIDE} rows and columns"))),
+/// What the axes of an array are.
+struct Order {
+    frames: usize,
+    size: [usize; 2],
+    /// Axis of the frames, of the rows, of the columns; one of all taxels is that of both, and one frame has none.
+    axes: [Option<usize>; 3],
+}
+
+impl Order {
+    /// That of a shape.
+    fn of(shape: &[usize], size: Option<[usize; 2]>, source: &Source) -> Result<Order, ImportError> {
+        let wrong = |allowed: &str| source.field("shape", format!("{shape:?}"), allowed);
+        let (frames, size, axes) = match (shape, size) {
+            ([frames, taxels], Some(size)) if size[0] * size[1] == *taxels => {
+                (*frames, size, [Some(0), Some(1), Some(1)])
+            }
+            ([rows, cols], size) if size.is_none_or(|size| size == [*rows, *cols]) => {
+                (1, [*rows, *cols], [None, Some(0), Some(1)])
+            }
+            ([frames, rows, cols], size) if size.is_none_or(|size| size == [*rows, *cols]) => {
+                (*frames, [*rows, *cols], [Some(0), Some(1), Some(2)])
+            }
+            ([rows, cols, frames], Some(size)) if size == [*rows, *cols] => {
+                (*frames, size, [Some(2), Some(0), Some(1)])
+            }
+            ([taxels, frames], Some(size)) if size[0] * size[1] == *taxels => {
+                (*frames, size, [Some(1), Some(0), Some(0)])
+            }
+            (_, Some(_)) => {
+                let allowed =
+                    "that of --size: (frames, rows, cols), (rows, cols), (frames, taxels), (rows, cols, frames) or \
+                               (taxels, frames)";
+                return Err(wrong(allowed));
+            }
+            _ => return Err(wrong("(frames, rows, cols) or (rows, cols)")),
+        };
+        match size[0].max(size[1]) <= LARGEST_SIDE {
+            true => Ok(Order { frames, size, axes }),
+            false => Err(wrong(&format!("at most {LARGEST_SIDE} rows and columns"))),
+        }
+    }
+
+    /// Values from one frame, row and column to the next.
+    fn steps(&self, shape: &[usize], fortran: bool) -> [usize; 3] {
+        let step = |axis: usize| if fortran { &shape[..axis] } else { &shape[axis + 1..] }.iter().product::<usize>();
+        let [frames, rows, cols] = self.axes.map(|axis| axis.map_or(0, step));
+        // Taxels on one axis.
+        let rows = if self.axes[1] == self.axes[2] { rows * self.size[1] } else { rows };
+        [frames, rows, cols]
+    }
+
+    /// That an array may be of another order, in words: more columns than frames, where no size is stated.
+    fn in_doubt(&self, shape: &[usize], size: Option<[usize; 2]>) -> Vec<String> {
+        let ([a, b, c], None) = (shape, size) else { return Vec::new() };
+        match c > a {
+            true => vec![format!("read as {a} frames of {b}×{c}; --size {a}x{b} reads {c} frames of {a}×{b}")],
+            false => Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An array of bytes whose axes, of this shape, have these steps in (frame, row, column), of 3 frames of 2×4.
+    fn array(shape: &[usize], place: impl Fn([usize; 3]) -> usize, fortran: bool) -> Vec<u8> {
+        let order = if fortran { "True" } else { "False" };
+        let header =
+            format!("{{'descr': '|u1', 'fortran_order': {order}, 'shape': ({shape:?}), }}\n").replace(['[', ']'], "");
+        let mut data = vec![0; 24];
+        for value in 0..24 {
+            data[place([value / 8, value / 4 % 2, value % 4])] = value as u8 + 1;
+        }
+        [NPY_MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes(), &data].concat()
+    }
+
+    #[test]
+    fn frames_are_the_same_in_every_order() {
+        type Place = fn([usize; 3]) -> usize;
+        let orders: [(&[usize], Place, Place); 4] = [
+            (&[3, 2, 4], |[f, r, c]| (2 * f + r) * 4 + c, |[f, r, c]| f + 3 * (r + 2 * c)),
+            (&[3, 8], |[f, r, c]| 8 * f + 4 * r + c, |[f, r, c]| f + 3 * (4 * r + c)),
+            (&[2, 4, 3], |[f, r, c]| (4 * r + c) * 3 + f, |[f, r, c]| r + 2 * (c + 4 * f)),
+            (&[8, 3], |[f, r, c]| (4 * r + c) * 3 + f, |[f, r, c]| 4 * r + c + 8 * f),
+        ];
+        let wanted: Vec<Vec<f64>> =
+            (0..3).map(|frame| (1..9).map(|own| f64::from(8 * frame + own)).collect()).collect();
+        let source = Source { file: "a.npy" };
+        for (shape, c, fortran) in orders {
+            for bytes in [array(shape, c, false), array(shape, fortran, true)] {
+                let read = parse(&bytes, Some([2, 4]), &source).unwrap();
+                let frames: Vec<Vec<f64>> = read.frames.into_iter().map(|frame| frame.values).collect();
+                assert_eq!((frames, read.in_doubt), (wanted.clone(), vec![]), "{shape:?}");
+            }
+        }
+        // More columns than frames, and no size that says what they are.
+        let read = |shape: &[usize]| parse(&array(shape, |[f, r, c]| 8 * f + 4 * r + c, false), None, &source).unwrap();
+        assert_eq!(read(&[2, 4, 3]).in_doubt, ["read as 2 frames of 4×3; --size 2x4 reads 3 frames of 2×4"]);
+        assert!(read(&[4, 2, 3]).in_doubt.is_empty());
     }
 }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 use serde_json::Value;
 
-use super::reader::LeftOut;
+use super::read::LeftOut;
 use super::{Line, NoReadings, TimeUnit};
 use crate::plain_words::JsonError;
 

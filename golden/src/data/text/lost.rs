@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use super::cells::Digits;
-use super::reader::{Read, TextFrame};
+use super::read::{Doubt, Read, TextFrame};
 use super::{json, Layout};
 
 /// Change of a reading, over the largest of those that no lost character explains: from this one on it may be due to a character that
@@ -22,22 +22,6 @@ const LEAST: f64 = 0.05;
 const OTHERS: usize = 6;
 /// Lines before and after one that has lost characters in which one more may be lost where it does not show.
 const DOUBTED: usize = 100;
-
-/// Why a reading of a frame may be another one than that which was sent.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Doubt {
-    /// The line of this number, at most a hundred lines away, has lost characters, and one that this frame has lost would not show.
-    NearLoss(usize),
-    /// A reading has changed by far more than the others, and with one more character its number would be nearly that before.
-    Reading {
-        /// Row-major, from 0.
-        taxel: usize,
-        /// The number as it is written.
-        cell: String,
-        /// The reading before.
-        before: f64,
-    },
-}
 
 /// Finds frames in which a number may have lost a character: see [`super::Reader`].
 #[derive(Clone, Debug, Default)]

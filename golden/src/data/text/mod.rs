@@ -38,6 +38,7 @@ mod decode;
 mod json;
 mod layout;
 mod lost;
+mod read;
 mod reader;
 #[cfg(test)]
 mod tests;
@@ -49,8 +50,8 @@ pub use cells::{reading, Separator};
 pub use decode::{decoded, Decoded};
 pub(crate) use json::without_nan;
 pub use layout::{Form, Layout, Stated};
-pub use lost::Doubt;
-pub use reader::{LeftOut, Read, Reader, TextFrame};
+pub use read::{Doubt, LeftOut, Read, TextFrame};
+pub use reader::Reader;
 pub(crate) use time::number_ns;
 pub use time::{is_date, TimeUnit};
 pub use whole::{frames, TextFrames};

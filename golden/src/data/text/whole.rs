@@ -1,7 +1,8 @@
 //! All frames of a text.
 
-use super::reader::{LeftOut, Read, Reader, TextFrame};
-use super::{json, shown, Doubt, Layout, Line, NoReadings, Stated};
+use super::read::{Doubt, LeftOut, Read, TextFrame};
+use super::reader::Reader;
+use super::{json, shown, Layout, Line, NoReadings, Stated};
 
 /// All frames of a text.
 #[derive(Clone, Debug, PartialEq)]
