@@ -21,7 +21,7 @@ use dermis_sim::stream::{
     run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
 };
 
-use crate::carrier::{Carrier, Publisher, Subscription};
+use crate::carrier::{self, Carrier, Publisher, Subscription};
 use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
 use crate::messages::{self, Messages};
 use crate::patches::{Patch, PatchFile};
@@ -75,21 +75,21 @@ fn board(port: &str, scene: &Scene) -> Result<BoardEngine> {
 struct Outlet {
     messages: Messages,
     state: Arc<PatchState>,
-    wrench: Publisher,
-    contacts: Publisher,
-    arrows: Publisher,
-    forces: Option<Publisher>,
-    stress: Option<Publisher>,
+    wrench: Box<dyn Publisher>,
+    contacts: Box<dyn Publisher>,
+    arrows: Box<dyn Publisher>,
+    forces: Option<Box<dyn Publisher>>,
+    stress: Option<Box<dyn Publisher>>,
     /// Kept as long as it is published.
-    _scene: Publisher,
-    _tare: Subscription,
+    _scene: Box<dyn Publisher>,
+    _tare: Box<dyn Subscription>,
     zero: ZeroRequest,
     /// Least time between results that are published.
     period: Duration,
 }
 
 impl Outlet {
-    fn open(carrier: &Carrier, file: &PatchFile, patch: &Patch, state: Arc<PatchState>) -> Result<Outlet> {
+    fn open(carrier: &dyn Carrier, file: &PatchFile, patch: &Patch, state: Arc<PatchState>) -> Result<Outlet> {
         let topics = PatchTopics::new(&file.node.namespace, patch);
         let optional = |topic: &Option<topics::Topic>| topic.as_ref().map(|own| carrier.publisher(own)).transpose();
         let zero = ZeroRequest::default();
@@ -105,7 +105,7 @@ impl Outlet {
             forces: optional(&topics.forces)?,
             stress: optional(&topics.stress)?,
             _scene: scene,
-            _tare: carrier.subscription(&topics.tare, move |_| asked.now())?,
+            _tare: carrier.subscription(&topics.tare, Box::new(move || asked.now()))?,
             zero,
             period: file.node.rate_Hz.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate)),
         })
@@ -118,7 +118,7 @@ impl Outlet {
         if self.arrows.is_wanted() {
             self.arrows.put(self.messages.arrows(answer)?)?;
         }
-        let wanted = |publisher: &'_ Option<Publisher>| publisher.as_ref().is_some_and(Publisher::is_wanted);
+        let wanted = |publisher: &Option<Box<dyn Publisher>>| publisher.as_ref().is_some_and(|own| own.is_wanted());
         let forces = if wanted(&self.forces) { self.messages.forces(answer)? } else { None };
         let stress = if wanted(&self.stress) { self.messages.stress(answer)? } else { None };
         for (publisher, message) in [(&self.forces, forces), (&self.stress, stress)] {
@@ -150,13 +150,13 @@ fn now_ns() -> i64 {
 /// A scene that its engine refuses, an address that cannot be used.
 pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let engines = Engines::build(file)?;
-    let carrier = Carrier::open(&file.node)?;
+    let carrier = carrier::open(&file.node)?;
     let changes = Arc::new(Changes::default());
     let late = Duration::from_secs_f64(file.node.late_ms / 1e3);
     let mut outlets = Vec::new();
     for (index, patch) in file.patches.iter().enumerate() {
         let state = PatchState::new(index, &patch.fields.name, &patch.scene.name, late, Arc::clone(&changes));
-        outlets.push(Outlet::open(&carrier, file, patch, Arc::new(state))?);
+        outlets.push(Outlet::open(carrier.as_ref(), file, patch, Arc::new(state))?);
     }
     let places = match messages::places(&file.patches, now_ns())? {
         Some(message) => {
@@ -167,11 +167,12 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
         None => None,
     };
     let reports = carrier.publisher(&topics::diagnostics())?;
+    carrier.complete()?;
     let stop = Stop::default();
     let stopping = stop.clone();
     Interrupt::with(move || stopping.now())?;
     let (patches, threads) = (file.patches.len(), file.threads());
-    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.addresses().join(", "));
+    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.place());
     let running = AtomicBool::new(true);
     let begun = Instant::now();
     if let Some(time) = measure {
@@ -187,7 +188,7 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
         .collect();
     let share = (threads.max(1) as f64 / patches as f64).min(1.0);
     std::thread::scope(|scope| {
-        let reporting = scope.spawn(|| report(&outlets, &changes, &reports, &running));
+        let reporting = scope.spawn(|| report(&outlets, &changes, reports.as_ref(), &running));
         // A board keeps its worker waiting: it has one of its own.
         let (boards, computed): (Vec<&Own>, Vec<&Own>) = all.iter().partition(|own| own.patch.fields.board.is_some());
         let divided = (0..threads).map(|worker| computed.iter().copied().skip(worker).step_by(threads).collect());
@@ -278,7 +279,7 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
 }
 
 /// Publishes the states until the workers have ended: all once per second, those that change at once.
-fn report(outlets: &[Outlet], changes: &Changes, reports: &Publisher, running: &AtomicBool) -> Result<()> {
+fn report(outlets: &[Outlet], changes: &Changes, reports: &dyn Publisher, running: &AtomicBool) -> Result<()> {
     let mut due = Instant::now() + PERIOD;
     loop {
         let last = !running.load(Ordering::Acquire);

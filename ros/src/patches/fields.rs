@@ -1,6 +1,10 @@
 //! The fields of a patch file as they are written, with their defaults.
 
+use std::net::Ipv4Addr;
+
 use serde::Deserialize;
+
+use crate::carrier::CarrierName;
 
 /// Address of the router of rmw_zenoh.
 pub(super) const ROUTER: &str = "tcp/127.0.0.1:7447";
@@ -17,10 +21,14 @@ pub struct NodeFields {
     pub namespace: String,
     /// Domain of ROS 2, 0 to 232.
     pub domain: u32,
-    /// Addresses of routers and other nodes to connect to, as Zenoh writes them.
+    /// What carries its messages.
+    pub carrier: CarrierName,
+    /// Of Zenoh: addresses of routers and other nodes to connect to.
     pub connect: Vec<String>,
-    /// Addresses to listen on.
+    /// Of Zenoh: addresses to listen on.
     pub listen: Vec<String>,
+    /// Of DDS: addresses of this computer that others are told, and on whose networks they are sought.
+    pub interfaces: Vec<Ipv4Addr>,
     /// Most messages per second of a topic of a patch; every result if not stated.
     pub rate_Hz: Option<f64>,
     /// Results later than this after their frame count as late.
@@ -37,8 +45,10 @@ impl Default for NodeFields {
             name: "dermis".into(),
             namespace: "/".into(),
             domain: 0,
+            carrier: CarrierName::Zenoh,
             connect: vec![ROUTER.into()],
             listen: vec![LOOPBACK.into()],
+            interfaces: vec![Ipv4Addr::LOCALHOST],
             rate_Hz: None,
             late_ms: 20.0,
             queue: 2,
