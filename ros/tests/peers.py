@@ -60,19 +60,20 @@ class Raw:
     """What a subscriber of Zenoh receives, with the attachments."""
 
     def __init__(self, session: zenoh.Session, key: str, history: bool) -> None:
-        self.received: list[zenoh.Sample] = []
+        self.samples: list[bytes] = []
+        self.attachments: list[bytes] = []
         if history:
             config = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
-            self.own = zenoh.ext.declare_advanced_subscriber(session, key, self.received.append, history=config)
+            self.own = zenoh.ext.declare_advanced_subscriber(session, key, self.take, history=config)
         else:
-            self.own = session.declare_subscriber(key, self.received.append)
+            self.own = session.declare_subscriber(key, self.take)
 
-    @property
-    def samples(self) -> list[bytes]:
-        return [own.payload.to_bytes() for own in self.received]
+    def take(self, sample: zenoh.Sample) -> None:
+        self.attachments.append(sample.attachment.to_bytes())
+        self.samples.append(sample.payload.to_bytes())
 
     def lost(self) -> int:
-        attached = [struct.unpack("<qqB16s", own.attachment.to_bytes()) for own in self.received]
+        attached = [struct.unpack("<qqB16s", own) for own in self.attachments]
         numbers = [number for number, _, _, _ in attached]
         assert {length for _, _, length, _ in attached} == {16} and len({gid for _, _, _, gid in attached}) == 1
         return max(numbers) - min(numbers) + 1 - len(numbers)

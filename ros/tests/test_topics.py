@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import COLS, PITCH_MM, ROWS, Node, expected, feed, frame, line, node, run, wait
+from cyclonedds.core import Policy
 from peers import PEERS, STORE, DdsPeer, Peer, ZenohPeer, ros_type
 from rosbags.typesys import get_types_from_msg
 from zenoh_ros2_sdk import ROS2Subscriber, discovery
@@ -27,8 +28,6 @@ TYPES = {
 }
 STATE, PLACES, TEXT = "diagnostic_msgs/msg/DiagnosticArray", "tf2_msgs/msg/TFMessage", "std_msgs/msg/String"
 GRAPH = "rmw_dds_common/msg/ParticipantEntitiesInfo"
-# Subscribers of each latched topic that come later.
-LATE = 100
 PATCH = """
 [[patch]]
 name = "thumb"
@@ -54,12 +53,18 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", params=PEERS)
 def running(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, messages: Path) -> Iterator[Node]:
-    """A node over each carrier."""
+    """A node over each carrier; over Zenoh with the session of zenoh-ros2-sdk, of which a program has one."""
     for name in ("Contact", "Contacts"):
         text = (messages / "dermis_msgs/msg" / f"{name}.msg").read_text()
         STORE.register(get_types_from_msg(text, f"dermis_msgs/msg/{name}"))
     with node(tmp_path_factory.mktemp("node"), PATCH, 'namespace = "/hand"\nqueue = 64', request.param) as own:
+        if own.carrier == "zenoh":
+            ZenohSession.get_instance("127.0.0.1", own.port)
+            # Else it takes them from the network.
+            get_registry().messages_dir = messages
         yield own
+        if own.carrier == "zenoh":
+            ZenohSession.get_instance().close()
 
 
 @pytest.fixture
@@ -70,26 +75,20 @@ def peer(running: Node) -> Iterator[Peer]:
 
 
 @pytest.fixture
-def sdk(running: Node, messages: Path) -> Iterator[dict[str, list[Any]]]:
+def sdk(running: Node) -> Iterator[dict[str, list[Any]]]:
     """What subscribers of zenoh-ros2-sdk receive, a node of ROS 2 over Zenoh; over DDS there is none."""
     received: dict[str, list[Any]] = {}
+    subscribers = []
     if running.carrier == "zenoh":
-        # A program has one session.
-        ZenohSession.get_instance("127.0.0.1", running.port)
-        # Else it takes them from the network.
-        get_registry().messages_dir = messages
-        received = {topic: [] for topic in (*TYPES, "places")}
         # It asks the cache of what is latched where the topic has no namespace.
-        own = [ROS2Subscriber("/tf_static", PLACES, received["places"].append, domain_id=running.domain, qos=LATCHED)]
-        for topic, kind in TYPES.items():
-            name = f"/hand/thumb/{topic}"
-            own.append(ROS2Subscriber(name, kind, received[topic].append, domain_id=running.domain, qos=BEST_EFFORT))
-            assert own[-1].type_hash == STORE.hash_rihs01(kind)
+        topics = {"/tf_static": (PLACES, LATCHED)} | {f"/hand/thumb/{topic}": (kind, BEST_EFFORT) for topic, kind in TYPES.items()}
+        for topic, (kind, qos) in topics.items():
+            own = received[topic.rsplit("/", 1)[1]] = []
+            subscribers.append(ROS2Subscriber(topic, kind, own.append, domain_id=running.domain, qos=qos))
+            assert subscribers[-1].type_hash == STORE.hash_rihs01(kind)
     yield received
-    if received:
-        for subscriber in own:
-            subscriber.close()
-        ZenohSession.get_instance().close()
+    for subscriber in subscribers:
+        subscriber.close()
 
 
 over_zenoh = pytest.mark.parametrize("running", ["zenoh"], indirect=True)
@@ -214,7 +213,7 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
             change(topic, pressed)
             with pytest.raises(AssertionError):
                 check(topic, pressed, results)
-    assert [own.child_frame_id for message in sdk.get("places", []) for own in message.transforms] in ([], ["thumb_pad"])
+    assert all([own.child_frame_id for own in message.transforms] == ["thumb_pad"] for message in sdk.get("tf_static", []))
     # Every second frame changes a flag: reliable ones have no gap.
     assert len(state.samples) >= MESSAGES * 0.6 and state.lost() == 0
     statuses = [array.status for array in decoded(state.samples, STATE)]
@@ -231,7 +230,7 @@ def check_number(topic: str, message: Any) -> int:
 
 def test_latched_topics_are_there_for_whoever_comes_later(running: Node, peer: Peer) -> None:
     latched = {"/tf_static": PLACES, "/hand/thumb/scene": TEXT}
-    for _ in range(LATE):
+    for _ in range(MESSAGES):
         late = [peer.subscribe(topic, kind, latched=True) for topic, kind in latched.items()]
         wait(lambda late=late: all(own.samples for own in late))
         (places,), (scene,) = (own.samples for own in late)
@@ -251,15 +250,6 @@ def test_latched_topics_are_there_for_whoever_comes_later(running: Node, peer: P
     assert np.allclose(angles, [0.1, -0.2, 0.3], atol=1e-12)
 
 
-@over_zenoh
-def test_the_cache_of_what_is_latched_answers_each_time(running: Node) -> None:
-    own = ZenohPeer(running)
-    for topic, kind in {"/tf_static": PLACES, "/hand/thumb/scene": TEXT}.items():
-        place = f"{own.key(topic, kind)}/@adv/**?_anyke"
-        assert [len(list(own.session.get(place, timeout=5.0))) for _ in range(MESSAGES)] == [1] * MESSAGES
-    own.close()
-
-
 def topics_of_the_check(running: Node) -> set[tuple[str, str]]:
     """Names and types."""
     rows = [row.split() for row in run("DERMIS_ROS", str(running.file), "--check").stdout.splitlines()]
@@ -267,7 +257,7 @@ def topics_of_the_check(running: Node) -> set[tuple[str, str]]:
 
 
 @over_zenoh
-def test_tokens_name_the_topics_of_the_check(running: Node, sdk: dict[str, list[Any]]) -> None:
+def test_tokens_name_the_topics_of_the_check(running: Node) -> None:
     found = discovery.get_topic_names_and_types(running.domain)
     assert {(name, kind) for name, kinds in found for kind in kinds} == topics_of_the_check(running)
     quality = {"wrench": (2, 2, "1"), "scene": (1, 1, "1")}
@@ -309,10 +299,12 @@ def test_the_node_and_its_topics_are_found_on_dds(running: Node) -> None:
     assert {bytes(said.gid.data[:12])} == {gid[:12] for gid in found}
     topics = {(name.removeprefix("rt"), ros_type(kind)) for name, kind, _ in found.values() if name.startswith("rt/")}
     assert topics == topics_of_the_check(running)
-    qualities = {name: (str(qos[Policy.Reliability]), str(qos[Policy.Durability])) for name, _, qos in found.values()}
-    assert qualities["rt/hand/thumb/wrench"] == ("BestEffort", "Volatile")
-    assert qualities["rt/hand/thumb/scene"] == qualities["ros_discovery_info"] == ("Reliable", "TransientLocal")
-    assert qualities["rt/diagnostics"] == qualities["rt/hand/thumb/tare"] == ("Reliable", "Volatile")
+    reliable = {name: qos[Policy.Reliability] != Policy.Reliability.BestEffort for name, _, qos in found.values()}
+    latched = {name: qos[Policy.Durability] == Policy.Durability.TransientLocal for name, _, qos in found.values()}
+    quality = {name.removeprefix("rt/hand/thumb/"): (reliable[name], latched[name]) for name in reliable}
+    assert quality["wrench"] == quality["contacts"] == (False, False)
+    assert quality["scene"] == quality["rt/tf_static"] == quality["ros_discovery_info"] == (True, True)
+    assert quality["rt/diagnostics"] == quality["tare"] == (True, False)
     own.close()
 
 

@@ -8,6 +8,9 @@
 //! computer at the ports that its standard gives them, others by multicast. The hash of a type is not told, since `rustdds` has no
 //! place for it.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::net::{Ipv4Addr, UdpSocket};
