@@ -146,7 +146,7 @@ def test_what_is_wrong_in_a_patch_file_is_said_with_field_and_value(tmp_path: Pa
         '[node]\ntitle = "x"\n' + patch: "line 2, node.title: unknown field title; there are name, namespace",
         "[node]\ndomain = 300\n" + patch: "node.domain = 300 is not allowed; it must be 0 to 232",
         "[node]\nrate_Hz = 0\n" + patch: "node.rate_Hz = 0 is not allowed; it must be a number above 0",
-        '[node]\ncarrier = "mqtt"\n' + patch: "line 2, node.carrier: unknown carrier",
+        '[node]\ncarrier = "mqtt"\n' + patch: 'line 2, node.carrier: "mqtt" where zenoh or dds is wanted',
         "[node]\ninterfaces = []\n" + patch: "node.interfaces = [] is not allowed; it must be a list of addresses",
         '[node]\ninterfaces = ["lo"]\n' + patch: "line 2, node.interfaces[0]: ",
         '[node]\nlisten = ["udp/1.2.3.4:5"]\n' + patch: 'node.listen = "udp/1.2.3.4:5" is not allowed; it must be a list of',

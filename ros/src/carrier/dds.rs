@@ -31,6 +31,7 @@ use rustdds::{
     DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, QosPolicies, QosPolicyBuilder,
     RTPSEntity, RepresentationIdentifier, StatusEvented, Timestamp, TopicDescription, TopicKind, GUID,
 };
+use rustix::process::{getrlimit, setrlimit, Resource, Rlimit};
 
 use super::graph::{self, NodeEntities, ParticipantEntities};
 use super::{Carrier, Publisher, Subscription, Taken};
@@ -52,6 +53,8 @@ pub struct DdsNode {
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
     interfaces: Vec<Ipv4Addr>,
+    /// Results of a patch that may follow at once, after a stall: those of the frames that wait, and the next one.
+    burst: usize,
     own: Mutex<NodeEntities>,
     graph: Writer,
     matched: Arc<Matched>,
@@ -152,24 +155,30 @@ fn failed<E: std::fmt::Debug>(what: &str) -> impl Fn(E) -> anyhow::Error + '_ {
     move |error| anyhow!("{what}: {error:?}")
 }
 
-/// The name of a topic of ROS 2 on DDS.
-fn dds_name(topic: &Topic) -> String {
-    format!("{PREFIX}{}", topic.name)
+/// A topic of ROS 2 on DDS.
+fn dds_topic(participant: &DomainParticipant, topic: &Topic, burst: usize) -> Result<rustdds::Topic> {
+    // Names of DDS itself begin with no slash.
+    let name = if topic.name.starts_with('/') { format!("{PREFIX}{}", topic.name) } else { topic.name.clone() };
+    let created = participant.create_topic(name, topic.dds_type(), &qos(topic.quality, burst), TopicKind::NoKey);
+    created.map_err(failed(&topic.name))
 }
 
-fn qos(quality: Quality) -> QosPolicies {
+/// The quality of a topic, of whose messages at least `burst` may wait for the thread that sends them.
+fn qos(quality: Quality, burst: usize) -> QosPolicies {
     let reliability = match quality.reliable {
         true => Reliability::Reliable { max_blocking_time: BLOCKING },
         false => Reliability::BestEffort,
     };
     let durability = if quality.latched { Durability::TransientLocal } else { Durability::Volatile };
-    let depth = i32::try_from(quality.depth).unwrap_or(i32::MAX);
+    let depth = i32::try_from(quality.depth.max(burst)).unwrap_or(i32::MAX);
     QosPolicyBuilder::new().reliability(reliability).durability(durability).history(History::KeepLast { depth }).build()
 }
 
-fn dds_topic(participant: &DomainParticipant, name: String, topic: &Topic) -> Result<rustdds::Topic> {
-    let created = participant.create_topic(name, topic.dds_type(), &qos(topic.quality), TopicKind::NoKey);
-    created.map_err(failed(&topic.name))
+/// Lets the process open as many files as the system allows, since every writer and reader has some of its own: two, of hundreds of
+/// patches more than a process has by default. Where that is refused the topic says so for which there is none.
+fn allow_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
 impl DdsNode {
@@ -178,18 +187,18 @@ impl DdsNode {
     /// # Errors
     /// An address that no interface has; ports that cannot be had.
     pub fn open(fields: &NodeFields) -> Result<DdsNode> {
-        let NodeFields { name, namespace, domain, interfaces, .. } = fields;
+        let NodeFields { name, namespace, domain, interfaces, queue, .. } = fields;
         for own in interfaces {
             UdpSocket::bind((*own, 0)).with_context(|| format!("node.interfaces = {own}"))?;
         }
+        allow_files();
         let domain = u16::try_from(*domain)?;
         let builder = DomainParticipantBuilder::new(domain).with_only_networks(interfaces.iter().copied());
         let participant = builder.build().map_err(failed(&format!("node.domain = {domain}")))?;
         let none = QosPolicies::qos_none();
         let publisher = participant.create_publisher(&none).map_err(failed("DDS"))?;
         let subscriber = participant.create_subscriber(&none).map_err(failed("DDS"))?;
-        // Its name has no prefix.
-        let topic = dds_topic(&participant, graph::topic().name, &graph::topic())?;
+        let topic = dds_topic(&participant, &graph::topic(), 1)?;
         let graph = publisher.create_datawriter_no_key(&topic, None).map_err(failed("DDS"))?;
         let (streams, taken) = mpsc::unbounded::<BoxStream<'static, ()>>();
         let (end, ended) = oneshot::channel();
@@ -201,8 +210,8 @@ impl DdsNode {
         let events = stream::poll_fn(move |context| listener.as_async_status_stream().poll_next_unpin(context));
         streams.unbounded_send(events.map(move |event| seen.take(&event)).boxed()).map_err(failed("DDS"))?;
         let own = NodeEntities { namespace: namespace.clone(), name: name.clone(), ..NodeEntities::default() };
-        let (interfaces, own, thread) = (interfaces.clone(), Mutex::new(own), Some((end, thread)));
-        Ok(DdsNode { participant, publisher, subscriber, interfaces, own, graph, matched, streams, thread })
+        let (interfaces, burst, own, thread) = (interfaces.clone(), queue + 1, Mutex::new(own), Some((end, thread)));
+        Ok(DdsNode { participant, publisher, subscriber, interfaces, burst, own, graph, matched, streams, thread })
     }
 
     fn own(&self) -> MutexGuard<'_, NodeEntities> {
@@ -217,14 +226,14 @@ impl Carrier for DdsNode {
     }
 
     fn publisher(&self, topic: &Topic) -> Result<Box<dyn Publisher>> {
-        let own = dds_topic(&self.participant, dds_name(topic), topic)?;
+        let own = dds_topic(&self.participant, topic, self.burst)?;
         let writer: Writer = self.publisher.create_datawriter_no_key(&own, None).map_err(failed(&topic.name))?;
         self.own().writers.push(writer.guid().to_bytes());
         Ok(Box::new(DdsPublisher { writer, quality: topic.quality, matched: Arc::clone(&self.matched) }))
     }
 
     fn subscription(&self, topic: &Topic, taken: Taken) -> Result<Box<dyn Subscription>> {
-        let own = dds_topic(&self.participant, dds_name(topic), topic)?;
+        let own = dds_topic(&self.participant, topic, self.burst)?;
         let reader = self.subscriber.create_datareader_no_key::<(), Cdr>(&own, None).map_err(failed(&topic.name))?;
         self.own().readers.push(reader.guid().to_bytes());
         let (end, ended) = oneshot::channel();

@@ -47,12 +47,15 @@ fn a_topic_is_wanted_while_somebody_reads_it() {
 
 #[test]
 fn qualities_are_those_of_the_topics() {
-    let of = |topic: &Topic| (qos(topic.quality).reliability(), qos(topic.quality).durability());
-    let (reliable, last) =
-        (Some(Reliability::Reliable { max_blocking_time: BLOCKING }), |depth| Some(History::KeepLast { depth }));
-    assert_eq!(of(&tf_static()), (reliable, Some(Durability::TransientLocal)));
-    assert_eq!(of(&diagnostics()), (reliable, Some(Durability::Volatile)));
-    let stream = qos(STREAM);
-    assert_eq!((stream.reliability(), stream.history()), (Some(Reliability::BestEffort), last(1)));
-    assert_eq!(qos(diagnostics().quality).history(), last(10));
+    let reliable = Some(Reliability::Reliable { max_blocking_time: BLOCKING });
+    let (latched, volatile) = (Some(Durability::TransientLocal), Some(Durability::Volatile));
+    for (topic, burst, wanted, depth) in [
+        (tf_static(), 1, (reliable, latched), 1),
+        (diagnostics(), 3, (reliable, volatile), 10),
+        (Topic::of::<WrenchStamped>("/wrench", STREAM), 3, (Some(Reliability::BestEffort), volatile), 3),
+    ] {
+        let own = qos(topic.quality, burst);
+        assert_eq!((own.reliability(), own.durability()), wanted, "{}", topic.name);
+        assert_eq!(own.history(), Some(History::KeepLast { depth }), "{}", topic.name);
+    }
 }
