@@ -1,14 +1,17 @@
 """Patches that stall, flood, send rubbish or fail harm no other, and what is wrong in a patch file is said."""
 
 import os
+import random
+import socket
 import subprocess
 import threading
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from conftest import COLS, ROWS, SCENE, feed, line, node, run, wait
-from peers import PEERS, STORE, ZenohPeer
+from conftest import COLS, PATIENCE_S, ROWS, SCENE, feed, line, node, run, wait
+from peers import PEERS, STORE, DdsPeer, ZenohPeer
 from test_topics import STATE, TYPES
 
 PATCHES = "".join(
@@ -24,6 +27,7 @@ PATCHES = "".join(
 )
 FLOOD = 10**6
 FRAMES = 300
+PACKETS = 20_000
 
 
 def values(status: object) -> dict[str, str]:
@@ -93,6 +97,40 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
         assert values(found["good"])["dropped"] == "0" and int(values(found["again"])["source opened"]) >= 3
         peer.close()
     assert any("absent" in said and "tried again" in said for said in own.said)
+
+
+def spoiled(packet: bytes, chance: random.Random) -> bytes:
+    """A packet with some other bytes, perhaps cut, perhaps as if from another process."""
+    own = bytearray(packet)
+    for _ in range(chance.choice([0, 1, 2, 8, 50])):
+        own[chance.randrange(len(own))] = chance.choice([0, 1, 0x7F, 0xFF, chance.randrange(256)])
+    if chance.random() < 0.5:
+        own[8:20] = chance.randbytes(12)
+    return bytes(own[: chance.randrange(1, len(own) + 1)] if chance.random() < 0.2 else own)
+
+
+def test_packets_that_are_none_of_dds_harm_no_message(tmp_path: Path) -> None:
+    """Sent to all its ports; they are made of those that the node and Cyclone DDS announce themselves with."""
+    with node(tmp_path, '[[patch]]\nname = "a"\nscene = "scene.toml"\nsource = "a.pipe"\ncheck_every = 0\n', "queue = 8", "dds") as own:
+        # As the sixth process of this computer, to whose port every other one announces itself.
+        ports, chance = 7400 + 250 * own.domain, random.Random(1)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(("127.0.0.1", ports + 10 + 2 * 5))
+            sender.settimeout(PATIENCE_S)
+            peer, packets = DdsPeer(own), []
+            while len({len(packet) for packet in packets}) < 2:
+                packets.append(sender.recv(1 << 16))
+            for number in range(PACKETS):
+                sender.sendto(spoiled(chance.choice(packets), chance), ("127.0.0.1", ports + chance.choice([0, 1, 10, 11])))
+                # So that they are read.
+                time.sleep(0.01 if number % 50 == 0 else 0.0)
+        wrench = peer.subscribe("/a/wrench", TYPES["wrench"])
+        feed(tmp_path / "a.pipe", [line(0)] * 20, 50.0)
+        wait(lambda: wrench.samples)
+        before = len(wrench.samples)
+        feed(tmp_path / "a.pipe", [line(number) for number in range(100)], 50.0, lambda: len(wrench.samples), 4)
+        wait(lambda: len(wrench.samples) - before >= 100)
+        peer.close()
 
 
 def test_a_core_behind_ethernet_that_dies_harms_no_other(tmp_path: Path) -> None:
