@@ -102,7 +102,7 @@ buses: setup ## test the cores for a SoC with cocotb's models of the buses, unde
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
 	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
-ros: setup ## build dermis-ros, lint it, and test it against other programs that speak ROS 2 over Zenoh, in build/ros
+ros: setup ## build dermis-ros, lint it, and test it against other programs over Zenoh and DDS, in build/ros
 	@echo '== ros'
 	$(CARGO) clippy --locked --package dermis-ros --all-targets -- -D warnings
 	$(CARGO) build --locked --quiet --bin dermis

@@ -11,21 +11,11 @@ mod graph;
 mod zenoh;
 
 use anyhow::Result;
-use clap::ValueEnum;
-use serde::Deserialize;
 
-use crate::patches::NodeFields;
+pub use dds::DdsNode;
+pub use zenoh::ZenohNode;
+
 use crate::topics::Topic;
-
-/// Name of a carrier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum CarrierName {
-    /// For robots with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
-    Zenoh,
-    /// For robots with any other middleware.
-    Dds,
-}
 
 /// Called for each message that is taken.
 pub type Taken = Box<dyn Fn() + Send + Sync>;
@@ -76,14 +66,3 @@ pub trait Publisher: Send + Sync {
 
 /// Takes the messages of a topic as long as it is kept.
 pub trait Subscription: Send + Sync {}
-
-/// Joins the network as the node of these fields.
-///
-/// # Errors
-/// An address that cannot be used, with the field.
-pub fn open(fields: &NodeFields) -> Result<Box<dyn Carrier>> {
-    Ok(match fields.carrier {
-        CarrierName::Zenoh => Box::new(zenoh::ZenohNode::open(fields)?),
-        CarrierName::Dds => Box::new(dds::DdsNode::open(fields)?),
-    })
-}

@@ -12,6 +12,7 @@
 //! | `source` | lines of a patch, from a source that is opened again when it fails |
 //! | `topics` | names, types and qualities of the topics |
 //! | `carrier` | Zenoh or DDS, with the names that the middlewares of ROS 2 have |
+//! | `engines` | what computes the forces of each patch |
 //! | `messages` | results as messages |
 //! | `diagnostics` | what is known of each patch |
 //! | `node` | the workers, and what they publish |
@@ -21,6 +22,7 @@
 
 mod carrier;
 mod diagnostics;
+mod engines;
 mod messages;
 mod node;
 mod patches;
@@ -35,8 +37,7 @@ use anyhow::Result;
 use clap::{value_parser, Parser};
 use dermis_sim::{output, say};
 
-use carrier::CarrierName;
-use patches::PatchFile;
+use patches::{CarrierName, PatchFile};
 
 /// Publish the forces of the sensors in a patch file as topics of ROS 2, over Zenoh or DDS, until interrupted.
 #[derive(Parser, Debug)]
@@ -90,7 +91,7 @@ fn run(arguments: &Arguments) -> Result<String> {
     file.node.carrier = arguments.carrier.unwrap_or(file.node.carrier);
     if arguments.check {
         // Engines are built too: a scene may be refused by its estimator.
-        return node::Engines::build(&file).and_then(|_| topics::table(&file));
+        return engines::Engines::build(&file).and_then(|_| topics::table(&file));
     }
     node::run(&file, arguments.measure.map(Duration::from_secs))
 }

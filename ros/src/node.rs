@@ -1,74 +1,35 @@
 //! The node: a worker per core answers the streams of its patches, and publishes their results.
 
-use std::collections::BTreeMap;
 use std::io::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{anyhow, Context, Result};
+use anyhow::{anyhow, Result};
 use dermis_golden::data::recording::message::DiagnosticArray;
 use dermis_golden::data::text::Stated;
-use dermis_golden::engine::{CheckPace, CheckedEngine};
-use dermis_golden::fixed::Model;
-use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{EngineName, SharedEngine};
+use dermis_golden::engine::CheckPace;
 use dermis_sim::jobs::Interrupt;
-use dermis_sim::link::{open_board, BoardEngine, Session};
 use dermis_sim::recording::header;
 use dermis_sim::say;
 use dermis_sim::stream::{
     run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
 };
 
-use crate::carrier::{self, Carrier, Publisher, Subscription};
+use crate::carrier::{Carrier, DdsNode, Publisher, Subscription, ZenohNode};
 use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
+use crate::engines::{Engine, Engines};
 use crate::messages::{self, Messages};
-use crate::patches::{Patch, PatchFile};
+use crate::patches::{CarrierName, NodeFields, Patch, PatchFile};
 use crate::source::Reopened;
 use crate::topics::{self, PatchTopics};
 
-/// Time without a board's answer after which a request is sent again.
-const BOARD_TIMEOUT: Duration = Duration::from_millis(200);
-
-/// An engine that several patches may have.
-type Engine = Arc<CheckedEngine<SharedEngine>>;
-
-/// The engines of the patches; patches with the same scene and estimator have one.
-pub struct Engines(Vec<Engine>);
-
-impl Engines {
-    /// Builds them, one for each patch.
-    ///
-    /// # Errors
-    /// A scene that its engine refuses, with the patch.
-    pub fn build(file: &PatchFile) -> Result<Engines> {
-        let mut built: BTreeMap<(String, Option<String>, EngineName), Engine> = BTreeMap::new();
-        let mut all = Vec::new();
-        for (index, patch) in file.patches.iter().enumerate() {
-            if let Some(port) = &patch.fields.board {
-                let board = board(port, &patch.scene).with_context(|| format!("patch[{index}].board"))?;
-                all.push(Arc::new(CheckedEngine::new(Box::new(board) as Box<SharedEngine>)));
-                continue;
-            }
-            let key = (patch.path.clone(), patch.fields.estimator.clone(), patch.engine);
-            let engine = match built.get(&key) {
-                Some(engine) => Arc::clone(engine),
-                None => dermis_sim::engine::Engines::default()
-                    .of_stream(patch.engine, &patch.scene)
-                    .with_context(|| format!("patch[{index}].scene"))?,
-            };
-            all.push(Arc::clone(built.entry(key).or_insert(engine)));
-        }
-        Ok(Engines(all))
-    }
-}
-
-/// The board at a port, which was built for a scene.
-fn board(port: &str, scene: &Scene) -> Result<BoardEngine> {
-    let model = Model::new(scene)?;
-    let board = open_board(port, &model, None, BOARD_TIMEOUT, "host")?;
-    Ok(BoardEngine::new(Session::new(board, model, None, None, true, false)?))
+/// Joins the network of ROS 2 as the node of these fields.
+fn join(fields: &NodeFields) -> Result<Box<dyn Carrier>> {
+    Ok(match fields.carrier {
+        CarrierName::Zenoh => Box::new(ZenohNode::open(fields)?),
+        CarrierName::Dds => Box::new(DdsNode::open(fields)?),
+    })
 }
 
 /// What a patch publishes.
@@ -150,7 +111,7 @@ fn now_ns() -> i64 {
 /// A scene that its engine refuses, an address that cannot be used.
 pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let engines = Engines::build(file)?;
-    let carrier = carrier::open(&file.node)?;
+    let carrier = join(&file.node)?;
     let changes = Arc::new(Changes::default());
     let late = Duration::from_secs_f64(file.node.late_ms / 1e3);
     let mut outlets = Vec::new();
@@ -183,7 +144,7 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
             stop.now();
         });
     }
-    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
+    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(engines.each(), &outlets))
         .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
         .collect();
     let share = (threads.max(1) as f64 / patches as f64).min(1.0);

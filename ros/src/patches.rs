@@ -17,7 +17,7 @@ use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
 use dermis_sim::stream::Source;
 
-pub use fields::{NodeFields, PatchFields, Pose};
+pub use fields::{CarrierName, NodeFields, PatchFields, Pose};
 
 use fields::Fields;
 

@@ -209,9 +209,9 @@ def test_an_address_that_is_taken_is_said(tmp_path: Path) -> None:
         error = run("DERMIS_ROS", str(first.file), code=2).stderr
         assert "node.listen" in error and str(first.port) in error
         # One that this computer does not have: of those that documentation may use.
-        first.file.write_text(first.file.read_text().replace("[node]", '[node]\ninterfaces = ["127.0.0.1", "192.0.2.1"]'))
+        first.file.write_text(first.file.read_text().replace("[node]", '[node]\ninterfaces = ["127.0.0.1", "198.51.100.1"]'))
         error = run("DERMIS_ROS", str(first.file), "--carrier", "dds", code=2).stderr
-        assert error.startswith("error: node.interfaces = 192.0.2.1: "), error
+        assert error.startswith("error: node.interfaces = 198.51.100.1: "), error
 
 
 def test_a_recording_is_published_at_its_pace_and_ends_the_node(tmp_path: Path) -> None:

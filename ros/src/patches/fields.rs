@@ -2,14 +2,23 @@
 
 use std::net::Ipv4Addr;
 
+use clap::ValueEnum;
 use serde::Deserialize;
-
-use crate::carrier::CarrierName;
 
 /// Address of the router of rmw_zenoh.
 pub(super) const ROUTER: &str = "tcp/127.0.0.1:7447";
 /// Any port of the loopback.
 pub(super) const LOOPBACK: &str = "tcp/127.0.0.1:0";
+
+/// Name of a carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum CarrierName {
+    /// For robots with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
+    Zenoh,
+    /// For robots with any other middleware.
+    Dds,
+}
 
 /// What a file states of the node.
 #[derive(Clone, Debug, Deserialize)]
