@@ -163,14 +163,15 @@ fn dds_topic(participant: &DomainParticipant, topic: &Topic, burst: usize) -> Re
     created.map_err(failed(&topic.name))
 }
 
-/// The quality of a topic, of whose messages at least `burst` may wait for the thread that sends them.
+/// The quality of a topic, of whose messages at least `burst` may wait for the thread that sends them unless they are latched.
 fn qos(quality: Quality, burst: usize) -> QosPolicies {
     let reliability = match quality.reliable {
         true => Reliability::Reliable { max_blocking_time: BLOCKING },
         false => Reliability::BestEffort,
     };
     let durability = if quality.latched { Durability::TransientLocal } else { Durability::Volatile };
-    let depth = i32::try_from(quality.depth.max(burst)).unwrap_or(i32::MAX);
+    let depth = if quality.latched { quality.depth } else { quality.depth.max(burst) };
+    let depth = i32::try_from(depth).unwrap_or(i32::MAX);
     QosPolicyBuilder::new().reliability(reliability).durability(durability).history(History::KeepLast { depth }).build()
 }
 

@@ -50,7 +50,7 @@ fn qualities_are_those_of_the_topics() {
     let reliable = Some(Reliability::Reliable { max_blocking_time: BLOCKING });
     let (latched, volatile) = (Some(Durability::TransientLocal), Some(Durability::Volatile));
     for (topic, burst, wanted, depth) in [
-        (tf_static(), 1, (reliable, latched), 1),
+        (tf_static(), 3, (reliable, latched), 1),
         (diagnostics(), 3, (reliable, volatile), 10),
         (Topic::of::<WrenchStamped>("/wrench", STREAM), 3, (Some(Reliability::BestEffort), volatile), 3),
     ] {
