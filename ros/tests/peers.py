@@ -3,6 +3,7 @@ as they are on the wire, in CDR; rosbags decodes them."""
 
 import struct
 import time
+from functools import cache
 from typing import Any, Protocol
 
 import zenoh
@@ -126,6 +127,12 @@ class Cdr(IdlStruct):
         return Cdr(data)
 
 
+@cache
+def cdr_of(kind: str) -> type[Cdr]:
+    """A type of which Cyclone DDS has the name alone; it must live as long as Cyclone DDS."""
+    return make_idl_struct(kind.rsplit("/", 1)[1], dds_type(kind), {"any": uint8}, dataclassify=False, bases=(Cdr,))
+
+
 class Reader:
     """What a reader of Cyclone DDS receives, which forgets nothing."""
 
@@ -160,6 +167,7 @@ class DdsPeer:
     def __init__(self, node: Node) -> None:
         self.domain = Domain(node.domain, CYCLONE)
         self.participant = DomainParticipant(node.domain)
+        self.topics: dict[str, Topic] = {}
 
     def topic(self, name: str, kind: str, reliable: bool, latched: bool) -> tuple[Topic, Qos]:
         qos = Qos(
@@ -168,8 +176,9 @@ class DdsPeer:
             Policy.History.KeepAll,
             Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
         )
-        own = make_idl_struct(kind.rsplit("/", 1)[1], dds_type(kind), {"any": uint8}, dataclassify=False, bases=(Cdr,))
-        return Topic(self.participant, f"rt{name}" if name.startswith("/") else name, own), qos
+        if name not in self.topics:
+            self.topics[name] = Topic(self.participant, f"rt{name}" if name.startswith("/") else name, cdr_of(kind))
+        return self.topics[name], qos
 
     def subscribe(self, topic: str, kind: str, reliable: bool = False, latched: bool = False) -> Reader:
         return Reader(self.participant, *self.topic(topic, kind, reliable or latched, latched))
@@ -192,7 +201,7 @@ class DdsPeer:
         return BuiltinDataReader(self.participant, topic).take(1 << 16)
 
     def close(self) -> None:
-        del self.participant, self.domain
+        del self.topics, self.participant, self.domain
 
 
 PEERS: dict[str, type[Peer]] = {"zenoh": ZenohPeer, "dds": DdsPeer}
