@@ -91,9 +91,11 @@ python: setup ## build the Python package, install it into a new environment, bu
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
 
+# PyPI takes wheels that name the oldest C library that they run with.
 wheel: setup ## build a wheel of the Python package into build/wheels, for machines without Rust
 	python3 -m venv $(VENV)-wheel
-	$(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
+	rm -rf $(BUILD)/wheels
+	MATURIN_PEP517_ARGS='--compatibility pypi' $(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
 
 package: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
 package: NAME = dermis-$(VERSION)-$(shell rustc -vV | sed -n 's/^host: //p')
