@@ -23,9 +23,10 @@ READER    ?=
 MINUTES   ?= 5
 # The short report: make report QUICK=1
 QUICK     ?=
+PACKAGE    = $(BUILD)/package
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel package buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -90,9 +91,27 @@ python: setup ## build the Python package, install it into a new environment, bu
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
 
+# PyPI takes wheels that name the oldest C library that they run with.
 wheel: setup ## build a wheel of the Python package into build/wheels, for machines without Rust
 	python3 -m venv $(VENV)-wheel
-	$(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
+	rm -rf $(BUILD)/wheels
+	MATURIN_PEP517_ARGS='--compatibility pypi' $(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
+
+package: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
+package: NAME = dermis-$(VERSION)-$(shell rustc -vV | sed -n 's/^host: //p')
+package: OF_COMMIT = --sort=name --owner=0 --group=0 --numeric-owner --mtime=@$(shell git log -1 --format=%ct)
+package: program wheel ## write what a release has into build/package: programs for this kind of machine, wheel, source, checksums
+	$(CARGO) build --locked --release --package dermis-ros
+	rm -rf $(PACKAGE)
+	mkdir -p $(PACKAGE)/$(NAME)/completions
+	cp $(DERMIS) $(CARGO_TARGET_DIR)/release/dermis-ros LICENSE README.md CHANGELOG.md $(PACKAGE)/$(NAME)
+	$(DERMIS) man $(PACKAGE)/$(NAME)/man
+	for shell in bash fish zsh; do $(DERMIS) completions $$shell >$(PACKAGE)/$(NAME)/completions/dermis.$$shell || exit 1; done
+	tar $(OF_COMMIT) -czf $(PACKAGE)/$(NAME).tar.gz -C $(PACKAGE) $(NAME)
+	rm -r $(PACKAGE)/$(NAME)
+	cp $(BUILD)/wheels/dermis-$(VERSION)-*.whl $(PACKAGE)
+	git archive --prefix=dermis-$(VERSION)/ --output=$(PACKAGE)/dermis-$(VERSION).tar.gz HEAD
+	cd $(PACKAGE) && sha256sum *.tar.gz *.whl >SHA256SUMS
 
 buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
@@ -102,7 +121,7 @@ buses: setup ## test the cores for a SoC with cocotb's models of the buses, unde
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
 	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
-ros: setup ## build dermis-ros, lint it, and test it against other programs that speak ROS 2 over Zenoh, in build/ros
+ros: setup ## build dermis-ros, lint it, and test it against other programs over Zenoh and DDS, in build/ros
 	@echo '== ros'
 	$(CARGO) clippy --locked --package dermis-ros --all-targets -- -D warnings
 	$(CARGO) build --locked --quiet --bin dermis

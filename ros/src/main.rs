@@ -11,7 +11,8 @@
 //! | `patches` | the file that lists the patches |
 //! | `source` | lines of a patch, from a source that is opened again when it fails |
 //! | `topics` | names, types and qualities of the topics |
-//! | `carrier` | Zenoh, with the names that the middleware `rmw_zenoh` of ROS 2 has |
+//! | `carrier` | Zenoh or DDS, with the names that the middlewares of ROS 2 have |
+//! | `engines` | what computes the forces of each patch |
 //! | `messages` | results as messages |
 //! | `diagnostics` | what is known of each patch |
 //! | `node` | the workers, and what they publish |
@@ -21,6 +22,7 @@
 
 mod carrier;
 mod diagnostics;
+mod engines;
 mod messages;
 mod node;
 mod patches;
@@ -35,15 +37,18 @@ use anyhow::Result;
 use clap::{value_parser, Parser};
 use dermis_sim::{output, say};
 
-use patches::PatchFile;
+use patches::{CarrierName, PatchFile};
 
-/// Publish the forces of the sensors in a patch file as topics of ROS 2, over Zenoh, until interrupted.
+/// Publish the forces of the sensors in a patch file as topics of ROS 2, over Zenoh or DDS, until interrupted.
 #[derive(Parser, Debug)]
 #[command(name = "dermis-ros", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Patch file: the node, and for each sensor its name, scene, source of frames and place.
     #[arg(value_name = "FILE.toml", required_unless_present = "messages")]
     file: Option<PathBuf>,
+    /// What carries the messages, in place of `carrier` of the file.
+    #[arg(long, conflicts_with = "messages")]
+    carrier: Option<CarrierName>,
     /// Check the file and its scenes, print the topics, and end.
     #[arg(long, visible_alias = "dry-run")]
     check: bool,
@@ -68,8 +73,10 @@ A file for one sensor that sends a frame per line:
   scene = \"sensor-1\"
   source = \"udp://0.0.0.0:9000\"
 
-The node connects to the router of rmw_zenoh at tcp/127.0.0.1:7447 and listens on the loopback alone, unless [node] states
-connect and listen. `ros2 topic list` shows /thumb/wrench, /thumb/contacts, /thumb/arrows and more.
+Over Zenoh the node connects to the router of rmw_zenoh at tcp/127.0.0.1:7447 and listens on the loopback alone, unless [node]
+states connect and listen. Over DDS it seeks others and is told to them on the loopback alone, unless [node] states interfaces;
+its ports, 7400 + 250 * domain and the next 250 of UDP, are open on all interfaces all the same: a firewall must close them.
+`ros2 topic list` shows /thumb/wrench, /thumb/contacts, /thumb/arrows and more.
 
 Exit codes: 0 ended by its sources or interrupted, 2 wrong input or a network address that cannot be used.";
 /// Exit code of whatever fails: input and network are the user's.
@@ -80,10 +87,11 @@ fn run(arguments: &Arguments) -> Result<String> {
     if let Some(folder) = &arguments.messages {
         return messages::write_definitions(folder);
     }
-    let file = PatchFile::load(arguments.file.as_deref().unwrap_or(Path::new("")))?;
+    let mut file = PatchFile::load(arguments.file.as_deref().unwrap_or(Path::new("")))?;
+    file.node.carrier = arguments.carrier.unwrap_or(file.node.carrier);
     if arguments.check {
         // Engines are built too: a scene may be refused by its estimator.
-        return node::Engines::build(&file).and_then(|_| topics::table(&file));
+        return engines::Engines::build(&file).and_then(|_| topics::table(&file));
     }
     node::run(&file, arguments.measure.map(Duration::from_secs))
 }

@@ -1,95 +1,56 @@
 //! The node: a worker per core answers the streams of its patches, and publishes their results.
 
-use std::collections::BTreeMap;
 use std::io::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{anyhow, Context, Result};
+use anyhow::{anyhow, Result};
 use dermis_golden::data::recording::message::DiagnosticArray;
 use dermis_golden::data::text::Stated;
-use dermis_golden::engine::{CheckPace, CheckedEngine};
-use dermis_golden::fixed::Model;
-use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{EngineName, SharedEngine};
+use dermis_golden::engine::CheckPace;
 use dermis_sim::jobs::Interrupt;
-use dermis_sim::link::{open_board, BoardEngine, Session};
 use dermis_sim::recording::header;
 use dermis_sim::say;
 use dermis_sim::stream::{
     run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
 };
 
-use crate::carrier::{Carrier, Publisher, Subscription};
+use crate::carrier::{Carrier, DdsNode, Publisher, Subscription, ZenohNode};
 use crate::diagnostics::{Changes, Measured, PatchState, PERIOD};
+use crate::engines::{Engine, Engines};
 use crate::messages::{self, Messages};
-use crate::patches::{Patch, PatchFile};
+use crate::patches::{CarrierName, NodeFields, Patch, PatchFile};
 use crate::source::Reopened;
 use crate::topics::{self, PatchTopics};
 
-/// Time without a board's answer after which a request is sent again.
-const BOARD_TIMEOUT: Duration = Duration::from_millis(200);
-
-/// An engine that several patches may have.
-type Engine = Arc<CheckedEngine<SharedEngine>>;
-
-/// The engines of the patches; patches with the same scene and estimator have one.
-pub struct Engines(Vec<Engine>);
-
-impl Engines {
-    /// Builds them, one for each patch.
-    ///
-    /// # Errors
-    /// A scene that its engine refuses, with the patch.
-    pub fn build(file: &PatchFile) -> Result<Engines> {
-        let mut built: BTreeMap<(String, Option<String>, EngineName), Engine> = BTreeMap::new();
-        let mut all = Vec::new();
-        for (index, patch) in file.patches.iter().enumerate() {
-            if let Some(port) = &patch.fields.board {
-                let board = board(port, &patch.scene).with_context(|| format!("patch[{index}].board"))?;
-                all.push(Arc::new(CheckedEngine::new(Box::new(board) as Box<SharedEngine>)));
-                continue;
-            }
-            let key = (patch.path.clone(), patch.fields.estimator.clone(), patch.engine);
-            let engine = match built.get(&key) {
-                Some(engine) => Arc::clone(engine),
-                None => dermis_sim::engine::Engines::default()
-                    .of_stream(patch.engine, &patch.scene)
-                    .with_context(|| format!("patch[{index}].scene"))?,
-            };
-            all.push(Arc::clone(built.entry(key).or_insert(engine)));
-        }
-        Ok(Engines(all))
-    }
-}
-
-/// The board at a port, which was built for a scene.
-fn board(port: &str, scene: &Scene) -> Result<BoardEngine> {
-    let model = Model::new(scene)?;
-    let board = open_board(port, &model, None, BOARD_TIMEOUT, "host")?;
-    Ok(BoardEngine::new(Session::new(board, model, None, None, true, false)?))
+/// Joins the network of ROS 2 as the node of these fields.
+fn join(fields: &NodeFields) -> Result<Box<dyn Carrier>> {
+    Ok(match fields.carrier {
+        CarrierName::Zenoh => Box::new(ZenohNode::open(fields)?),
+        CarrierName::Dds => Box::new(DdsNode::open(fields)?),
+    })
 }
 
 /// What a patch publishes.
 struct Outlet {
     messages: Messages,
     state: Arc<PatchState>,
-    wrench: Publisher,
-    contacts: Publisher,
-    arrows: Publisher,
-    forces: Option<Publisher>,
-    stress: Option<Publisher>,
+    wrench: Box<dyn Publisher>,
+    contacts: Box<dyn Publisher>,
+    arrows: Box<dyn Publisher>,
+    forces: Option<Box<dyn Publisher>>,
+    stress: Option<Box<dyn Publisher>>,
     /// Kept as long as it is published.
-    _scene: Publisher,
-    _tare: Subscription,
+    _scene: Box<dyn Publisher>,
+    _tare: Box<dyn Subscription>,
     zero: ZeroRequest,
     /// Least time between results that are published.
     period: Duration,
 }
 
 impl Outlet {
-    fn open(carrier: &Carrier, file: &PatchFile, patch: &Patch, state: Arc<PatchState>) -> Result<Outlet> {
+    fn open(carrier: &dyn Carrier, file: &PatchFile, patch: &Patch, state: Arc<PatchState>) -> Result<Outlet> {
         let topics = PatchTopics::new(&file.node.namespace, patch);
         let optional = |topic: &Option<topics::Topic>| topic.as_ref().map(|own| carrier.publisher(own)).transpose();
         let zero = ZeroRequest::default();
@@ -105,7 +66,7 @@ impl Outlet {
             forces: optional(&topics.forces)?,
             stress: optional(&topics.stress)?,
             _scene: scene,
-            _tare: carrier.subscription(&topics.tare, move |_| asked.now())?,
+            _tare: carrier.subscription(&topics.tare, Box::new(move || asked.now()))?,
             zero,
             period: file.node.rate_Hz.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate)),
         })
@@ -118,7 +79,7 @@ impl Outlet {
         if self.arrows.is_wanted() {
             self.arrows.put(self.messages.arrows(answer)?)?;
         }
-        let wanted = |publisher: &'_ Option<Publisher>| publisher.as_ref().is_some_and(Publisher::is_wanted);
+        let wanted = |publisher: &Option<Box<dyn Publisher>>| publisher.as_ref().is_some_and(|own| own.is_wanted());
         let forces = if wanted(&self.forces) { self.messages.forces(answer)? } else { None };
         let stress = if wanted(&self.stress) { self.messages.stress(answer)? } else { None };
         for (publisher, message) in [(&self.forces, forces), (&self.stress, stress)] {
@@ -150,13 +111,13 @@ fn now_ns() -> i64 {
 /// A scene that its engine refuses, an address that cannot be used.
 pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
     let engines = Engines::build(file)?;
-    let carrier = Carrier::open(&file.node)?;
+    let carrier = join(&file.node)?;
     let changes = Arc::new(Changes::default());
     let late = Duration::from_secs_f64(file.node.late_ms / 1e3);
     let mut outlets = Vec::new();
     for (index, patch) in file.patches.iter().enumerate() {
         let state = PatchState::new(index, &patch.fields.name, &patch.scene.name, late, Arc::clone(&changes));
-        outlets.push(Outlet::open(&carrier, file, patch, Arc::new(state))?);
+        outlets.push(Outlet::open(carrier.as_ref(), file, patch, Arc::new(state))?);
     }
     let places = match messages::places(&file.patches, now_ns())? {
         Some(message) => {
@@ -167,11 +128,12 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
         None => None,
     };
     let reports = carrier.publisher(&topics::diagnostics())?;
+    carrier.complete()?;
     let stop = Stop::default();
     let stopping = stop.clone();
     Interrupt::with(move || stopping.now())?;
     let (patches, threads) = (file.patches.len(), file.threads());
-    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.addresses().join(", "));
+    say!("{}: {patches} patches, {threads} workers, at {}", file.node.name, carrier.place());
     let running = AtomicBool::new(true);
     let begun = Instant::now();
     if let Some(time) = measure {
@@ -182,12 +144,12 @@ pub fn run(file: &PatchFile, measure: Option<Duration>) -> Result<String> {
             stop.now();
         });
     }
-    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(&engines.0, &outlets))
+    let all: Vec<Own> = std::iter::zip(&file.patches, std::iter::zip(engines.each(), &outlets))
         .map(|(patch, (engine, outlet))| Own { patch, engine, outlet })
         .collect();
     let share = (threads.max(1) as f64 / patches as f64).min(1.0);
     std::thread::scope(|scope| {
-        let reporting = scope.spawn(|| report(&outlets, &changes, &reports, &running));
+        let reporting = scope.spawn(|| report(&outlets, &changes, reports.as_ref(), &running));
         // A board keeps its worker waiting: it has one of its own.
         let (boards, computed): (Vec<&Own>, Vec<&Own>) = all.iter().partition(|own| own.patch.fields.board.is_some());
         let divided = (0..threads).map(|worker| computed.iter().copied().skip(worker).step_by(threads).collect());
@@ -278,7 +240,7 @@ fn work<'a>(stop: &Stop, file: &PatchFile, all: &[&'a Own<'a>], share: f64) {
 }
 
 /// Publishes the states until the workers have ended: all once per second, those that change at once.
-fn report(outlets: &[Outlet], changes: &Changes, reports: &Publisher, running: &AtomicBool) -> Result<()> {
+fn report(outlets: &[Outlet], changes: &Changes, reports: &dyn Publisher, running: &AtomicBool) -> Result<()> {
     let mut due = Instant::now() + PERIOD;
     loop {
         let last = !running.load(Ordering::Acquire);

@@ -17,7 +17,7 @@ use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_sim::engine::EngineName;
 use dermis_sim::stream::Source;
 
-pub use fields::{NodeFields, PatchFields, Pose};
+pub use fields::{CarrierName, NodeFields, PatchFields, Pose};
 
 use fields::Fields;
 
@@ -119,7 +119,9 @@ impl PatchFile {
 
 impl NodeFields {
     fn check(&self) -> Result<()> {
-        let NodeFields { name, namespace, domain, connect, listen, rate_Hz, late_ms, queue, threads } = self;
+        let NodeFields {
+            name, namespace, domain, connect, listen, interfaces, rate_Hz, late_ms, queue, threads, ..
+        } = self;
         if !is_name(name) {
             return Err(wrong("node.name", quoted(name), NAME));
         }
@@ -140,6 +142,9 @@ impl NodeFields {
             if let Some(own) = addresses.iter().find(|own| !is_address(own)) {
                 return Err(wrong(field, quoted(own), "a list of addresses as \"tcp/192.168.1.7:7447\""));
             }
+        }
+        if interfaces.is_empty() {
+            return Err(wrong("node.interfaces", "[]", "a list of addresses as \"192.168.1.7\""));
         }
         if let Some(rate) = rate_Hz.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
             return Err(wrong("node.rate_Hz", rate, "a number above 0"));

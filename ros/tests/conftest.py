@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -65,22 +66,34 @@ def free_port() -> int:
         return int(own.getsockname()[1])
 
 
+def free_domain() -> int:
+    """A domain of DDS in which nobody of this computer is."""
+    for domain in random.sample(range(1, 200), 100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+            try:
+                own.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+            except OSError:
+                continue
+            return domain
+    raise AssertionError("all domains are taken")
+
+
 class Node:
     """A node that runs."""
 
-    def __init__(self, folder: Path, patches: str, node: str = "") -> None:
-        self.folder, self.port, self.said = folder, free_port(), []
+    def __init__(self, folder: Path, patches: str, node: str = "", carrier: str = "zenoh") -> None:
+        self.folder, self.carrier, self.port, self.domain, self.said = folder, carrier, free_port(), free_domain(), []
         (folder / "scene.toml").write_text(SCENE)
         self.file = folder / "hand.toml"
-        listen = f'[node]\nconnect = []\nlisten = ["tcp/127.0.0.1:{self.port}"]\n{node}\n'
-        self.file.write_text(listen + patches)
+        place = f'domain = {self.domain}\nconnect = []\nlisten = ["tcp/127.0.0.1:{self.port}"]\ncarrier = "{carrier}"\n'
+        self.file.write_text(f"[node]\n{place}{node}\n{patches}")
         for name in self.pipes(patches):
             os.mkfifo(folder / name)
         command = [os.environ["DERMIS_ROS"], str(self.file)]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
-        self.wait_for("workers, at tcp/127.0.0.1")
+        self.wait_for("workers, at tcp/127.0.0.1" if carrier == "zenoh" else f"workers, at DDS domain {self.domain} on 127.0.0.1")
 
     @staticmethod
     def pipes(patches: str) -> list[str]:
@@ -107,8 +120,8 @@ class Node:
 
 
 @contextmanager
-def node(folder: Path, patches: str, fields: str = "") -> Iterator[Node]:
-    own = Node(folder, patches, fields)
+def node(folder: Path, patches: str, fields: str = "", carrier: str = "zenoh") -> Iterator[Node]:
+    own = Node(folder, patches, fields, carrier)
     try:
         yield own
         own.end()

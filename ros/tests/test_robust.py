@@ -1,14 +1,18 @@
 """Patches that stall, flood, send rubbish or fail harm no other, and what is wrong in a patch file is said."""
 
 import os
+import random
+import socket
 import subprocess
 import threading
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from conftest import COLS, ROWS, SCENE, feed, line, node, run, wait
-from rosbags.typesys import Stores, get_typestore
-from test_topics import STATE, TYPES, Raw, key, session
+import pytest
+from conftest import COLS, PATIENCE_S, ROWS, SCENE, feed, line, node, run, wait
+from peers import PEERS, STORE, DdsPeer, ZenohPeer
+from test_topics import STATE, TYPES
 
 PATCHES = "".join(
     f'[[patch]]\nname = "{name}"\nscene = "scene.toml"\nsource = "{source}"\ncheck_every = 0\n'
@@ -23,18 +27,19 @@ PATCHES = "".join(
 )
 FLOOD = 10**6
 FRAMES = 300
+PACKETS = 20_000
 
 
 def values(status: object) -> dict[str, str]:
     return {pair.key: pair.value for pair in status.values}
 
 
-def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Path) -> None:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with node(tmp_path, PATCHES, "domain = 7\nqueue = 8") as own:
-        zenoh_session = session(own)
-        wrench = {name: Raw(zenoh_session, key(store, f"/{name}/wrench", TYPES["wrench"])) for name in ("good", "flood", "again")}
-        state = Raw(zenoh_session, key(store, "/diagnostics", STATE))
+@pytest.mark.parametrize("carrier", PEERS)
+def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Path, carrier: str) -> None:
+    with node(tmp_path, PATCHES, "queue = 8", carrier) as own:
+        peer = PEERS[carrier](own)
+        wrench = {name: peer.subscribe(f"/{name}/wrench", TYPES["wrench"]) for name in ("good", "flood", "again")}
+        state = peer.subscribe("/diagnostics", STATE, reliable=True)
         feed(tmp_path / "good.pipe", [line(0)] * 20, 50.0)
         wait(lambda: wrench["good"].samples)
         before = len(wrench["good"].samples)
@@ -79,7 +84,7 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
             before = len(state.samples)
             while True:
                 wait(lambda: len(state.samples) > before)
-                array = store.deserialize_cdr(state.samples[before].payload.to_bytes(), STATE)
+                array = STORE.deserialize_cdr(state.samples[before], STATE)
                 if len(array.status) == 6:
                     return {one.name.removeprefix("dermis: "): one for one in array.status}
                 before += 1
@@ -90,14 +95,48 @@ def test_a_patch_that_floods_stalls_or_sends_rubbish_harms_no_other(tmp_path: Pa
         assert int(values(found["rubbish"])["refused"]) > 100 and "results" in values(found["rubbish"])
         assert found["absent"].level == 2 and "no-such-port" in found["absent"].message
         assert values(found["good"])["dropped"] == "0" and int(values(found["again"])["source opened"]) >= 3
-        zenoh_session.close()
+        peer.close()
     assert any("absent" in said and "tried again" in said for said in own.said)
+
+
+def spoiled(packet: bytes, chance: random.Random) -> bytes:
+    """A packet with some other bytes, perhaps cut, perhaps as if from another process."""
+    own = bytearray(packet)
+    for _ in range(chance.choice([0, 1, 2, 8, 50])):
+        own[chance.randrange(len(own))] = chance.choice([0, 1, 0x7F, 0xFF, chance.randrange(256)])
+    if chance.random() < 0.5:
+        own[8:20] = chance.randbytes(12)
+    return bytes(own[: chance.randrange(1, len(own) + 1)] if chance.random() < 0.2 else own)
+
+
+def test_packets_that_are_none_of_dds_harm_no_message(tmp_path: Path) -> None:
+    """Sent to all its ports; they are made of those that the node and Cyclone DDS announce themselves with."""
+    with node(tmp_path, '[[patch]]\nname = "a"\nscene = "scene.toml"\nsource = "a.pipe"\ncheck_every = 0\n', "queue = 8", "dds") as own:
+        # As the sixth process of this computer, to whose port every other one announces itself.
+        ports, chance = 7400 + 250 * own.domain, random.Random(1)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(("127.0.0.1", ports + 10 + 2 * 5))
+            sender.settimeout(PATIENCE_S)
+            peer, packets = DdsPeer(own), []
+            while len({len(packet) for packet in packets}) < 2:
+                packets.append(sender.recv(1 << 16))
+            for number in range(PACKETS):
+                sender.sendto(spoiled(chance.choice(packets), chance), ("127.0.0.1", ports + chance.choice([0, 1, 10, 11])))
+                # So that they are read.
+                time.sleep(0.01 if number % 50 == 0 else 0.0)
+        wrench = peer.subscribe("/a/wrench", TYPES["wrench"])
+        feed(tmp_path / "a.pipe", [line(0)] * 20, 50.0)
+        wait(lambda: wrench.samples)
+        before = len(wrench.samples)
+        feed(tmp_path / "a.pipe", [line(number) for number in range(100)], 50.0, lambda: len(wrench.samples), 4)
+        wait(lambda: len(wrench.samples) - before >= 100)
+        peer.close()
 
 
 def test_a_core_behind_ethernet_that_dies_harms_no_other(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)
-    store, patch = get_typestore(Stores.ROS2_JAZZY), '[[patch]]\nname = "{0}"\nscene = "scene.toml"\nsource = "{0}.pipe"\n'
+    patch = '[[patch]]\nname = "{0}"\nscene = "scene.toml"\nsource = "{0}.pipe"\n'
     with ExitStack() as stack:
         cores = {}
         for name in ("whole", "dying"):
@@ -107,10 +146,10 @@ def test_a_core_behind_ethernet_that_dies_harms_no_other(tmp_path: Path) -> None
             assert core.stdout is not None
             cores[name] = core, core.stdout.readline().strip()
         patches = "".join(patch.format(name) + f'board = "{port}"\n' for name, (_, port) in cores.items())
-        own = stack.enter_context(node(tmp_path, patches + patch.format("computed") + 'engine = "fixed"\n', "domain = 7"))
-        zenoh_session = session(own)
-        stack.callback(zenoh_session.close)
-        wrench = {name: Raw(zenoh_session, key(store, f"/{name}/wrench", TYPES["wrench"])) for name in (*cores, "computed")}
+        own = stack.enter_context(node(tmp_path, patches + patch.format("computed") + 'engine = "fixed"\n'))
+        peer = ZenohPeer(own)
+        stack.callback(peer.close)
+        wrench = {name: peer.subscribe(f"/{name}/wrench", TYPES["wrench"]) for name in (*cores, "computed")}
         feed(tmp_path / "dying.pipe", [line(number) for number in range(20)], 20.0)
         wait(lambda: wrench["dying"].samples)
         cores["dying"][0].kill()
@@ -145,6 +184,9 @@ def test_what_is_wrong_in_a_patch_file_is_said_with_field_and_value(tmp_path: Pa
         '[node]\ntitle = "x"\n' + patch: "line 2, node.title: unknown field title; there are name, namespace",
         "[node]\ndomain = 300\n" + patch: "node.domain = 300 is not allowed; it must be 0 to 232",
         "[node]\nrate_Hz = 0\n" + patch: "node.rate_Hz = 0 is not allowed; it must be a number above 0",
+        '[node]\ncarrier = "mqtt"\n' + patch: 'line 2, node.carrier: "mqtt" where zenoh or dds is wanted',
+        "[node]\ninterfaces = []\n" + patch: "node.interfaces = [] is not allowed; it must be a list of addresses",
+        '[node]\ninterfaces = ["lo"]\n' + patch: "line 2, node.interfaces[0]: ",
         '[node]\nlisten = ["udp/1.2.3.4:5"]\n' + patch: 'node.listen = "udp/1.2.3.4:5" is not allowed; it must be a list of',
         patch.replace('"a"', '"9a"'): 'patch[0].name = "9a" is not allowed; it must be letters, digits and underscores',
         patch + patch: 'patch[1].name = "a" is not allowed; it must be another one than that of patch[0]',
@@ -166,6 +208,10 @@ def test_an_address_that_is_taken_is_said(tmp_path: Path) -> None:
     with node(tmp_path, '[[patch]]\nname = "a"\nscene = "scene.toml"\nsource = "a.pipe"\n') as first:
         error = run("DERMIS_ROS", str(first.file), code=2).stderr
         assert "node.listen" in error and str(first.port) in error
+        # One that this computer does not have: of those that documentation may use.
+        first.file.write_text(first.file.read_text().replace("[node]", '[node]\ninterfaces = ["127.0.0.1", "198.51.100.1"]'))
+        error = run("DERMIS_ROS", str(first.file), "--carrier", "dds", code=2).stderr
+        assert error.startswith("error: node.interfaces = 198.51.100.1: "), error
 
 
 def test_a_recording_is_published_at_its_pace_and_ends_the_node(tmp_path: Path) -> None:

@@ -1,8 +1,7 @@
-"""The topics of a node as other programs receive them: zenoh-ros2-sdk, a node of ROS 2 over Zenoh, and Zenoh's own subscribers with the
-messages decoded by rosbags; every field against what `dermis reconstruct` says of the same frames."""
+"""The topics of a node as other programs receive them over each carrier, with the messages decoded by rosbags; every field against what
+`dermis reconstruct` says of the same frames."""
 
 import math
-import struct
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import zenoh
-import zenoh.ext
 from conftest import COLS, PITCH_MM, ROWS, Node, expected, feed, frame, line, node, run, wait
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber, discovery
+from cyclonedds.core import Policy
+from peers import PEERS, STORE, DdsPeer, Peer, ZenohPeer, ros_type
+from rosbags.typesys import get_types_from_msg
+from zenoh_ros2_sdk import ROS2Subscriber, discovery
 from zenoh_ros2_sdk.message_registry import get_registry
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile, QosReliability
 from zenoh_ros2_sdk.session import ZenohSession
@@ -28,6 +27,7 @@ TYPES = {
     "stress": "sensor_msgs/msg/Image",
 }
 STATE, PLACES, TEXT = "diagnostic_msgs/msg/DiagnosticArray", "tf2_msgs/msg/TFMessage", "std_msgs/msg/String"
+GRAPH = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 PATCH = """
 [[patch]]
 name = "thumb"
@@ -51,62 +51,48 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def store(messages: Path) -> Any:
-    """The types of ROS 2, and those of Dermis from its definitions."""
-    own = get_typestore(Stores.ROS2_JAZZY)
+@pytest.fixture(scope="module", params=PEERS)
+def running(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, messages: Path) -> Iterator[Node]:
+    """A node over each carrier; over Zenoh with the session of zenoh-ros2-sdk, of which a program has one."""
     for name in ("Contact", "Contacts"):
         text = (messages / "dermis_msgs/msg" / f"{name}.msg").read_text()
-        own.register(get_types_from_msg(text, f"dermis_msgs/msg/{name}"))
-    return own
-
-
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory, messages: Path) -> Iterator[Node]:
-    """A node, and the session of zenoh-ros2-sdk, of which a program has one."""
-    with node(tmp_path_factory.mktemp("node"), PATCH, 'namespace = "/hand"\ndomain = 7\nqueue = 64') as own:
-        ZenohSession.get_instance("127.0.0.1", own.port)
-        # Else it takes them from the network.
-        get_registry().messages_dir = messages
+        STORE.register(get_types_from_msg(text, f"dermis_msgs/msg/{name}"))
+    with node(tmp_path_factory.mktemp("node"), PATCH, 'namespace = "/hand"\nqueue = 64', request.param) as own:
+        if own.carrier == "zenoh":
+            ZenohSession.get_instance("127.0.0.1", own.port)
+            # Else it takes them from the network.
+            get_registry().messages_dir = messages
         yield own
-        ZenohSession.get_instance().close()
+        if own.carrier == "zenoh":
+            ZenohSession.get_instance().close()
 
 
-class Raw:
-    """What a subscriber of Zenoh itself receives on a topic, with the attachments."""
-
-    def __init__(self, session: zenoh.Session, key: str, history: bool = False) -> None:
-        self.samples: list[zenoh.Sample] = []
-        if history:
-            config = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
-            self.own = zenoh.ext.declare_advanced_subscriber(session, key, self.samples.append, history=config)
-        else:
-            self.own = session.declare_subscriber(key, self.samples.append)
-
-    def attachments(self) -> list[tuple[int, int, bytes]]:
-        found = []
-        for sample in self.samples:
-            sequence, time_ns, length, gid = struct.unpack("<qqB16s", sample.attachment.to_bytes())
-            assert length == 16
-            found.append((sequence, time_ns, gid))
-        return found
+@pytest.fixture
+def peer(running: Node) -> Iterator[Peer]:
+    own = PEERS[running.carrier](running)
+    yield own
+    own.close()
 
 
-def key(store: Any, topic: str, kind: str) -> str:
-    package, _, name = kind.split("/")
-    return f"7/{topic.lstrip('/')}/{package}::msg::dds_::{name}_/{store.hash_rihs01(kind)}"
+@pytest.fixture
+def sdk(running: Node) -> Iterator[dict[str, list[Any]]]:
+    """What subscribers of zenoh-ros2-sdk receive, a node of ROS 2 over Zenoh; over DDS there is none."""
+    received: dict[str, list[Any]] = {}
+    subscribers = []
+    if running.carrier == "zenoh":
+        # It asks the cache of what is latched where the topic has no namespace.
+        topics = {"/tf_static": (PLACES, LATCHED)} | {f"/hand/thumb/{topic}": (kind, BEST_EFFORT) for topic, kind in TYPES.items()}
+        for topic, (kind, qos) in topics.items():
+            own = received[topic.rsplit("/", 1)[1]] = []
+            subscribers.append(ROS2Subscriber(topic, kind, own.append, domain_id=running.domain, qos=qos))
+            assert subscribers[-1].type_hash == STORE.hash_rihs01(kind)
+    yield received
+    for subscriber in subscribers:
+        subscriber.close()
 
 
-def session(own: Node) -> zenoh.Session:
-    config = zenoh.Config()
-    for option, value in [
-        ("mode", '"peer"'),
-        ("connect/endpoints", f'["tcp/127.0.0.1:{own.port}"]'),
-        ("listen/endpoints", '["tcp/127.0.0.1:0"]'),
-        ("scouting/multicast/enabled", "false"),
-    ]:
-        config.insert_json5(option, value)
-    return zenoh.open(config)
+over_zenoh = pytest.mark.parametrize("running", ["zenoh"], indirect=True)
+over_dds = pytest.mark.parametrize("running", ["dds"], indirect=True)
 
 
 def stamp_ns(header: Any) -> int:
@@ -201,28 +187,24 @@ def change(topic: str, message: Any) -> None:
         message.data = np.frombuffer(bytes(changed), np.uint8)
 
 
-def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: Node, store: Any) -> None:
-    received: dict[str, list[Any]] = {topic: [] for topic in TYPES}
-    places: list[Any] = []
-    own = session(running)
-    raw = {topic: Raw(own, key(store, f"/hand/thumb/{topic}", kind)) for topic, kind in TYPES.items()}
-    state = Raw(own, key(store, "/diagnostics", STATE))
-    # zenoh-ros2-sdk asks the cache of what is latched where the topic has no namespace.
-    sdk = [ROS2Subscriber("/tf_static", PLACES, places.append, domain_id=7, qos=LATCHED)]
-    for topic, kind in TYPES.items():
-        name = f"/hand/thumb/{topic}"
-        sdk.append(ROS2Subscriber(name, kind, received[topic].append, domain_id=7, qos=BEST_EFFORT))
-        assert sdk[-1].type_hash == store.hash_rihs01(kind)
+def decoded(samples: list[bytes], kind: str) -> list[Any]:
+    return [STORE.deserialize_cdr(cdr, kind) for cdr in samples]
+
+
+def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: Node, peer: Peer, sdk: dict[str, list[Any]]) -> None:
+    raw = {topic: peer.subscribe(f"/hand/thumb/{topic}", kind) for topic, kind in TYPES.items()}
+    state = peer.subscribe("/diagnostics", STATE, reliable=True)
     lines = [line(number) for number in range(MESSAGES)]
     # The first frames bring the node and its subscribers together.
     feed(running.folder / "thumb.pipe", [line(-number) for number in range(40, 0, -1)], 20.0)
-    wait(lambda: all(received[topic] and raw[topic].samples for topic in TYPES))
+    wait(lambda: all(raw[topic].samples for topic in TYPES) and all(sdk.values()))
     feed(running.folder / "thumb.pipe", lines, 60.0, lambda: len(raw["wrench"].samples), 32)
     results = expected(running.folder / "scene.toml", "".join(line(number) for number in range(-40, MESSAGES)))
     wait(lambda: len(raw["wrench"].samples) >= MESSAGES)
     for topic, kind in TYPES.items():
-        decoded = [store.deserialize_cdr(sample.payload.to_bytes(), kind) for sample in raw[topic].samples]
-        for messages in (received[topic], decoded):
+        for messages in (decoded(raw[topic].samples, kind), sdk.get(topic)):
+            if messages is None:
+                continue
             numbers = [check(topic, message, results) for message in messages]
             counted = [number for number in numbers if number >= 0]
             assert len(set(counted)) == len(counted) >= 0.999 * MESSAGES, topic
@@ -231,19 +213,14 @@ def test_every_message_of_every_type_arrives_and_is_that_of_the_result(running: 
             change(topic, pressed)
             with pytest.raises(AssertionError):
                 check(topic, pressed, results)
-        assert len({gid for _, _, gid in raw[topic].attachments()}) == 1
-    assert [transform.child_frame_id for message in places for transform in message.transforms] == ["thumb_pad"]
+    assert all([own.child_frame_id for own in message.transforms] == ["thumb_pad"] for message in sdk.get("tf_static", []))
     # Every second frame changes a flag: reliable ones have no gap.
-    sequence = [number for number, _, _ in state.attachments()]
-    assert len(sequence) >= MESSAGES * 0.6 and sequence == list(range(sequence[0], sequence[0] + len(sequence)))
-    statuses = [store.deserialize_cdr(own.payload.to_bytes(), STATE).status for own in state.samples]
+    assert len(state.samples) >= MESSAGES * 0.6 and state.lost() == 0
+    statuses = [array.status for array in decoded(state.samples, STATE)]
     values = [{pair.key: pair.value for pair in own.values} for (own,) in statuses]
     touched = ["no-contact" not in own["flags"] for own in values]
     assert any(touched) and not all(touched) and {own.name for (own,) in statuses} == {"dermis: thumb"}
     assert values[-1]["dropped"] == "0" and int(values[-1]["results"]) > MESSAGES
-    for subscriber in sdk:
-        subscriber.close()
-    own.close()
 
 
 def check_number(topic: str, message: Any) -> int:
@@ -251,18 +228,16 @@ def check_number(topic: str, message: Any) -> int:
     return (stamp_ns(header) - 1_700_000_000_000_000_000) // 10_000_000
 
 
-def test_latched_topics_are_there_for_whoever_comes_later(running: Node, store: Any) -> None:
-    own = session(running)
-    places = key(store, "/tf_static", PLACES)
-    scene = key(store, "/hand/thumb/scene", TEXT)
-    for _ in range(10):
-        late = [Raw(own, place, history=True) for place in (places, scene)]
-        wait(lambda: all(one.samples for one in late))
-        for one in late:
-            one.own.undeclare()
-    (transform,) = store.deserialize_cdr(late[0].samples[0].payload.to_bytes(), PLACES).transforms
-    text = store.deserialize_cdr(late[1].samples[0].payload.to_bytes(), TEXT).data
-    assert text == (running.folder / "scene.toml").read_text()
+def test_latched_topics_are_there_for_whoever_comes_later(running: Node, peer: Peer) -> None:
+    latched = {"/tf_static": PLACES, "/hand/thumb/scene": TEXT}
+    for _ in range(MESSAGES):
+        late = [peer.subscribe(topic, kind, latched=True) for topic, kind in latched.items()]
+        wait(lambda late=late: all(own.samples for own in late))
+        (places,), (scene,) = (own.samples for own in late)
+        for own in late:
+            own.close()
+    (transform,) = STORE.deserialize_cdr(places, PLACES).transforms
+    assert STORE.deserialize_cdr(scene, TEXT).data == (running.folder / "scene.toml").read_text()
     assert (transform.header.frame_id, transform.child_frame_id) == ("palm", "thumb_pad")
     assert vector(transform.transform.translation) == [0.01, -0.02, 0.03]
     w, x, y, z = (getattr(transform.transform.rotation, name) for name in "wxyz")
@@ -273,21 +248,21 @@ def test_latched_topics_are_there_for_whoever_comes_later(running: Node, store: 
         math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
     ]
     assert np.allclose(angles, [0.1, -0.2, 0.3], atol=1e-12)
-    # The cache answers each time: nothing of what is reliable is lost.
-    for place in (places, scene):
-        answers = [len(list(own.get(f"{place}/@adv/**?_anyke", timeout=5.0))) for _ in range(MESSAGES)]
-        assert answers == [1] * MESSAGES
-    own.close()
 
 
+def topics_of_the_check(running: Node) -> set[tuple[str, str]]:
+    """Names and types."""
+    rows = [row.split() for row in run("DERMIS_ROS", str(running.file), "--check").stdout.splitlines()]
+    return {(row[1], row[2]) for row in rows}
+
+
+@over_zenoh
 def test_tokens_name_the_topics_of_the_check(running: Node) -> None:
-    table = run("DERMIS_ROS", str(running.file), "--check").stdout
-    rows = [row.split() for row in table.splitlines()]
-    wanted = {(row[1], row[2]) for row in rows}
-    assert {(name, kind) for name, kinds in discovery.get_topic_names_and_types(7) for kind in kinds} == wanted
+    found = discovery.get_topic_names_and_types(running.domain)
+    assert {(name, kind) for name, kinds in found for kind in kinds} == topics_of_the_check(running)
     quality = {"wrench": (2, 2, "1"), "scene": (1, 1, "1")}
     for topic, (reliability, durability, depth) in quality.items():
-        info = discovery.get_topic_info(f"/hand/thumb/{topic}", 7, verbose=True)
+        info = discovery.get_topic_info(f"/hand/thumb/{topic}", running.domain, verbose=True)
         (own,) = info.publishers
         assert (own.node_name.strip("/"), own.node_namespace.strip("/")) == ("dermis", "hand")
         decoded = QosProfile.decode(own.qos)
@@ -295,32 +270,55 @@ def test_tokens_name_the_topics_of_the_check(running: Node) -> None:
         assert (decoded.reliability.value, decoded.durability.value) == (reliability, durability)
 
 
-def test_types_have_the_published_hashes(store: Any, messages: Path, running: Node) -> None:
+@over_zenoh
+def test_types_have_the_published_hashes(running: Node) -> None:
     """By rosbags, from its own definitions; of Dermis' types from those that the program writes."""
-    own = session(running)
-    tokens = [str(reply.ok.key_expr).split("/") for reply in own.liveliness().get("@ros2_lv/7/**", timeout=5.0)]
+    own = ZenohPeer(running)
+    found = own.session.liveliness().get(f"@ros2_lv/{running.domain}/**", timeout=5.0)
+    tokens = [str(reply.ok.key_expr).split("/") for reply in found]
     hashes = {parts[10]: parts[11] for parts in tokens if len(parts) > 11}
     assert len(hashes) == 9
     for name, own_hash in hashes.items():
         package, _, _, kind = name.replace("::", "/").split("/")
-        assert own_hash == store.hash_rihs01(f"{package}/msg/{kind.rstrip('_')}"), name
+        assert own_hash == STORE.hash_rihs01(f"{package}/msg/{kind.rstrip('_')}"), name
     own.close()
 
 
-def test_tare_takes_the_zero_anew(running: Node, store: Any) -> None:
-    own = session(running)
-    wrench = Raw(own, key(store, "/hand/thumb/wrench", TYPES["wrench"]))
+@over_dds
+def test_the_node_and_its_topics_are_found_on_dds(running: Node) -> None:
+    """By Cyclone DDS: names, types and qualities of writers and readers, and that the node says which are its own."""
+    own = DdsPeer(running)
+    graph = own.subscribe("ros_discovery_info", GRAPH, latched=True)
+    wait(lambda: graph.samples and len(own.endpoints()) == len(topics_of_the_check(running)) + 1)
+    found = own.endpoints()
+    (said,) = decoded(graph.samples, GRAPH)
+    (one,) = said.node_entities_info_seq
+    assert (one.node_namespace, one.node_name) == ("/hand", "dermis")
+    gids = {bytes(gid.data) for gid in [*one.reader_gid_seq, *one.writer_gid_seq]}
+    assert gids == {gid for gid, (name, _, _) in found.items() if name.startswith("rt/")}
+    assert {bytes(said.gid.data[:12])} == {gid[:12] for gid in found}
+    topics = {(name.removeprefix("rt"), ros_type(kind)) for name, kind, _ in found.values() if name.startswith("rt/")}
+    assert topics == topics_of_the_check(running)
+    reliable = {name: qos[Policy.Reliability] != Policy.Reliability.BestEffort for name, _, qos in found.values()}
+    latched = {name: qos[Policy.Durability] == Policy.Durability.TransientLocal for name, _, qos in found.values()}
+    quality = {name.removeprefix("rt/hand/thumb/"): (reliable[name], latched[name]) for name in reliable}
+    assert quality["wrench"] == quality["contacts"] == (False, False)
+    assert quality["scene"] == quality["rt/tf_static"] == quality["ros_discovery_info"] == (True, True)
+    assert quality["rt/diagnostics"] == quality["tare"] == (True, False)
+    own.close()
+
+
+def test_tare_takes_the_zero_anew(running: Node, peer: Peer) -> None:
+    wrench = peer.subscribe("/hand/thumb/wrench", TYPES["wrench"])
 
     def normal() -> float:
-        return float(store.deserialize_cdr(wrench.samples[-1].payload.to_bytes(), TYPES["wrench"]).wrench.force.z)
+        return float(decoded(wrench.samples[-1:], TYPES["wrench"])[0].wrench.force.z)
 
     moved = frame(0) * 0 + 0.05
     feed(running.folder / "thumb.pipe", [line(2, moved)] * 20, 100.0)
     wait(lambda: len(wrench.samples) >= 10)
     assert normal() > 1.0
-    tare = ROS2Publisher("/hand/thumb/tare", "std_msgs/msg/Empty", msg_definition="", domain_id=7)
-    wait(lambda: tare.pub.matching_status.matching)
-    tare.publish(structure_needs_at_least_one_member=0)
+    peer.tare("/hand/thumb/tare")
     # The message is there before the frames of the new zero.
     time.sleep(0.5)
     feed(running.folder / "thumb.pipe", [line(2, moved)] * 40, 100.0)
@@ -329,5 +327,3 @@ def test_tare_takes_the_zero_anew(running: Node, store: Any) -> None:
     feed(running.folder / "thumb.pipe", [line(2, moved + frame(2))] * 20, 100.0)
     wanted = expected(running.folder / "scene.toml", line(2))
     wait(lambda: abs(normal() - next(iter(wanted.values()))["resultant_N"][2]) < 1e-6)
-    tare.close()
-    own.close()

@@ -1,11 +1,24 @@
 //! The fields of a patch file as they are written, with their defaults.
 
+use std::net::Ipv4Addr;
+
+use clap::ValueEnum;
 use serde::Deserialize;
 
 /// Address of the router of rmw_zenoh.
 pub(super) const ROUTER: &str = "tcp/127.0.0.1:7447";
 /// Any port of the loopback.
 pub(super) const LOOPBACK: &str = "tcp/127.0.0.1:0";
+
+/// Name of a carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum CarrierName {
+    /// For robots with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
+    Zenoh,
+    /// For robots with any other middleware.
+    Dds,
+}
 
 /// What a file states of the node.
 #[derive(Clone, Debug, Deserialize)]
@@ -17,10 +30,14 @@ pub struct NodeFields {
     pub namespace: String,
     /// Domain of ROS 2, 0 to 232.
     pub domain: u32,
-    /// Addresses of routers and other nodes to connect to, as Zenoh writes them.
+    /// What carries its messages.
+    pub carrier: CarrierName,
+    /// Of Zenoh: addresses of routers and other nodes to connect to.
     pub connect: Vec<String>,
-    /// Addresses to listen on.
+    /// Of Zenoh: addresses to listen on.
     pub listen: Vec<String>,
+    /// Of DDS: addresses of this computer that others are told, and on whose networks they are sought.
+    pub interfaces: Vec<Ipv4Addr>,
     /// Most messages per second of a topic of a patch; every result if not stated.
     pub rate_Hz: Option<f64>,
     /// Results later than this after their frame count as late.
@@ -37,8 +54,10 @@ impl Default for NodeFields {
             name: "dermis".into(),
             namespace: "/".into(),
             domain: 0,
+            carrier: CarrierName::Zenoh,
             connect: vec![ROUTER.into()],
             listen: vec![LOOPBACK.into()],
+            interfaces: vec![Ipv4Addr::LOCALHOST],
             rate_Hz: None,
             late_ms: 20.0,
             queue: 2,

@@ -60,10 +60,18 @@ pub trait Message: Serialize + Sized {
     /// # Errors
     /// A text or list that CDR cannot represent, in words.
     fn to_cdr(&self) -> Result<Vec<u8>, String> {
-        let mut bytes = LITTLE_ENDIAN.to_vec();
-        cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, self).map_err(|error| error.to_string())?;
-        Ok(bytes)
+        to_cdr(self)
     }
+}
+
+/// A message in CDR.
+///
+/// # Errors
+/// As [`Message::to_cdr`].
+pub fn to_cdr<T: Serialize>(message: &T) -> Result<Vec<u8>, String> {
+    let mut bytes = LITTLE_ENDIAN.to_vec();
+    cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, message).map_err(|error| error.to_string())?;
+    Ok(bytes)
 }
 
 const TIME: Definition = ("builtin_interfaces/Time", include_str!("msg/Time.msg"));
