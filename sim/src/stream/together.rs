@@ -290,10 +290,10 @@ mod tests {
             zero: ZeroRequest::default(),
         };
         let flood: Box<dyn Read + Send> = Box::new(Flood(line.clone().into_bytes(), 0));
-        // All lines of the other one wait at once.
+        // All lines of the other one wait at once, and as many of the flood, so that it does not matter when its reader has its turn.
         let others = member(memory(line.repeat(WANTED)), WANTED, Policy::All);
         let (mut order, stop) = (Vec::new(), Stop::default());
-        let ends = run_together(&stop, vec![member(flood, 1, Policy::Latest), others], &mut |index, outcome| {
+        let ends = run_together(&stop, vec![member(flood, WANTED, Policy::Latest), others], &mut |index, outcome| {
             if let Outcome::Answer(_) = outcome {
                 order.push(index);
             }
