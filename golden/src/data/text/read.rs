@@ -19,7 +19,7 @@ pub struct TextFrame {
     pub readings: Vec<f64>,
     /// The true force in N, [x, y, normal], of a line of JSON that states it.
     pub resultant_N: Option<[f64; 3]>,
-    /// Why a reading may be another one than that which was sent, if one may be: see [`Reader`].
+    /// Why a reading may be another one than that which was sent, if one may be: see [`super::Reader`].
     pub doubt: Option<Doubt>,
     /// Its lines, until they have been judged.
     pub(super) written: String,
