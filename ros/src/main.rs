@@ -74,7 +74,7 @@ A file for one sensor that sends a frame per line:
   source = \"udp://0.0.0.0:9000\"
 
 Over Zenoh the node connects to the router of rmw_zenoh at tcp/127.0.0.1:7447 and listens on the loopback alone, unless [node]
-states connect and listen. Over DDS it seeks others and is told to them on the loopback alone, unless [node] states interfaces;
+states connect and listen. Over DDS discovery is on the loopback alone, unless [node] states interfaces;
 its ports, 7400 + 250 * domain and the next 250 of UDP, are open on all interfaces all the same: a firewall must close them.
 `ros2 topic list` shows /thumb/wrench, /thumb/contacts, /thumb/arrows and more.
 

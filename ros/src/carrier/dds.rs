@@ -5,7 +5,7 @@
 //! node    ros_discovery_info, with the identities of its writers and readers
 //! ```
 //! One thread takes what comes: messages of subscriptions, and which readers each writer has. DDS finds other processes of this
-//! computer at the ports that its standard gives them, others by multicast. The hash of a type is not told, since `rustdds` has no
+//! computer at the ports that its standard gives them, others by multicast. The hash of a type is not announced, since `rustdds` has no
 //! place for it.
 
 #[cfg(test)]
@@ -255,7 +255,7 @@ impl Carrier for DdsNode {
 }
 
 impl Drop for DdsNode {
-    /// The thread holds the participant, which says goodbye when nobody holds it.
+    /// The participant leaves the domain when its last handle is dropped, and the thread has one.
     fn drop(&mut self) {
         if let Some((end, thread)) = self.thread.take() {
             drop(end);

@@ -36,7 +36,7 @@ pub struct NodeFields {
     pub connect: Vec<String>,
     /// Of Zenoh: addresses to listen on.
     pub listen: Vec<String>,
-    /// Of DDS: addresses of this computer that others are told, and on whose networks they are sought.
+    /// Of DDS: addresses of this computer on whose networks discovery runs.
     pub interfaces: Vec<Ipv4Addr>,
     /// Most messages per second of a topic of a patch; every result if not stated.
     pub rate_Hz: Option<f64>,

@@ -56,7 +56,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         }
         frames.push(RawFrame { number: frame + 1, time_s: None, values, stated: None, device: None });
     }
-    let in_doubt = order.in_doubt(&header.shape, size);
+    let in_doubt = in_doubt(&header.shape, size);
     Ok(Recording { cut, in_doubt, ..Recording::bare(Format::Npy, [rows, cols], frames) })
 }
 
@@ -138,6 +138,10 @@ fn number(descr: &str) -> Option<NumberFormat> {
     Some(NumberFormat { kind, width, big_endian })
 }
 
+/// Shapes beside a stated size.
+const OF_SIZE: &str =
+    "that of --size: (frames, rows, cols), (rows, cols), (frames, taxels), (rows, cols, frames) or (taxels, frames)";
+
 /// What the axes of an array are.
 struct Order {
     frames: usize,
@@ -166,12 +170,7 @@ impl Order {
             ([taxels, frames], Some(size)) if size[0] * size[1] == *taxels => {
                 (*frames, size, [Some(1), Some(0), Some(0)])
             }
-            (_, Some(_)) => {
-                let allowed =
-                    "that of --size: (frames, rows, cols), (rows, cols), (frames, taxels), (rows, cols, frames) or \
-                               (taxels, frames)";
-                return Err(wrong(allowed));
-            }
+            (_, Some(_)) => return Err(wrong(OF_SIZE)),
             _ => return Err(wrong("(frames, rows, cols) or (rows, cols)")),
         };
         match size[0].max(size[1]) <= LARGEST_SIDE {
@@ -180,22 +179,26 @@ impl Order {
         }
     }
 
-    /// Values from one frame, row and column to the next.
+    /// Values from one frame, row and column to the next; those of a shape that no file can hold are the largest number.
     fn steps(&self, shape: &[usize], fortran: bool) -> [usize; 3] {
-        let step = |axis: usize| if fortran { &shape[..axis] } else { &shape[axis + 1..] }.iter().product::<usize>();
+        let step = |axis: usize| {
+            let inner = if fortran { &shape[..axis] } else { &shape[axis + 1..] };
+            inner.iter().fold(1, |step: usize, side| step.saturating_mul(*side))
+        };
         let [frames, rows, cols] = self.axes.map(|axis| axis.map_or(0, step));
         // Taxels on one axis.
-        let rows = if self.axes[1] == self.axes[2] { rows * self.size[1] } else { rows };
+        let rows = if self.axes[1] == self.axes[2] { rows.saturating_mul(self.size[1]) } else { rows };
         [frames, rows, cols]
     }
+}
 
-    /// That an array may be of another order, in words: more columns than frames, where no size is stated.
-    fn in_doubt(&self, shape: &[usize], size: Option<[usize; 2]>) -> Vec<String> {
-        let ([a, b, c], None) = (shape, size) else { return Vec::new() };
-        match c > a {
-            true => vec![format!("read as {a} frames of {b}×{c}; --size {a}x{b} reads {c} frames of {a}×{b}")],
-            false => Vec::new(),
+/// That an array may be of another order, in words: more columns than frames, where no size is stated.
+fn in_doubt(shape: &[usize], size: Option<[usize; 2]>) -> Vec<String> {
+    match (shape, size) {
+        ([a, b, c], None) if c > a => {
+            vec![format!("read as {a} frames of {b}×{c}; --size {a}x{b} reads {c} frames of {a}×{b}")]
         }
+        _ => Vec::new(),
     }
 }
 
@@ -232,6 +235,16 @@ mod tests {
                 let read = parse(&bytes, Some([2, 4]), &source).unwrap();
                 let frames: Vec<Vec<f64>> = read.frames.into_iter().map(|frame| frame.values).collect();
                 assert_eq!((frames, read.in_doubt), (wanted.clone(), vec![]), "{shape:?}");
+            }
+        }
+        // More frames than a file can hold, in every order: none is whole.
+        let most = usize::MAX / 2;
+        for shape in [[most, 2, 4], [2, 4, most]] {
+            for fortran in [false, true] {
+                let bytes = array(&shape, |[f, r, c]| 8 * f + 4 * r + c, fortran);
+                let read = parse(&bytes, Some([2, 4]), &source);
+                let said = read.map_or_else(|error| error.to_string(), |read| read.cut.unwrap_or_default());
+                assert!(said.contains(&most.to_string()), "{shape:?}: {said}");
             }
         }
         // More columns than frames, and no size that says what they are.

@@ -140,6 +140,8 @@ pub(super) struct Digits {
     leading: bool,
 }
 
+/// Characters of the longest number of a program that writes more digits than a number in double precision has.
+const LONGEST_NUMBER: usize = 64;
 /// Share of the numbers from which on all are taken to be written alike.
 const LIKE: f64 = 0.9;
 
@@ -294,9 +296,13 @@ impl Digits {
         }
     }
 
-    /// Whether the number in a cell would with one more character be written as the others and differ from `wanted` by `most`.
+    /// Whether the number in a cell would with one more character be written as the others and differ from `wanted` by `most`. One
+    /// that is longer than programs write numbers is taken to be so: trying takes the square of its length.
     pub(super) fn would_be(&self, cell: &str, wanted: f64, most: f64) -> bool {
         let text = point(cell);
+        if text.len() > LONGEST_NUMBER {
+            return true;
+        }
         let with = |(at, character): (usize, char)| {
             let longer = format!("{}{character}{}", &text[..at], &text[at..]);
             self.reading(&longer).is_ok_and(|value| (value - wanted).abs() <= most)

@@ -43,7 +43,7 @@ pub(super) struct LostCharacters {
 impl LostCharacters {
     /// The cells of a line are these.
     pub(super) fn note(&mut self, layout: &Layout, cells: &[Cow<str>]) {
-        self.hides |= layout.hides_a_lost_digit(cells);
+        self.hides = self.hides || layout.hides_a_lost_digit(cells);
     }
 
     /// A line is JSON, whose numbers are as short as they can be.
@@ -83,7 +83,7 @@ impl LostCharacters {
     /// The frame that waits for the next one, which does not come.
     pub(super) fn waiting(&mut self) -> Option<Read> {
         let first = *self.first.take()?;
-        Some(Read::Frame(self.with(first, None)))
+        Some(Read::Frame(self.judged(first, None)))
     }
 
     /// The next frame, and one that waited for it.
@@ -101,19 +101,20 @@ impl LostCharacters {
             self.before.clone_from(&frame.readings);
             // Either frame may lack a character.
             let doubt = self.compare(&first, layout, 2 * lines);
-            frames.push(self.with(*first, doubt));
+            frames.push(self.judged(*first, doubt));
         }
         let doubt = self.compare(&frame, layout, lines);
-        frames.push(self.with(frame, doubt));
+        frames.push(self.judged(frame, doubt));
         frames
     }
 
-    /// The frame with what there is to doubt, without its text.
-    fn with(&mut self, frame: TextFrame, doubt: Option<Doubt>) -> TextFrame {
+    /// The frame with its doubt, its own or that near a loss, and without its text.
+    fn judged(&mut self, frame: TextFrame, doubt: Option<Doubt>) -> TextFrame {
         if doubt.is_some() {
             // One alone may be a reading that has changed so.
             let before = self.suspect.replace(frame.line);
-            self.cut = before.filter(|line| frame.line - line <= DOUBTED).map_or(self.cut, |_| Some(frame.line));
+            self.cut =
+                before.filter(|line| frame.line.abs_diff(*line) <= DOUBTED).map_or(self.cut, |_| Some(frame.line));
         }
         let near = || self.cut.filter(|line| self.hides && frame.line.abs_diff(*line) <= DOUBTED).map(Doubt::NearLoss);
         TextFrame { doubt: doubt.or_else(near), written: String::new(), ..frame }

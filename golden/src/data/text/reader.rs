@@ -31,7 +31,8 @@ const HALF_DAY_NS: i64 = 43_200_000_000_000;
 ///
 /// - a line at most a hundred lines away has lost characters, or
 /// - a reading has changed by far more than all others (of a grid: one for each of its lines), and with one more character its number
-///   would be nearly that before. The first frame is compared with the second, for which it waits; [`Reader::settle`] ends that.
+///   would be nearly that before. The first frame, unless it is JSON, is compared with the second, for which it waits;
+///   [`Reader::settle`] ends that.
 ///
 /// ```
 /// use dermis_golden::data::text::{Line, Read, Reader, Stated};

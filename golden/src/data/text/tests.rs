@@ -548,3 +548,15 @@ fn a_lost_character_makes_no_wrong_frame_without_a_doubt() {
     }
     assert!(by_reading > 100, "{by_reading}");
 }
+
+/// A number of a hundred thousand digits, which no character brings near the one before, is doubted at once.
+#[test]
+fn a_number_without_end_is_doubted() {
+    let line =
+        |at: usize| (1..17).map(|taxel| format!("{}", 0.01 * taxel as f64 + 1e-4 * at as f64)).collect::<Vec<_>>();
+    let mut lines: Vec<Vec<String>> = (0..4).map(line).collect();
+    lines[3][5] = format!("-0.9{}", "12".repeat(50_000));
+    let texts: Vec<String> = lines.iter().map(|cells| cells.join(",")).collect();
+    let doubted: Vec<bool> = streamed(&texts, [4, 4]).iter().map(|frame| frame.doubt.is_some()).collect();
+    assert_eq!(doubted, [false, false, false, true]);
+}
