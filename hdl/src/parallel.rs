@@ -85,11 +85,12 @@ pub(crate) fn build<'k>(model: &Model, k: &'k Builder, io: EnginePorts<Inside<'k
     let engine = Parallel { k, model, restart, s };
     let c = engine.control();
     engine.follow(&c);
-    engine.receive(&io, &c);
+    let array = engine.searched_array(&c);
+    engine.receive(&io, &c, array);
     engine.multiply(&c);
     engine.find_contacts(&c);
     engine.search(&c);
-    engine.send(&io, &c);
+    engine.send(&io, &c, array);
     engine.unused();
     observe(k, model);
 }

@@ -55,7 +55,7 @@ impl Passes<'_> {
         let labels = layout.pack(&found.labels);
         self.streams.segmented = labels.iter().map(|quad| quad.map(|label| label as i64)).collect();
 
-        let array = Array { sensor, codes, dead: &plan.dead, floor: plan.noise_floor };
+        let array = Array { sensor, codes, dead: &plan.dead, floor: plan.noise_floor() };
         let mut all = Vec::with_capacity(found.middles.len());
         for (index, &middle) in found.middles.iter().enumerate() {
             let read = window(formats, &contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);

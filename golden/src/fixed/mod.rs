@@ -41,7 +41,7 @@ mod subarray;
 pub use contacts::{Contact, Contacts};
 pub use error::{FitSuggestion, FixedError, Shortage};
 pub use model::Model;
-pub use plan::contents::{CasePlan, Dropped, Plan};
+pub use plan::contents::{CasePlan, Dropped, OwnTables, Plan};
 pub use plan::cycles::Cycles;
 pub use run::{Stage, Trace};
 pub use specimen::Intake;

@@ -152,6 +152,7 @@ impl Model {
         let mut scene = scene.clone().with_chosen_hardware();
         let needs = scene.search.noise_floor_MPa() > 0.0
             || scene.threshold.min_force_N > 0.0
+            || scene.hardware.states_limits_of_each_array()
             || scene.input.longest_average() > 0
             || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {

@@ -62,7 +62,7 @@ impl Model {
     /// Adds frames of codes to `prepared`, as [`Prepare::add`](super::stages::prepare::Prepare::add) does; every stress is 0
     /// while the tables are not whole.
     pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
-        self.prepare.add(prepared, codes, self.tables_outcome == Outcome::Broken);
+        self.prepare.add(prepared, codes, self.own().outcome == Outcome::Broken);
     }
 
     /// Computes one reconstruction from the words of the frame buffer.
@@ -85,7 +85,7 @@ impl Model {
 
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {
-            part.scatter(sensor, &solved.forces(case, self.threshold), &mut forces);
+            part.scatter(sensor, &solved.forces(case, self.threshold()), &mut forces);
         }
         let contact = forces.iter().any(|f| f.words[2] != 0);
         let negative = self.push_limit.is_some_and(|push| pulls(&forces, push));
@@ -106,14 +106,14 @@ impl Model {
                         (Flag::TooManyContacts, mu.more_contacts),
                         (Flag::ScoreLow, mu.score.zip(self.score_limit).is_some_and(|(score, limit)| score > limit)),
                         (Flag::NegativePressure, negative),
-                        (Flag::TablesIncomplete, self.tables_outcome == Outcome::Broken),
-                        (Flag::TablesRefused, self.tables_outcome != Outcome::Whole),
-                        (Flag::ZeroLimit, prepared.drift.was_limited() && self.tables_outcome != Outcome::Broken),
+                        (Flag::TablesIncomplete, self.own().outcome == Outcome::Broken),
+                        (Flag::TablesRefused, self.own().outcome != Outcome::Whole),
+                        (Flag::ZeroLimit, prepared.drift.was_limited() && self.own().outcome != Outcome::Broken),
                     ]),
                 score: mu.score.unwrap_or(0),
                 rescale: s.rescale,
                 normalise: s.normalise,
-                tables_version: self.tables_version.into(),
+                tables_version: self.own().version.into(),
                 rescale_saturations: s.saturations,
                 force_saturations,
                 cycles: sending.counted as u32,

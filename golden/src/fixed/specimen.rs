@@ -6,24 +6,24 @@ use serde_json::json;
 use super::error::FixedError;
 use super::model::Model;
 use super::plan::cases::{limits, requantised, Limits};
-use super::plan::contents::{CasePlan, Plan};
+use super::plan::contents::{CasePlan, OwnTables, Plan};
 use super::stages::load::{self, Outcome, Tables, VERSION_BITS, WORD_BYTES};
 use super::stages::prepare::{Prepare, Scale};
 use super::words::quantised::Quantised;
 use crate::spec::scene::Scene;
 
 impl Plan {
-    /// The tables that the hardware holds; `None` unless they are writable.
+    /// The tables that the hardware holds, of several arrays those of the first; `None` unless they are writable.
     pub fn tables(&self) -> Option<Tables> {
-        let Prepare { zero: Some(zero), gain: Some(gain), .. } = &self.prepare else { return None };
+        let Prepare { zero: Some(zero), gain: Some(gain), .. } = self.prepare.of_array(0) else { return None };
         // No code exceeds the largest floor.
         let largest_floor = (1i64 << (self.formats().input_bits - 1)) - 1;
         self.has_writable_tables().then(|| Tables {
-            version: self.tables_version,
-            threshold: self.threshold.clamp(0, u32::MAX.into()) as u32,
-            noise_floor: i64::from(self.noise_floor).clamp(0, largest_floor) as i32,
-            zero: zero.clone(),
-            gain: gain.clone(),
+            version: self.own().version,
+            threshold: self.threshold().clamp(0, u32::MAX.into()) as u32,
+            noise_floor: i64::from(self.noise_floor()).clamp(0, largest_floor) as i32,
+            zero,
+            gain,
             coefficients: match self.scene.hardware.has_writable_coefficients() {
                 true => self.cases().iter().flat_map(CasePlan::memory).flatten().collect(),
                 false => Vec::new(),
@@ -61,12 +61,13 @@ impl Plan {
         let outcome = tables.load(image, layout, code_bits);
         match outcome {
             Outcome::Refused => self.refuse(),
-            Outcome::Broken => (self.tables_version, self.tables_outcome) = (0, Outcome::Broken),
+            Outcome::Broken => (self.own_mut().version, self.own_mut().outcome) = (0, Outcome::Broken),
             Outcome::Whole => {
-                (self.threshold, self.noise_floor) = (tables.threshold.into(), tables.noise_floor);
+                let Tables { version, noise_floor, .. } = tables;
+                let threshold = tables.threshold.into();
+                *self.own_mut() = OwnTables { noise_floor, threshold, version, outcome: Outcome::Whole };
                 (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));
                 self.take(&tables.coefficients);
-                (self.tables_version, self.tables_outcome) = (tables.version, Outcome::Whole);
             }
         }
         outcome
@@ -84,8 +85,8 @@ impl Plan {
     }
 
     fn refuse(&mut self) {
-        if self.tables_outcome == Outcome::Whole {
-            self.tables_outcome = Outcome::Refused;
+        if self.own().outcome == Outcome::Whole {
+            self.own_mut().outcome = Outcome::Refused;
         }
     }
 }
@@ -97,6 +98,8 @@ pub struct Intake {
     image: Vec<u8>,
     /// The rest of a refused image follows.
     skipping: bool,
+    /// Array of the image.
+    array: usize,
 }
 
 impl Intake {
@@ -108,6 +111,19 @@ impl Intake {
     /// Whether the rest of a refused image follows.
     pub fn is_skipping(&self) -> bool {
         self.skipping
+    }
+
+    /// Array of the image that has begun; of several arrays the model is that of this one.
+    pub fn array(&self) -> usize {
+        self.array
+    }
+
+    /// Array of the image of the next byte, which comes with `array`: that of the first byte.
+    pub fn array_of_byte(&mut self, array: usize) -> usize {
+        if !self.is_busy() {
+            self.array = array;
+        }
+        self.array
     }
 
     /// The bytes of an image that has begun; from the last of its first word on, tables are written.
@@ -149,15 +165,13 @@ impl Intake {
     }
 
     /// A reset: an image ends whose first word was right. The tables stay as they are, and it is forgotten that one was
-    /// refused. The last `unused` bytes do not count: a byte that is taken in the cycle before a reset is not used.
+    /// refused, of other arrays by [`Model::forget_refusal`]. The last `unused` bytes do not count: a byte that is taken in the
+    /// cycle before a reset is not used.
     pub fn reset(&mut self, model: &mut Model, unused: usize) -> Option<Outcome> {
         self.image.truncate(self.image.len().saturating_sub(unused));
         let begun = self.image.len() >= WORD_BYTES;
         let outcome = begun.then(|| self.ends(model));
-        let plan = model.plan_mut();
-        if plan.tables_outcome == Outcome::Refused {
-            plan.tables_outcome = Outcome::Whole;
-        }
+        model.forget_refusal();
         *self = Intake::default();
         outcome
     }
@@ -168,12 +182,21 @@ impl Intake {
 }
 
 impl Model {
+    /// A reset: that an image was refused is forgotten; tables that are not whole stay so.
+    pub fn forget_refusal(&mut self) {
+        let own = self.plan_mut().own_mut();
+        if own.outcome == Outcome::Refused {
+            own.outcome = Outcome::Whole;
+        }
+    }
+
     /// What the hardware does with the bytes of an image, see [`Plan::load`].
     pub fn load(&mut self, image: &[u8]) -> Outcome {
         self.plan_mut().load(image)
     }
 
-    /// The model of this hardware with the tables of the specimen that `scene` describes; frames report `version`, 1 to 32767.
+    /// The model of this hardware with the tables of the specimen that `scene` describes; frames report `version`, 1 to 32767. Of
+    /// several arrays it is that of one alone: which it becomes, the image does not say.
     ///
     /// # Errors
     /// [`FixedError::Tables`]: the hardware's tables are not writable, or such a version is not possible.
@@ -188,8 +211,11 @@ impl Model {
         if version == 0 || version >> VERSION_BITS != 0 {
             return wrong("version", version.to_string(), "1 to 32767");
         }
+        if self.scene.hardware.arrays > 1 {
+            return self.of_array(0)?.with_tables(scene, version);
+        }
         let mut own = self.scene.clone();
-        let specimen = scene.clone().with_chosen_hardware();
+        let specimen = scene.of_array(0).with_chosen_hardware();
         if let Some(part) = differs(&own, &specimen) {
             return Err(FixedError::NoTable { part });
         }
@@ -200,16 +226,16 @@ impl Model {
         (own.sensor.thickness_mm, own.input.dead) = (specimen.sensor.thickness_mm, specimen.input.dead);
         let quantised = self.quantised_for(&own)?;
         let scale = Scale::new(&own)?;
-        let Limits { prepare, noise_floor, threshold } = limits(&own, scale, self.formats().force_exponent)?;
+        let Limits { prepare, own: limits } = limits(&own, scale, self.formats().force_exponent)?;
         if prepare.reading_per_MPa != self.prepare.reading_per_MPa {
             return Err(FixedError::NoTable { part: "the largest gain, without hardware.table_range.gain," });
         }
         let mut plan = Plan::clone(self);
-        (plan.prepare, plan.noise_floor, plan.threshold) = (prepare, noise_floor, threshold);
+        (plan.prepare, plan.own) = (prepare, limits);
         if let Some(quantised) = quantised {
             plan.first_mut().quantised = quantised;
         }
-        (plan.tables_version, plan.tables_outcome) = (version, Outcome::Whole);
+        plan.own_mut().version = version;
         plan.scene = own;
         Model::of_plan(plan)
     }

@@ -69,7 +69,7 @@ impl SubarrayTrace {
     pub fn new(plan: &Plan, case: &CasePlan, codes: &[i32]) -> Self {
         let CasePlan { formats, quantised, .. } = case;
         let layout = case.layout();
-        let received = receive::receive(codes, plan.noise_floor);
+        let received = receive::receive(codes, plan.noise_floor());
         let condition = received.meets(plan.scene.partition.condition);
         let left = normalise::shift(received.magnitude, formats.input_bits);
         let normalised = normalise::normalise(&layout.pack(codes), left);

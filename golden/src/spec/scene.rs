@@ -43,7 +43,7 @@ use adc_scan::ScanFields;
 use estimator::FORMER_NAMES;
 use field::{choice, nested, table, whole, File, Flag, Kind as _, Limits, Listed, Number};
 pub(crate) use kinds::rise;
-use kinds::{BoardName, DeadTaxels, Knots};
+use kinds::{BoardName, DeadTaxels, Knots, OfEachArray};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -341,6 +341,13 @@ table! {
             .or(1)
             .hardware("parallel engine; no link, no blocks of frames")
             .page("in-your-soc");
+        /// Noise floor of each array in MPa, in place of `search.noise_floor_MPa`.
+        array_noise_floors_MPa: Vec<f64> = OfEachArray(Number::NotNegative)
+            .or(Vec::new())
+            .hardware("not with `\"adaptive\"`")
+            .page("in-your-soc");
+        /// Smallest normal force of each array in N, in place of `threshold.min_force_N`.
+        array_min_forces_N: Vec<f64> = OfEachArray(Number::NotNegative).or(Vec::new()).page("in-your-soc");
         /// Where the tables of a specimen stand: in the bitstream, or written while the engine rests.
         tables: TableStorage = choice(&[("rom", TableStorage::Rom), ("writable", TableStorage::Writable)])
             .or(TableStorage::Rom)
@@ -386,6 +393,11 @@ impl HardwareSpec {
             Some([_, most]) if self.has_writable_tables() => most,
             _ => gains.map_or(1.0, |gains| gains.iter().fold(0.0, |most, gain| gain.abs().max(most))),
         }
+    }
+
+    /// Whether arrays have noise floors or thresholds of their own.
+    pub fn states_limits_of_each_array(&self) -> bool {
+        !(self.array_noise_floors_MPa.is_empty() && self.array_min_forces_N.is_empty())
     }
 
     /// Width of the number of an array: 0 where there is one.
@@ -634,12 +646,20 @@ const ARRAY_PLACE: &str = "{array}";
 const LEAST_LINES: usize = 4;
 
 impl Scene {
-    /// The scene of array `array` of those that an engine serves, alone with its own files; the same scene where there is one.
+    /// The scene of array `array` of those that an engine serves, alone with its own files and limits; the same scene where there
+    /// is one.
     pub fn of_array(&self, array: usize) -> Scene {
         let mut own = self.clone();
         if self.hardware.arrays > 1 {
             own.hardware.arrays = 1;
             let number = array.to_string();
+            let of_each = |list: &mut Vec<f64>| std::mem::take(list).get(array).copied();
+            if let Some(floor) = of_each(&mut own.hardware.array_noise_floors_MPa) {
+                own.search.noise_floor_MPa = Some(floor);
+            }
+            if let Some(least) = of_each(&mut own.hardware.array_min_forces_N) {
+                own.threshold.min_force_N = least;
+            }
             for path in [&mut own.input.calibration, &mut own.input.tare].into_iter().flatten() {
                 *path = path.to_string_lossy().replace(ARRAY_PLACE, &number).into();
             }

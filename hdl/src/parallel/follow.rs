@@ -44,15 +44,28 @@ impl<'k> Parallel<'k, '_> {
         s.forces.frames.set(self.held("searched_frames", c.hand_over, passing, remembers));
     }
 
-    /// Of several arrays the one of a frame comes out with its `beats`: those that wait in the output may be of several frames.
-    pub(super) fn name_array(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>, beats: Beats<'k>) {
-        let (k, s, arrays) = (self.k, &self.s, Arrays::of_model(self.model));
-        let Some(prepare) = s.prepare.as_ref().filter(|_| arrays.bits > 0) else { return };
-        k.comment("Array of the frame received, in the passes, searched; of the frames that are sent");
+    /// Of several arrays the one of the frame that is searched.
+    pub(super) fn searched_array(&self, c: &Control<'k>) -> Option<Expr<'k>> {
+        let (k, s) = (self.k, &self.s);
+        let prepare = s.prepare.as_ref().filter(|_| Arrays::of_model(self.model).bits > 0)?;
+        k.comment("Array of the frame received, in the passes, searched");
         let received = self.held("received_array", s.receive.accept, prepare.m_axis_tid, true);
         let passing = self.held("frame_array", c.begin_frame, received, true);
-        let searched = self.held("searched_array", c.hand_over, passing, true);
-        let sent = k.instance("sent_arrays", Queue::new(arrays.bits));
+        Some(self.held("searched_array", c.hand_over, passing, true))
+    }
+
+    /// Of several arrays the one of a frame, which was `searched`, comes out with its `beats`: those that wait in the output may be of
+    /// several frames.
+    pub(super) fn name_array(
+        &self,
+        io: &EnginePorts<Inside<'k>>,
+        c: &Control<'k>,
+        beats: Beats<'k>,
+        searched: Option<Expr<'k>>,
+    ) {
+        let (k, Some(searched)) = (self.k, searched) else { return };
+        k.comment("Arrays of the frames that are sent");
+        let sent = k.instance("sent_arrays", Queue::new(searched.bits()));
         sent.reserve.set(c.begin_send);
         sent.write.set(c.begin_send);
         sent.last.set(c.begin_send);

@@ -84,7 +84,7 @@ impl<'k> Parallel<'k, '_> {
     }
 
     /// Values and statuses go to `forces`, beats that `send` requests to the output.
-    pub(super) fn send(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>) {
+    pub(super) fn send(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>, searched_array: Option<Expr<'k>>) {
         let (k, s) = (self.k, &self.s);
         k.comment("search -> forces -> send");
         s.forces.values.set(c.values.step);
@@ -119,7 +119,7 @@ impl<'k> Parallel<'k, '_> {
         }
         let beats = through!(beats, s.resultants);
         leave_by!(beats, io);
-        self.name_array(io, c, beats);
+        self.name_array(io, c, beats, searched_array);
         if let Some(prepare) = &s.prepare {
             k.comment("Tables are written while no frame is under way");
             prepare.idle.set(!(s.receive.full | c.computes | beats.valid));

@@ -1,8 +1,11 @@
 //! From the input to `fold`; tables.
 
+use dermis_golden::fixed::OwnTables;
+
 use super::control::Control;
 use super::Parallel;
 use crate::language::{Expr, Inside};
+use crate::primitives::THRESHOLD_BITS;
 use crate::streams::{arrive_at, through, Beats, EnginePorts};
 
 impl<'k> Parallel<'k, '_> {
@@ -12,7 +15,7 @@ impl<'k> Parallel<'k, '_> {
     }
 
     /// Tables and frames go to `prepare`, frames on to `fold`.
-    pub(super) fn receive(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>) {
+    pub(super) fn receive(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>, searched_array: Option<Expr<'k>>) {
         let (k, s) = (self.k, &self.s);
         k.comment("prepare -> receive -> normalise -> fold");
         let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
@@ -40,12 +43,59 @@ impl<'k> Parallel<'k, '_> {
         self.assign(&s.pass.coefficient_word, &s.prepare, |prepare| prepare.coefficient_word);
         self.assign(&s.pass.coefficient_pair, &s.prepare, |prepare| prepare.coefficient_pair);
         self.assign(&s.pass.coefficient_data, &s.prepare, |prepare| prepare.coefficient_data);
+        self.assign(&s.forces.version, &s.prepare, |prepare| prepare.version);
+        self.assign(&s.forces.incomplete, &s.prepare, |prepare| prepare.incomplete);
+        match searched_array {
+            None => self.limits(),
+            Some(searched) => self.limits_of_arrays(c, searched),
+        }
+    }
+
+    /// Noise floor and threshold, where they are written.
+    fn limits(&self) {
+        let s = &self.s;
         self.assign(&s.receive.floor, &s.prepare, |prepare| prepare.noise_floor);
         if let Some(window) = &s.window {
             self.assign(&window.floor, &s.prepare, |prepare| prepare.noise_floor);
         }
         self.assign(&s.forces.threshold, &s.prepare, |prepare| prepare.threshold);
-        self.assign(&s.forces.version, &s.prepare, |prepare| prepare.version);
-        self.assign(&s.forces.incomplete, &s.prepare, |prepare| prepare.incomplete);
+    }
+
+    /// The same of the array of a frame, where they are written or each array has its own.
+    fn limits_of_arrays(&self, c: &Control<'k>, searched: Expr<'k>) {
+        let (k, s, model) = (self.k, &self.s, self.model);
+        let Some(prepare) = &s.prepare else { return };
+        let written = model.has_writable_tables();
+        k.unused([prepare.noise_floor, prepare.threshold]);
+        let of_each = |of: &dyn Fn(&OwnTables) -> i64, bits: usize| -> Vec<u64> {
+            let most = (1i64 << bits) - 1;
+            model.own.iter().map(|own| of(own).clamp(0, most) as u64).collect()
+        };
+        k.comment("Noise floor of the frame received, in the passes; threshold of the one that is sent");
+        let (varies, bits) = (model.built_in_floor().is_none(), s.receive.floor.bits());
+        let offered = match (varies, written) {
+            (false, _) => self.zero(bits),
+            (true, true) => prepare.noise_floor,
+            // No code exceeds the largest floor.
+            (true, false) => prepare.m_axis_tid.table(bits, &of_each(&|own| own.noise_floor.into(), bits - 1)),
+        };
+        let received = self.held("received_floor", s.receive.accept, offered, varies);
+        s.receive.floor.set(received);
+        if let Some(window) = &s.window {
+            window.floor.set(self.held("frame_floor", c.begin_frame, received, varies));
+        }
+        let varies = model.built_in_threshold().is_none();
+        let sent = self.held("sent_array", c.begin_send, searched, written || varies);
+        if written {
+            prepare.sent_array.set(sent);
+        }
+        s.forces.threshold.set(match (varies, written) {
+            (false, _) => self.zero(THRESHOLD_BITS),
+            (true, true) => prepare.threshold,
+            (true, false) => {
+                let own = sent.table(THRESHOLD_BITS, &of_each(&|own| own.threshold, THRESHOLD_BITS));
+                k.delay("threshold", own)
+            }
+        });
     }
 }

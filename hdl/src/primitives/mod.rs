@@ -36,7 +36,7 @@ pub use frame::arrays::{Arrays, FrameArray};
 pub use frame::arrival::Arrival;
 #[cfg(test)]
 pub(crate) use frame::average::tests::Sums;
-pub use frame::average::{Average, FrameMarks};
+pub use frame::average::{Average, AveragePorts, FrameMarks};
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
 pub use frame::calibrate::{Calibrate, CalibratePorts};

@@ -25,7 +25,7 @@ stage_list! {
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = rounded_bits(model);
     }
-    receive: Receive = Receive::new(f, model.noise_floor), "receive.rs";
+    receive: Receive = Receive::new(f, model.noise_floor()), "receive.rs";
     reorder: TaxelReorder = TaxelReorder::new(model.layout()), "taxel_reorder.rs";
     pass_sequencer: PassSequencer = PassSequencer::new(f, unrounded, rounded), "pass_sequencer.rs";
     rounder: Rounder = Rounder::new(unrounded, rounded), "rounder.rs";

@@ -125,7 +125,7 @@ impl Forces {
             mu_step: f.mu_step,
             mu_fraction: f.mu_fraction,
             shift_base: i64::from(f.mu_fraction) + rescale_max - headroom,
-            threshold: model.threshold,
+            threshold: model.threshold(),
             score_limit: model.score_limit.map(i64::from),
             balance: Balance::of_model(model),
             taxels: 4 * f.quads as u64,

@@ -134,7 +134,7 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let bits = self.model.formats().input_bits as usize;
             let whole = self.reception.is_whole();
-            let stats = whole.then(|| receive(&self.reception.codes, self.model.noise_floor));
+            let stats = whole.then(|| receive(&self.reception.codes, self.model.noise_floor()));
             vec![
                 Some((inputs[0].number() == 0 && !whole).into()),
                 Some(self.reception.accepted(inputs).is_some().into()),
@@ -175,7 +175,7 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
         let subject = |changes: &[Change]| {
             subject_of!(
-                Receive::new(model.formats(), model.noise_floor),
+                Receive::new(model.formats(), model.noise_floor()),
                 changes,
                 inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, read_address, reported],
                 outputs [s_axis_tready, accept, full, word, magnitude, positive, negative, framing],

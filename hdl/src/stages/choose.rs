@@ -52,7 +52,7 @@ impl Choose {
             grids: model.grids(),
             condition: model.scene.partition.condition,
             // A floor beyond the code's range is clamped to its end, which no code exceeds either.
-            floor: model.noise_floor.min((1 << (bits - 1)) - 1),
+            floor: model.noise_floor().min((1 << (bits - 1)) - 1),
             bits,
         }
     }

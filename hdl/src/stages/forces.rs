@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn values_are_stored_and_beats_leave_as_they_were_requested() {
         let model = model(4, 4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n");
-        let model = model.with_changed_plan(|plan| plan.threshold = 1000).unwrap();
+        let model = model.with_changed_plan(|plan| plan.own_mut().threshold = 1000).unwrap();
         let stimulus = stimulus(&model, 20);
         let subject = |changes: &[Change]| {
             subject_of!(

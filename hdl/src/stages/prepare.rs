@@ -1,6 +1,7 @@
 //! Stage `prepare`: images of tables, calibration and averaging before `receive`, as far as the scene has them.
 //!
-//! Of several arrays each has a zero, gain, drift and mean of its own; the array of a frame is that of its first beat.
+//! Of several arrays each has a zero, gain, drift and mean of its own, and tables if they are written; the array of a frame or of an
+//! image of tables is that of its first beat.
 //!
 //! Where zeros run, port `frames` says above the number of frames whether one is at its limit ([`FrameMarks`]).
 
@@ -9,8 +10,8 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Outside};
 use crate::primitives::{
-    Arrays, Average, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray, FrameMarks, Load, LoadPorts, PAIR_BITS,
-    THRESHOLD_BITS, VERSION_WORD_BITS,
+    Arrays, Average, AveragePorts, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray, FrameMarks, Load,
+    LoadPorts, PAIR_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
 };
 use crate::streams::{leave_by, through, Beats};
 
@@ -58,7 +59,7 @@ block! {
         out m_axis_tlast;
         /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
         out frames: marks.bits();
-        /// Reset of the engine: `rst`, or tables are written.
+        /// Reset of the engine: `rst`, or tables are written; with several arrays `rst`.
         out restart;
         /// Writes `coefficient_data` to lanes `coefficient_pair` of word `coefficient_word` of the coefficient memory; only with `restart`.
         out coefficient_write;
@@ -68,14 +69,26 @@ block! {
         out coefficient_pair: coefficients.pair_bits();
         /// The coefficients of two lanes; valid with `coefficient_write`.
         out coefficient_data: PAIR_BITS;
-        /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`.
-        out noise_floor: floor_bits;
-        /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`.
+        /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`, of several arrays that of the word on
+        /// `m_axis_tdata`.
+        out noise_floor: written_bits(load.is_some(), *floor_bits);
+        /// Of several arrays whose tables are written that of the frame whose forces are sent.
+        in sent_array: if load.is_some() { arrays.bits } else { 0 };
+        /// Its threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`, of several arrays a cycle later.
         out threshold: THRESHOLD_BITS;
-        /// Version of the tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
+        /// Version of its tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
         out version: VERSION_WORD_BITS;
-        /// The tables are not whole.
+        /// Its tables are not whole.
         out incomplete;
+    }
+}
+
+/// Width of a word that is written, else of a constant 0.
+fn written_bits(written: bool, bits: usize) -> usize {
+    if written {
+        bits
+    } else {
+        1
     }
 }
 
@@ -89,7 +102,7 @@ impl Prepare {
         let arrays = Arrays::of_model(model);
         let frame_array = FrameArray::new(arrays, taxels);
         let calibrate = Calibrate::new(&model.prepare, taxels, bits, model.has_writable_tables(), arrays);
-        let average = Average::new([taxels, bits], &model.prepare, marks, arrays);
+        let average = Average::new([taxels, bits], &model.prepare, marks, model.has_writable_tables(), arrays);
         let prepares = load.is_some() || calibrate.is_some() || average.is_some() || frame_array.is_some();
         prepares.then(|| Prepare {
             stream_bits: model.stream_bits() as usize,
@@ -141,11 +154,38 @@ impl Block for Prepare {
             None => k.constant(1, 0),
         });
         let words = through!(words, average);
-        io.m_axis_tid.set(average.as_ref().map_or(array, |average| {
+        let array = average.as_ref().map_or(array, |average| {
             average.s_axis_tid.set(array);
             average.m_axis_tid
-        }));
+        });
+        io.m_axis_tid.set(array);
+        if let Some(load) = load.as_ref().filter(|_| self.arrays.bits > 0) {
+            tables_of_arrays(k, &io, load, array, calibrate.as_ref(), average.as_ref());
+        }
         leave_by!(Beats { data: words.data.low(self.input_bits), ..words }, io);
+    }
+}
+
+/// Of several arrays those whose tables are written and read; the words that leave are of `array`.
+fn tables_of_arrays<'k>(
+    k: &'k Builder,
+    io: &PreparePorts<Inside<'k>>,
+    load: &LoadPorts<Outside<'k>>,
+    array: Expr<'k>,
+    calibrate: Option<&CalibratePorts<Outside<'k>>>,
+    average: Option<&AveragePorts<Outside<'k>>>,
+) {
+    load.s_axis_tid.set(io.s_axis_tid);
+    load.floor_array.set(array);
+    load.sent_array.set(io.sent_array);
+    k.unused([load.anew, load.array]);
+    if let Some(calibrate) = calibrate {
+        load.calibrated_array.set(calibrate.incomplete_array);
+        calibrate.write_array.set(load.array);
+        calibrate.anew.set(load.anew);
+    }
+    if let Some(average) = average {
+        average.anew.set(load.anew);
     }
 }
 
@@ -169,12 +209,12 @@ fn tables<'k>(
     io.threshold.set(load.threshold);
     io.version.set(load.version);
     io.incomplete.set(load.incomplete);
-    k.unused([load.write, load.taxel, load.entry]);
+    k.unused([load.write, load.taxel, load.entry, load.calibrates_nothing]);
     if let Some(calibrate) = calibrate {
         calibrate.write.set(load.write);
         calibrate.write_taxel.set(load.taxel);
         calibrate.write_entry.set(load.entry);
-        calibrate.incomplete.set(load.incomplete);
+        calibrate.incomplete.set(load.calibrates_nothing);
     }
 }
 

@@ -306,7 +306,7 @@ pub(crate) mod tests {
             let part = self.case().parts.get(inputs[6].number() as usize).filter(|_| self.full);
             let stats = part.map(|part| {
                 let codes: Vec<i32> = part.indices(&model.scene.sensor).map(|at| self.reception.codes[at]).collect();
-                receive(&codes, model.noise_floor)
+                receive(&codes, model.noise_floor())
             });
             let next = self.reception.codes.len() + 1;
             let row_end = next.is_multiple_of(self.case().layout().rows * model.scene.sensor.cols);
@@ -345,9 +345,9 @@ pub(crate) mod tests {
         // The second of two cases, and a sensor with dead taxels.
         let parts = model(10, 14, &format!("[partition]\ncases = [0, 1]\n{noise}"));
         let dead = model(5, 7, &format!("{noise}dead = [[0, 3], [4, 6]]\n"));
-        assert!(parts.noise_floor > 0 && dead.dead.len() == 2);
+        assert!(parts.noise_floor() > 0 && dead.dead.len() == 2);
         let tables = noise.replace("[input]", "[hardware]\ntables = \"writable\"\n[input]");
-        let written = model(4, 5, &tables).with_changed_plan(|plan| plan.noise_floor += 17).unwrap();
+        let written = model(4, 5, &tables).with_changed_plan(|plan| plan.own_mut().noise_floor += 17).unwrap();
         for (model, case, defect) in [
             (written, 0, Change::value("", "stats__floor", |k| k.constant(20, (1 << 19) - 1))),
             (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),
@@ -357,7 +357,7 @@ pub(crate) mod tests {
             let mut buffer = FrameBuffer::new(&model, case);
             let count = buffer.case().parts.len();
             let quads = count * buffer.case().formats.quads;
-            let floor = Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64);
+            let floor = Word::from(model.built_in_floor().map_or(model.noise_floor(), |_| 0) as u64);
             let cycle = |cycle: usize| {
                 let beat = buffer.reception.beat(&mut random, cycle);
                 let free = buffer.full && random.u8(..40) == 0;

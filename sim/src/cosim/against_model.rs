@@ -56,7 +56,7 @@ impl Vector {
     /// The image of the tables of `model`, which nothing answers.
     pub fn of_image(model: &Model) -> Vector {
         let codes = model.image_beats();
-        let frame = format!("tables of version {}", model.tables_version);
+        let frame = format!("tables of version {}", model.own().version);
         let of_zeros = model.run(&vec![0; model.scene.sensor.taxels()]);
         let mut vector = Vector { taxels: codes.len(), ..Vector::new(model, frame, codes, of_zeros) };
         let expected = &mut vector.expected;

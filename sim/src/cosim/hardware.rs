@@ -99,7 +99,7 @@ impl Hardware {
 
     /// The image with which every run begins, if tables have been loaded.
     pub fn image(&self) -> Option<Vector> {
-        (self.model.tables_version > 0).then(|| Vector::of_image(&self.model))
+        (self.model.own().version > 0).then(|| Vector::of_image(&self.model))
     }
 
     /// Starts a simulation of many cycles.

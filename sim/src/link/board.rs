@@ -89,7 +89,7 @@ pub(super) fn load(board: &mut dyn Board, model: &Model, forces: bool) -> Result
     board.write_tables(&model.image())?;
     let codes = if model.code_beats() > 0 { 0 } else { model.scene.sensor.taxels() };
     let answer = board.frame(model, &vec![0; codes], forces)?;
-    let wants = model.tables_version;
+    let wants = model.own().version;
     let has = answer.tables().find(|tables| *tables != wants.to_string());
     has.map_or(Ok(()), |has| Err(HostError::Tables { port: board.name().to_owned(), has, wants }))
 }

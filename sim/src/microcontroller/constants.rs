@@ -90,7 +90,7 @@ fn add_input(all: &mut Definitions, model: &Model, layout: &Layout) {
     all.option("HAS_FULL_SCALE", scene.input.full_scale_MPa.is_some());
     all.option("UNIPOLAR", scene.input.unipolar);
     all.add("DEAD_TAXELS", model.dead.len());
-    all.add("NOISE_FLOOR", model.noise_floor);
+    all.add("NOISE_FLOOR", model.noise_floor());
     all.add("CONDITION_BOTH_SIGNS", u8::from(scene.partition.condition == Condition::BothSigns));
     all.add("INPUT_LOW_BITS", formats.input_low_bits);
     all.add("LIMB_ALIGN", formats.limb_align);
@@ -156,7 +156,7 @@ fn add_forces(all: &mut Definitions, model: &Model) {
     all.unsigned("FORCE_HEADROOM", FORCE_BITS - formats.search_bits[0]);
     all.unsigned("FORCE_SHIFT_MOST", FORCE_SHIFT_MAX);
     all.unsigned("FORCE_BITS", FORCE_BITS);
-    all.long("THRESHOLD", model.threshold);
+    all.long("THRESHOLD", model.threshold());
 }
 
 /// Word and lowest bit of each field of the status, and the words that are constant.

@@ -34,10 +34,10 @@ impl LoadReport {
             specimen: model.scene.name.clone(),
             file: path.to_owned(),
             bytes: image.len(),
-            version: model.tables_version,
+            version: model.own().version,
             layout: model.table_layout(),
-            threshold_lsb: model.threshold,
-            noise_floor_codes: model.noise_floor,
+            threshold_lsb: model.threshold(),
+            noise_floor_codes: model.noise_floor(),
             port: port.map(str::to_owned),
         }
     }

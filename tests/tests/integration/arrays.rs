@@ -20,12 +20,13 @@ const TAXELS: usize = 12;
 /// Frames of a run.
 const FRAMES: usize = 100;
 
-/// A scene of `ARRAYS` arrays of 4 × 3 taxels and the folder of their tables, which differ in zeros and gains.
-pub(crate) fn scene(more: &str) -> (TempDir, Scene) {
+/// A scene of `ARRAYS` arrays of 4 × 3 taxels, with more of its hardware and else, and the folder of their tables, which differ in
+/// zeros and gains.
+pub(crate) fn scene([hardware, more]: [&str; 2]) -> (TempDir, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
         "name = \"arrays\"\n[sensor]\nrows = 4\ncols = 3\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
-         [hardware]\narrays = {ARRAYS}\n[search]\nmu_max = 0.05\n[fixed]\ninput_bits = 16\n{more}"
+         [hardware]\narrays = {ARRAYS}\n{hardware}[search]\nmu_max = 0.05\n[fixed]\ninput_bits = 16\n{more}"
     );
     let scene = Scene::parse(&text, &folder.path().join("arrays.toml").display().to_string()).unwrap();
     for array in 0..ARRAYS {
@@ -63,23 +64,51 @@ pub(crate) fn vectors(model: &Model) -> Vec<Vector> {
     (0..FRAMES).map(&mut frame).collect()
 }
 
-/// What each array has of its own.
-pub(crate) const SCENES: [(&str, &str); 6] = [
+/// Limits of which each array has its own.
+const LIMITS: &str = "array_noise_floors_MPa = [0.0, 0.004, 0.02, 0.04]\narray_min_forces_N = [0.02, 0.0, 0.05, 0.1]\n";
+
+/// What each array has of its own: more of the hardware, and else.
+pub(crate) const SCENES: [(&str, [&str; 2]); 9] = [
     (
-        "tables, running zeros and sliding means",
-        "[input]\naverage = 2\nmean = \"sliding\"\ncalibration = \"table-{array}.csv\"\nfull_scale_MPa = 1.0\n\
+        "tables, limits, running zeros and sliding means",
+        [
+            LIMITS,
+            "[input]\naverage = 2\nmean = \"sliding\"\ncalibration = \"table-{array}.csv\"\nfull_scale_MPa = 1.0\n\
          zero = \"running\"\nzero_average = 2\nzero_limit_MPa = 0.02\n",
+        ],
     ),
-    ("tables", "[input]\ncalibration = \"table-{array}.csv\"\nfull_scale_MPa = 1.0\n"),
     (
-        "running zeros, two subarrays",
-        "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 2\n\
+        "tables that are written, running zeros and sliding means",
+        [
+            "tables = \"writable\"\n",
+            "[input]\naverage = 2\nmean = \"sliding\"\ncalibration = \"table-{array}.csv\"\n\
+          full_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 2\nzero_limit_MPa = 0.02\n",
+        ],
+    ),
+    ("tables", ["", "[input]\ncalibration = \"table-{array}.csv\"\nfull_scale_MPa = 1.0\n"]),
+    (
+        "limits, running zeros, two subarrays",
+        [
+            LIMITS,
+            "[partition]\nrows = 2\ncols = 1\n[input]\nfull_scale_MPa = 1.0\nzero = \"running\"\nzero_average = 2\n\
          zero_limit_MPa = 0.02\n",
+        ],
     ),
     // Of the shortest frames, several of which wait in the output.
-    ("nothing but their number", "[output]\nforces = \"resultants\"\n"),
-    ("sliding means", "[input]\naverage = 3\nmean = \"sliding\"\n"),
-    ("adaptive means", "[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false\n"),
+    ("nothing but their number", ["", "[output]\nforces = \"resultants\"\n"]),
+    ("sliding means", ["", "[input]\naverage = 3\nmean = \"sliding\"\n"]),
+    ("adaptive means", ["", "[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false\n"]),
+    (
+        "tables that are written, adaptive means",
+        [
+            "tables = \"writable\"\n",
+            "[input]\naverage = 3\nmean = \"adaptive\"\ntemplate = false\nfull_scale_MPa = 1.0\n",
+        ],
+    ),
+    (
+        "tables that are written",
+        ["tables = \"writable\"\n", "[output]\nforces = \"resultants\"\n[input]\nfull_scale_MPa = 1.0\n"],
+    ),
 ];
 
 fn hardware(scene: &Scene) -> Hardware {
@@ -89,7 +118,7 @@ fn hardware(scene: &Scene) -> Hardware {
 #[test]
 fn every_array_is_as_if_alone() {
     for (what, more) in variants(&SCENES, 3) {
-        let (_folder, scene) = scene(more);
+        let (_folder, scene) = scene(*more);
         let hardware = hardware(&scene);
         let vectors = vectors(&hardware.model);
         for stimulus in [Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: 3 }] {
@@ -97,7 +126,7 @@ fn every_array_is_as_if_alone() {
         }
         assert_equal(&compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed), format!("{what}, kernel"));
         // Another array would have given other forces, where it has something of its own.
-        if scene.input.calibration.is_some() {
+        if scene.input.calibration.is_some() || scene.hardware.states_limits_of_each_array() {
             let other =
                 |vector: &Vector| hardware.model.of_array((vector.array + 1) % ARRAYS).unwrap().run(&vector.codes);
             let first = &vectors[0];
@@ -110,10 +139,12 @@ fn every_array_is_as_if_alone() {
 #[test]
 fn frames_that_come_at_once_are_answered_within_the_bound() {
     for (what, more) in variants(&SCENES, 1) {
-        let (_folder, scene) = scene(more);
+        let (_folder, scene) = scene(*more);
         let hardware = hardware(&scene);
         let mut vectors = vectors(&hardware.model);
         vectors.truncate(ARRAYS);
+        // Each is loaded, above the noise floor of any array.
+        vectors.iter_mut().for_each(|vector| vector.codes.fill(12_000));
         let mut device = hardware.device_for(Simulator::Verilator, &vectors, 1).unwrap();
         let (taps, vectors) = hardware.observable(Simulator::Verilator, &vectors);
         let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
@@ -129,11 +160,15 @@ fn frames_that_come_at_once_are_answered_within_the_bound() {
 /// Frames of arrays in any order, 10⁴ of them in `make stress`: gaps, back-pressure, damaged frames, resets at every cycle.
 #[test]
 fn an_array_that_is_damaged_harms_no_other() {
-    for (what, more) in variants(&SCENES, 1) {
-        let (_folder, scene) = scene(more);
+    for (what, more) in variants(&SCENES, 2) {
+        let (_folder, scene) = scene(*more);
         let outcomes = stress(&hardware(&scene), &[], wanted("DERMIS_STRESS_CYCLES", 150_000), 1).unwrap();
         for outcome in &outcomes {
             assert!(outcome.violations == 0 && outcome.frames_out > 100, "{what}: {outcome:#?}");
+            assert!(
+                outcome.experiment != "tables" || outcome.images.min(outcome.images_broken) > 10,
+                "{what}: {outcome:#?}"
+            );
             assert!(outcome.experiment != "tlast" || outcome.cut.min(outcome.flagged) > 10, "{what}: {outcome:#?}");
         }
     }
@@ -147,11 +182,13 @@ fn a_defect_is_found() {
     let [calibrate, average] = ["prepare__calibrate", "prepare__average"];
     let defects = [
         // All arrays have the table and the drift of the first, or its mean; the array is that of the last beat; the number of a
-        // frame is that of the one in the passes.
+        // frame is that of the one in the passes; so are its noise floor and its threshold.
         Change::value(calibrate, "place", |k| k.named("taxel").extend(6)),
         Change::value(average, "place", |k| k.named("taxel").extend(6)),
         Change::value("prepare__frame_array", "begins", |k| k.constant(1, 1)),
         Change::value("", "sent_arrays__word", |k| k.named("frame_array__kept")),
+        Change::value("", "received_floor__keep", |k| k.constant(1, 0)),
+        Change::value("", "sent_array__keep", |k| k.constant(1, 0)),
     ];
     for defect in variants(&defects, 2) {
         hardware.generated = generate_changed(&hardware.model, std::slice::from_ref(defect)).unwrap();

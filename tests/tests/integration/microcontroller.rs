@@ -153,8 +153,8 @@ fn calibrated(plan: &mut Plan) {
     let taxels = plan.scene.sensor.taxels() as i32;
     plan.prepare.zero = Some((0..taxels).map(|taxel| 700 * (taxel % 5) - 900).collect());
     plan.prepare.gain = Some((0..taxels).map(|taxel| 65536 - 991 * (taxel % 7)).collect());
-    plan.threshold = 5000;
-    plan.noise_floor = 300;
+    plan.own_mut().threshold = 5000;
+    plan.own_mut().noise_floor = 300;
 }
 
 /// Odd sizes, dead taxels without symmetry, a shared matrix, narrow and wide words, no shear, calibration.

@@ -7,7 +7,7 @@
 //! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
 //! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
 
-use super::contents::{CasePlan, ContactPlan, Dropped, Plan};
+use super::contents::{CasePlan, ContactPlan, Dropped, OwnTables, Plan};
 use super::cycles::SHORTEST_SWEEP;
 use super::fit::{fit, Design};
 use super::specimens::specimens;
@@ -147,15 +147,12 @@ fn of_shapes(
         // That of the specimen that needs most; all have it.
         scene.search.degree = Some(planned[0].formats.degree).filter(|degree| *degree > 0);
     }
-    let Limits { prepare, noise_floor, threshold } = limits(&scene, scale.clone(), force_exponent)?;
+    let Limits { prepare, own } = limits(&scene, scale.clone(), force_exponent)?;
     Ok(Plan {
-        noise_floor,
-        threshold,
+        own,
         prepare,
         score_limit,
         push_limit,
-        tables_version: 0,
-        tables_outcome: Outcome::Whole,
         // Scenes with dead taxels have a single subarray.
         dead: match scene.hardware.has_writable_dead_taxels() {
             true => Vec::new(),
@@ -188,10 +185,8 @@ fn clean_limits(scene: &Scene) -> Result<(Option<i32>, Option<u32>), FixedError>
 pub struct Limits {
     /// Zero and gain of each taxel, and averaging.
     pub prepare: Prepare,
-    /// Noise floor in LSBs of a frame buffer word, rounded down.
-    pub noise_floor: i32,
-    /// Threshold in force LSBs, 2^`force_exponent` code LSBs in MPa · 1 N/MPa, rounded up.
-    pub threshold: i64,
+    /// Noise floor and threshold of each array; a force LSB is 2^`force_exponent` code LSBs in MPa · 1 N/MPa.
+    pub own: Vec<OwnTables>,
 }
 
 /// The limits of a scene in the words of its hardware.
@@ -210,14 +205,20 @@ pub fn limits(scene: &Scene, scale: Scale, force_exponent: i32) -> Result<Limits
     };
     let prepare = Prepare::new(scene, scale, full_scale.unwrap_or(1.0));
     let code_lsb = |full_scale: f64| full_scale / prepare.largest();
-    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa(), &code_lsb)?;
     let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
-    let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
-    Ok(Limits {
-        noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
-        threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
-        prepare,
-    })
+    let own = |array: usize| {
+        let Scene { search, threshold, .. } = &scene.of_array(array);
+        let noise_floor = scaled("search.noise_floor_MPa", search.noise_floor_MPa(), &code_lsb)?;
+        let threshold = scaled("threshold.min_force_N", threshold.min_force_N, &force_lsb)?;
+        Ok(OwnTables {
+            noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
+            threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+            version: 0,
+            outcome: Outcome::Whole,
+        })
+    };
+    let own: Result<Vec<OwnTables>, FixedError> = (0..scene.hardware.arrays).map(own).collect();
+    Ok(Limits { own: own?, prepare })
 }
 
 /// The subarrays of a case; contacts are found on the whole array.

@@ -30,20 +30,14 @@ pub struct Plan {
     pub board: Board,
     /// Calibration and averaging of the input.
     pub prepare: Prepare,
-    /// Noise floor in LSBs of a frame buffer word, rounded down.
-    pub noise_floor: i32,
+    /// What each array has of its own beside zeros and gains, array after array.
+    pub own: Vec<OwnTables>,
     /// Word of a score above which it is that of no clean frame, where the whole array is searched for one μ and there is a
     /// table of deviations. Words of scores fall with the objective.
     pub score_limit: Option<i32>,
     /// Times that the forces below zero are below those above in every clean frame, 1 to 15, where there is such a limit; see
     /// [`forces::pulls`](crate::fixed::stages::forces::pulls).
     pub push_limit: Option<u32>,
-    /// `threshold.min_force_N` in force LSBs, rounded up.
-    pub threshold: i64,
-    /// Version of the tables: 0 for those of the bitstream.
-    pub tables_version: u16,
-    /// What became of the last image of tables.
-    pub tables_outcome: Outcome,
     /// Dead taxels, row-major in the array, ascending; none where they are written, as gains of 0.
     pub dead: Vec<usize>,
     /// Segmentation and window, where each contact has a μ of its own.
@@ -56,6 +50,19 @@ pub struct Plan {
     pub dropped: Vec<Dropped>,
     /// At least one.
     pub(super) cases: Vec<CasePlan>,
+}
+
+/// What an array has of its own beside zeros and gains.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OwnTables {
+    /// Noise floor in LSBs of a frame buffer word, rounded down.
+    pub noise_floor: i32,
+    /// `threshold.min_force_N` in force LSBs, rounded up.
+    pub threshold: i64,
+    /// Version of the tables: 0 for those of the bitstream.
+    pub version: u16,
+    /// What became of the last image of tables.
+    pub outcome: Outcome,
 }
 
 /// What one partition case adds to the hardware. All cases use the lanes, the search and the force unit of the first.
@@ -103,7 +110,32 @@ impl Plan {
     /// The plan of array `array` of those that this engine serves, alone; of an engine of one array the same plan. Formats and the
     /// meaning of a code are those of all arrays. `array` is below `hardware.arrays`.
     pub fn of_array(&self, array: usize) -> Plan {
-        Plan { prepare: self.prepare.of_array(array), scene: self.scene.of_array(array), ..self.clone() }
+        Plan {
+            prepare: self.prepare.of_array(array),
+            scene: self.scene.of_array(array),
+            own: self.own.get(array).cloned().into_iter().collect(),
+            ..self.clone()
+        }
+    }
+
+    /// What the array has of its own; of several that of the first.
+    pub fn own(&self) -> &OwnTables {
+        &self.own[0]
+    }
+
+    /// The same, to change it.
+    pub fn own_mut(&mut self) -> &mut OwnTables {
+        &mut self.own[0]
+    }
+
+    /// Noise floor in LSBs of a frame buffer word; of several arrays that of the first.
+    pub fn noise_floor(&self) -> i32 {
+        self.own[0].noise_floor
+    }
+
+    /// Threshold in force LSBs; of several arrays that of the first.
+    pub fn threshold(&self) -> i64 {
+        self.own[0].threshold
     }
 
     /// The cases built, case 0 first if there are several.
@@ -199,9 +231,9 @@ impl Plan {
     pub fn choose(&self, codes: &[i32]) -> usize {
         let mut seen = FrameStats::default();
         for (index, &code) in codes.iter().enumerate() {
-            seen.add(&self.scene.sensor, index, code, self.noise_floor);
+            seen.add(&self.scene.sensor, index, code, self.noise_floor());
         }
-        seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
+        seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor())
     }
 
     /// Whether the hardware has a μ search: `search.mu_max` is above 0, and no network gives μ.
@@ -225,18 +257,29 @@ impl Plan {
         self.formats().code_bits + u32::from(self.has_writable_tables())
     }
 
-    /// Width of the noise floor on its way through the engine; one bit, 0, where it is not written.
+    /// Width of the noise floor on its way through the engine; one bit, 0, where it is built in.
     pub fn floor_bits(&self) -> u32 {
-        if self.has_writable_tables() {
-            self.formats().input_bits
-        } else {
-            1
+        match self.built_in_floor() {
+            Some(_) => 1,
+            None => self.formats().input_bits,
         }
     }
 
-    /// The noise floor in codes that is built in; `None` where it is written.
+    /// The noise floor in codes that is built in; `None` where it is written or each array has its own.
     pub fn built_in_floor(&self) -> Option<i32> {
-        (!self.has_writable_tables()).then_some(self.noise_floor)
+        self.built_in(|own| own.noise_floor)
+    }
+
+    /// The threshold in force LSBs that is built in; `None` likewise.
+    pub fn built_in_threshold(&self) -> Option<i64> {
+        self.built_in(|own| own.threshold)
+    }
+
+    /// What `of` gives where it is neither written nor differs between arrays.
+    fn built_in<T: PartialEq>(&self, of: impl Fn(&OwnTables) -> T) -> Option<T> {
+        let first = of(&self.own[0]);
+        let common = self.own.iter().all(|own| of(own) == first);
+        (common && !self.has_writable_tables()).then_some(first)
     }
 
     /// Whether the scene asks for the coefficient check.

@@ -45,7 +45,7 @@ fn hardware_that_takes_an_image_is_the_specimen_s() {
     let mut hardware = hardware();
     let (_folder, scene) = specimen(1.75);
     let own = hardware.with_tables(&scene, 41).unwrap();
-    assert!(own.noise_floor > 0 && own.threshold > 0);
+    assert!(own.noise_floor() > 0 && own.threshold() > 0);
     let frame =
         Frame::from_stress("f", &scene.sensor, (0..20).map(|taxel| f64::from(taxel) / 40.0 - 0.2).collect()).unwrap();
     let codes = own.readings(std::slice::from_ref(&frame)).unwrap();
@@ -55,7 +55,7 @@ fn hardware_that_takes_an_image_is_the_specimen_s() {
     let result = own.decode(&[frame], "fixed", &own.run(&codes).beats, &own.run(&codes).status).unwrap();
     assert_eq!(result.extra.tables_version, Some(41));
     // The tables of the bitstream have version 0.
-    assert_eq!(super::super::Model::new(&scene).unwrap().tables_version, 0);
+    assert_eq!(super::super::Model::new(&scene).unwrap().own().version, 0);
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn a_refused_image_leaves_the_tables_and_a_broken_one_no_force() {
     assert_eq!(hardware.load(&broken), Outcome::Broken);
     assert!(hardware.run(&codes).beats.iter().all(|force| *force == [0; 3]));
     // A refused image does not make tables whole.
-    assert_eq!((hardware.load(&other), hardware.tables_outcome), (Outcome::Refused, Outcome::Broken));
+    assert_eq!((hardware.load(&other), hardware.own().outcome), (Outcome::Refused, Outcome::Broken));
     assert!(flags(&hardware).contains(&crate::result::flags::Flag::TablesIncomplete));
     assert_eq!(hardware.load(&image), Outcome::Whole);
     assert!(!flags(&hardware).contains(&crate::result::flags::Flag::TablesIncomplete));
@@ -141,13 +141,13 @@ fn an_image_ends_as_the_stream_says() {
     };
     assert_eq!(send(&mut hardware, &image, true), [Outcome::Refused]);
     assert_eq!(send(&mut hardware, &image, false), [Outcome::Whole]);
-    assert_eq!((hardware.tables_version, hardware.tables_outcome), (3, Outcome::Whole));
+    assert_eq!((hardware.own().version, hardware.own().outcome), (3, Outcome::Whole));
     assert_eq!(send(&mut hardware, &[&image[..], &[0, 0]].concat(), false), [Outcome::Broken]);
     assert_eq!(send(&mut hardware, &image[..40], false), [Outcome::Broken]);
     let mut wrong = image.clone();
     wrong[5] ^= 1;
     assert_eq!(send(&mut hardware, &wrong, false), [Outcome::Refused]);
-    assert_eq!(hardware.tables_outcome, Outcome::Broken);
+    assert_eq!(hardware.own().outcome, Outcome::Broken);
     // Broken off by a code, and by a reset.
     for (bytes, outcome) in [(3, Outcome::Refused), (7, Outcome::Broken)] {
         image[..bytes].iter().for_each(|&byte| assert_eq!(intake.byte(&mut hardware, byte, false, false), None));

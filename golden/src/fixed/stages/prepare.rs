@@ -130,13 +130,14 @@ impl Scale {
         if !scene.hardware.has_writable_tables() {
             return Ok(Scale { tare, table, largest });
         }
-        let table = table.unwrap_or_else(|| Calibration::identity(scene.sensor.taxels()));
+        let table = table.unwrap_or_else(|| Calibration::identity(scene.hardware.arrays * scene.sensor.taxels()));
         let Some([least, most]) = scene.hardware.table_range.gain else {
             return Ok(Scale { tare, table: Some(table), largest });
         };
         let outside = |gain: &f64| !(least..=most).contains(&gain.abs());
         if let Some(taxel) = table.gain.iter().position(outside) {
-            let place = [taxel / scene.sensor.cols, taxel % scene.sensor.cols];
+            let of_array = taxel % scene.sensor.taxels();
+            let place = [of_array / scene.sensor.cols, of_array % scene.sensor.cols];
             return Err(FixedError::TableRange { place, gain: table.gain[taxel], allowed: [least, most] });
         }
         Ok(Scale { tare, table: Some(table), largest })

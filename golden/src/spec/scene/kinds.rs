@@ -1,6 +1,6 @@
-//! Values of fields that stand for themselves: a board's name, dead taxels, the knots of a curve.
+//! Values of fields that stand for themselves: a board's name, dead taxels, the knots of a curve, a number for each array.
 
-use super::field::{number_of, Kind};
+use super::field::{number_of, Kind, Number};
 use crate::spec::board::Board;
 use crate::spec::sensor::MAX_SIDE;
 use serde_json::{json, Value as Json};
@@ -63,6 +63,29 @@ impl Kind for DeadTaxels {
     }
 
     fn show(&self, value: &Vec<[usize; 2]>) -> Option<Value> {
+        value.is_empty().then(|| Value::Array(Vec::new()))
+    }
+}
+
+/// A number for each array, or none.
+pub(super) struct OfEachArray(pub(super) Number);
+
+impl Kind for OfEachArray {
+    type Value = Vec<f64>;
+
+    fn read(&self, value: &Value, file: &str) -> Option<Vec<f64>> {
+        value.as_array()?.iter().map(|value| self.0.read(value, file)).collect()
+    }
+
+    fn allowed(&self) -> String {
+        format!("a list with {} for each of hardware.arrays", self.0.allowed())
+    }
+
+    fn schema(&self) -> Json {
+        json!({ "type": "array", "items": self.0.schema() })
+    }
+
+    fn show(&self, value: &Vec<f64>) -> Option<Value> {
         value.is_empty().then(|| Value::Array(Vec::new()))
     }
 }

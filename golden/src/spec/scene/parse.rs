@@ -56,6 +56,7 @@ impl Scene {
         };
         check_inverse(&reader, &scene)?;
         check_table_range(&reader, &scene)?;
+        check_arrays(&reader, &scene)?;
         Ok(scene)
     }
 
@@ -318,6 +319,25 @@ fn check_table_range(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
     if dead_taxels > most || (1..dead).contains(&dead_taxels) {
         let allowed = format!("0, or a whole number from {dead} to {most}: input.dead has {dead}");
         return Err(reader.wrong_field("hardware.table_range.dead_taxels", allowed));
+    }
+    Ok(())
+}
+
+/// What each of several arrays has of its own is stated for all of them.
+fn check_arrays(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
+    let HardwareSpec { arrays, array_noise_floors_MPa, array_min_forces_N, .. } = &scene.hardware;
+    let of_each = [
+        ("hardware.array_noise_floors_MPa", array_noise_floors_MPa),
+        ("hardware.array_min_forces_N", array_min_forces_N),
+    ];
+    for (field, list) in of_each {
+        if !list.is_empty() && (*arrays == 1 || list.len() != *arrays) {
+            let allowed = match arrays {
+                1 => "left out, or hardware.arrays above 1".to_owned(),
+                _ => format!("a list of {arrays} numbers, one for each of hardware.arrays"),
+            };
+            return Err(reader.wrong_field(field, allowed));
+        }
     }
     Ok(())
 }

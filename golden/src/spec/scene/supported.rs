@@ -29,7 +29,7 @@
 //! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
 //! the bitstream; dead taxels with one subarray, as above.
 //!
-//! Several arrays: not with writable tables, a scan or blocks of frames, of which each would have to be told which array it is of.
+//! Several arrays: not with writable coefficients, which all have in common, nor with a scan or blocks of frames, of which each would have to be told which array it is of.
 //!
 //! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
 //! are taken, no average of frames, `input_bits` for a result and a sign.
@@ -184,10 +184,16 @@ impl Scene {
             ),
             rule(several && self.hardware.has_writable_tables(), "hardware.tables", writable(), "rom, with adaptive"),
             rule(
-                arrays && self.hardware.has_writable_tables(),
-                "hardware.tables",
-                writable(),
-                "rom, with hardware.arrays above 1",
+                arrays && self.hardware.has_writable_coefficients(),
+                "hardware.arrays",
+                self.hardware.arrays.to_string(),
+                "1, with hardware.table_range.thickness_mm or dead_taxels: all arrays have the same coefficients",
+            ),
+            rule(
+                several && !self.hardware.array_noise_floors_MPa.is_empty(),
+                "hardware.array_noise_floors_MPa",
+                "[…]".to_string(),
+                "none, with adaptive",
             ),
             rule(
                 arrays && self.hardware.adc_scan.is_some(),

@@ -17,7 +17,7 @@ use dermis_golden::fixed::stages::prepare::adaptive_mean::{AdaptiveMean, FACTOR_
 use dermis_golden::fixed::stages::send::{FRAMES, WINDOW};
 use dermis_golden::spec::mean_window::MeanWindow;
 
-use super::arrays::Arrays;
+use super::arrays::{Arrays, Resets};
 use super::sliding_mean::{rises, MeanPorts};
 use crate::language::{concat, Builder, Contents, Expr, Net, Type};
 use crate::primitives::address::counter::count_bits;
@@ -94,7 +94,7 @@ impl AdaptiveKernel<'_> {
         let followed = k.delay("followed_place", beat.place);
         means.write(beat.valid.at(1), followed, written);
         let sums = self.sums(k, &beat, &fresh, second);
-        self.judge(k, io.rst, &frame, &sums);
+        self.judge(k, io.resets, &frame, &sums);
         let (value, leaves, final_value) = self.window(k, io.rst, &frame, *stored, moves);
         let data = io.data_out.register();
         k.when(moves, || {
@@ -127,14 +127,14 @@ impl AdaptiveKernel<'_> {
     /// Takes the beats of a frame until it is full, and again once its last word has left. What is read: the place of the beat, or of the
     /// word that is sent.
     fn take<'k>(&self, k: &'k Builder, io: &MeanPorts<'k>, left: Expr<'k>) -> (Frame<'k>, Beat<'k>, Expr<'k>) {
-        let (rst, tlast, power) = (io.rst, io.tlast, self.mean.longest() as usize);
+        let (rst, resets, tlast, power) = (io.rst, io.resets, io.tlast, self.mean.longest() as usize);
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels())));
         let end = self.taxels() as u64 - 1;
         k.comment("Place of the next word; g and c of its frame, whole frames in the longest mean.");
         let taxel = k.state("taxel", index, rst, 0);
-        let gains = self.arrays.state(k, "gain", Type::unsigned(count_bits(power + 1)), rst, 0);
-        let odds = self.arrays.state(k, "odd", bit, rst, 0);
-        let wholes = self.arrays.state(k, "whole", Type::unsigned(power + 1), rst, 0);
+        let gains = self.arrays.state(k, "gain", Type::unsigned(count_bits(power + 1)), resets, 0);
+        let odds = self.arrays.state(k, "odd", bit, resets, 0);
+        let wholes = self.arrays.state(k, "whole", Type::unsigned(power + 1), resets, 0);
         let [full, settling, sending] = ["full", "settling", "sending"].map(|name| k.state(name, bit, rst, 0));
         let (sent, last) = (k.register("sent", index), k.register("last", bit));
         let takes = k.wire("takes", io.offered & !*full);
@@ -278,8 +278,8 @@ impl AdaptiveKernel<'_> {
     }
 
     /// Judges a full frame: the level, then one window after the other.
-    fn judge<'k>(&self, k: &'k Builder, rst: Expr<'k>, frame: &Frame<'k>, sums: &Sums<'k>) {
-        let bit = Type::unsigned(1);
+    fn judge<'k>(&self, k: &'k Builder, resets: Resets<'k>, frame: &Frame<'k>, sums: &Sums<'k>) {
+        let (rst, bit) = (resets.rst, Type::unsigned(1));
         let bits = FACTOR_BITS as usize;
         k.comment("Cycles until the sums are complete; the window that is judged, digits of its factor.");
         let cycles = k.state("cycles", Type::unsigned(count_bits(SUM_LATENCY as usize - 1)), rst, 0);
@@ -288,7 +288,7 @@ impl AdaptiveKernel<'_> {
         let digit = k.register("digit", Type::unsigned(count_bits(bits + 1)));
         let found = k.register("found", bit);
         let settled = k.wire("settled", *frame.settling & cycles.is(u64::from(SUM_LATENCY) - 2));
-        let level = self.level(k, rst, frame, *sums.spread, settled);
+        let level = self.level(k, resets, frame, *sums.spread, settled);
         let factors: Vec<u64> = self.mean.factors.iter().map(|factor| u64::from(*factor)).collect();
         let indices = 1 << window.bits();
         let padded = |words: &[u64]| [words, &vec![0; indices - words.len()]].concat();
@@ -339,16 +339,16 @@ impl AdaptiveKernel<'_> {
     fn level<'k>(
         &self,
         k: &'k Builder,
-        rst: Expr<'k>,
+        resets: Resets<'k>,
         frame: &Frame<'k>,
         spread: Expr<'k>,
         settled: Expr<'k>,
     ) -> Expr<'k> {
         let run_bits = count_bits(SAME_SIDE as usize);
         k.comment("Level of the second differences: half of the frames are above it; frames on the same side of it.");
-        let levels = self.arrays.state(k, "level", Type::unsigned(spread.bits() + 1), rst, 0);
-        let sides = self.arrays.state(k, "side", Type::unsigned(1), rst, 0);
-        let runs = self.arrays.state(k, "run", Type::unsigned(run_bits), rst, 0);
+        let levels = self.arrays.state(k, "level", Type::unsigned(spread.bits() + 1), resets, 0);
+        let sides = self.arrays.state(k, "side", Type::unsigned(1), resets, 0);
+        let runs = self.arrays.state(k, "run", Type::unsigned(run_bits), resets, 0);
         let [level, side, run] = [&levels, &sides, &runs].map(|states| states.of(frame.array));
         let above = k.wire("above", level.less(spread.extend(level.bits())));
         let same = k.wire("same", !(side ^ above));

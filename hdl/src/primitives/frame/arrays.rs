@@ -47,9 +47,48 @@ impl Arrays {
     }
 
     /// A state named `name` for each array, `value` after a reset.
-    pub(super) fn state<'k>(self, k: &'k Builder, name: &str, ty: Type, rst: Expr<'k>, value: u64) -> PerArray<'k> {
+    pub(super) fn state<'k>(
+        self,
+        k: &'k Builder,
+        name: &str,
+        ty: Type,
+        resets: Resets<'k>,
+        value: u64,
+    ) -> PerArray<'k> {
         let named = |array| if self.bits == 0 { name.to_owned() } else { format!("{name}_of_{array}") };
-        PerArray { states: (0..self.count()).map(|array| k.state(&named(array), ty, rst, value)).collect() }
+        PerArray {
+            states: (0..self.count()).map(|array| k.state(&named(array), ty, resets.of(array), value)).collect(),
+        }
+    }
+
+    /// What resets them: `rst`, and where tables are `written` the bits of `anew`.
+    pub(super) fn resets<'k>(self, rst: Expr<'k>, anew: Expr<'k>, written: bool) -> Resets<'k> {
+        Resets { rst, anew: (self.anew_bits(written) > 0).then_some(anew) }
+    }
+
+    /// Width of the port by which single arrays begin anew: a bit for each of several arrays whose tables are `written`.
+    pub(super) fn anew_bits(self, written: bool) -> usize {
+        if self.bits > 0 && written {
+            self.count()
+        } else {
+            0
+        }
+    }
+}
+
+/// What resets the states of the arrays.
+#[derive(Clone, Copy)]
+pub(super) struct Resets<'k> {
+    /// All of them.
+    pub rst: Expr<'k>,
+    /// A bit for each array that begins anew, where single arrays do.
+    pub anew: Option<Expr<'k>>,
+}
+
+impl<'k> Resets<'k> {
+    /// What resets array `array`.
+    fn of(self, array: usize) -> Expr<'k> {
+        self.anew.map_or(self.rst, |anew| self.rst | anew.at(array))
     }
 }
 

@@ -38,6 +38,8 @@ block! {
         marks: FrameMarks,
         /// Each has a sliding mean of its own; one where blocks are added up.
         arrays: Arrays,
+        /// Tables are written.
+        written: bool,
     }
     ports AveragePorts {
         clock;
@@ -65,6 +67,8 @@ block! {
         /// Number of frames in a sliding mean, up to 2^(k+1) − 1, with the window of an adaptive one above; above it, where zeros run, whether one is at its limit. Valid
         /// with `m_axis_tvalid`. Otherwise one bit, 0.
         out frames: marks.bits();
+        /// Of several arrays those whose means begin anew, a bit each; only while no frame is under way.
+        in anew: arrays.anew_bits(*written);
     }
 }
 
@@ -97,11 +101,18 @@ impl FrameMarks {
 
 impl Average {
     /// Sums words of `bits` bits of `taxels` taxels over 2^k frames, or gives 2^k times their sliding or adaptive mean, as `prepare` has
-    /// it, one for each of the `arrays`; with the `marks` of a frame. `None` where each frame is its own sum.
-    pub fn new([taxels, bits]: [usize; 2], prepare: &Prepare, marks: FrameMarks, arrays: Arrays) -> Option<Self> {
+    /// it, one for each of the `arrays`, whose tables are `written` or not; with the `marks` of a frame. `None` where each frame is its
+    /// own sum.
+    pub fn new(
+        [taxels, bits]: [usize; 2],
+        prepare: &Prepare,
+        marks: FrameMarks,
+        written: bool,
+        arrays: Arrays,
+    ) -> Option<Self> {
         let Prepare { average: power, mean, adaptive, .. } = prepare.clone();
         let averages = power > 0 || mean == MeanKind::Sliding;
-        averages.then_some(Average { taxels, bits, power: power as usize, mean, adaptive, marks, arrays })
+        averages.then_some(Average { taxels, bits, power: power as usize, mean, adaptive, marks, arrays, written })
     }
 
     /// Whether the mean is adaptive.
@@ -169,9 +180,10 @@ impl Average {
 
 impl Block for Average {
     fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
-        let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays } = *self;
+        let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays, written } = *self;
         let ports = MeanPorts {
             rst: io.rst,
+            resets: arrays.resets(io.rst, io.anew, written),
             data: io.s_axis_tdata,
             array: io.s_axis_tid,
             offered: io.s_axis_tvalid,

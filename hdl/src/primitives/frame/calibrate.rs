@@ -53,14 +53,20 @@ block! {
         in m_axis_tready;
         /// The beat is the last of its frame; valid with `m_axis_tvalid`.
         out m_axis_tlast;
-        /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; during a reset.
+        /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; while no frame is under way.
         in write;
+        /// Array of the taxel; valid with `write`.
+        in write_array: if *written { arrays.bits } else { 0 };
         /// Index of the taxel; valid with `write`.
         in write_taxel: count_bits(*taxels);
         /// Zero in the low bits, gain above; valid with `write`.
         in write_entry: bits + GAIN_BITS as usize;
+        /// Of several arrays that whose stress is held to 0 with `incomplete`.
+        out incomplete_array: if *written { arrays.bits } else { 0 };
         /// Every stress is 0, where tables are writable: they are not whole.
         in incomplete;
+        /// Of several arrays those whose running zeros begin anew, a bit each; only while no frame is under way.
+        in anew: arrays.anew_bits(*written);
     }
 }
 
@@ -100,9 +106,13 @@ impl Calibrate {
         if !self.written {
             return Some(entries);
         }
-        // Nothing is read during the reset in which it is written.
+        // What is read while it is written is of no frame.
         let entries = entries.unchecked();
-        entries.write(io.write, io.write_taxel, io.write_entry);
+        let place = match self.arrays.bits {
+            0 => io.write_taxel,
+            _ => k.wire("write_place", io.write_array.concat(io.write_taxel)),
+        };
+        entries.write(io.write, place, io.write_entry);
         Some(entries)
     }
 
@@ -142,7 +152,7 @@ impl Calibrate {
             k.when(moves, || waits.set(waits.low(RECOVERY - 1).concat(offered & early)));
             let (taxel, off, gain, valid) = (*taxel, difference, factor, valids.at(2));
             let beat = Beat { rst, moves, offered, taxel, place, end, early, off, gain, valid };
-            follow(k, zero, self.arrays, self.taxels, beat)
+            follow(k, zero, self.arrays, self.arrays.resets(rst, io.anew, self.written), self.taxels, beat)
         });
         let (difference, factor, limited) = match followed {
             None => (difference, factor, None),
@@ -194,6 +204,9 @@ impl Calibrate {
                 k.register("arrays", Type::unsigned(steps * array_bits)).comment("Of the beats in the registers.");
             k.when(moves, || arrays.set(arrays.low((steps - 1) * array_bits).concat(io.s_axis_tid)));
             io.m_axis_tid.set(arrays.slice((steps - 1) * array_bits, array_bits));
+            if self.written {
+                io.incomplete_array.set(arrays.slice((steps - 2) * array_bits, array_bits));
+            }
         }
     }
 }

@@ -9,8 +9,9 @@ use dermis_golden::fixed::Plan;
 use dermis_golden::spec::quads::Quads;
 use dermis_golden::wire::link::{CRC_POLYNOMIAL, CRC_RESIDUE};
 
+use super::arrays::{Arrays, Resets};
 use crate::block;
-use crate::language::{Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::counter::count_bits;
 
 block! {
@@ -21,8 +22,9 @@ block! {
     /// ```
     /// The first byte waits until `idle` has been high, and no code has passed, for [`REST`] cycles. A byte is taken in one cycle
     /// and used in the next, but for a reset.
-    /// From the first written word to the last byte `restart` is high. What is in the tables, whether they are whole and their
-    /// version stand in memories, which a reset leaves and the bitstream initialises.
+    /// From the first written word to the last byte `restart` is high, or of several arrays the bit of `anew` of the one that is
+    /// written, which is that of the image's first beat. What is in the tables, whether they are whole and their version stand in
+    /// memories, which a reset leaves and the bitstream initialises.
     pub struct Load {
         code_bits: usize,
         input_bits: usize,
@@ -30,8 +32,9 @@ block! {
         coefficients: CoefficientPlaces,
         /// Number of the layout of an image.
         layout: u32,
-        /// The tables of the bitstream.
-        tables: Tables,
+        /// The tables of the bitstream, of each array.
+        tables: Vec<Tables>,
+        arrays: Arrays,
     }
     ports LoadPorts {
         clock;
@@ -40,6 +43,8 @@ block! {
         in idle;
         /// A code, sign-extended, or a byte of an image, `stream_bits` wide; valid with `s_axis_tvalid`.
         in s_axis_tdata: code_bits + 1;
+        /// Array of the frame or image, that of its first beat; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -54,10 +59,14 @@ block! {
         in m_axis_tready;
         /// The beat is the last of its frame; valid with `m_axis_tvalid`.
         out m_axis_tlast;
-        /// Reset of the engine: `rst`, or tables are written.
+        /// Reset of the engine: `rst`, or tables are written; with several arrays `rst`.
         out restart;
-        /// Writes `entry` to taxel `taxel`.
+        /// Of several arrays the one whose tables are written, a bit each.
+        out anew: arrays.anew_bits(true);
+        /// Writes `entry` to taxel `taxel` of array `array`.
         out write;
+        /// Array of the image; valid with `write`.
+        out array: arrays.bits;
         /// Index of the taxel; valid with `write`.
         out taxel: count_bits(*taxels);
         /// Zero in the low bits, gain above; valid with `write`.
@@ -71,14 +80,22 @@ block! {
         out coefficient_pair: coefficients.pair_bits();
         /// The coefficients of two lanes, the lower first, 18 bits each; valid with `coefficient_write`.
         out coefficient_data: PAIR_BITS;
+        /// Array whose noise floor is read.
+        in floor_array: arrays.bits;
         /// Noise floor in codes, `input_bits` wide, ≥ 0; valid unless `restart`.
         out noise_floor: input_bits;
-        /// Threshold in force LSBs, 32 bits; valid unless `restart`.
+        /// Array whose forces and status are sent.
+        in sent_array: arrays.bits;
+        /// Threshold in force LSBs, 32 bits; valid unless `restart`, of several arrays a cycle after `sent_array`.
         out threshold: THRESHOLD_BITS;
         /// Version of the tables, 15 bits, and above it whether the last image was refused; valid unless `restart`.
         out version: VERSION_WORD_BITS;
-        /// The tables are not whole.
+        /// These tables are not whole.
         out incomplete;
+        /// Array whose stress is calibrated.
+        in calibrated_array: arrays.bits;
+        /// The tables of that array are not whole.
+        out calibrates_nothing;
     }
 }
 
@@ -98,14 +115,17 @@ pub(crate) fn table_beat<'k>(k: &'k Builder, octet: Expr<'k>, code_bits: usize) 
 impl Load {
     /// For the tables of `plan`, if they are writable.
     pub fn of_plan(plan: &Plan) -> Option<Self> {
-        let (tables, formats) = (plan.tables()?, plan.formats());
+        let formats = plan.formats();
+        let arrays = 0..plan.scene.hardware.arrays;
+        let tables: Option<Vec<Tables>> = arrays.map(|array| plan.of_array(array).tables()).collect();
         Some(Load {
             code_bits: formats.code_bits as usize,
             input_bits: formats.input_bits as usize,
             taxels: plan.scene.sensor.taxels(),
             coefficients: CoefficientPlaces::new(plan),
             layout: plan.table_layout(),
-            tables,
+            tables: tables?,
+            arrays: Arrays::of_model(plan),
         })
     }
 }
@@ -156,13 +176,13 @@ fn crc_after<'k>(k: &'k Builder, crc: Expr<'k>, byte: Expr<'k>) -> Expr<'k> {
 
 impl Block for Load {
     fn build<'k>(&self, k: &'k Builder, io: LoadPorts<Inside<'k>>) {
-        self.take_tables(k, io, &self.tables);
+        self.take_tables(k, io);
     }
 }
 
 impl Load {
-    /// Frames pass, images are taken; the bitstream has `tables`.
-    fn take_tables<'k>(&self, k: &'k Builder, io: LoadPorts<Inside<'k>>, tables: &Tables) {
+    /// Frames pass, images are taken.
+    fn take_tables<'k>(&self, k: &'k Builder, io: LoadPorts<Inside<'k>>) {
         let (bits, bit, word_bits) = (self.code_bits, Type::unsigned(1), 8 * WORD_BYTES);
         let (data, offered, tlast, ready) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready);
         let zero = k.constant(1, 0);
@@ -172,7 +192,9 @@ impl Load {
         let writing =
             k.state("writing", bit, io.rst, 0).comment("Word 0 was right; a register, since it resets the engine.");
         let took = k.state("took", bit, io.rst, 0);
-        let refused = k.state("refused", bit, io.rst, 0);
+        let refused = self.arrays.state(k, "refused", bit, Resets { rst: io.rst, anew: None }, 0);
+        let own = (self.arrays.bits > 0).then(|| k.register("own", Type::unsigned(self.arrays.bits)));
+        let array = own.map_or(io.s_axis_tid, |own| *own);
         let in_frame = k.state("in_frame", bit, io.rst, 0);
         let rests = k.state("rests", Type::unsigned(count_bits(REST as usize + 1)), io.rst, 0);
         let place = k.state("place", Type::unsigned(count_bits(WORD_BYTES)), io.rst, 0);
@@ -209,7 +231,10 @@ impl Load {
         k.when(begins, || {
             image.set(!*in_frame);
             skipping.set(*in_frame);
-            k.when(*in_frame, || refused.set(k.constant(1, 1)));
+            k.when(*in_frame, || refused.set(k, io.s_axis_tid, k.constant(1, 1)));
+            if let Some(own) = own {
+                own.set(io.s_axis_tid);
+            }
         });
 
         k.comment("The byte taken in the cycle before, and the word that it ends.");
@@ -242,7 +267,7 @@ impl Load {
             writing.set(right_head);
             place.set(k.constant(place.bits(), 0));
             index.set(k.constant(index.bits(), 0));
-            refused.set(fails);
+            refused.set(k, array, fails);
             skipping.set(fails & *took & !*took_last);
         });
 
@@ -251,44 +276,62 @@ impl Load {
         io.taxel.set((*index - first).low(count_bits(self.taxels)));
         io.entry.set(word.low(bits + GAIN_BITS as usize));
         self.write_coefficients(k, &io, ends_word & !index.less(after) & !index.is(words as u64 - 1), *image, *word);
-        io.restart.set(io.rst | *writing);
-        self.keep(k, &io, tables, *word, at, [right_head, done, *refused]);
+        match self.arrays.bits {
+            0 => {
+                io.restart.set(io.rst | *writing);
+            }
+            bits => {
+                io.restart.set(io.rst);
+                let of = |number: u64| *writing & array.is(number);
+                io.anew.set(concat(&(0..1 << bits).rev().map(of).collect::<Vec<_>>()));
+                io.array.set(array);
+            }
+        }
+        self.keep(k, &io, array, *word, at, [right_head, done, refused.of(io.sent_array)]);
     }
 
-    /// Threshold, noise floor, version and state of the tables: from word n of an image, which is `word` when `at(n)`. Then
-    /// whether its first word is right, whether it ends whole, whether the last one was refused.
+    /// Threshold, noise floor, version and state of the tables: from word n of an image of `array`, which is `word` when `at(n)`.
+    /// Then whether its first word is right, whether it ends whole, whether the last one of `sent_array` was refused.
     fn keep<'k>(
         &self,
         k: &'k Builder,
         io: &LoadPorts<Inside<'k>>,
-        tables: &Tables,
+        array: Expr<'k>,
         word: Expr<'k>,
         at: impl Fn(usize) -> Expr<'k>,
         [right_head, done, refused]: [Expr<'k>; 3],
     ) {
-        let zero = k.constant(1, 0);
-        k.comment("Memories of one word: a reset leaves them as they are.");
-        let kept = |name: &str, bits: usize, value: u64| -> MemoryPort {
-            k.memory(name, 1, bits, Contents::Words(vec![(0, value)]))
+        k.comment("Memories of a word for each array: a reset leaves them as they are.");
+        let kept = |name: &str, bits: usize, value: &dyn Fn(&Tables) -> u64| -> MemoryPort {
+            let words = self.tables.iter().map(value).enumerate().collect();
+            k.memory(name, self.arrays.count(), bits, Contents::Words(words))
         };
-        let thresholds = kept("thresholds", THRESHOLD_BITS, tables.threshold.into());
-        let floors = kept("noise_floors", self.input_bits, tables.noise_floor as u64);
-        let states = kept("states", 1 + VERSION_BITS as usize, 1 << VERSION_BITS | u64::from(tables.version));
-        let state = k.wire("state", states.read(zero));
+        let place = |array: Expr<'k>| if self.arrays.bits == 0 { k.constant(1, 0) } else { array };
+        let thresholds = kept("thresholds", THRESHOLD_BITS, &|tables| tables.threshold.into());
+        let floors = kept("noise_floors", self.input_bits, &|tables| tables.noise_floor as u64);
+        let whole_version = |tables: &Tables| 1 << VERSION_BITS | u64::from(tables.version);
+        let states = kept("states", 1 + VERSION_BITS as usize, &whole_version);
+        let state = k.wire("state", states.read(place(io.sent_array)));
         let whole = state.top();
 
         let new_version = k.register("new_version", Type::unsigned(VERSION_BITS as usize));
         let second = k.wire("second", at(1));
         k.when(second, || new_version.set(word.slice(THRESHOLD_BITS, VERSION_BITS as usize)));
-        thresholds.write(second, zero, word.low(THRESHOLD_BITS));
-        floors.write(at(2), zero, word.low(self.input_bits));
+        thresholds.write(second, place(array), word.low(THRESHOLD_BITS));
+        floors.write(at(2), place(array), word.low(self.input_bits));
         let new_state = done.mux(k.constant(1, 1).concat(*new_version), k.constant(1 + VERSION_BITS as usize, 0));
-        states.write(done | right_head, zero, new_state);
+        states.write(done | right_head, place(array), new_state);
 
-        io.noise_floor.set(floors.read(zero));
-        io.threshold.set(thresholds.read(zero));
+        io.noise_floor.set(floors.read(place(io.floor_array)));
+        let threshold = thresholds.read(place(io.sent_array));
+        // Of several arrays it is a read behind a choice, which the comparison of forces need not wait for.
+        io.threshold.set(if self.arrays.bits == 0 { threshold } else { k.delay("threshold_held", threshold) });
         io.version.set((refused | !whole).concat(state.low(VERSION_BITS as usize)));
         io.incomplete.set(!whole);
+        io.calibrates_nothing.set(match self.arrays.bits {
+            0 => !whole,
+            _ => !states.read(io.calibrated_array).top(),
+        });
     }
 
     /// The coefficients are in the bitstream: nothing is written.

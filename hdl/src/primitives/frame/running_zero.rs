@@ -15,7 +15,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::stages::prepare::running_zero::RunningZero;
 
-use super::arrays::Arrays;
+use super::arrays::{Arrays, Resets};
 use crate::language::{Builder, Contents, Expr, Type};
 
 /// Cycles after an early `tlast` in which no beat is taken, so that the words of a frame of one beat have been written.
@@ -48,11 +48,12 @@ pub(super) struct Followed<'k> {
     pub limited: Expr<'k>,
 }
 
-/// For `taxels` taxels of each of the `arrays`.
+/// For `taxels` taxels of each of the `arrays`, whose zeros begin anew with `resets`.
 pub(super) fn follow<'k>(
     k: &'k Builder,
     zero: &RunningZero,
     arrays: Arrays,
+    resets: Resets<'k>,
     taxels: usize,
     beat: Beat<'k>,
 ) -> Followed<'k> {
@@ -65,7 +66,7 @@ pub(super) fn follow<'k>(
 
     k.comment("The drift as it was stored, 0 in the first frame after a reset.");
     let array = arrays.of_place(place);
-    let firsts = arrays.state(k, "first", bit, rst, 1);
+    let firsts = arrays.state(k, "first", bit, resets, 1);
     let word = k.register("word", Type::unsigned(moved_bits + step_bits));
     let held = |name: &str, value: Expr<'k>| {
         let register = k.register(name, value.ty());
@@ -108,7 +109,7 @@ pub(super) fn follow<'k>(
 
     let [pressed, limiting] = ["pressed", "limiting"].map(|name| k.state(name, bit, rst, 0));
     k.comment("Nothing pressed in the frame before; a zero was at its limit in it.");
-    let [all_rest, all_limited] = ["rests", "limited"].map(|name| arrays.state(k, name, bit, rst, 0));
+    let [all_rest, all_limited] = ["rests", "limited"].map(|name| arrays.state(k, name, bit, resets, 0));
     let array = arrays.of_place(place);
     let [rests, limited] = [&all_rest, &all_limited].map(|state| state.of(array));
     let either = |go: Expr<'k>, stay: Expr<'k>| rests.mux(go, stay);

@@ -12,7 +12,7 @@
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::spec::sliding::gain_shift;
 
-use super::arrays::Arrays;
+use super::arrays::{Arrays, Resets};
 use crate::language::{Builder, Contents, Expr, Output, Type};
 use crate::primitives::address::counter::count_bits;
 
@@ -25,6 +25,8 @@ pub fn frames_bits(power: u32) -> usize {
 #[derive(Clone, Copy)]
 pub(super) struct MeanPorts<'k> {
     pub rst: Expr<'k>,
+    /// What resets the mean of each array.
+    pub resets: Resets<'k>,
     pub data: Expr<'k>,
     pub array: Expr<'k>,
     pub offered: Expr<'k>,
@@ -55,7 +57,7 @@ pub(super) struct SlidingMean {
 impl SlidingMean {
     /// The kernel.
     pub fn build<'k>(&self, k: &'k Builder, io: MeanPorts<'k>) {
-        let MeanPorts { rst, data, array, offered, tlast, ready_out, .. } = io;
+        let MeanPorts { rst, resets, data, array, offered, tlast, ready_out, .. } = io;
         let MeanPorts { data_out, array_out, valid_out, last_out, ready, frames, .. } = io;
         let (power, wide) = (self.power, self.bits + self.power);
         let (bit, index) = (Type::unsigned(1), Type::unsigned(count_bits(self.taxels)));
@@ -64,9 +66,9 @@ impl SlidingMean {
         let means = k.memory("means", self.arrays.places(self.taxels), wide, Contents::Undefined).holds(Holds::Average);
         k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
         let taxel = k.state("taxel", index, rst, 0);
-        let gains = self.arrays.state(k, "gain", shift, rst, 0);
-        let odds = self.arrays.state(k, "odd", bit, rst, 0);
-        let wholes = self.arrays.state(k, "whole", count, rst, 0);
+        let gains = self.arrays.state(k, "gain", shift, resets, 0);
+        let odds = self.arrays.state(k, "odd", bit, resets, 0);
+        let wholes = self.arrays.state(k, "whole", count, resets, 0);
         let [gain, odd, whole] = [&gains, &odds, &wholes].map(|state| state.of(array));
         let [held, added] = ["held", "added"].map(|name| k.state(name, bit, rst, 0));
         let valid = valid_out.state(rst, 0);

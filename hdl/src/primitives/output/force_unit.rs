@@ -194,7 +194,7 @@ impl ForceUnit {
             fraction: f.mu_fraction as usize,
             mu_step: f.mu_step,
             base_shift: force_shift(f, 0, 0).into(),
-            threshold: (!model.has_writable_tables()).then(|| model.threshold.clamp(0, 1 << WORD) as u64),
+            threshold: model.built_in_threshold().map(|threshold| threshold.clamp(0, 1 << WORD) as u64),
             score_limit: model.score_limit.map(i64::from),
             balance: Balance::of_model(model),
             checks: model.has_coefficient_check(),

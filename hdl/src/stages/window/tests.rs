@@ -17,7 +17,7 @@ use crate::wire::Word;
 /// A model of an array with so many contacts, `own` rows and columns in a window; `more` is the rest of the scene file.
 fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, more: &str) -> Model {
     let change = |plan: &mut Plan| {
-        (plan.scene.partition.max_contacts, plan.noise_floor) = (contacts, 100);
+        (plan.scene.partition.max_contacts, plan.own_mut().noise_floor) = (contacts, 100);
         let segmenter = Segmenter::new(&plan.scene.sensor, 1.0);
         let window = window::Window { place: Place::Contact, rows: own[0], cols: own[1] };
         plan.by_contact = Some(ContactPlan { segmenter, window });
@@ -27,7 +27,7 @@ fn with_contacts([rows, cols]: [usize; 2], own: [usize; 2], contacts: usize, mor
 
 /// Input `floor`.
 fn floor_word(model: &Model) -> Word {
-    Word::from(model.built_in_floor().map_or(model.noise_floor, |_| 0) as u64)
+    Word::from(model.built_in_floor().map_or(model.noise_floor(), |_| 0) as u64)
 }
 
 fn window_of(model: &Model) -> window::Window {
@@ -89,7 +89,7 @@ impl Contact {
     /// What the bit-true model reads.
     fn words(&self, model: &Model) -> WindowWords {
         let array =
-            Array { sensor: &model.scene.sensor, codes: &self.codes, dead: &model.dead, floor: model.noise_floor };
+            Array { sensor: &model.scene.sensor, codes: &self.codes, dead: &model.dead, floor: model.noise_floor() };
         let is_own = |taxel: usize| self.labels[taxel] == self.label;
         window(model.formats(), &window_of(model), &array, self.middle, &is_own)
     }

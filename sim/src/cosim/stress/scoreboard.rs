@@ -39,7 +39,7 @@ struct PendingFrame<'a> {
 
 /// Input beats accepted so far and output beats due.
 pub(super) struct Scoreboard<'a> {
-    /// That of each array, with the tables that the hardware has.
+    /// That of each array, with the tables that the hardware has of it.
     models: Vec<Cow<'a, Model>>,
     samples: &'a [Sample],
     /// What the hardware has of the frames of each array so far.
@@ -94,7 +94,7 @@ impl<'a> Scoreboard<'a> {
         self.models.len()
     }
 
-    /// The model of the array of the current frame; where tables are written there is one array.
+    /// The model of the array of the current frame.
     fn model(&self) -> &Model {
         &self.models[self.array]
     }
@@ -104,16 +104,22 @@ impl<'a> Scoreboard<'a> {
         self.accepted.is_multiple_of(self.model().scene.sensor.taxels())
     }
 
+    /// Whether the array of the next beat counts: it is the first of a frame or of an image.
+    pub(super) fn names_array(&self) -> bool {
+        self.begins() && !self.intake.is_busy()
+    }
+
     /// Records an accepted beat, a code of `sample` or a byte of an image; `alone`: sent at full speed, with no other frame in
     /// the device.
     pub(super) fn accepted(&mut self, cycle: u64, sample: usize, code: Code, alone: bool) {
         let Code { data, last, array } = code;
         if self.model().has_writable_tables() && data >> (self.model().formats().code_bits - 1) == 1 {
-            return self.accepted_byte(data as u8, last);
+            return self.accepted_byte(data as u8, last, array % self.arrays());
         }
         if self.intake.is_busy() {
-            let outcome = self.intake.code(self.models[0].to_mut());
-            self.count_image(outcome);
+            let of = self.intake.array();
+            let outcome = self.intake.code(self.models[of].to_mut());
+            self.count_image(of, outcome);
         }
         if self.begins() {
             self.array = array % self.arrays();
@@ -151,17 +157,19 @@ impl<'a> Scoreboard<'a> {
         }
     }
 
-    fn accepted_byte(&mut self, byte: u8, last: bool) {
-        let in_frame = !self.begins();
-        let outcome = self.intake.byte(self.models[0].to_mut(), byte, last, in_frame);
+    fn accepted_byte(&mut self, byte: u8, last: bool, array: usize) {
+        let (in_frame, of) = (!self.begins(), self.intake.array_of_byte(array));
+        let outcome = self.intake.byte(self.models[of].to_mut(), byte, last, in_frame);
         if in_frame && outcome.is_some() {
-            self.pending.iter_mut().for_each(|frame| frame.may_refuse = true);
+            let own = self.pending.iter_mut().filter(|frame| frame.array == of);
+            own.for_each(|frame| frame.may_refuse = true);
         }
-        self.count_image(outcome);
+        self.count_image(of, outcome);
     }
 
-    /// Counts an image that is over. Once tables have been written the engine is as after a reset.
-    fn count_image(&mut self, outcome: Option<Loaded>) {
+    /// Counts an image of array `array` that is over. Once tables have been written the engine is as after a reset; of several
+    /// arrays only what it has of this one.
+    fn count_image(&mut self, array: usize, outcome: Option<Loaded>) {
         let counts = match outcome {
             None => return,
             Some(Loaded::Refused) => {
@@ -172,6 +180,10 @@ impl<'a> Scoreboard<'a> {
             Some(Loaded::Broken) => &mut self.outcome.images_broken,
         };
         *counts += 1;
+        if self.arrays() > 1 {
+            self.prepared[array] = self.models[array].prepare.empty();
+            return;
+        }
         (self.accepted, self.framing_error) = (0, false);
         self.empty();
     }
@@ -226,8 +238,10 @@ impl<'a> Scoreboard<'a> {
         self.outcome.frames_in -= self.pending.len() as u64;
         if self.model().has_writable_tables() {
             // The last byte was accepted in the cycle before.
-            let outcome = self.intake.reset(self.models[0].to_mut(), 1);
-            self.count_image(outcome);
+            let of = self.intake.array();
+            let outcome = self.intake.reset(self.models[of].to_mut(), 1);
+            self.models.iter_mut().for_each(|model| model.to_mut().forget_refusal());
+            self.count_image(of, outcome);
         }
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
         self.empty();

@@ -51,12 +51,13 @@ pub(super) fn tables(bench: &mut Testbench, model: &Model, random: &mut fastrand
         let mut rates = HandshakeRates::random(random);
         for _ in 0..random.usize(..4) {
             let sample = random.usize(..bench.sample_count());
-            bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
+            let frame = Burst::whole(bench.sample(sample), sample).of_array(random.usize(..bench.arrays()));
+            bench.send(&frame, &mut rates);
         }
         let mut image = random_tables(model, &coefficients, random).image(model.table_layout(), code_bits);
         let inner = random.usize(WORD_BYTES..image.len());
         let sample = random.usize(..bench.sample_count());
-        let frame = Burst::whole(bench.sample(sample), sample);
+        let frame = Burst::whole(bench.sample(sample), sample).of_array(random.usize(..bench.arrays()));
         let mut resets = false;
         let burst = match random.u32(..14) {
             0 => {
@@ -80,7 +81,7 @@ pub(super) fn tables(bench: &mut Testbench, model: &Model, random: &mut fastrand
             }
             _ => Burst::image(&image, code_bits),
         };
-        bench.send(&burst, &mut rates);
+        bench.send(&burst.of_array(random.usize(..bench.arrays())), &mut rates);
         if resets {
             let held = 1 + random.u64(..LONGEST_RESET);
             bench.reset(held, random);
@@ -89,8 +90,7 @@ pub(super) fn tables(bench: &mut Testbench, model: &Model, random: &mut fastrand
             outcome.longest_reset = outcome.longest_reset.max(held);
         }
         if random.u32(..4) == 0 {
-            let sample = random.usize(..bench.sample_count());
-            bench.send_alone(&Burst::whole(bench.sample(sample), sample));
+            bench.send_alone(&bench.any(random));
         }
     }
     bench.drain(&mut HandshakeRates::full_speed());

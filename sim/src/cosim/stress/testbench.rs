@@ -68,10 +68,10 @@ impl Burst {
         Burst { array, ..self }
     }
 
-    /// The beat at `at`; in a frame that has begun it has another `tid`, which does not count.
-    fn code(&self, at: usize, begins: bool) -> Code {
+    /// The beat at `at`; where `tid` does not count it is another.
+    fn code(&self, at: usize, counts: bool) -> Code {
         let (data, last) = self.codes[at];
-        Code { data, last, array: if begins { self.array } else { self.array + at } }
+        Code { data, last, array: if counts { self.array } else { self.array + at } }
     }
 
     /// Without `tlast` at the end.
@@ -177,7 +177,7 @@ impl<'a> Testbench<'a> {
 
     fn offer(&mut self, burst: &Burst, rates: &mut HandshakeRates, alone: bool) {
         for at in 0..burst.codes.len() {
-            let code = burst.code(at, self.scoreboard.begins());
+            let code = burst.code(at, self.scoreboard.names_array());
             // AXI4-Stream: once valid, a beat stays until it is accepted.
             let mut offering = false;
             loop {
@@ -197,7 +197,7 @@ impl<'a> Testbench<'a> {
     pub(super) fn send_until(&mut self, burst: &Burst, end: u64) -> bool {
         let alone = self.scoreboard.is_empty();
         for at in 0..burst.codes.len() {
-            let code = burst.code(at, self.scoreboard.begins());
+            let code = burst.code(at, self.scoreboard.names_array());
             while self.cycle == end || !self.step(Some(code), true) {
                 if self.cycle >= end || !self.can_continue() {
                     return false;

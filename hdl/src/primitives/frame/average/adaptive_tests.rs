@@ -109,7 +109,7 @@ fn subject(prepare: &Prepare, bits: usize, changes: &[Change]) -> Subject<'stati
     let taxels = prepare.adaptive.as_ref().unwrap().live.len();
     let marks = FrameMarks { frames_bits: MARK_BITS, limited: false };
     subject_of!(
-        Average::new([taxels, bits], prepare, marks, Arrays::default()).unwrap(),
+        Average::new([taxels, bits], prepare, marks, false, Arrays::default()).unwrap(),
         changes,
         inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
         outputs [s_axis_tready, m_axis_tvalid, m_axis_tlast, m_axis_tdata, frames],

@@ -101,7 +101,7 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
         })
         .collect();
     let prepare = prepare(POWER, MeanKind::Block);
-    let average = Average::new([TAXELS, BITS], &prepare, FrameMarks::default(), Arrays::default()).unwrap();
+    let average = Average::new([TAXELS, BITS], &prepare, FrameMarks::default(), false, Arrays::default()).unwrap();
     check(&kernel_of(&average), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
@@ -195,7 +195,7 @@ fn every_frame_gives_the_mean_so_far() {
         assert!(most > 2 << power, "{most} frames");
         let marks = FrameMarks { frames_bits: frames_bits(power), limited: false };
         let prepare = prepare(power, MeanKind::Sliding);
-        let average = Average::new([TAXELS, BITS], &prepare, marks, Arrays::default()).unwrap();
+        let average = Average::new([TAXELS, BITS], &prepare, marks, false, Arrays::default()).unwrap();
         check(&kernel_of(&average), &stimulus, &mut Means::new(power));
     }
 }

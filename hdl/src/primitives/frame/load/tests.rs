@@ -4,25 +4,29 @@ use dermis_golden::fixed::stages::load::{beats, Outcome};
 use dermis_golden::fixed::{Intake, Model};
 
 use super::*;
-use crate::language::testbench::{check_with_defects, subject_of, Reference};
-use crate::language::Change;
+use crate::language::testbench::{check_with_defects, Reference, Subject};
+use crate::language::{kernel_of, Change};
 use crate::scenes::model;
 use crate::wire::Word;
 
+/// Inputs of several arrays.
+const OF_ARRAYS: [&str; 4] = ["s_axis_tid", "floor_array", "sent_array", "calibrated_array"];
 const WRITABLE: &str = "[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n";
 
-/// The stream as the model takes it; a byte is taken in one cycle and used in the next.
+/// The stream as the models of the arrays take it; a byte is taken in one cycle and used in the next.
 #[derive(Clone)]
 struct Loader {
-    plan: Model,
+    plans: Vec<Model>,
     intake: Intake,
     /// A byte was taken in the cycle before; with it, unless it is skipped, the byte and its `tlast`.
     took: Option<Option<(u8, bool)>>,
     in_frame: bool,
     rests: u64,
-    /// What stands in the tables, whole or not.
-    floor: u64,
-    threshold: u64,
+    /// What stands in the tables of each array, whole or not.
+    floors: Vec<u64>,
+    thresholds: Vec<u64>,
+    /// The threshold of `sent_array` in the cycle before.
+    held_threshold: Option<u64>,
     /// Number and content of a word of coefficients that ended in the cycle before.
     pair: Option<(usize, u64)>,
     /// An image ended with its first word in the cycle before.
@@ -32,22 +36,37 @@ struct Loader {
 
 impl Loader {
     fn new(plan: &Model) -> Self {
+        let plans: Vec<Model> = (0..plan.own.len()).map(|array| plan.of_array(array).unwrap()).collect();
         Loader {
-            plan: plan.clone(),
             intake: Intake::default(),
             took: None,
             in_frame: false,
             rests: 0,
-            floor: plan.noise_floor as u64,
-            threshold: plan.threshold as u64,
+            floors: plans.iter().map(|plan| plan.noise_floor() as u64).collect(),
+            thresholds: plans.iter().map(|plan| plan.threshold() as u64).collect(),
+            held_threshold: None,
+            plans,
             pair: None,
             ended: false,
             reset: false,
         }
     }
 
+    /// Any of the models, for what they have in common.
+    fn plan(&self) -> &Model {
+        &self.plans[0]
+    }
+
+    /// Outcome and version of the tables of array `array`. While an image is written they are not whole.
+    fn state(&self, array: usize) -> (Outcome, u16) {
+        match self.writing() && array == self.intake.array() {
+            true => (Outcome::Broken, 0),
+            false => (self.plans[array].own().outcome, self.plans[array].own().version),
+        }
+    }
+
     fn bits(&self) -> usize {
-        self.plan.formats().code_bits as usize
+        self.plan().formats().code_bits as usize
     }
 
     /// Whether a byte is taken, and whether a code passes, if the receiver is ready.
@@ -67,12 +86,12 @@ impl Loader {
     }
 
     fn first_coefficient(&self) -> usize {
-        HEAD_WORDS + self.plan.scene.sensor.taxels()
+        HEAD_WORDS + self.plan().scene.sensor.taxels()
     }
 
     /// Numbers of the words with coefficients.
     fn coefficient_words(&self) -> Range<usize> {
-        let CoefficientPlaces { words, pairs } = CoefficientPlaces::new(&self.plan);
+        let CoefficientPlaces { words, pairs } = CoefficientPlaces::new(self.plan());
         self.first_coefficient()..self.first_coefficient() + words * pairs
     }
 
@@ -91,6 +110,11 @@ impl Loader {
     }
 }
 
+/// The array that input `number` of [`OF_ARRAYS`] names; the only one where there are none.
+fn array_of(inputs: &[Word], number: usize) -> usize {
+    inputs.get(6 + number).map_or(0, |array| array.number() as usize)
+}
+
 /// The low `bits` bits.
 fn low(word: u64, bits: usize) -> u64 {
     word & ((1 << bits) - 1)
@@ -103,12 +127,15 @@ impl Reference for Loader {
         let [takes, passes] = self.moves(inputs);
         let entries = HEAD_WORDS..self.first_coefficient();
         let pair = self.pair.filter(|_| !rst);
-        let pairs = CoefficientPlaces::new(&self.plan).pairs;
+        let pairs = CoefficientPlaces::new(self.plan()).pairs;
         let entry = self.written().filter(|(number, _)| entries.contains(number) && !rst);
-        // While an image is written the tables are not whole.
-        let (outcome, version) = match self.writing() {
-            true => (Outcome::Broken, 0),
-            false => (self.plan.tables_outcome, self.plan.tables_version),
+        let [floor_array, sent_array, calibrated_array] = [1, 2, 3].map(|k| array_of(inputs, k));
+        let (outcome, version) = self.state(sent_array);
+        let own = (self.plans.len() > 1).then(|| self.intake.array() as u64);
+        let writing = self.writing() || self.ended;
+        let threshold = match own {
+            None => Some(self.thresholds[0]),
+            Some(_) => self.held_threshold,
         };
         let spoiled = u64::from(outcome != Outcome::Whole);
         vec![
@@ -123,12 +150,19 @@ impl Reference for Loader {
             pair.map(|(number, _)| Word::from((number / pairs) as u64)),
             pair.map(|(number, _)| Word::from((number % pairs) as u64)),
             pair.map(|(_, word)| Word::from(low(word, PAIR_BITS))),
-            bit(rst || self.writing() || self.ended),
-            Some(Word::from(self.floor)),
-            Some(Word::from(self.threshold)),
+            bit(rst || (writing && own.is_none())),
+            Some(Word::from(self.floors[floor_array])),
+            threshold.map(Word::from),
             bit(true).map(|_| Word::from(spoiled << VERSION_BITS | u64::from(version))),
             bit(outcome == Outcome::Broken),
+            bit(self.state(calibrated_array).0 == Outcome::Broken),
         ]
+        .into_iter()
+        .chain(own.into_iter().flat_map(|own| {
+            let anew = if writing { 1 << own } else { 0 };
+            [self.reset.then(|| Word::from(anew as u64)), entry.map(|_| Word::from(own))]
+        }))
+        .collect()
     }
 
     fn clock(&mut self, inputs: &[Word]) {
@@ -138,10 +172,13 @@ impl Reference for Loader {
         let coefficients = self.coefficient_words();
         self.pair = written.filter(|(number, _)| coefficients.contains(number));
         self.pair = self.pair.map(|(number, word)| (number - coefficients.start, word));
-        let Loader { plan, intake, .. } = self;
+        self.held_threshold = Some(self.thresholds[array_of(inputs, 2)]);
+        let own = self.intake.array();
+        let Loader { plans, intake, .. } = self;
         if rst {
             // The byte taken last has not been used.
-            intake.reset(plan, 0);
+            intake.reset(&mut plans[own], 0);
+            plans.iter_mut().for_each(Model::forget_refusal);
             let (took, in_frame, rests, pair, ended, reset) = (None, false, 0, None, false, true);
             *self = Loader { took, in_frame, rests, pair, ended, reset, ..self.clone() };
             return;
@@ -151,14 +188,14 @@ impl Reference for Loader {
             Some(Some((byte, last))) => {
                 let is_first = intake.image().len() + 1 == WORD_BYTES;
                 match written {
-                    Some((1, word)) => self.threshold = low(word, THRESHOLD_BITS),
-                    Some((2, word)) => self.floor = low(word, plan.formats().input_bits as usize),
+                    Some((1, word)) => self.thresholds[own] = low(word, THRESHOLD_BITS),
+                    Some((2, word)) => self.floors[own] = low(word, plans[own].formats().input_bits as usize),
                     _ => {}
                 }
-                self.ended = intake.byte(plan, byte, last, false) == Some(Outcome::Broken) && is_first;
+                self.ended = intake.byte(&mut plans[own], byte, last, false) == Some(Outcome::Broken) && is_first;
             }
             None if valid && !self.is_byte(inputs) => {
-                self.intake.code(&mut self.plan);
+                self.intake.code(&mut self.plans[own]);
             }
             _ => {}
         }
@@ -167,9 +204,10 @@ impl Reference for Loader {
         if takes {
             let byte = inputs[2].field(0, 8) as u8;
             let begins = !self.intake.is_busy();
+            let own = self.intake.array_of_byte(array_of(inputs, 0));
             if self.intake.is_skipping() || (begins && self.in_frame) {
                 // An image between the codes of a frame is refused at once.
-                self.intake.byte(&mut self.plan, byte, last, self.in_frame);
+                self.intake.byte(&mut self.plans[own], byte, last, self.in_frame);
                 self.took = Some(None);
             } else {
                 self.took = Some(Some((byte, last)));
@@ -241,7 +279,10 @@ fn stimulus(plan: &Model, cycles: usize) -> Vec<Vec<Word>> {
             let &(beat, last) = beats_left.last().unwrap();
             let [valid, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
             let data = Word::of_fields(&[beat.into()], plan.stream_bits() as usize);
-            let inputs = vec![rst.into(), idle.into(), data, valid, last.into(), ready];
+            let mut inputs = vec![rst.into(), idle.into(), data, valid, last.into(), ready];
+            if plan.own.len() > 1 {
+                inputs.extend(OF_ARRAYS.map(|_| Word::from(random.u64(..plan.own.len() as u64))));
+            }
             let [takes, passes] = loader.moves(&inputs);
             if takes || (passes && ready.number() == 1) {
                 beats_left.pop();
@@ -255,6 +296,7 @@ fn stimulus(plan: &Model, cycles: usize) -> Vec<Vec<Word>> {
 #[test]
 fn an_image_is_taken_as_the_model_takes_it() {
     is_taken(&model(2, 3, WRITABLE));
+    is_taken(&model(2, 3, &WRITABLE.replace("[hardware]", "[hardware]\narrays = 4")));
     is_taken(&model(2, 3, &format!("{WRITABLE}[hardware.table_range]\nthickness_mm = [1.0, 4.0]\n")));
 }
 
@@ -266,26 +308,43 @@ fn is_taken(model: &Model) {
         loader.clock(inputs);
         seen[3] |= loader.ended;
         ends_with_pair |= loader.pair.is_some() && loader.intake.image().is_empty();
-        match loader.plan.tables_outcome {
-            Outcome::Whole => seen[0] |= loader.plan.tables_version > 0,
-            Outcome::Refused => seen[1] = true,
-            Outcome::Broken => seen[2] = true,
+        for own in loader.plans.iter().map(|plan| plan.own()) {
+            match own.outcome {
+                Outcome::Whole => seen[0] |= own.version > 0,
+                Outcome::Refused => seen[1] = true,
+                Outcome::Broken => seen[2] = true,
+            }
         }
     }
     assert_eq!(seen, [true; 4], "images are taken, refused, broken, and broken after their first word");
     let writes_coefficients = !loader.coefficient_words().is_empty();
     assert_eq!(ends_with_pair, writes_coefficients, "a short image ends with two coefficients");
-    let subject = |changes: &[Change]| {
-        subject_of!(
-            Load::of_plan(model).unwrap(),
-            changes,
-            inputs [rst, idle, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-            outputs [
-                m_axis_tvalid, m_axis_tdata, m_axis_tlast, s_axis_tready, write, taxel, entry, coefficient_write,
-                coefficient_word, coefficient_pair, coefficient_data, restart, noise_floor, threshold, version, incomplete,
-            ],
-        )
-    };
+    let mut inputs = vec!["rst", "idle", "s_axis_tdata", "s_axis_tvalid", "s_axis_tlast", "m_axis_tready"];
+    let mut outputs = vec![
+        "m_axis_tvalid",
+        "m_axis_tdata",
+        "m_axis_tlast",
+        "s_axis_tready",
+        "write",
+        "taxel",
+        "entry",
+        "coefficient_write",
+        "coefficient_word",
+        "coefficient_pair",
+        "coefficient_data",
+        "restart",
+        "noise_floor",
+        "threshold",
+        "version",
+        "incomplete",
+        "calibrates_nothing",
+    ];
+    if model.own.len() > 1 {
+        inputs.extend(OF_ARRAYS);
+        outputs.extend(["anew", "array"]);
+    }
+    let load = Load::of_plan(model).unwrap();
+    let subject = |changes: &[Change]| Subject::of(kernel_of(&load), changes, &inputs, &outputs);
     let defects = [
         // A wrong CRC does not count.
         Change::value("", "wrong_crc", |k| k.constant(1, 0)),
@@ -303,6 +362,14 @@ fn is_taken(model: &Model) {
             Change::within("", "pair", |k| [!k.named("image"), k.named("over")]),
             // All coefficients go to the first word.
             Change::value("", "address", |k| k.named("address")),
+        ];
+        check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
+    }
+    if model.own.len() > 1 {
+        let defects = [
+            // All images are of the first array; all arrays begin anew.
+            Change::value("", "own", |k| k.constant(2, 0)),
+            Change::value("", "anew", |k| k.named("writing").repeat(4)),
         ];
         check_with_defects(subject, &stimulus, || Loader::new(model), &defects);
     }

@@ -115,7 +115,7 @@ impl Requests {
                 let mu = own.position.map(|x| mu_word(f, x));
                 let threshold = match self.model.has_writable_tables() {
                     true => inputs[24].number() as i64,
-                    false => self.model.threshold,
+                    false => self.model.threshold(),
                 };
                 let result = force(f, entry.value, mu, shift, threshold);
                 frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
@@ -260,7 +260,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    check_forces(model(side, side, more).with_changed_plan(|plan| plan.threshold = threshold).unwrap());
+    check_forces(model(side, side, more).with_changed_plan(|plan| plan.own_mut().threshold = threshold).unwrap());
 }
 
 fn check_forces(model: Model) {
@@ -279,7 +279,7 @@ fn beats_are_those_of_the_model() {
         check_forces(searched.with_changed_plan(|plan| plan.score_limit = Some(limit)).unwrap());
     }
     let weighed = |push: u32| {
-        let change = |plan: &mut Plan| (plan.push_limit, plan.threshold) = (Some(push), 1 << 20);
+        let change = |plan: &mut Plan| (plan.push_limit, plan.own_mut().threshold) = (Some(push), 1 << 20);
         model(4, 4, "[search]\nmu_max = 0.05\n").with_changed_plan(change).unwrap()
     };
     [1, 5, 14].into_iter().for_each(|push| check_forces(weighed(push)));
