@@ -2,6 +2,7 @@
 
 import os
 import random
+from pathlib import Path
 
 import cocotb
 
@@ -16,8 +17,15 @@ def forces(array):
         return b"".join(int(line, 16).to_bytes(12, "little") for line in file)[:FORCE_BYTES]
 
 
-MEAN = next(field for field in MANIFEST["output"]["status"] if field["name"] == "frames")
+IMAGE, VERSION = Path(os.environ["DERMIS_IMAGE"]).read_bytes(), int(os.environ["DERMIS_VERSION"])
 FORCES = [forces(array) for array in range(ARRAYS)]
+
+
+def status(data, name):
+    """A field of the first status."""
+    own = next(field for field in MANIFEST["output"]["status"] if field["name"] == name)
+    place = FORCE_BYTES + 4 * own["word"]
+    return int.from_bytes(data[place : place + 4], "little") >> own["low"] & ((1 << own["bits"]) - 1)
 
 
 @cocotb.test()
@@ -53,7 +61,25 @@ async def a_damaged_frame_of_an_array_harms_no_other(dut):
     for array in range(ARRAYS):
         data = await bench.expect(array, forces=False)
         assert data[:FORCE_BYTES] == FORCES[array]
-        word = FORCE_BYTES + 4 * MEAN["word"]
-        frames = int.from_bytes(data[word : word + 4], "little") >> MEAN["low"] & ((1 << MEAN["bits"]) - 1)
+        frames = status(data, "frames")
         assert frames == (1 if array == 1 else 2), f"array {array}: {frames} frames in its mean"
     assert await bench.registers.errors() == {"framing"}
+
+
+@cocotb.test()
+async def an_image_is_of_its_array_alone(dut):
+    bench = await Bench.begin(dut)
+    for turn in range(2):
+        for array in range(ARRAYS):
+            await bench.send(tid=array)
+        for array in range(ARRAYS):
+            data, own, spoiled, _ = await bench.receive()
+            written = turn == 1 and array == 2
+            assert (own, spoiled) == (array, False)
+            assert data[:FORCE_BYTES] == FORCES[0 if written else array], f"array {array}"
+            seen = (status(data, "frames"), status(data, "tables_version"))
+            assert seen == ((1, VERSION) if written else (turn + 1, 0)), f"array {array}: {seen}"
+        if turn == 0:
+            # It is that of the first array: the third answers as the first from then on, and its mean begins anew.
+            await bench.registers.load(IMAGE, array=2)
+    assert await bench.registers.errors() == set()

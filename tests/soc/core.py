@@ -31,6 +31,10 @@ def lines(ending):
         return [int(line, 16) for line in file]
 
 
+def low_bit(register, field):
+    return next(own["low"] for own in REGISTERS[register]["fields"] if own["name"] == field)
+
+
 def signed(word, bits):
     return word - (1 << bits) if word >> (bits - 1) else word
 
@@ -86,8 +90,24 @@ class Registers:
         assert not refused, name
 
     async def pulse(self, name, field):
-        low = next(own["low"] for own in REGISTERS[name]["fields"] if own["name"] == field)
-        await self.write(name, 1 << low)
+        await self.write(name, 1 << low_bit(name, field))
+
+    async def is_set(self, name, field):
+        """Whether a bit of a register is high."""
+        return bool((await self.read(name)) >> low_bit(name, field) & 1)
+
+    async def push(self, byte, last, array=0):
+        """Writes a byte of an image of tables once there is room for it."""
+        while await self.is_set("tables", "waiting"):
+            pass
+        await self.write("tables", byte | last << low_bit("tables", "last") | array << low_bit("tables", "array"))
+
+    async def load(self, image, array=0):
+        """Writes an image of tables of an array, which its first byte names."""
+        for place, byte in enumerate(image):
+            await self.push(byte, place + 1 == len(image), array if place == 0 else 15 - array)
+        while await self.is_set("tables", "waiting"):
+            pass
 
     async def errors(self):
         """Names of the errors since they were last cleared, which clears them."""

@@ -18,7 +18,6 @@ CYCLES = int(os.environ.get("DERMIS_CYCLES", 20_000))
 OWN = BEATS[:FORCE_BYTES]
 with open(f"{os.environ['DERMIS_SPECIMEN']}_beats.hex", encoding="utf-8") as file:
     SPECIMEN = b"".join(int(line, 16).to_bytes(12, "little") for line in file)[:FORCE_BYTES]
-FIELDS = {field["name"]: field["low"] for field in REGISTERS["tables"]["fields"]}
 # In the flags of the first status triple, and above the shift in the second.
 INCOMPLETE = 1 << 6
 REFUSED = 1 << 15
@@ -31,25 +30,6 @@ def status(data):
     return version & (REFUSED - 1), bool(version & REFUSED), bool(word(2) & INCOMPLETE)
 
 
-async def reads(registers, field):
-    """Whether a bit of the register is high."""
-    return bool((await registers.read("tables")) >> FIELDS[field] & 1)
-
-
-async def push(registers, byte, last):
-    """Writes a byte once there is room for it."""
-    while await reads(registers, "waiting"):
-        pass
-    await registers.write("tables", byte | last << FIELDS["last"])
-
-
-async def load(registers, image):
-    for place, byte in enumerate(image):
-        await push(registers, byte, place + 1 == len(image))
-    while await reads(registers, "waiting"):
-        pass
-
-
 async def frame(bench, tid=1):
     await bench.send(CODES, tid=tid)
     data, *_ = await bench.receive()
@@ -59,7 +39,7 @@ async def frame(bench, tid=1):
 async def begin(dut):
     """A bench whose core has the tables of its bitstream as version 1: those of the test before outlast a reset."""
     bench = await Bench.begin(dut)
-    await load(bench.registers, OWN_IMAGE)
+    await bench.registers.load(OWN_IMAGE)
     return bench
 
 
@@ -68,9 +48,9 @@ async def begin(dut):
 async def a_frame_after_an_image_is_the_specimen_s(dut):
     bench = await Bench.begin(dut)
     assert SPECIMEN != OWN
-    assert await reads(bench.registers, "writable")
+    assert await bench.registers.is_set("tables", "writable")
     assert await frame(bench) == (OWN, (0, False, False))
-    await load(bench.registers, IMAGE)
+    await bench.registers.load(IMAGE)
     assert await frame(bench) == (SPECIMEN, (VERSION, False, False))
     # A reset leaves the tables.
     await bench.registers.pulse("control", "reset")
@@ -88,13 +68,13 @@ async def a_byte_waits_for_the_frame_and_another_is_refused(dut):
     await bench.send(CODES, tid=2)
     await ClockCycles(dut.aclk, 60)
     await registers.write("tables", IMAGE[0])
-    assert await reads(registers, "waiting")
+    assert await registers.is_set("tables", "waiting")
     assert (await registers.access(REGISTERS["tables"]["address"], IMAGE[1]))[1]
     assert await registers.errors() == {"access"}
     data, *_ = await bench.receive()
     assert data[:FORCE_BYTES] == OWN
     for place, byte in enumerate(IMAGE[1:]):
-        await push(registers, byte, place + 2 == len(IMAGE))
+        await registers.push(byte, place + 2 == len(IMAGE))
     assert await frame(bench) == (SPECIMEN, (VERSION, False, False))
 
 
@@ -104,7 +84,7 @@ async def frames_under_way_are_solved_with_the_old_tables_and_later_ones_with_th
     bench.sink.set_pause_generator(pauses(2, 0.4))
     for tid in range(6):
         await bench.send(CODES, tid=tid)
-    loading = cocotb.start_soon(load(bench.registers, IMAGE))
+    loading = cocotb.start_soon(bench.registers.load(IMAGE))
     seen = []
     for tid in range(6):
         data, own, *_ = await bench.receive()
@@ -138,11 +118,11 @@ async def wrong_images_are_refused_and_the_next_frame_is_right(dut):
             image[draws.randrange(6)] ^= 1 << draws.randrange(8)
         if kind == "reset":
             for byte in image[: draws.randrange(7, len(image))]:
-                await push(bench.registers, byte, False)
+                await bench.registers.push(byte, False)
             await bench.registers.pulse("control", "reset")
             await ClockCycles(dut.aclk, 24)
         else:
-            await load(bench.registers, image)
+            await bench.registers.load(image)
         if kind == "whole":
             current = (SPECIMEN, VERSION)
         elif kind != "other":

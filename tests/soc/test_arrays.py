@@ -2,11 +2,13 @@
 
 import os
 import shutil
+import subprocess
 
 import pytest
-from test_cores import BUILD, HERE, environment, generate, icarus
+from test_cores import BUILD, DERMIS, HERE, environment, generate, icarus
 
 ARRAYS = 4
+VERSION = 7
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +22,8 @@ def scene():
         lines = [f"{row},{col},{0.002 * array * (row - col)},{1 - 0.1 * array * (row > 0)}\n" for row, col in places]
         (folder / f"arrays-{array}.csv").write_text("row,col,offset,gain\n" + "".join(lines), encoding="utf-8")
         generate(folder / f"alone-{array}", scene=f"{scene}#{array}")
+    image = [DERMIS, "load", scene, f"{scene}#0", "--tables-version", str(VERSION), "--out", folder / "first.tables"]
+    subprocess.run(image, check=True, stdout=subprocess.DEVNULL)
     return scene
 
 
@@ -29,6 +33,7 @@ def simulate(scene, folder, change=lambda text: text):
     verilog.write_text(change(verilog.read_text(encoding="utf-8")), encoding="utf-8")
     alone = BUILD / "arrays/alone-{}/dermis_arrays_tb_beats.hex"
     more = {"DERMIS_ARRAYS": str(ARRAYS), "DERMIS_ALONE": str(alone)}
+    more |= {"DERMIS_IMAGE": str(BUILD / "arrays/first.tables"), "DERMIS_VERSION": str(VERSION)}
     if "DERMIS_NIGHTLY" in os.environ:
         more["DERMIS_ROUNDS"] = "200"
     vectors = BUILD / "arrays/alone-0/dermis_arrays_tb"
@@ -36,16 +41,21 @@ def simulate(scene, folder, change=lambda text: text):
 
 
 def test_arrays(scene):
-    assert simulate(scene, BUILD / "arrays/axi") == (2, 0)
+    assert simulate(scene, BUILD / "arrays/axi") == (3, 0)
 
 
-# The mean of the first array is that of all.
-def test_a_defect_is_found(scene):
-    right = "wire [5:0] place = {s_axis_tid, taxel};"
-
+@pytest.mark.parametrize(
+    "name, right, count, wrong",
+    [
+        # Zeros, gains and means of the first array are those of all; an image is written to the array of the next frame.
+        ("place", "wire [5:0] place = {s_axis_tid, taxel};", 2, "wire [5:0] place = {2'd0, taxel};"),
+        ("image", "{write_array, write_taxel}", 1, "{s_axis_tid, write_taxel}"),
+    ],
+)
+def test_a_defect_is_found(scene, name, right, count, wrong):
     def change(text):
-        assert text.count(right) == 2, right
-        return text.replace(right, "wire [5:0] place = {2'd0, taxel};")
+        assert text.count(right) == count, right
+        return text.replace(right, wrong)
 
-    tests, failed = simulate(scene, BUILD / "arrays/defect", change)
-    assert tests == 2 and failed > 0
+    tests, failed = simulate(scene, BUILD / f"arrays/defect-{name}", change)
+    assert tests == 3 and failed > 0

@@ -135,6 +135,9 @@ pub const ACCESS: Field =
 pub const OCTET: Field = field("octet", 0, 8, "the byte; reads as 0");
 /// The image's end.
 pub const LAST: Field = field("last", 8, 1, "it is the image's last; reads as 0");
+/// The image's array.
+pub const ARRAY: Field =
+    field("array", 9, 4, "of several arrays the one that the image is of, beside its first byte; reads as 0");
 /// No room.
 pub const WAITING: Field =
     field("waiting", 16, 1, "the byte written last waits for the frames before it: a write is refused");
@@ -186,7 +189,7 @@ pub const REGISTERS: [Register; 18] = [
         address: 0x40,
         access: Access::Push,
         meaning: "a byte of an image of tables, as `dermis load` makes one; only with hardware.tables = writable",
-        fields: &[OCTET, LAST, WAITING, WRITABLE],
+        fields: &[OCTET, LAST, ARRAY, WAITING, WRITABLE],
     },
     number(
         "frames_lost",

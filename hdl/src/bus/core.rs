@@ -128,10 +128,10 @@ impl Core {
         Core {
             shape,
             stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits, Arrays::of_model(model)),
-            tables_in: writable.then(|| TablesIn::new(code_bits)),
+            tables_in: writable.then(|| TablesIn::new(code_bits, Arrays::of_model(model))),
             engine: Engine::new(model),
             stream_out: StreamOut::new(shape.words, model.force_triples()),
-            registers: Registers::new(&constants, writable),
+            registers: Registers::new(&constants, writable, Arrays::of_model(model)),
         }
     }
 }
@@ -189,7 +189,10 @@ impl Block for Core {
             }
         }
         arrive_at!(through!(sent_by!(stream_in), tables_in), engine);
-        engine.s_axis_tid.set(stream_in.m_axis_tid);
+        engine.s_axis_tid.set(tables_in.as_ref().map_or(stream_in.m_axis_tid, |tables_in| {
+            tables_in.s_axis_tid.set(stream_in.m_axis_tid);
+            tables_in.m_axis_tid
+        }));
         // Its identifier, of which the array is a part, comes from `labels`.
         k.unused([engine.m_axis_tid]);
 

@@ -6,7 +6,7 @@ use dermis_golden::wire::registers::{self, Access, Register, ADDRESS_BITS, REGIS
 use super::tables_in::OCTET_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
-use crate::primitives::QUEUE_PLACES;
+use crate::primitives::{Arrays, QUEUE_PLACES};
 
 /// Bytes of a register.
 const BYTES: usize = REGISTER_BITS / 8;
@@ -18,6 +18,7 @@ block! {
         constants: Vec<(&'static str, u32)>,
         /// The tables of the engine are writable.
         writable: bool,
+        arrays: Arrays,
     }
     ports RegistersPorts {
         clock;
@@ -48,8 +49,8 @@ block! {
         in restarting;
         /// The byte offered is accepted in this cycle.
         in octet_taken;
-        /// A byte of an image of tables, and above it whether it is the last; valid with `octet_valid`.
-        out octet: OCTET_BITS;
+        /// A byte of an image of tables, above it whether it is the last, and above that the array; valid with `octet_valid`.
+        out octet: OCTET_BITS + arrays.bits;
         /// A byte is offered; it is held until `octet_taken`.
         out octet_valid;
         /// Content of the register; valid in the cycle after `select`.
@@ -62,9 +63,10 @@ block! {
 }
 
 impl Registers {
-    /// With the content of the constant registers, by name, for an engine whose tables are `writable` or not.
-    pub fn new(constants: &[(&'static str, u32)], writable: bool) -> Self {
-        Registers { constants: constants.to_vec(), writable }
+    /// With the content of the constant registers, by name, for an engine whose tables, of each of the `arrays`, are
+    /// `writable` or not.
+    pub fn new(constants: &[(&'static str, u32)], writable: bool, arrays: Arrays) -> Self {
+        Registers { constants: constants.to_vec(), writable, arrays }
     }
 }
 
@@ -89,7 +91,7 @@ impl Block for Registers {
         let room = waiting.map_or(k.constant(1, 0), |waiting| any(&|own| own.access == Access::Push) & !*waiting);
         let writable = k.wire("writable", writable | room);
         let wrong = k.wire("wrong", io.select & !io.write.mux(writable, known));
-        // What a write does is in the low byte, but for an image's end.
+        // What a write does is in the low byte, but for an image's end and its array.
         let written = k.wire("written", io.select & io.write & io.strobe.at(0));
         let bits = |name: &str| {
             let own = REGISTERS.iter().find(|own| own.name == name);
@@ -106,16 +108,19 @@ impl Block for Registers {
 
         match waiting {
             None => {
-                io.octet.set(k.constant(OCTET_BITS, 0));
+                io.octet.set(k.constant(io.octet.bits(), 0));
             }
             Some(waiting) => {
                 let octet = io.octet.register();
-                let last = io.strobe.at(registers::LAST.low / 8) & io.data.at(registers::LAST.low);
+                // The byte, and what stands above it.
+                let rest = io.octet.bits() - registers::OCTET.bits;
+                let rest =
+                    io.strobe.at(registers::LAST.low / 8).repeat(rest) & io.data.slice(registers::LAST.low, rest);
                 let pushed = k.wire("pushed", written & room);
                 k.when(io.octet_taken, || waiting.set(k.constant(1, 0)));
                 k.when(pushed, || {
                     waiting.set(k.constant(1, 1));
-                    octet.set(last.concat(io.data.low(registers::OCTET.bits)));
+                    octet.set(rest.concat(io.data.low(registers::OCTET.bits)));
                 });
             }
         }
@@ -216,8 +221,9 @@ mod tests {
         left: u64,
         answer: Option<(u32, bool)>,
         reset: bool,
-        /// The engine has writable tables.
+        /// The engine has writable tables, of arrays whose numbers have so many bits.
         writable: bool,
+        array_bits: usize,
         /// The byte that waits, and the one before.
         waiting: Option<u64>,
         octet: Option<u64>,
@@ -266,7 +272,8 @@ mod tests {
                 self.waiting = None;
             }
             if written && index == 16 && room {
-                self.octet = Some(data & 255 | (data & 256 & (strobe >> 1 << 8)));
+                let above = if strobe >> 1 & 1 == 1 { (1 << (9 + self.array_bits)) - 256 } else { 0 };
+                self.octet = Some(data & (255 | above));
                 self.waiting = self.octet;
             }
             let [complete, sent, clipped, partial, misframed, whole, restarting] =
@@ -283,8 +290,8 @@ mod tests {
             self.under_way = if restarting { 0 } else { under_way & 31 };
             self.left = if commands & 1 == 1 { RESET_CYCLES } else { self.left.saturating_sub(1) };
             if rst == 1 {
-                let Map { answer, writable, octet, .. } = *self;
-                *self = Map { reset: true, answer, writable, octet, ..Map::default() };
+                let Map { answer, writable, array_bits, octet, .. } = *self;
+                *self = Map { reset: true, answer, writable, array_bits, octet, ..Map::default() };
             }
         }
     }
@@ -306,9 +313,9 @@ mod tests {
             inputs
         });
         let stimulus: Vec<_> = stimulus.collect();
-        for writable in [false, true] {
-            let block = Registers::new(&CONSTANTS, writable);
-            check(&kernel_of(&block), &stimulus, &mut Map { writable, ..Map::default() });
+        for (writable, array_bits) in [(false, 0), (true, 0), (true, 4)] {
+            let block = Registers::new(&CONSTANTS, writable, Arrays { bits: array_bits });
+            check(&kernel_of(&block), &stimulus, &mut Map { writable, array_bits, ..Map::default() });
         }
     }
 }

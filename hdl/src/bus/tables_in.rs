@@ -2,7 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
-use crate::primitives::table_beat;
+use crate::primitives::{table_beat, Arrays};
 
 block! {
     /// ```text
@@ -13,26 +13,31 @@ block! {
     pub struct TablesIn {
         /// Width of a code.
         code_bits: usize,
+        arrays: Arrays,
     }
     ports TablesInPorts {
         clock;
         reset;
         /// A taxel's code, `code_bits` wide, signed; valid with `s_axis_tvalid`.
         in s_axis_tdata: code_bits;
+        /// Array of the frame; valid with `s_axis_tvalid`.
+        in s_axis_tid: arrays.bits;
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
         out s_axis_tready;
         /// The beat is the last of its frame; valid with `s_axis_tvalid`.
         in s_axis_tlast;
-        /// A byte, and above it whether it is the last of its image; valid with `octet_valid`.
-        in octet: OCTET_BITS;
+        /// A byte, above it whether it is the last of its image, and above that the array of its image; valid with `octet_valid`.
+        in octet: OCTET_BITS + arrays.bits;
         /// A byte is offered; it is held until `octet_taken`.
         in octet_valid;
         /// The byte is accepted in this cycle.
         out octet_taken;
         /// A code, or a byte of an image; valid with `m_axis_tvalid`.
         out m_axis_tdata: code_bits + 1;
+        /// Array of the frame or image; valid with `m_axis_tvalid`.
+        out m_axis_tid: arrays.bits;
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -42,13 +47,13 @@ block! {
     }
 }
 
-/// Bits of a byte with the mark of an image's last.
+/// Bits of a byte with the mark of an image's last, below the number of its array.
 pub(super) const OCTET_BITS: usize = 9;
 
 impl TablesIn {
-    /// For codes of `code_bits` bits, with bytes between them.
-    pub fn new(code_bits: usize) -> Self {
-        TablesIn { code_bits }
+    /// For codes of `code_bits` bits of the `arrays`, with bytes between them.
+    pub fn new(code_bits: usize, arrays: Arrays) -> Self {
+        TablesIn { code_bits, arrays }
     }
 }
 
@@ -66,10 +71,14 @@ impl Block for TablesIn {
             table_beat(k, io.octet.low(8), self.code_bits),
             io.s_axis_tdata.signed().extend(io.m_axis_tdata.bits()).unsigned(),
         ));
-        io.m_axis_tlast.set(is_byte.mux(io.octet.top(), io.s_axis_tlast));
+        let last = k.wire("last", io.octet.at(OCTET_BITS - 1));
+        io.m_axis_tlast.set(is_byte.mux(last, io.s_axis_tlast));
+        if self.arrays.bits > 0 {
+            io.m_axis_tid.set(is_byte.mux(io.octet.slice(OCTET_BITS, self.arrays.bits), io.s_axis_tid));
+        }
         held.set(offered & !is_byte & !io.m_axis_tready);
         k.when(io.s_axis_tvalid & code_taken, || in_frame.set(!io.s_axis_tlast));
-        k.when(octet_taken, || in_image.set(!io.octet.top()));
+        k.when(octet_taken, || in_image.set(!last));
     }
 }
 
@@ -95,15 +104,15 @@ mod tests {
 
     impl Turns {
         fn is_byte(&self, inputs: &[Word]) -> bool {
-            self.image || (inputs[5].number() == 1 && !self.frame && !self.held)
+            self.image || (inputs[6].number() == 1 && !self.frame && !self.held)
         }
     }
 
     impl Reference for Turns {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let [valid, last, offered, ready] = [2, 3, 5, 6].map(|k| inputs[k].number() == 1);
+            let [valid, last, offered, ready] = [3, 4, 6, 7].map(|k| inputs[k].number() == 1);
             let byte = self.is_byte(inputs);
-            let octet = inputs[4].number();
+            let octet = inputs[5].number();
             let data =
                 if byte { load::beats(&[octet as u8], BITS as u32)[0].into() } else { inputs[1].signed(0, BITS) };
             let all = [
@@ -111,20 +120,21 @@ mod tests {
                 (ready && byte && offered).into(),
                 (if byte { offered } else { valid }).into(),
                 Word::of_fields(&[data], BITS + 1),
-                (if byte { octet >> 8 == 1 } else { last }).into(),
+                (if byte { octet >> 8 & 1 == 1 } else { last }).into(),
+                (if byte { octet >> 9 } else { inputs[2].number() }).into(),
             ];
             all.map(|word| self.reset.then_some(word)).into()
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, valid, last, offered, ready] = [0, 2, 3, 5, 6].map(|k| inputs[k].number() == 1);
+            let [rst, valid, last, offered, ready] = [0, 3, 4, 6, 7].map(|k| inputs[k].number() == 1);
             let byte = self.is_byte(inputs);
             self.held = valid && !byte && !ready;
             if valid && !byte && ready {
                 self.frame = !last;
             }
             if offered && byte && ready {
-                self.image = inputs[4].number() >> 8 == 0;
+                self.image = inputs[5].number() >> 8 & 1 == 0;
             }
             if rst {
                 *self = Turns { reset: true, ..Turns::default() };
@@ -138,10 +148,12 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..20_000)
             .map(|cycle| {
                 let bit = |random: &mut fastrand::Rng, of: u8| Word::from(random.u8(..of) == 0);
-                let octet = Word::from(random.u64(..256) | u64::from(random.u8(..5) == 0) << 8);
+                let octet = random.u64(..256) | u64::from(random.u8(..5) == 0) << 8 | random.u64(..4) << 9;
+                let octet = Word::from(octet);
                 vec![
                     Word::from(cycle < 2 || random.u16(..700) == 0),
                     random_word(&mut random, BITS),
+                    random_word(&mut random, 2),
                     bit(&mut random, 2),
                     bit(&mut random, 6),
                     octet,
@@ -150,6 +162,6 @@ mod tests {
                 ]
             })
             .collect();
-        check(&kernel_of(&TablesIn::new(BITS)), &stimulus, &mut Turns::default());
+        check(&kernel_of(&TablesIn::new(BITS, Arrays { bits: 2 })), &stimulus, &mut Turns::default());
     }
 }

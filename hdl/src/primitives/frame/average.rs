@@ -180,7 +180,8 @@ impl Average {
 
 impl Block for Average {
     fn build<'k>(&self, k: &'k Builder, io: AveragePorts<Inside<'k>>) {
-        let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays, written } = *self;
+        let Average { taxels, bits, power, mean, ref adaptive, marks: FrameMarks { limited, .. }, arrays, written } =
+            *self;
         let ports = MeanPorts {
             rst: io.rst,
             resets: arrays.resets(io.rst, io.anew, written),
