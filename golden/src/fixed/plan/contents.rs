@@ -1,5 +1,7 @@
 //! What a plan contains: everything about a scene's hardware that is known before a frame arrives.
 
+use serde_json::Value;
+
 use super::resources::Resources;
 use super::storage::Storage;
 use crate::estimate::misfit::Misfit;
@@ -126,6 +128,14 @@ impl Plan {
     /// The same, to change it.
     pub fn own_mut(&mut self) -> &mut OwnTables {
         &mut self.own[0]
+    }
+
+    /// A number of each array, as JSON: the number itself where there is one array.
+    pub fn of_each_array(&self, of: impl Fn(&OwnTables) -> Value) -> Value {
+        match self.own.as_slice() {
+            [only] => of(only),
+            several => several.iter().map(of).collect(),
+        }
     }
 
     /// Noise floor in LSBs of a frame buffer word; of several arrays that of the first.

@@ -122,7 +122,7 @@ pub fn image_bytes(plan: &Plan) -> Option<usize> {
 }
 
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
-/// whether records take the place of forces, condition, noise floor and threshold in codes, limit of the score, whether codes are
+/// whether records take the place of forces, condition, noise floors in codes and thresholds, limit of the score, whether codes are
 /// checked, the arrays, zeros and gains of the taxels, dead taxels, the quantised matrices with the columns kept, the network, what finds the
 /// contacts, and the scan. The names of scene and board and the clock are not included.
 pub fn scene_hash(plan: &Plan) -> u32 {
@@ -134,8 +134,8 @@ pub fn scene_hash(plan: &Plan) -> u32 {
         "formats": plan.formats(),
         "records": plan.sends_resultants(),
         "both_signs": plan.scene.partition.condition == Condition::BothSigns,
-        "noise_floor": plan.noise_floor(),
-        "threshold": plan.threshold(),
+        "noise_floor": plan.of_each_array(|own| own.noise_floor.into()),
+        "threshold": plan.of_each_array(|own| own.threshold.into()),
         "score_limit": plan.score_limit,
         "columns": plan.storage().columns,
         "zero": plan.prepare.zero,
