@@ -405,10 +405,12 @@ impl HardwareSpec {
         self.arrays.trailing_zeros() as usize
     }
 
-    /// Takes frames of stress, which need neither calibration nor converters: the tables are in the bitstream, codes come as a
-    /// stream. The formats remain those of [`TableRange`]'s coefficients, so that a frame has the same forces.
+    /// Takes frames of stress, which need neither calibration nor converters and are of any array: the tables are in the bitstream,
+    /// codes come as a stream. The formats remain those of [`TableRange`]'s coefficients, so that a frame has the same forces.
     pub fn take_stress(&mut self) {
         self.tables = TableStorage::Rom;
+        self.array_noise_floors_MPa.clear();
+        self.array_min_forces_N.clear();
         self.table_range.gain = None;
         self.adc_scan = None;
     }

@@ -74,11 +74,13 @@ block! {
         out noise_floor: written_bits(load.is_some(), *floor_bits);
         /// Of several arrays whose tables are written that of the frame whose forces are sent.
         in sent_array: if load.is_some() { arrays.bits } else { 0 };
-        /// Its threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`, of several arrays a cycle later.
+        /// Threshold in force LSBs, 32 bits, where it is written, else 0; valid unless `restart`, of several arrays a cycle after
+        /// `sent_array`.
         out threshold: THRESHOLD_BITS;
-        /// Version of its tables and whether the last were refused, where they are written, else 0; valid unless `restart`.
+        /// Version of the tables, of several arrays those of `sent_array`, and whether the last were refused, where they are written,
+        /// else 0; valid unless `restart`.
         out version: VERSION_WORD_BITS;
-        /// Its tables are not whole.
+        /// These tables are not whole.
         out incomplete;
     }
 }

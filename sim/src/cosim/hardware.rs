@@ -147,7 +147,7 @@ impl Hardware {
         let design = Design {
             taps: &generated.taps,
             input_bits: self.model.stream_bits(),
-            array_bits: self.model.scene.hardware.array_bits(),
+            array_bits: self.built.scene.hardware.array_bits(),
             open_state,
             optimisation,
             ..Design::of_pins(generated)

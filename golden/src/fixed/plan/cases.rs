@@ -26,7 +26,7 @@ use crate::spec::board::{Board, EngineKind};
 use crate::spec::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::spec::quads::Quads;
 use crate::spec::scene::MAX_DEGREE;
-use crate::spec::scene::{CodeCheck, Scene};
+use crate::spec::scene::{CodeCheck, HardwareSpec, Scene};
 use crate::spec::sensor::Sensor;
 use crate::spec::window::Window;
 
@@ -206,10 +206,14 @@ pub fn limits(scene: &Scene, scale: Scale, force_exponent: i32) -> Result<Limits
     let prepare = Prepare::new(scene, scale, full_scale.unwrap_or(1.0));
     let code_lsb = |full_scale: f64| full_scale / prepare.largest();
     let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
+    let stated = |list: &[f64], of_each, common| if list.is_empty() { common } else { of_each };
+    let HardwareSpec { array_noise_floors_MPa, array_min_forces_N, .. } = &scene.hardware;
+    let floor = stated(array_noise_floors_MPa, "hardware.array_noise_floors_MPa", "search.noise_floor_MPa");
+    let least = stated(array_min_forces_N, "hardware.array_min_forces_N", "threshold.min_force_N");
     let own = |array: usize| {
         let Scene { search, threshold, .. } = &scene.of_array(array);
-        let noise_floor = scaled("search.noise_floor_MPa", search.noise_floor_MPa(), &code_lsb)?;
-        let threshold = scaled("threshold.min_force_N", threshold.min_force_N, &force_lsb)?;
+        let noise_floor = scaled(floor, search.noise_floor_MPa(), &code_lsb)?;
+        let threshold = scaled(least, threshold.min_force_N, &force_lsb)?;
         Ok(OwnTables {
             noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
             threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,

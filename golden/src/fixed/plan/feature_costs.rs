@@ -169,8 +169,11 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         });
     }
     // A threshold that is written is there whatever the scene's.
-    let threshold = scene.threshold.min_force_N > 0.0 || written;
-    let own = format!("{} N", scene.threshold.min_force_N);
+    let threshold = plan.built_in_threshold() != Some(0);
+    let own = match plan.built_in_threshold() {
+        None if !written => "of each array".to_owned(),
+        _ => format!("{} N", scene.threshold.min_force_N),
+    };
     add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
         let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
         plain(&thresholded)

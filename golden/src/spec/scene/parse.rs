@@ -41,7 +41,7 @@ impl Scene {
         let sensor = sensor(&reader)?;
         let input = InputSpec::read(&reader)?;
         check_input(&reader, &input, &sensor)?;
-        let scene = Scene {
+        let mut scene = Scene {
             name: name(&reader, origin)?,
             medium: MediumFields::read(&reader)?.medium(&reader)?,
             partition: PartitionFields::read(&reader)?.partition(&reader, &sensor)?,
@@ -56,7 +56,7 @@ impl Scene {
         };
         check_inverse(&reader, &scene)?;
         check_table_range(&reader, &scene)?;
-        check_arrays(&reader, &scene)?;
+        check_arrays(&reader, &mut scene)?;
         Ok(scene)
     }
 
@@ -323,14 +323,18 @@ fn check_table_range(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// What each of several arrays has of its own is stated for all of them.
-fn check_arrays(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
+/// What each of several arrays has of its own is stated for all of them, in place of what they would have in common. What is
+/// decided for all, such as an estimator, is decided for the largest noise.
+fn check_arrays(reader: &Reader, scene: &mut Scene) -> Result<(), SceneError> {
     let HardwareSpec { arrays, array_noise_floors_MPa, array_min_forces_N, .. } = &scene.hardware;
     let of_each = [
-        ("hardware.array_noise_floors_MPa", array_noise_floors_MPa),
-        ("hardware.array_min_forces_N", array_min_forces_N),
+        ("hardware.array_noise_floors_MPa", "search.noise_floor_MPa", array_noise_floors_MPa),
+        ("hardware.array_min_forces_N", "threshold.min_force_N", array_min_forces_N),
     ];
-    for (field, list) in of_each {
+    for (field, common, list) in of_each {
+        if !list.is_empty() && reader.value(common).is_some() {
+            return Err(reader.wrong_field(common, format!("left out beside {field}")));
+        }
         if !list.is_empty() && (*arrays == 1 || list.len() != *arrays) {
             let allowed = match arrays {
                 1 => "left out, or hardware.arrays above 1".to_owned(),
@@ -339,6 +343,8 @@ fn check_arrays(reader: &Reader, scene: &Scene) -> Result<(), SceneError> {
             return Err(reader.wrong_field(field, allowed));
         }
     }
+    let largest = array_noise_floors_MPa.iter().copied().reduce(f64::max);
+    scene.search.noise_floor_MPa = scene.search.noise_floor_MPa.or(largest);
     Ok(())
 }
 

@@ -172,6 +172,20 @@ fn wrong_values_name_what_is_allowed() {
         ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
         ("[hardware]\ncode_check = true", "\"on\" or \"off\""),
         ("[hardware]\nsearch_width = 3", "hardware.search_width = 3 is not allowed; it must be 4, 2 or 1"),
+        (
+            "[hardware]\narrays = 2\narray_min_forces_N = [0.1]",
+            "hardware.array_min_forces_N = [0.1] is not allowed; it must be a list of 2 numbers, one for each of hardware.arrays",
+        ),
+        ("[hardware]\narray_noise_floors_MPa = [1e-3]", "left out, or hardware.arrays above 1"),
+        (
+            "[search]\nnoise_floor_MPa = 1e-3\n[hardware]\narrays = 2\narray_noise_floors_MPa = [1e-3, 1e-4]",
+            "search.noise_floor_MPa = 0.001 is not allowed; it must be left out beside hardware.array_noise_floors_MPa",
+        ),
+        (
+            "[input]\nfull_scale_MPa = 1\nzero = \"running\"\nzero_limit_MPa = 0.01\n[hardware]\narrays = 2\n\
+             array_noise_floors_MPa = [1e-4, 3e-3]",
+            "at least 5 times the noise floor",
+        ),
         ("[hardware]\narrays = 12", "hardware.arrays = 12 is not allowed; it must be 1, 2, 4, 8 or 16"),
         ("[hardware]\nboard = \"ulx4m\"", "\"colorlight-i5\" or \"colorlight-i9\" or \"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
@@ -202,7 +216,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[input]\nzero = \"running\"\nzero_limit_MPa = 1\nzero_average = 17", "from 1 to 16"),
         (
             "[search]\nnoise_floor_MPa = 0.01\n[input]\nzero = \"running\"\nzero_limit_MPa = 0.04",
-            "at least 5 times search.noise_floor_MPa",
+            "at least 5 times the noise floor",
         ),
         // The default of the limit is below the noise.
         (
@@ -330,8 +344,8 @@ fn choices_not_built_yet_say_so() {
             "hardware.search_width = 2; available: 4, with adaptive",
         ),
         (
-            "[hardware]\narrays = 2\ntables = \"writable\"",
-            "hardware.tables = writable; available: rom, with hardware.arrays",
+            "[hardware]\narrays = 2\ntables = \"writable\"\n[hardware.table_range]\nthickness_mm = [1, 4]",
+            "hardware.arrays = 2; available: 1, with hardware.table_range.thickness_mm",
         ),
         (
             "[hardware]\narrays = 2\n[input]\naverage = 1",
@@ -374,10 +388,16 @@ fn the_golden_model_rejects_unsupported_combinations() {
 fn an_array_of_a_scene_is_named_behind_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hand.toml").display().to_string();
-    std::fs::write(&path, format!("{SENSOR}[hardware]\narrays = 4\n[input]\ncalibration = \"{{array}}.csv\"\n"))
-        .unwrap();
+    let limits = "array_noise_floors_MPa = [1e-4, 4e-4, 2e-4, 3e-4]\narray_min_forces_N = [0, 1, 2, 3]\n";
+    std::fs::write(
+        &path,
+        format!("{SENSOR}[hardware]\narrays = 4\n{limits}[input]\ncalibration = \"{{array}}.csv\"\n"),
+    )
+    .unwrap();
     let third = Scene::load(&format!("{path}#3")).unwrap();
     assert_eq!((third.hardware.arrays, third.input.calibration), (1, Some(folder.path().join("3.csv"))));
+    assert_eq!((third.search.noise_floor_MPa, third.threshold.min_force_N), (Some(3e-4), 3.0));
+    assert!(!third.hardware.states_limits_of_each_array());
     let error = Scene::load(&format!("{path}#4")).unwrap_err().to_string();
     assert!(error.ends_with("hand.toml#4: the scene has 4 (hardware.arrays), numbered from 0"), "{error}");
     assert!(Scene::load("sensor-1#0").is_ok());

@@ -4,6 +4,7 @@ use super::declared::Declared;
 use super::field::{choice, number_of, table, whole, HasDefault, Kind, Member, Number, Table};
 use super::reader::Reader;
 use super::SceneError;
+use toml::Value;
 
 /// What the zero of each taxel is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,9 +70,12 @@ impl Member for ZeroFields {
         }
         let number = |path| reader.value(path).and_then(number_of);
         let full_scale_MPa = number("input.full_scale_MPa");
-        let least = RunningZero::LEAST_OVER_NOISE * number("search.noise_floor_MPa").unwrap_or(0.0);
+        let of_arrays = reader.value("hardware.array_noise_floors_MPa").and_then(Value::as_array);
+        let noise = number("search.noise_floor_MPa").into_iter();
+        let noise = noise.chain(of_arrays.into_iter().flatten().filter_map(number_of));
+        let least = RunningZero::LEAST_OVER_NOISE * noise.fold(0.0, f64::max);
         let in_range = |mpa: &f64| *mpa >= least && full_scale_MPa.is_none_or(|most| *mpa <= most);
-        let allowed = "a number above 0, at least 5 times search.noise_floor_MPa, at most input.full_scale_MPa";
+        let allowed = "a number above 0, at least 5 times the noise floor, at most input.full_scale_MPa";
         if zero_limit_MPa.is_some_and(|mpa| !in_range(&mpa)) {
             return Err(reader.wrong_field(limit, allowed));
         }
