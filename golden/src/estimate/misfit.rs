@@ -30,7 +30,7 @@ mod tests;
 
 use crate::data::frame::Frame;
 use crate::estimate::learned::{Learned, LearnedError, NOISE};
-use crate::physics::influence::table;
+use crate::physics::influence::{at_distance, table};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
@@ -46,8 +46,9 @@ const CELLS: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Misfit {
     sensor: Sensor,
-    /// Stress per force on a cell for each distance, as [`table`] has it.
-    influence: Vec<[f32; 3]>,
+    /// Stress per force on a cell, along x, y and z: for each distance in rows, as [`table`] has it, and each distance in columns of
+    /// either sign, so that the taxels of a row lie beside each other.
+    influence: [Vec<f32>; 3],
     alive: Vec<bool>,
     unipolar: bool,
     limit: f64,
@@ -69,7 +70,10 @@ impl Misfit {
     /// The check with this limit.
     pub(crate) fn new(scene: &Scene, limit: f64) -> Misfit {
         let sensor = scene.sensor.clone();
-        let influence = table(&sensor, scene.medium).into_iter().map(|own| own.map(|c| c as f32)).collect();
+        let (influence, reach) = (table(&sensor, scene.medium), sensor.cols as isize - 1);
+        let distances = || (0..sensor.rows as isize).flat_map(|down| (-reach..=reach).map(move |right| [down, right]));
+        let along = |axis: usize| distances().map(|at| at_distance(&influence, sensor.cols, at)[axis] as f32).collect();
+        let influence = [0, 1, 2].map(along);
         Misfit { alive: scene.input.alive(&sensor), sensor, influence, unipolar: scene.input.unipolar, limit }
     }
 
@@ -132,14 +136,15 @@ impl Misfit {
     fn of_cells(&self, mu: &[[f64; 2]]) -> Mat<f32> {
         let Sensor { rows, cols, .. } = self.sensor;
         let mut all = Mat::zeros(mu.len(), mu.len());
-        for (cell, mut column) in all.col_iter_mut().enumerate() {
-            let ([s, d], [u, v]) = ([cell / cols, cell % cols], mu[cell].map(|mu| mu as f32));
-            for r in 0..rows {
+        for (cell, mu) in mu.iter().enumerate() {
+            let ([s, d], [u, v]) = ([cell / cols, cell % cols], mu.map(|mu| mu as f32));
+            for (r, row) in (0..rows).zip(all.col_as_slice_mut(cell).chunks_mut(cols)) {
                 // Odd along its own axis.
                 let v = if r < s { -v } else { v };
-                for c in 0..cols {
-                    let [x, y, z] = self.influence[r.abs_diff(s) * cols + c.abs_diff(d)];
-                    column[r * cols + c] = z + if c < d { -u } else { u } * x + v * y;
+                let begin = r.abs_diff(s) * (2 * cols - 1) + cols - 1 - d;
+                let [x, y, z] = self.influence.each_ref().map(|own| &own[begin..begin + cols]);
+                for (c, taxel) in row.iter_mut().enumerate() {
+                    *taxel = z[c] + u * x[c] + v * y[c];
                 }
             }
         }

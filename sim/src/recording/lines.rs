@@ -18,6 +18,30 @@ pub enum Pace {
     Recorded,
 }
 
+/// Most bytes of the lines of a file that is repeated, which are kept so that it is read and put into words once.
+const KEPT_BYTES: usize = 4 << 20;
+
+/// The lines of a file that begins again: each with when its frame was acquired.
+#[derive(Default)]
+struct Kept {
+    lines: Vec<(u64, Vec<u8>)>,
+    bytes: usize,
+    /// Number of the next line, once all are there.
+    next: Option<usize>,
+}
+
+impl Kept {
+    /// Keeps a line; whether there was room.
+    fn add(&mut self, time_ns: u64, line: &[u8]) -> bool {
+        self.bytes += line.len();
+        let fits = self.bytes <= KEPT_BYTES;
+        if fits {
+            self.lines.push((time_ns, line.to_vec()));
+        }
+        fits
+    }
+}
+
 /// The frames of a file, read as lines that a stream takes; errors have no file's name.
 pub struct Lines {
     path: PathBuf,
@@ -25,6 +49,8 @@ pub struct Lines {
     pace: Pace,
     /// Begin again at the end.
     repeat: bool,
+    /// The lines so far of a file that begins again and is not too long.
+    kept: Option<Kept>,
     /// Take a file that is cut like one that ends.
     partial: bool,
     frames: Frames,
@@ -51,7 +77,8 @@ impl Lines {
     ) -> Result<Lines, RecordingError> {
         let frames = Frames::open(&path, options.clone())?;
         let (due, gap, line) = (Duration::ZERO, Duration::ZERO, Cursor::default());
-        Ok(Lines { path, options, pace, repeat, partial, frames, begun: None, count: 0, due, gap, line })
+        let kept = repeat.then(Kept::default);
+        Ok(Lines { path, options, pace, repeat, kept, partial, frames, begun: None, count: 0, due, gap, line })
     }
 
     /// How the file ends, once there is no further line.
@@ -59,34 +86,59 @@ impl Lines {
         self.frames.end()
     }
 
-    /// Takes the next line, once it is due; returns whether there is one.
-    fn advance(&mut self) -> Result<bool, RecordingError> {
-        let mut next = self.frames.next_frame()?;
+    /// The next line of the file, and when its frame was acquired.
+    fn read_next(&mut self) -> Result<Option<(u64, Vec<u8>)>, RecordingError> {
+        let next = self.frames.next_frame()?;
         if let (End::Cut, Some(words), false) = (self.end(), self.end().words(), self.partial) {
             return Err(RecordingError::new(words));
         }
+        let Some(frame) = next else { return Ok(None) };
+        // NaN, a missing reading, is written as null.
+        let line = format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})).into_bytes();
+        self.kept = self.kept.take().and_then(|mut kept| kept.add(frame.time_ns, &line).then_some(kept));
+        Ok(Some((frame.time_ns, line)))
+    }
+
+    /// The same of the lines that are kept, once all are: they begin again.
+    fn next_kept(&mut self) -> Option<(u64, Vec<u8>)> {
+        let Kept { lines, next, .. } = self.kept.as_mut()?;
+        let number = next.as_mut()?;
+        let line = lines.get(*number).cloned();
+        *number += 1;
+        line
+    }
+
+    /// Takes the next line, once it is due; returns whether there is one.
+    fn advance(&mut self) -> Result<bool, RecordingError> {
+        let all_kept = self.kept.as_ref().is_some_and(|kept| kept.next.is_some());
+        let mut next = if all_kept { self.next_kept() } else { self.read_next()? };
         if next.is_none() && self.repeat {
-            self.frames = Frames::open(&self.path, self.options.clone())?;
             (self.begun, self.count, self.due) = (None, 0, Duration::ZERO);
-            next = self.frames.next_frame()?;
+            next = match self.kept.as_mut().filter(|kept| !kept.lines.is_empty()) {
+                Some(kept) => {
+                    kept.next = Some(0);
+                    self.next_kept()
+                }
+                None => {
+                    self.frames = Frames::open(&self.path, self.options.clone())?;
+                    self.read_next()?
+                }
+            };
         }
-        let Some(frame) = next else { return Ok(false) };
+        let Some((time_ns, line)) = next else { return Ok(false) };
         // From the last frame to the first one as long as from the last but one to the last.
-        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, frame.time_ns));
+        let (begun, first) = *self.begun.get_or_insert((Instant::now() + self.gap, time_ns));
         let due = match self.pace {
             Pace::Unbounded => Duration::ZERO,
             Pace::Rate(rate) => Duration::try_from_secs_f64(self.count as f64 / rate).unwrap_or(Duration::MAX),
-            Pace::Recorded => Duration::from_nanos(frame.time_ns.saturating_sub(first)),
+            Pace::Recorded => Duration::from_nanos(time_ns.saturating_sub(first)),
         };
         let wait = begun.checked_add(due).map_or(due, |at| at.saturating_duration_since(Instant::now()));
         std::thread::sleep(wait);
         // Times may go back.
         (self.gap, self.due) = (due.saturating_sub(self.due), due);
         self.count += 1;
-        // NaN, a missing reading, is written as null.
-        self.line = Cursor::new(
-            format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})).into_bytes(),
-        );
+        self.line = Cursor::new(line);
         Ok(true)
     }
 }
@@ -138,6 +190,12 @@ mod tests {
         }
         assert_eq!(recorder.finish().unwrap(), seconds.len() as u64);
         (path, frames[0].clone())
+    }
+
+    #[test]
+    fn lines_are_kept_while_there_is_room() {
+        let (mut kept, line) = (Kept::default(), [b'1'; KEPT_BYTES / 2]);
+        assert!(kept.add(1, &line) && kept.add(2, &line) && !kept.add(3, b"1"));
     }
 
     #[test]
