@@ -65,7 +65,8 @@ pub(crate) fn vectors(model: &Model) -> Vec<Vector> {
 }
 
 /// Limits of which each array has its own.
-const LIMITS: &str = "array_noise_floors_MPa = [0.0, 0.004, 0.02, 0.04]\narray_min_forces_N = [0.02, 0.0, 0.05, 0.1]\n";
+const LIMITS: &str =
+    "array_noise_floors_MPa = [0.0, 0.001, 0.002, 0.004]\narray_min_forces_N = [0.02, 0.0, 0.05, 0.1]\n";
 
 /// What each array has of its own: more of the hardware, and else.
 pub(crate) const SCENES: [(&str, [&str; 2]); 9] = [

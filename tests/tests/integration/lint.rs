@@ -16,6 +16,8 @@ use dermis_sim::cosim::QUICK_SCENES;
 use dermis_tests::tools::folder_of;
 use dermis_tests::{scene, variants};
 
+use crate::arrays;
+
 /// Whether Verilator has no warning, and what it says; with the design's waivers or without them.
 fn verilator(generated: &Generated, with_waivers: bool) -> (bool, String) {
     let folder = folder_of(generated);
@@ -88,6 +90,18 @@ fn writable_tables_are_clean_with_the_same_waivers() {
     let covers = generate(&writable(Some([2.0, 4.0]))).unwrap();
     for generated in [generate(&writable(None)).unwrap(), generate_core(&writable(None), core).unwrap(), covers] {
         lint(&generated).unwrap_or_else(|log| panic!("{log}"));
+    }
+}
+
+#[test]
+fn several_arrays_are_clean_with_the_same_waivers() {
+    let core = CoreShape { bus: Bus::AxiLite, words: 1 };
+    for (what, more) in variants(&arrays::SCENES, 2) {
+        let (_folder, scene) = arrays::scene(*more);
+        let model = Model::new(&scene).unwrap();
+        for generated in [generate(&model).unwrap(), generate_core(&model, core).unwrap()] {
+            lint(&generated).unwrap_or_else(|log| panic!("{what}: {log}"));
+        }
     }
 }
 
