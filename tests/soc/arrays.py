@@ -37,7 +37,7 @@ async def each_array_is_as_if_alone(dut):
     draws = random.Random(5)
     for _ in range(int(os.environ.get("DERMIS_ROUNDS", 6))):
         # Above the number of the array `tid` is free.
-        tids = [draws.randrange(16) for _ in range(4)]
+        tids = [draws.randrange(16 * ARRAYS) for _ in range(4)]
         for tid in tids:
             await bench.send(tid=tid)
         for tid in tids:

@@ -4,7 +4,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{constants, ADDRESS_BITS, REGISTER_BITS};
 
 use super::stream_in::WORD_BYTES;
-use super::{AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, Wishbone, ID_BITS};
+use super::{id_bits, AxiLite, Bus, CoreShape, Registers, StreamIn, StreamOut, TablesIn, Wishbone};
 use crate::block;
 use crate::engine::Engine;
 use crate::error::HdlError;
@@ -17,6 +17,7 @@ block! {
     /// An engine with streams of whole words and registers on a bus; all ports change on the rising edge of `aclk`.
     pub struct Core {
         shape: CoreShape,
+        arrays: Arrays,
         stream_in: StreamIn,
         tables_in: Option<TablesIn>,
         engine: Engine,
@@ -33,7 +34,7 @@ block! {
         in s_axis_tkeep: WORD_BYTES;
         /// Identifier of the frame, the same in all its beats; of several arrays the low bits are the number of the frame's. Valid
         /// with `s_axis_tvalid`.
-        in s_axis_tid: ID_BITS;
+        in s_axis_tid: id_bits(*arrays);
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The core accepts a beat in this cycle.
@@ -47,7 +48,7 @@ block! {
         /// A bit per word that is no force, and above them whether the frame is spoiled; valid with `m_axis_tvalid`.
         out m_axis_tuser: shape.words + 1;
         /// Identifier of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: ID_BITS;
+        out m_axis_tid: id_bits(*arrays);
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -124,14 +125,16 @@ impl Core {
     /// The core of the scene of `model`.
     pub fn new(model: &Model, shape: CoreShape) -> Self {
         let (code_bits, writable) = (model.formats().code_bits as usize, model.has_writable_tables());
+        let arrays = Arrays::of_model(model);
         let constants = constants(model, REGISTER_BITS / 8 * shape.words);
         Core {
             shape,
-            stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits, Arrays::of_model(model)),
-            tables_in: writable.then(|| TablesIn::new(code_bits, Arrays::of_model(model))),
+            arrays,
+            stream_in: StreamIn::new(model.scene.sensor.taxels(), code_bits, arrays),
+            tables_in: writable.then(|| TablesIn::new(code_bits, arrays)),
             engine: Engine::new(model),
-            stream_out: StreamOut::new(shape.words, model.force_triples()),
-            registers: Registers::new(&constants, writable, Arrays::of_model(model)),
+            stream_out: StreamOut::new(shape.words, model.force_triples(), arrays),
+            registers: Registers::new(&constants, writable, arrays),
         }
     }
 }
@@ -157,7 +160,7 @@ impl Block for Core {
         let restart = k.instance("restart", Dff {});
         let stream_in = k.instance("stream_in", &self.stream_in);
         let tables_in = k.instance("tables_in", self.tables_in.as_ref());
-        let labels = k.instance("labels", Queue::new(ID_BITS + 1));
+        let labels = k.instance("labels", Queue::new(id_bits(self.arrays) + 1));
         let engine = k.instance("engine", &self.engine);
         let stream_out = k.instance("stream_out", &self.stream_out);
         let registers = k.instance("registers", &self.registers);

@@ -9,11 +9,12 @@ use serde_json::json;
 use super::core::hierarchy;
 use super::ip_xact::{component, TopPort};
 use super::testbench::testbench;
-use super::{Bus, CoreShape};
+use super::{id_bits, Bus, CoreShape};
 use crate::error::HdlError;
 use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::{Change, Kernel};
 use crate::manifest::GeneratedFile;
+use crate::primitives::Arrays;
 
 /// The ports of a top module.
 fn top_ports(top: &Kernel) -> impl Iterator<Item = TopPort> + '_ {
@@ -82,7 +83,8 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     core.files.extend(own);
     core.files.push(GeneratedFile { name: format!("{}.xml", core.top), text: xml });
     core.add_core_file(model, testbench(model, &core, shape, command));
-    core.manifest["core"] = json!({ "bus": suffix, "stream_bits": 8 * bytes });
+    core.manifest["core"] =
+        json!({ "bus": suffix, "stream_bits": 8 * bytes, "id_bits": id_bits(Arrays::of_model(model)) });
     core.seal();
     Ok(core)
 }

@@ -20,6 +20,8 @@ mod tables_in;
 mod testbench;
 mod wishbone;
 
+use crate::primitives::Arrays;
+
 pub use axi_lite::AxiLite;
 pub use core::Core;
 pub use generate::{generate_core, generate_core_changed};
@@ -29,8 +31,13 @@ pub use stream_out::{StreamOut, WIDTHS};
 pub use tables_in::TablesIn;
 pub use wishbone::Wishbone;
 
-/// Bits of a frame's identifier, `tid`.
+/// Bits of a frame's identifier, `tid`, which its sender chooses; of several arrays the number of the frame's is below them.
 pub const ID_BITS: usize = 4;
+
+/// Bits of `tid`.
+pub(crate) fn id_bits(arrays: Arrays) -> usize {
+    ID_BITS + arrays.bits
+}
 
 /// The bus of the registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

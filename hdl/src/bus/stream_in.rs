@@ -2,7 +2,7 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 
-use super::ID_BITS;
+use super::id_bits;
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
 use crate::primitives::Arrays;
@@ -30,7 +30,7 @@ block! {
         /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
         in s_axis_tkeep: WORD_BYTES;
         /// Identifier of the frame, the same in all its beats; valid with `s_axis_tvalid`.
-        in s_axis_tid: ID_BITS;
+        in s_axis_tid: id_bits(*arrays);
         /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
         in s_axis_tvalid;
         /// The block accepts a beat in this cycle.
@@ -50,7 +50,7 @@ block! {
         /// The beat is the last of its frame, as the sender says; valid with `m_axis_tvalid`.
         out m_axis_tlast;
         /// Label of the frame: its identifier, and above it whether it is spoiled; valid with `complete`.
-        out label: ID_BITS + 1;
+        out label: id_bits(*arrays) + 1;
         /// The last taxel of a frame is accepted in this cycle.
         out complete;
         /// A code is clipped in this cycle.
@@ -77,7 +77,7 @@ impl Block for StreamIn {
         let count = k.state("count", Type::unsigned(count_bits(taxels)), io.rst, 0);
         let spoiled = k.state("spoiled", bit, io.rst, 0);
         let mixed = k.state("mixed", bit, io.rst, 0).comment("The frame has beats of several identifiers.");
-        let frame = k.register("frame", Type::unsigned(ID_BITS)).comment("Identifier of the frame.");
+        let frame = k.register("frame", Type::unsigned(id_bits(arrays))).comment("Identifier of the frame.");
         let code = io.m_axis_tdata.register();
         let valid = io.m_axis_tvalid.state(io.rst, 0);
         let tlast = io.m_axis_tlast.register();
@@ -179,7 +179,7 @@ mod tests {
             let event = self.event(inputs);
             let bit = |bit: bool| self.reset.then(|| Word::from(bit));
             let ready = inputs[6].number() == 1 && (self.beat.is_none() || inputs[7].number() == 1);
-            let label = Word::from(u64::from(event.spoiled) << ID_BITS | event.id);
+            let label = Word::from(u64::from(event.spoiled) << id_bits(ARRAYS) | event.id);
             vec![
                 self.beat.map(|(code, ..)| Word::from(code)),
                 bit(self.beat.is_some()),
@@ -222,7 +222,7 @@ mod tests {
             taxel = if last { 0 } else { (taxel + 1) % TAXELS };
             // And mostly of one identifier.
             if taxel == 1 || random.u8(..20) == 0 {
-                id = random.u64(..1 << ID_BITS);
+                id = random.u64(..1 << id_bits(ARRAYS));
             }
             let word = if random.u8(..8) == 0 { random.u32(..) } else { random.i32(-2048..2048) as u32 };
             vec![

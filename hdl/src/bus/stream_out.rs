@@ -2,9 +2,10 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 
-use super::ID_BITS;
+use super::id_bits;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
+use crate::primitives::Arrays;
 
 /// Words of a beat of the engine.
 const TRIPLE: usize = 3;
@@ -31,6 +32,7 @@ block! {
         width: usize,
         /// Beats of a frame that are forces, its first.
         forces: usize,
+        arrays: Arrays,
     }
     ports StreamOutPorts {
         clock;
@@ -44,7 +46,7 @@ block! {
         /// The beat is the last of its frame; valid with `s_axis_tvalid`.
         in s_axis_tlast;
         /// Identifier of the frame, and above it whether it is spoiled; valid with `s_axis_tvalid`.
-        in label: ID_BITS + 1;
+        in label: id_bits(*arrays) + 1;
         /// The rest of the frame will not come; no beat is accepted in this cycle.
         in abandon;
         /// Words, the first in the low bits; valid with `m_axis_tvalid`.
@@ -54,7 +56,7 @@ block! {
         /// A bit per word that is no force, and whether the frame is spoiled; valid with `m_axis_tvalid`.
         out m_axis_tuser: width + 1;
         /// Identifier of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: ID_BITS;
+        out m_axis_tid: id_bits(*arrays);
         /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
         out m_axis_tvalid;
         /// The receiver accepts a beat in this cycle.
@@ -69,15 +71,17 @@ block! {
 }
 
 impl StreamOut {
-    /// For beats of `width` words, one of [`WIDTHS`]; the first `forces` beats of a frame are forces.
-    pub fn new(width: usize, forces: usize) -> Self {
-        StreamOut { width, forces }
+    /// For beats of `width` words, one of [`WIDTHS`]; the first `forces` beats of a frame, which is of one of the `arrays`, are
+    /// forces.
+    pub fn new(width: usize, forces: usize, arrays: Arrays) -> Self {
+        StreamOut { width, forces, arrays }
     }
 }
 
 impl Block for StreamOut {
     fn build<'k>(&self, k: &'k Builder, io: StreamOutPorts<Inside<'k>>) {
-        let StreamOut { width, forces } = *self;
+        let StreamOut { width, forces, arrays } = *self;
+        let id_bits = id_bits(arrays);
         let bit = Type::unsigned(1);
         // At most one word less than a beat is left when three more come.
         let places = width - 1 + TRIPLE;
@@ -89,7 +93,7 @@ impl Block for StreamOut {
         let ending = k.state("ending", bit, io.rst, 0).comment("The last words of a frame wait.");
         let beat = k.state("beat", Type::unsigned(count_bits(forces + 1)), io.rst, 0);
         let beat = beat.comment("Beats taken of the frame, up to the number of forces.");
-        let label = k.register("own_label", Type::unsigned(ID_BITS + 1)).comment("Of the frame whose words wait.");
+        let label = k.register("own_label", Type::unsigned(id_bits + 1)).comment("Of the frame whose words wait.");
         let closing =
             k.state("closing", bit, io.rst, 0).comment("The frame was abandoned, and its end has no place yet.");
         let abandoned = k.state("abandoned", bit, io.rst, 0).comment("The end of an abandoned frame waits.");
@@ -134,7 +138,7 @@ impl Block for StreamOut {
         let there: Vec<_> = (0..width).rev().map(|word| number(word).less(*filled).repeat(WORD / 8)).collect();
         io.m_axis_tkeep.set(concat(&there));
         io.m_axis_tuser.set((label.top() | *abandoned).concat(kinds.low(width)));
-        io.m_axis_tid.set(label.low(ID_BITS));
+        io.m_axis_tid.set(label.low(id_bits));
         io.whole.set(given & io.s_axis_tlast);
         io.sent.set(taken & ends & !*abandoned);
     }
@@ -149,6 +153,9 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
+    const ARRAYS: Arrays = Arrays { bits: 2 };
+    /// Bits of an identifier.
+    const ID: usize = 6;
     const FORCES: usize = 4;
 
     /// The words that wait, whether each is no force, whether it is its frame's last.
@@ -207,7 +214,7 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let [valid, ends, abandon, ready] = [2, 3, 5, 6].map(|k| inputs[k].number() == 1);
             let takes = self.takes(ready, abandon);
-            let label = self.label.map(|label| label | u64::from(self.abandoned) << ID_BITS);
+            let label = self.label.map(|label| label | u64::from(self.abandoned) << ID);
             let now: Vec<_> = self.waiting.iter().take(self.width).copied().collect();
             let last = self.is_ending() && self.waiting.len() <= self.width;
             let (mut data, mut keep, mut user) = (Word::default(), 0, 0);
@@ -224,8 +231,8 @@ mod tests {
                 bit(takes),
                 shown(data),
                 shown(Word::from(keep)),
-                label.and_then(|label| shown(Word::from(user | (label >> ID_BITS) << self.width))),
-                label.and_then(|label| shown(Word::from(label & ((1 << ID_BITS) - 1)))),
+                label.and_then(|label| shown(Word::from(user | (label >> ID) << self.width))),
+                label.and_then(|label| shown(Word::from(label & ((1 << ID) - 1)))),
                 bit(takes && valid && ends),
                 bit(last && ready && !self.abandoned),
             ]
@@ -269,13 +276,13 @@ mod tests {
                     data,
                     Word::from(random.u8(..8) > 1),
                     Word::from(random.u8(..7) == 0),
-                    Word::from(random.u64(..1 << (ID_BITS + 1))),
+                    Word::from(random.u64(..1 << (ID + 1))),
                     Word::from(random.u8(..20) == 0),
                     Word::from(random.u8(..8) > 1),
                 ]
             });
             let stimulus: Vec<_> = stimulus.collect();
-            check(&kernel_of(&StreamOut::new(width, FORCES)), &stimulus, &mut Words::new(width));
+            check(&kernel_of(&StreamOut::new(width, FORCES, ARRAYS)), &stimulus, &mut Words::new(width));
         }
     }
 }

@@ -8,7 +8,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{ID, REGISTER_BITS};
 
-use super::{Bus, CoreShape, ID_BITS};
+use super::{id_bits, Bus, CoreShape};
 use crate::generate::Generated;
 use crate::manifest::GeneratedFile;
 use crate::primitives::Arrays;
@@ -34,18 +34,19 @@ pub(super) fn testbench(model: &Model, core: &Generated, shape: CoreShape, comma
         counts: [codes.len(), words.len()],
         patience,
     };
-    let text = opening.text(model, top, &core.files) + &text(top, shape, 3 * model.force_triples());
+    let text = opening.text(model, top, &core.files)
+        + &text(top, shape, 3 * model.force_triples(), id_bits(Arrays::of_model(model)));
     vec![file(".sv", text), file("_codes.hex", lines(&codes)), file("_words.hex", lines(&words))]
 }
 
 /// The module after its opening; the first `force_words` words of a frame are forces.
-fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
+fn text(top: &str, shape: CoreShape, force_words: usize, id_bits: usize) -> String {
     let (pins, access) = bus(shape.bus);
     format!(
         "
   localparam LANES = {lanes};
   localparam FORCE_WORDS = {force_words};
-  localparam [{top_bit}:0] TID = {ID_BITS}'d{TID};
+  localparam [{top_bit}:0] TID = {id_bits}'d{TID};
 
   integer lane;
   reg identified = 1'b0;
@@ -103,7 +104,7 @@ fn text(top: &str, shape: CoreShape, force_words: usize) -> String {
 endmodule
 ",
         lanes = shape.words,
-        top_bit = ID_BITS - 1,
+        top_bit = id_bits - 1,
         declarations = declarations(shape.bus),
     )
 }

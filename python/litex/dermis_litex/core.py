@@ -7,6 +7,7 @@ from litex.gen import ClockSignal, If, Instance, LiteXModule, Mux, ResetSignal, 
 from litex.soc.interconnect import stream, wishbone
 
 WORD_BITS = 32
+# Of a core of one array; that of several has the number of the array below them.
 ID_BITS = 4
 REMEDY = "write the folder with `dermis build SCENE --bus wishbone`"
 
@@ -80,18 +81,18 @@ def require_forces(core):
         )
 
 
-def results(words):
+def results(words, id_bits=ID_BITS):
     """The layout of a core's results, `words` words in a beat."""
-    return [("data", WORD_BITS * words), ("keep", WORD_BITS // 8 * words), ("user", words + 1), ("id", ID_BITS)]
+    return [("data", WORD_BITS * words), ("keep", WORD_BITS // 8 * words), ("user", words + 1), ("id", id_bits)]
 
 
 class WholeFrames(LiteXModule):
     """Results in, each of them with `count` words out, `words` in a beat: one that ends early, because a reset by register abandoned it,
     is filled up with words of 0 that are spoiled and no forces. Its status has no cycles."""
 
-    def __init__(self, words, count):
-        self.sink = sink = stream.Endpoint(results(words))
-        self.source = source = stream.Endpoint(results(words))
+    def __init__(self, words, count, id_bits=ID_BITS):
+        self.sink = sink = stream.Endpoint(results(words, id_bits))
+        self.source = source = stream.Endpoint(results(words, id_bits))
 
         # # #
 
@@ -99,7 +100,7 @@ class WholeFrames(LiteXModule):
         all_kept = 2 ** len(sink.keep) - 1
         # A word has a bit of `keep` per byte.
         last_kept = 2 ** (WORD_BITS // 8 * (count - (beats - 1) * words)) - 1
-        at, fills, ends, identifier = Signal(max=max(beats, 2)), Signal(), Signal(), Signal(ID_BITS)
+        at, fills, ends, identifier = Signal(max=max(beats, 2)), Signal(), Signal(), Signal(id_bits)
         self.comb += [
             ends.eq(at == beats - 1),
             source.valid.eq(sink.valid | fills),
@@ -121,7 +122,8 @@ class WholeFrames(LiteXModule):
 class Dermis(LiteXModule):
     """A core between two streams.
 
-    - `sink`: a taxel's code per beat, 32 bits signed, row-major; `last` on a frame's last taxel; `id` names the frame.
+    - `sink`: a taxel's code per beat, 32 bits signed, row-major; `last` on a frame's last taxel; `id` names the frame, with several
+      arrays in its low bits the array.
     - `source`: words of 32 bits, fx, fy, fz of each taxel, then status, always `words` of a frame (see `WholeFrames`); `keep`,
       `user` and `id` as the guide says.
     - `bus`: the register map on Wishbone, addresses of words, 64 registers.
@@ -147,8 +149,9 @@ class Dermis(LiteXModule):
         self.words = self.force_words + 3 * constants["status_triples"]
         bits = self.manifest["core"]["stream_bits"]
         words = bits // WORD_BITS
-        self.sink = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
-        self.frames = WholeFrames(words, self.words)
+        id_bits = self.manifest["core"]["id_bits"]
+        self.sink = stream.Endpoint([("data", WORD_BITS), ("id", id_bits)])
+        self.frames = WholeFrames(words, self.words, id_bits)
         self.source = self.frames.source
         self.bus = wishbone.Interface(data_width=WORD_BITS, address_width=8, addressing="word")
 

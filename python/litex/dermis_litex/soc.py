@@ -6,7 +6,7 @@ from litex.soc.integration.soc import SoCRegion
 from litex.soc.interconnect import wishbone
 from litex.soc.interconnect.csr import CSRStorage
 
-from dermis_litex.core import ID_BITS, Dermis, require_width
+from dermis_litex.core import Dermis, require_width
 
 
 class DermisDMA(LiteXModule):
@@ -31,7 +31,7 @@ class DermisDMA(LiteXModule):
         # Results that come without a transfer wait.
         self.writer.add_ctrl(ready_on_idle=0)
         self.writer.add_csr()
-        self.id = CSRStorage(ID_BITS, description="Identifier of the frames to come.")
+        self.id = CSRStorage(len(core.sink.id), description="Identifier of the frames to come.")
 
         # # #
 
