@@ -185,12 +185,15 @@ class DermisCamera(Camera):
         self._late, self._handed, self._warned = None, None, False
         stream.thread.start()
         if warmup:
-            with stream.changed:
-                stream.wait(0, self.config.timeout_s)
-                count, failure = stream.count, stream.failure
-            if not count:
+            try:
+                with stream.changed:
+                    stream.wait(0, self.config.timeout_s)
+                    count, failure = stream.count, stream.failure
+                if not count:
+                    raise ConnectionError(f"{self}: {failure or f'no result within {self.config.timeout_s} s'}") from failure
+            except BaseException:  # Ctrl-C too leaves no thread.
                 self._end(stream)
-                raise ConnectionError(f"{self}: {failure or f'no result within {self.config.timeout_s} s'}") from failure
+                raise
         self._stream = stream
         logger.info("%s connected.", self)
 

@@ -431,6 +431,29 @@ def test_a_board_reconstructs_the_readings(camera: Callable[..., Camera], record
             core.kill()
 
 
+def test_ctrl_c_in_a_connection_leaves_nothing(camera: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch) -> None:
+    import lerobot_camera_dermis.camera as module
+
+    def interrupted(*_: Any) -> bool:
+        raise KeyboardInterrupt
+
+    one = camera(source="sources:steady")
+    with monkeypatch.context() as change, pytest.raises(KeyboardInterrupt):
+        change.setattr(module._Stream, "wait", interrupted)
+        one.connect()
+    assert not one.is_connected and not reading_threads() and sources.CLOSED == ["steady"]
+    one.connect()
+
+
+def test_an_image_that_lerobot_would_turn_is_refused(tmp_path: Path) -> None:
+    sensor = "rows = 3\ncols = 4\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n"
+    (tmp_path / "three.toml").write_text(f"[sensor]\n{sensor}")
+    settings = {"scene": str(tmp_path / "three.toml"), "source": "sources:steady"}
+    with pytest.raises(ValueError, match="LeRobot would take the rows for channels"):
+        made(**settings)
+    assert made(**settings, height=6).height == 6
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
