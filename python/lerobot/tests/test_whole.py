@@ -17,11 +17,15 @@ import dermis
 import sources
 from lerobot.configs import parser
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
-from lerobot.datasets.utils import build_dataset_frame, hw_to_dataset_features
 from lerobot.robots import Robot, RobotConfig, make_robot_from_config
 from lerobot.utils.import_utils import register_third_party_plugins
 from lerobot_camera_dermis import force_image, forces_N_of
 from touching import Touch
+
+try:
+    from lerobot.utils.feature_utils import build_dataset_frame, hw_to_dataset_features
+except ImportError:  # Where they are in LeRobot 0.4.
+    from lerobot.datasets.utils import build_dataset_frame, hw_to_dataset_features
 
 register_third_party_plugins()
 
