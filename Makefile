@@ -23,10 +23,12 @@ READER    ?=
 MINUTES   ?= 5
 # The short report: make report QUICK=1
 QUICK     ?=
+# All of LeRobot, with PyTorch: make lerobot WHOLE=1
+WHOLE     ?=
 PACKAGE    = $(BUILD)/package
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel package buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel package lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -89,7 +91,7 @@ python: setup ## build the Python package, install it into a new environment, bu
 	python3 -m venv --clear $(VENV)
 	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
 	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
-	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python/tests
 
 # PyPI takes wheels that name the oldest C library that they run with.
 wheel: setup ## build a wheel of the Python package into build/wheels, for machines without Rust
@@ -112,6 +114,16 @@ package: program wheel ## write what a release has into build/package: programs 
 	cp $(BUILD)/wheels/dermis-$(VERSION)-*.whl $(PACKAGE)
 	git archive --prefix=dermis-$(VERSION)/ --output=$(PACKAGE)/dermis-$(VERSION).tar.gz HEAD
 	cd $(PACKAGE) && sha256sum *.tar.gz *.whl >SHA256SUMS
+
+# Its interface of cameras needs few of the requirements of LeRobot, which as a whole bring PyTorch and CUDA.
+lerobot: setup ## test the camera for LeRobot in build/lerobot; WHOLE=1 tests it with all of LeRobot, which loads 4.6 GB
+	@echo '== lerobot'
+	$(CARGO) build --locked --quiet --bin dermis
+	python3 -m venv --clear $(BUILD)/lerobot
+	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check -r python/lerobot/tests/requirements.txt
+	MATURIN_PEP517_ARGS='--profile dev' $(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check ./python
+	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check $(if $(WHOLE),,--no-deps) lerobot==0.4.4 ./python/lerobot
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(BUILD)/lerobot/bin/python -m pytest python/lerobot
 
 buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
@@ -200,6 +212,7 @@ nightly: fuzz program tools ## run all variants of the tests, those too that `ma
 	@echo '== all tests'
 	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --locked --release --workspace --exclude dermis-python --exclude dermis-ros --lib --bins --examples --tests --no-fail-fast -- --include-ignored
 	DERMIS_NIGHTLY=1 $(MAKE) --no-print-directory buses
+	$(MAKE) --no-print-directory lerobot
 	$(MAKE) --no-print-directory ros
 	@echo '== guide'
 	$(DERMIS) --build-dir $(BUILD) guide --check
