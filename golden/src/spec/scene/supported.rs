@@ -29,7 +29,8 @@
 //! `dead_taxels`): not with a network, which was trained for one cover, nor with the coefficient check, whose signatures are in
 //! the bitstream; dead taxels with one subarray, as above.
 //!
-//! Several arrays: not with writable coefficients, which all have in common, nor with a scan or blocks of frames, of which each would have to be told which array it is of.
+//! Several arrays: not with writable coefficients, which all have in common, nor with a scan or blocks of frames, of which each would
+//! have to be told which array it is of.
 //!
 //! `hardware.source = "adc-scan"`: no dead taxels as tables, since a dead taxel's samples are told from others while they
 //! are taken, no average of frames, `input_bits` for a result and a sign.
