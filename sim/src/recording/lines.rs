@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn lines_are_kept_while_there_is_room() {
-        let (mut kept, line) = (Kept::default(), [b'1'; KEPT_BYTES / 2]);
+        let (mut kept, line) = (Kept::default(), vec![b'1'; KEPT_BYTES / 2]);
         assert!(kept.add(1, &line) && kept.add(2, &line) && !kept.add(3, b"1"));
     }
 
