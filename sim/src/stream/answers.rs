@@ -755,7 +755,8 @@ mod tests {
             let options = StreamOptions { queue, policy: Policy::Latest, live: true, layout: Stated::default() };
             let (counts, all_read) = drained(options, Duration::from_secs(60));
             assert_eq!((all_read, counts.answered + counts.dropped), (Some(true), 600));
-            assert!(counts.answered <= queue as u64 + 1, "{counts:?}");
+            // The first frame is answered once the second is there; then all are read, and the queue holds the last ones.
+            assert!(counts.answered <= queue as u64 + 2, "{counts:?}");
         }
         // A source that waits is not read.
         let (counts, all_read) = drained(ALL, Duration::from_millis(100));
