@@ -16,12 +16,10 @@ impl Plan {
     /// The tables that the hardware holds, of several arrays those of the first; `None` unless they are writable.
     pub fn tables(&self) -> Option<Tables> {
         let Prepare { zero: Some(zero), gain: Some(gain), .. } = self.prepare.of_array(0) else { return None };
-        // No code exceeds the largest floor.
-        let largest_floor = (1i64 << (self.formats().input_bits - 1)) - 1;
         self.has_writable_tables().then(|| Tables {
             version: self.own().version,
-            threshold: self.threshold().clamp(0, u32::MAX.into()) as u32,
-            noise_floor: i64::from(self.noise_floor()).clamp(0, largest_floor) as i32,
+            threshold: self.own().threshold_word(),
+            noise_floor: self.own().floor_word(self.formats().input_bits),
             zero,
             gain,
             coefficients: match self.scene.hardware.has_writable_coefficients() {

@@ -67,17 +67,13 @@ impl<'k> Parallel<'k, '_> {
         let Some(prepare) = &s.prepare else { return };
         let written = model.has_writable_tables();
         k.unused([prepare.noise_floor, prepare.threshold]);
-        let of_each = |of: &dyn Fn(&OwnTables) -> i64, bits: usize| -> Vec<u64> {
-            let most = (1i64 << bits) - 1;
-            model.own.iter().map(|own| of(own).clamp(0, most) as u64).collect()
-        };
+        let of_each = |of: &dyn Fn(&OwnTables) -> u64| model.own.iter().map(of).collect::<Vec<u64>>();
         k.comment("Noise floor of the frame received, in the passes; threshold of the one that is sent");
         let (varies, bits) = (model.built_in_floor().is_none(), s.receive.floor.bits());
         let offered = match (varies, written) {
             (false, _) => self.zero(bits),
             (true, true) => prepare.noise_floor,
-            // No code exceeds the largest floor.
-            (true, false) => prepare.m_axis_tid.table(bits, &of_each(&|own| own.noise_floor.into(), bits - 1)),
+            (true, false) => prepare.m_axis_tid.table(bits, &of_each(&|own| own.floor_word(bits as u32) as u64)),
         };
         let received = self.held("received_floor", s.receive.accept, offered, varies);
         s.receive.floor.set(received);
@@ -93,7 +89,7 @@ impl<'k> Parallel<'k, '_> {
             (false, _) => self.zero(THRESHOLD_BITS),
             (true, true) => prepare.threshold,
             (true, false) => {
-                let own = sent.table(THRESHOLD_BITS, &of_each(&|own| own.threshold, THRESHOLD_BITS));
+                let own = sent.table(THRESHOLD_BITS, &of_each(&|own| own.threshold_word().into()));
                 k.delay("threshold", own)
             }
         });

@@ -149,7 +149,8 @@ class Dermis(LiteXModule):
         self.words = self.force_words + 3 * constants["status_triples"]
         bits = self.manifest["core"]["stream_bits"]
         words = bits // WORD_BITS
-        id_bits = self.manifest["core"]["id_bits"]
+        # Earlier versions wrote none: they had as many for any number of arrays.
+        id_bits = self.manifest["core"].get("id_bits", ID_BITS)
         self.sink = stream.Endpoint([("data", WORD_BITS), ("id", id_bits)])
         self.frames = WholeFrames(words, self.words, id_bits)
         self.source = self.frames.source

@@ -32,7 +32,7 @@ pub struct Plan {
     pub board: Board,
     /// Calibration and averaging of the input.
     pub prepare: Prepare,
-    /// What each array has of its own beside zeros and gains, array after array.
+    /// What each array has of its own beside zeros and gains, array after array: as many as `hardware.arrays`, at least one.
     pub own: Vec<OwnTables>,
     /// Word of a score above which it is that of no clean frame, where the whole array is searched for one μ and there is a
     /// table of deviations. Words of scores fall with the objective.
@@ -65,6 +65,18 @@ pub struct OwnTables {
     pub version: u16,
     /// What became of the last image of tables.
     pub outcome: Outcome,
+}
+
+impl OwnTables {
+    /// The noise floor as a word as wide as a code of `bits` bits, which has none above the largest floor.
+    pub fn floor_word(&self, bits: u32) -> i32 {
+        i64::from(self.noise_floor).clamp(0, (1 << (bits - 1)) - 1) as i32
+    }
+
+    /// The threshold as a word of 32 bits.
+    pub fn threshold_word(&self) -> u32 {
+        self.threshold.clamp(0, u32::MAX.into()) as u32
+    }
 }
 
 /// What one partition case adds to the hardware. All cases use the lanes, the search and the force unit of the first.
@@ -140,12 +152,12 @@ impl Plan {
 
     /// Noise floor in LSBs of a frame buffer word; of several arrays that of the first.
     pub fn noise_floor(&self) -> i32 {
-        self.own[0].noise_floor
+        self.own().noise_floor
     }
 
     /// Threshold in force LSBs; of several arrays that of the first.
     pub fn threshold(&self) -> i64 {
-        self.own[0].threshold
+        self.own().threshold
     }
 
     /// The cases built, case 0 first if there are several.
@@ -287,7 +299,7 @@ impl Plan {
 
     /// What `of` gives where it is neither written nor differs between arrays.
     fn built_in<T: PartialEq>(&self, of: impl Fn(&OwnTables) -> T) -> Option<T> {
-        let first = of(&self.own[0]);
+        let first = of(self.own());
         let common = self.own.iter().all(|own| of(own) == first);
         (common && !self.has_writable_tables()).then_some(first)
     }
