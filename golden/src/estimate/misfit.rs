@@ -17,7 +17,7 @@
 //! cover like a larger contact.
 //!
 //! p is that of [`STEPS`] steps of the accelerated projected gradient (Beck and Teboulle 2009, FISTA), in units of max |b|
-//! and in single precision: the same for the golden model and for what hardware sent, whose μ differ by its LSB.
+//! and in single precision, `fit`: the same for the golden model and for what hardware sent, whose μ differ by its LSB.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -25,20 +25,21 @@
 //! | in: μ of each taxel, from a result | taxels × 2 | – |
 //! | out: misfit over its limit | scalar | – |
 
+mod fit;
+mod kernels;
 #[cfg(test)]
 mod tests;
 
+pub use fit::STEPS;
+
 use crate::data::frame::Frame;
 use crate::estimate::learned::{Learned, LearnedError, NOISE};
-use crate::physics::influence::{at_distance, table};
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Col, Mat, Par};
+use fit::{Fit, Readings};
+use kernels::Kernels;
 
-/// Steps of the projected gradient; with three times as many, the limit of sensor-1's network changes by 1 %.
-pub const STEPS: usize = 20;
 /// Share of |b| that forces on cells as large as the taxels leave, and gains that differ.
 const CELLS: f64 = 0.1;
 
@@ -46,9 +47,7 @@ const CELLS: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Misfit {
     sensor: Sensor,
-    /// Stress per force on a cell, along x, y and z: for each distance in rows, as [`table`] has it, and each distance in columns of
-    /// either sign, so that the taxels of a row lie beside each other.
-    influence: [Vec<f32>; 3],
+    kernels: Kernels,
     alive: Vec<bool>,
     unipolar: bool,
     limit: f64,
@@ -70,11 +69,8 @@ impl Misfit {
     /// The check with this limit.
     pub(crate) fn new(scene: &Scene, limit: f64) -> Misfit {
         let sensor = scene.sensor.clone();
-        let (influence, reach) = (table(&sensor, scene.medium), sensor.cols as isize - 1);
-        let distances = || (0..sensor.rows as isize).flat_map(|down| (-reach..=reach).map(move |right| [down, right]));
-        let along = |axis: usize| distances().map(|at| at_distance(&influence, sensor.cols, at)[axis] as f32).collect();
-        let influence = [0, 1, 2].map(along);
-        Misfit { alive: scene.input.alive(&sensor), sensor, influence, unipolar: scene.input.unipolar, limit }
+        let kernels = Kernels::new(&sensor, scene.medium);
+        Misfit { alive: scene.input.alive(&sensor), sensor, kernels, unipolar: scene.input.unipolar, limit }
     }
 
     /// The misfit of the calibrated `frame` of a result, over its limit; `noise_MPa` is the stated standard deviation of a
@@ -124,73 +120,13 @@ impl Misfit {
         if !(peak > 0.0 && peak.is_finite()) {
             return None;
         }
-        let scaled = Col::from_fn(n, |t| (read(t) / peak) as f32);
-        let left = f64::from(self.left(&scaled, &self.of_cells(mu)));
+        let scaled: Vec<f32> = (0..n).map(|t| (read(t) / peak) as f32).collect();
+        let size = scaled.iter().map(|b| f64::from(*b).powi(2)).sum::<f64>().sqrt();
+        let readings = Readings { b: &scaled, alive: &self.alive, unipolar: self.unipolar };
+        let left = f64::from(Fit::new(&self.kernels.of_cells(mu), &readings).left());
         let largest = NOISE[1];
         let sigma = if noise_MPa > 0.0 { (noise_MPa / peak).min(largest) } else { largest };
         let live = self.alive.iter().filter(|alive| **alive).count() as f64;
-        Some(left / (live.sqrt() * sigma).hypot(CELLS * f64::from(scaled.norm_l2())) / self.limit)
-    }
-
-    /// Cz + μ1 Cx + μ2 Cy, with the μ of each cell.
-    fn of_cells(&self, mu: &[[f64; 2]]) -> Mat<f32> {
-        let Sensor { rows, cols, .. } = self.sensor;
-        let mut all = Mat::zeros(mu.len(), mu.len());
-        for (cell, mu) in mu.iter().enumerate() {
-            let ([s, d], [u, v]) = ([cell / cols, cell % cols], mu.map(|mu| mu as f32));
-            for (r, row) in (0..rows).zip(all.col_as_slice_mut(cell).chunks_mut(cols)) {
-                // Odd along its own axis.
-                let v = if r < s { -v } else { v };
-                let begin = r.abs_diff(s) * (2 * cols - 1) + cols - 1 - d;
-                let [x, y, z] = self.influence.each_ref().map(|own| &own[begin..begin + cols]);
-                for (c, taxel) in row.iter_mut().enumerate() {
-                    *taxel = z[c] + u * x[c] + v * y[c];
-                }
-            }
-        }
-        all
-    }
-
-    /// |r| of stress `b` for forces p ≥ 0 on cells that cause `of_cells`.
-    fn left(&self, b: &Col<f32>, of_cells: &Mat<f32>) -> f32 {
-        let n = b.nrows();
-        let rest = |p: &Col<f32>, into: &mut Col<f32>| {
-            matmul(into.as_mut(), Accum::Replace, of_cells, p, 1.0, Par::Seq);
-            for t in 0..n {
-                into[t] = match self.alive[t] {
-                    false => 0.0,
-                    // Tension reads as 0.
-                    true if self.unipolar && b[t] <= 0.0 => (-into[t]).min(0.0),
-                    true => b[t] - into[t],
-                };
-            }
-        };
-        // The norm of a matrix is at most the root of its largest sums along rows and along columns.
-        let (mut rows, mut largest) = (vec![0.0f32; n], 0.0f32);
-        for column in of_cells.col_iter() {
-            let mut sum = 0.0;
-            column.iter().zip(&mut rows).for_each(|(c, row)| {
-                *row += c.abs();
-                sum += c.abs();
-            });
-            largest = largest.max(sum);
-        }
-        let step = 1.0 / (largest * rows.into_iter().fold(0.0, f32::max));
-        let (mut p, mut ahead) = (Col::<f32>::zeros(n), Col::<f32>::zeros(n));
-        let (mut left, mut slope, mut inertia) = (Col::<f32>::zeros(n), Col::<f32>::zeros(n), 1.0f32);
-        for _ in 0..STEPS {
-            rest(&ahead, &mut left);
-            matmul(slope.as_mut(), Accum::Replace, of_cells.transpose(), &left, 1.0, Par::Seq);
-            let next = (1.0 + (1.0 + 4.0 * inertia * inertia).sqrt()) / 2.0;
-            let share = (inertia - 1.0) / next;
-            inertia = next;
-            for cell in 0..n {
-                let moved = (ahead[cell] + step * slope[cell]).max(0.0);
-                ahead[cell] = moved + share * (moved - p[cell]);
-                p[cell] = moved;
-            }
-        }
-        rest(&p, &mut left);
-        left.norm_l2()
+        Some(left / (live.sqrt() * sigma).hypot(CELLS * size) / self.limit)
     }
 }

@@ -24,7 +24,7 @@
 //! | in: per case, `receive` of its subarrays | parts | – |
 //! | out: reason for rejecting the case | text | – |
 
-use super::array::{Array, CaseOutcome, EngineInput};
+use super::array::{Array, BySearch, CaseOutcome, EngineInput};
 use super::by_contacts::taxels;
 use super::contacts::Contacts;
 use super::error::GoldenError;
@@ -130,7 +130,7 @@ impl Estimator for Adaptive {
     /// Solves all admissible cases and returns the one whose shear is nearest to that of the contacts.
     fn estimate(&self, input: &EngineInput) -> Reconstruction {
         let (array, sensor) = (&self.array, &input.scene.sensor);
-        let whole = array.subarrays(input, array.whole(), &Sparse::default());
+        let whole = array.subarrays(input, array.whole(), &BySearch(&Sparse::default()));
         let solved = array.find_contacts(self.taxels.as_ref(), input);
         let target = solved.as_ref().map(Contacts::forces);
         let contacts = match &solved {
@@ -147,7 +147,7 @@ impl Estimator for Adaptive {
                 refused.push((tiling.case, reason));
                 continue;
             }
-            let outcome = array.subarrays(input, tiling, &Sparse::default());
+            let outcome = array.subarrays(input, tiling, &BySearch(&Sparse::default()));
             let own = off(&outcome);
             if own <= best.0 {
                 let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();

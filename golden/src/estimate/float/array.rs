@@ -139,8 +139,8 @@ impl Array {
         whole.parts.iter().enumerate().map(|(index, part)| (part, whole.matrices(index)))
     }
 
-    /// Solves every subarray of a partition on its own, by the μ that maximises `objective`.
-    pub fn subarrays(&self, input: &EngineInput, tiling: &Tiling, objective: &dyn Objective) -> CaseOutcome {
+    /// Solves every subarray of a partition on its own.
+    pub fn subarrays(&self, input: &EngineInput, tiling: &Tiling, solve: &dyn Solve) -> CaseOutcome {
         let Scene { sensor, search, threshold: least, .. } = input.scene;
         let mut outcome = CaseOutcome { forces: Forces::zeros(sensor.taxels()), ..CaseOutcome::default() };
         for (index, part) in tiling.parts.iter().enumerate() {
@@ -148,8 +148,12 @@ impl Array {
             let b = part.gather(sensor, &input.frame.stress_MPa);
             // With mu_max = 0 nothing is searched: there is no score and no test for compression.
             let searched = received.condition_met && search.mu_max > 0.0;
-            let objective = searched.then_some(objective);
-            let (estimate, w) = solve(tiling.matrices(index), objective, &b, search.mu_max, input.noise_MPa);
+            let matrices = tiling.matrices(index);
+            let (estimate, p) = match searched {
+                true => solve.solve(matrices, &b, search.mu_max, input.noise_MPa),
+                false => (None, Polynomial::of_degree(matrices, &b, 0).eval([0.0; 2])),
+            };
+            let w = force(&p, estimate.map_or([0.0; 2], |estimate| estimate.found.mu), 0.0);
             let (x, truncation) = tiling.apply_form(&b, w);
             outcome.truncation.extend(truncation);
             let own = threshold(x, least.min_force_N);
@@ -173,23 +177,22 @@ impl Array {
     }
 }
 
-/// Solves one subarray: polynomial, search where there is an objective, forces before the threshold.
-fn solve(
-    matrices: &Matrices,
-    objective: Option<&dyn Objective>,
-    b: &[f64],
-    mu_max: f64,
-    noise_MPa: f64,
-) -> (Option<Estimate>, Forces) {
-    let Some(objective) = objective else {
-        let family = Polynomial::of_degree(matrices, b, 0);
-        return (None, force(family.v(0, 0), [0.0; 2], 0.0));
-    };
-    let family = Polynomial::new(matrices, b);
-    let estimate = objective.find(&SearchInput { sensor: &matrices.sensor, b, family: &family, mu_max, noise_MPa });
-    let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
-    let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
-    (estimate, force(&p, mu, 0.0))
+/// Finds μ of a subarray.
+pub(super) trait Solve {
+    /// The estimate for stress `b` in MPa, `None` if no μ is admissible, and p in N with its μ or with 0, before the threshold.
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<Estimate>, Vec<f64>);
+}
+
+/// By the μ that maximises an objective.
+pub(super) struct BySearch<'a>(pub &'a dyn Objective);
+
+impl Solve for BySearch<'_> {
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, noise_MPa: f64) -> (Option<Estimate>, Vec<f64>) {
+        let family = Polynomial::new(matrices, b);
+        let estimate = self.0.find(&SearchInput { sensor: &matrices.sensor, b, family: &family, mu_max, noise_MPa });
+        let p = estimate.map_or_else(|| family.eval([0.0; 2]), |estimate| estimate.pressure(&family));
+        (estimate, p)
+    }
 }
 
 impl EngineInput<'_> {

@@ -10,7 +10,7 @@
 //! | out: forces | 3 × n | N |
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
-use super::array::{Array, CaseOutcome, EngineInput};
+use super::array::{Array, BySearch, CaseOutcome, EngineInput};
 use super::contacts::by_network::NetworkContacts;
 use super::contacts::{Contacts, MeasuredStress, Solver};
 use super::error::GoldenError;
@@ -104,7 +104,7 @@ impl EngineInput<'_> {
 impl Estimator for ByContacts {
     fn estimate(&self, input: &EngineInput) -> Reconstruction {
         let array = &self.array;
-        let outcome = array.subarrays(input, array.whole(), &Sparse::default());
+        let outcome = array.subarrays(input, array.whole(), &BySearch(&Sparse::default()));
         match array.find_contacts(self.taxels.as_ref(), input) {
             Some(contacts) => array.by_region(input, outcome, &contacts, None),
             None => input.finish(outcome),

@@ -8,12 +8,14 @@
 //!
 //! With `contacts` the network is evaluated for each contact, `float::contacts::by_network`.
 
-use super::array::{Array, EngineInput};
+use super::array::{Array, EngineInput, Solve};
 use super::by_contacts;
 use super::error::GoldenError;
 use super::estimator::{Clipped, Estimator};
-use super::objective::{Estimate, Objective, SearchInput};
+use super::objective::Estimate;
+use super::pass;
 use crate::estimate::learned::{Learned, OneContact};
+use crate::physics::matrices::Matrices;
 use crate::result::reconstruct::Reconstruction;
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Scene};
@@ -75,16 +77,15 @@ impl Estimator for ByNetworkOfContacts {
     }
 }
 
-impl Objective for ByNetwork {
-    /// No candidate is compared: that Σp presses is all that counts.
-    fn score(&self, p: &[f64]) -> Option<f64> {
+impl Solve for ByNetwork {
+    fn solve(&self, matrices: &Matrices, b: &[f64], mu_max: f64, _: f64) -> (Option<Estimate>, Vec<f64>) {
+        let told = self.network.shear(&OneContact { b, alive: &self.alive, centre_mm: [0.0; 2] });
+        let p = pass::at(matrices, b, told.mean);
         let sum: f64 = p.iter().sum();
-        (sum > 0.0 && sum.is_finite()).then_some(0.0)
-    }
-
-    fn find(&self, input: &SearchInput) -> Option<Estimate> {
-        let told = self.network.shear(&OneContact { b: input.b, alive: &self.alive, centre_mm: [0.0; 2] });
-        self.score(&input.family.eval(told.mean))?;
-        Some(Estimate::of_network(&told, input.mu_max))
+        // No candidate is compared: that Σp presses is all that counts.
+        match sum > 0.0 && sum.is_finite() {
+            true => (Some(Estimate::of_network(&told, mu_max)), p),
+            false => (None, pass::at(matrices, b, [0.0; 2])),
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! | in: stress | n | MPa |
 //! | out: forces, μ of each subarray | 3 × n, 2 per subarray | N, – |
 
-use super::array::{Array, EngineInput};
+use super::array::{Array, BySearch, EngineInput};
 use super::error::GoldenError;
 use super::estimator::Estimator;
 use super::objective::{of_kind, Objective};
@@ -31,7 +31,7 @@ pub(super) fn new(scene: &Scene) -> Result<Box<dyn Estimator>, GoldenError> {
 
 impl Estimator for BySubarray {
     fn estimate(&self, input: &EngineInput) -> Reconstruction {
-        input.finish(self.array.subarrays(input, self.array.whole(), &*self.objective))
+        input.finish(self.array.subarrays(input, self.array.whole(), &BySearch(&*self.objective)))
     }
 
     fn array(&self) -> Option<&Array> {

@@ -12,7 +12,7 @@
 //! | out: v_ij | (d + 1)(d + 2)/2 of n | N |
 //!
 //! 1 + d(d + 1) matrix-vector products of n²/4 multiplications in the basis of mirror parities
-//! ([`crate::physics::symmetry::folded`]). The remainder of the series is of the order r^(d+1) ([`crate::physics::matrices`]). Feeds
+//! ([`crate::physics::symmetry::folded`]); at one μ that is known, [`at`], 1 + 2d. The remainder of the series is of the order r^(d+1) ([`crate::physics::matrices`]). Feeds
 //! `search` and `forces`.
 
 #[cfg(test)]
@@ -93,6 +93,23 @@ impl Polynomial {
             }
         }
     }
+}
+
+/// p(μ) in N of the series of the matrices' degree for stress `b` in MPa, where no other μ is asked for: each order is the one before
+/// times −(μ1 Ax + μ2 Ay).
+pub fn at(matrices: &Matrices, b: &[f64], mu: [f64; 2]) -> Vec<f64> {
+    let FoldedMatrices { basis, cz_pinv, ax, ay } = &matrices.folded;
+    let mut order = vec![0.0; b.len()];
+    cz_pinv.accumulate(&basis.fold(b), 1.0, &mut order);
+    let mut sum = order.clone();
+    for _ in 0..matrices.degree {
+        let mut next = vec![0.0; b.len()];
+        ax.accumulate(&order, -mu[0], &mut next);
+        ay.accumulate(&order, -mu[1], &mut next);
+        sum.iter_mut().zip(&next).for_each(|(sum, next)| *sum += next);
+        order = next;
+    }
+    basis.unfold(&sum)
 }
 
 /// p(μ) in N without the series, from (Cz + μ1 Cx + μ2 Cy) p = b by LU decomposition with row exchanges: n³/3

@@ -32,12 +32,21 @@ pub const ODD_X: usize = FLIP_X;
 pub const ODD_Y: usize = FLIP_Y;
 
 /// One entry of a folded vector.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Entry {
-    /// Quad address.
-    quad: usize,
-    /// Number of distinct images m.
+    /// The distinct images of a quad, each a taxel with its sign.
+    taxels: Vec<(usize, f64)>,
+    /// Their number m.
     images: f64,
+    /// √m
+    root: f64,
+}
+
+impl Entry {
+    /// Σ over the images, with their signs.
+    fn sum(&self, value: impl Fn(usize) -> f64) -> f64 {
+        self.taxels.iter().map(|(taxel, sign)| sign * value(*taxel)).sum()
+    }
 }
 
 /// A basis for the vectors and matrices of a subarray: the mirror parities, or the taxels themselves.
@@ -92,7 +101,13 @@ impl Basis {
     pub fn parities(rows: usize, cols: usize) -> Basis {
         let quads = Quads { rows, cols };
         let entries = std::array::from_fn(|parity| {
-            let entry = |quad| Entry { quad, images: f64::from(quads.lane_mask(quad).count_ones()) };
+            let entry = |quad| {
+                let distinct = (0..Quads::LANES).filter(|lane| quads.lane_mask(quad) >> lane & 1 == 1);
+                let taxels: Vec<(usize, f64)> =
+                    distinct.map(|lane| (quads.taxel(quad, lane), sign(parity, lane))).collect();
+                let images = taxels.len() as f64;
+                Entry { taxels, images, root: images.sqrt() }
+            };
             (0..quads.len()).filter(|&quad| has_entry(quads, quad, parity)).map(entry).collect()
         });
         Basis { quads, entries }
@@ -118,11 +133,7 @@ impl Basis {
         if self.is_taxels() {
             return x.to_vec();
         }
-        let own = |parity: usize| {
-            let at = move |entry: &Entry| self.sum(entry.quad, parity, |taxel| x[taxel]) / entry.images.sqrt();
-            self.entries[parity].iter().map(at)
-        };
-        (0..4).flat_map(own).collect()
+        self.entries.iter().flatten().map(|entry| entry.sum(|taxel| x[taxel]) / entry.root).collect()
     }
 
     /// Transforms a vector in this basis back to row-major taxels.
@@ -131,13 +142,9 @@ impl Basis {
             return f.to_vec();
         }
         let mut x = vec![0.0; f.len()];
-        for parity in 0..4 {
-            for (entry, f) in self.entries[parity].iter().zip(&f[self.range(parity)]) {
-                let share = f / entry.images.sqrt();
-                for lane in (0..4).filter(|lane| self.is_distinct(entry.quad, *lane)) {
-                    x[self.quads.taxel(entry.quad, lane)] += sign(parity, lane) * share;
-                }
-            }
+        for (entry, f) in self.entries.iter().flatten().zip(f) {
+            let share = f / entry.root;
+            entry.taxels.iter().for_each(|(taxel, sign)| x[*taxel] += sign * share);
         }
         x
     }
@@ -152,8 +159,8 @@ impl Basis {
             let (rows, cols) = (&self.entries[target], &self.entries[target ^ flip]);
             let entries = Mat::from_fn(rows.len(), cols.len(), |i, j| {
                 let (row, col) = (&rows[i], &cols[j]);
-                let first = self.quads.taxel(row.quad, 0);
-                (row.images / col.images).sqrt() * self.sum(col.quad, target ^ flip, |taxel| m(first, taxel))
+                let (first, _) = row.taxels[0];
+                (row.images / col.images).sqrt() * col.sum(|taxel| m(first, taxel))
             });
             Block { row0: self.range(target).start, col0: self.range(target ^ flip).start, entries }
         };
@@ -173,27 +180,13 @@ impl Basis {
                 for (i, row) in rows.iter().enumerate() {
                     // The same sum for each image of the pair, up to its sign.
                     let share = entries[(i, j)] / (row.images * col.images).sqrt();
-                    for k in (0..4).filter(|lane| self.is_distinct(row.quad, *lane)) {
-                        for l in (0..4).filter(|lane| self.is_distinct(col.quad, *lane)) {
-                            let sign = sign(target, k) * sign(target ^ flip, l);
-                            m[(self.quads.taxel(row.quad, k), self.quads.taxel(col.quad, l))] += sign * share;
-                        }
+                    for (i, k) in &row.taxels {
+                        col.taxels.iter().for_each(|(j, l)| m[(*i, *j)] += k * l * share);
                     }
                 }
             }
         }
         m
-    }
-
-    /// Σ over the distinct images of a quad, with the signs of the parity.
-    fn sum(&self, quad: usize, parity: usize, value: impl Fn(usize) -> f64) -> f64 {
-        let own = (0..4).filter(|lane| self.is_distinct(quad, *lane));
-        own.map(|lane| sign(parity, lane) * value(self.quads.taxel(quad, lane))).sum()
-    }
-
-    /// Whether a lane is a distinct taxel, not a copy.
-    fn is_distinct(&self, quad: usize, lane: usize) -> bool {
-        self.quads.lane_mask(quad) >> lane & 1 == 1
     }
 }
 

@@ -26,7 +26,7 @@ const FEWEST: usize = 8;
 const FEWEST_BESIDE: usize = 2;
 
 /// Readings since a taxel last changed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Run {
     frames: usize,
     /// Readings of the taxels beside it when it changed.
@@ -114,16 +114,24 @@ impl History {
             let equal = of(&mut live().take_while(|k| k < first)).max(of(&mut live().skip_while(|k| k <= last)));
             equal.min(largest) / whole
         });
-        let beside = |taxel: usize| self.beside[taxel].iter().map(|k| now[*k]).collect::<Vec<_>>();
-        let run = |taxel: usize| match self.runs.get(taxel) {
-            Some(run) if now[taxel].is_nan() => run.clone(),
-            Some(run) if self.last[taxel] == now[taxel] => Run { frames: run.frames + 1, ..run.clone() },
-            _ => Run { frames: 1, beside: beside(taxel) },
+        let beside = |taxel: usize| self.beside[taxel].iter().map(|k| now[*k]);
+        let begun = !self.runs.is_empty();
+        self.runs.resize(now.len(), Run::default());
+        for (taxel, run) in self.runs.iter_mut().enumerate().filter(|(taxel, _)| !begun || !now[*taxel].is_nan()) {
+            if begun && self.last[taxel] == now[taxel] {
+                run.frames += 1;
+            } else {
+                run.frames = 1;
+                run.beside.clear();
+                run.beside.extend(beside(taxel));
+            }
+        }
+        let still = |taxel: &usize| {
+            let Run { frames, beside } = &self.runs[*taxel];
+            *frames >= FEWEST && beside.len() >= FEWEST_BESIDE
         };
-        let runs: Vec<Run> = (0..now.len()).map(run).collect();
-        let still = |taxel: &usize| runs[*taxel].frames >= FEWEST && runs[*taxel].beside.len() >= FEWEST_BESIDE;
         let least = |taxel: usize| {
-            let changes = std::iter::zip(beside(taxel), &runs[taxel].beside).map(|(now, then)| now - then);
+            let changes = std::iter::zip(beside(taxel), &self.runs[taxel].beside).map(|(now, then)| now - then);
             let changes: Vec<f64> = changes.filter(|change| !change.is_nan()).collect();
             if changes.len() < FEWEST_BESIDE {
                 return 0.0;
@@ -137,7 +145,7 @@ impl History {
         // The last reading of each taxel, which may be older than the last frame.
         let last =
             (0..now.len()).map(|k| if now[k].is_nan() { *self.last.get(k).unwrap_or(&f64::NAN) } else { now[k] });
-        (self.runs, self.last, self.range) = (runs, last.collect(), whole);
+        (self.last, self.range) = (last.collect(), whole);
         (constant, torn)
     }
 }

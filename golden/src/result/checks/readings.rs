@@ -77,7 +77,7 @@ fn coarse_share(input: &Input, readings: &[Frame]) -> Option<f64> {
     let mut sums: Vec<f64> = (0..sensor.taxels()).filter(there).map(sum).collect();
     let taxels = sums.len();
     sums.retain(|sum| !unipolar || input.sign() * sum > 0.0);
-    sums.sort_by(f64::total_cmp);
+    sums.sort_unstable_by(f64::total_cmp);
     let groups: Vec<&[f64]> = sums.chunk_by(|a, b| a == b).collect();
     let at = (0..groups.len()).max_by_key(|at| groups[*at].len())?;
     let distances =
@@ -96,20 +96,29 @@ pub(super) fn range(readings: impl Iterator<Item = f64>) -> f64 {
 /// The smallest difference of two readings; `None` where all are equal.
 pub(super) fn step(readings: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = readings.collect();
-    sorted.sort_by(f64::total_cmp);
+    sorted.sort_unstable_by(f64::total_cmp);
     let least = ROUNDING * (sorted.last()? - sorted.first()?);
     sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > least).reduce(f64::min)
 }
 
 /// Whether the range of readings has enough steps to judge single ones.
 pub(super) fn is_fine(readings: impl Iterator<Item = f64> + Clone) -> bool {
-    step(readings.clone()).is_some_and(|step| range(readings) >= FEWEST_STEPS * step)
+    step(readings.clone()).is_some_and(|step| has_steps(range(readings), step))
+}
+
+/// Whether a range has enough steps to judge single readings.
+fn has_steps(range: f64, step: f64) -> bool {
+    range >= FEWEST_STEPS * step
 }
 
 /// Readings that rise with the load.
 struct Upward {
     rows: Vec<Line>,
     cols: Vec<Line>,
+    /// Largest less smallest of all.
+    range: f64,
+    /// As [`step`] has it.
+    step: Option<f64>,
 }
 
 /// The readings of a row or column; `None` of dead taxels and of missing readings.
@@ -126,9 +135,8 @@ fn equal(one: &Line, other: &Line, rounding: f64) -> bool {
     !std::iter::zip(one, other).any(differ)
 }
 
-/// Whether all lines i and `sum` − i are equal, and those other than the innermost two are not silent.
-fn mirrored(lines: &[Line], sum: usize) -> bool {
-    let rounding = ROUNDING * range(lines.iter().flatten().flatten().copied());
+/// Whether all lines i and `sum` − i are equal, within `rounding`, and those other than the innermost two are not silent.
+fn mirrored(lines: &[Line], sum: usize, rounding: f64) -> bool {
     let pairs = || (0..sum.div_ceil(2)).filter(|i| sum - i < lines.len()).map(|i| (i, &lines[i], &lines[sum - i]));
     pairs().all(|(_, one, other)| equal(one, other, rounding))
         && pairs().any(|(i, one, _)| i != (sum - 1) / 2 && range_of(one) > 0.0)
@@ -139,15 +147,6 @@ fn is_there(line: &Line) -> bool {
     2 * line.iter().flatten().count() >= line.len()
 }
 
-/// Whether line k repeats the one before it.
-fn is_twin(lines: &[Line], k: usize) -> bool {
-    k > 0
-        && is_there(&lines[k - 1])
-        && is_there(&lines[k])
-        && equal(&lines[k - 1], &lines[k], 0.0)
-        && !mirrored(lines, 2 * k - 1)
-}
-
 impl Upward {
     fn new(input: &Input, frame: &Frame) -> Upward {
         let Sensor { rows, cols, .. } = frame.sensor;
@@ -155,7 +154,17 @@ impl Upward {
         let reading = |k: usize| (alive[k] && !frame.lacks(k)).then(|| sign * frame.stress_MPa[k]);
         let rows_of = (0..rows).map(|i| (0..cols).map(|j| reading(i * cols + j)).collect()).collect();
         let cols_of = (0..cols).map(|j| (0..rows).map(|i| reading(i * cols + j)).collect()).collect();
-        Upward { rows: rows_of, cols: cols_of }
+        let readings = || (0..rows * cols).filter_map(reading);
+        Upward { rows: rows_of, cols: cols_of, range: range(readings()), step: step(readings()) }
+    }
+
+    /// Whether line k of rows or columns repeats the one before it.
+    fn is_twin(&self, lines: &[Line], k: usize) -> bool {
+        k > 0
+            && is_there(&lines[k - 1])
+            && is_there(&lines[k])
+            && equal(&lines[k - 1], &lines[k], 0.0)
+            && !mirrored(lines, 2 * k - 1, ROUNDING * self.range)
     }
 
     fn readings(&self) -> impl Iterator<Item = f64> + Clone + '_ {
@@ -164,14 +173,15 @@ impl Upward {
 
     /// `None` where all readings are equal.
     fn plateau(&self) -> Option<f64> {
-        let step = step(self.readings())?;
+        let step = self.step?;
         let largest = self.readings().reduce(f64::max)?;
         let next = self.readings().filter(|b| largest - b >= step).reduce(f64::max)?;
         let of_row = |row: &Line| {
-            row.iter().enumerate().filter(|(j, b)| **b == Some(largest) && !is_twin(&self.cols, *j)).count()
+            row.iter().enumerate().filter(|(j, b)| **b == Some(largest) && !self.is_twin(&self.cols, *j)).count()
         };
-        let own = (0..self.rows.len()).filter(|i| !is_twin(&self.rows, *i)).map(|i| of_row(&self.rows[i]));
-        let is_mirrored = |lines: &[Line]| (1..2 * lines.len() - 2).any(|sum| mirrored(lines, sum));
+        let own = (0..self.rows.len()).filter(|i| !self.is_twin(&self.rows, *i)).map(|i| of_row(&self.rows[i]));
+        let rounding = ROUNDING * self.range;
+        let is_mirrored = |lines: &[Line]| (1..2 * lines.len() - 2).any(|sum| mirrored(lines, sum, rounding));
         let images = [&self.rows, &self.cols].into_iter().filter(|lines| is_mirrored(lines)).count();
         let equal = own.sum::<usize>().div_ceil(1 << images);
         Some(equal.saturating_sub(1) as f64 * ((largest - next) / step).ln())
@@ -179,14 +189,14 @@ impl Upward {
 
     /// `None` on arrays of few rows and columns, and for readings of few steps.
     fn line_share(&self) -> Option<f64> {
-        let (whole, step) = (range(self.readings()), step(self.readings()).filter(|_| is_fine(self.readings()))?);
+        let (whole, step) = (self.range, self.step.filter(|step| has_steps(self.range, *step))?);
         let all = [&self.rows, &self.cols].into_iter().filter(|lines| lines.len() >= FEWEST_LINES);
         all.map(|lines| self.repeated(lines).max(self.silent(lines, step)) / whole).reduce(f64::max)
     }
 
     /// The largest range of a line that the next one repeats.
     fn repeated(&self, lines: &[Line]) -> f64 {
-        (1..lines.len()).filter(|&k| is_twin(lines, k)).map(|k| range_of(&lines[k])).fold(0.0, f64::max)
+        (1..lines.len()).filter(|&k| self.is_twin(lines, k)).map(|k| range_of(&lines[k])).fold(0.0, f64::max)
     }
 
     /// The largest range beside lines of one reading: of the smaller side, or of the larger one where it has many steps.

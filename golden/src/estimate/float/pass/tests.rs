@@ -68,6 +68,18 @@ fn series_differs_from_the_solve_by_its_truncation() {
     }
 }
 
+/// At one μ the orders are summed as they come: the same but for rounding, also with dead taxels.
+#[test]
+fn at_one_mu_the_series_is_the_polynomial() {
+    let (whole, b) = setting("sensor-1", "S1-hs-hertz");
+    for matrices in [whole.without(&[37]).unwrap(), whole] {
+        let family = Polynomial::new(&matrices, &b);
+        for mu in [[0.0, 0.0], [0.26, -0.145], [-0.4, 0.3]] {
+            agree(&at(&matrices, &b, mu), &family.eval(mu));
+        }
+    }
+}
+
 #[test]
 fn family_meets_the_stress() {
     let (m, b) = setting("eight-by-eight", "S8-hs-random-1");
