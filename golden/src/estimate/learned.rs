@@ -55,8 +55,9 @@ use crate::read::bytes_up_to;
 use crate::spec::quads::Quads;
 use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
+use composed::FirstLayer;
 use faer::Mat;
-use features::{Features, Readings};
+use features::{power_above, Features};
 use network::Network;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
@@ -81,6 +82,8 @@ pub struct Learned {
     sensor: Sensor,
     features: Features,
     network: Network,
+    /// Its first layer behind the features.
+    first: FirstLayer,
 }
 
 /// μ as the network knows it.
@@ -174,7 +177,8 @@ impl Learned {
         let (network, signature) = file::decode(bytes, file)?;
         signature.check(scene, estimator, file)?;
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
-        Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
+        let first = FirstLayer::new(&features, &network.layers[0]);
+        Ok(Learned { signature, sensor: scene.sensor.clone(), features, network, first })
     }
 
     /// What the network was trained for.
@@ -193,15 +197,18 @@ impl Learned {
         let n = window.taxels();
         let origin = window.origin(&self.sensor, contact.centre_mm);
         let taxels = window.taxels_of(&self.sensor, origin);
-        let mut readings = Readings { b: Mat::zeros(n, 1), masked: Mat::zeros(n, 1) };
+        let (mut b, mut masked) = (Mat::zeros(n, 1), Mat::zeros(n, 1));
         for (own, taxel) in taxels.iter().enumerate() {
-            let b = taxel.filter(|taxel| contact.alive[*taxel]).map(|taxel| contact.b[taxel]);
-            // A unipolar array reads no tension, also where that of another contact was taken out.
-            let b = b.map(|b| if self.signature.unipolar { b.max(0.0) } else { b } as f32);
-            readings.b[(own, 0)] = b.unwrap_or(0.0);
-            readings.masked[(own, 0)] = if b.is_some() { 0.0 } else { 1.0 };
+            match taxel.filter(|taxel| contact.alive[*taxel]).map(|taxel| contact.b[taxel] as f32) {
+                // A unipolar array reads no tension, also where that of another contact was taken out.
+                Some(stress) => b[(own, 0)] = if self.signature.unipolar { stress.max(0.0) } else { stress },
+                None => masked[(own, 0)] = 1.0,
+            }
         }
-        let (mean, sigma) = self.network.shear(self.features.of(&readings))[0];
+        let scale = power_above(b.norm_max()).recip();
+        let stress = self.features.in_parities(&b, &|_| scale);
+        let mask = (masked.norm_max() > 0.0).then(|| self.features.in_parities(&masked, &|_| 1.0));
+        let (mean, sigma) = self.network.shear_behind(self.first.apply(&stress, mask.as_ref()))[0];
         let of_scene = |values: [f64; 2]| values.map(|value| value * self.signature.mu_max);
         let mut found = Gaussian { mean: of_scene(mean), sigma: of_scene(sigma) };
         let size = found.mean[0].hypot(found.mean[1]);

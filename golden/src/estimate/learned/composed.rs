@@ -11,7 +11,7 @@
 //! | out: weights of the mask in the first layer, of a window around a contact | outputs × quads | – |
 //! | out: biases of each layer and parity | outputs | – |
 
-use super::features::{Features, Readings, AMPLITUDE};
+use super::features::{Features, AMPLITUDE};
 use super::network::{Layer, Parities};
 use super::Learned;
 use crate::physics::symmetry::folded::EVEN;
@@ -31,27 +31,45 @@ pub struct ComposedLayer {
     pub largest: f64,
 }
 
+/// The first layer of a network as products with the parities of b/s and of the mask: everything before its ReLU is linear in both.
+pub(super) struct FirstLayer {
+    /// Outputs × quads.
+    stress: Layer,
+    mask: Parities,
+}
+
+impl FirstLayer {
+    /// That of a network with these features.
+    pub fn new(features: &Features, layer: &Layer) -> FirstLayer {
+        let stress = Layer { weights: features.composed(&layer.weights), ..layer.clone() };
+        FirstLayer { stress, mask: features.of_mask(&layer.weights) }
+    }
+
+    /// Its outputs before ReLU; without `mask` no taxel is masked.
+    pub fn apply(&self, stress: &Parities, mask: Option<&Parities>) -> Parities {
+        let mut outputs = self.stress.apply(stress);
+        for (outputs, (own, mask)) in outputs.iter_mut().zip(self.mask.iter().zip(mask.into_iter().flatten())) {
+            *outputs += own * mask;
+        }
+        outputs
+    }
+}
+
 impl Learned {
     /// The layers for an array with these taxels alive, row-major; those of a window around a contact are the same for all.
     pub fn composed(&self, alive: &[bool]) -> Vec<ComposedLayer> {
-        let mut layers: Vec<ComposedLayer> = self.network.layers.iter().map(plain).collect();
+        let FirstLayer { stress, mask } = &self.first;
+        let mut first = plain(stress);
         if self.signature.window.place == Place::Contact {
-            if let (Some(own), Some(first)) = (layers.first_mut(), self.network.layers.first()) {
-                own.weights = self.features.composed(&first.weights);
-                own.mask = Some(self.features.of_mask(&first.weights));
-            }
-            return layers;
-        }
-        let masked = Mat::from_fn(alive.len(), 1, |taxel, _| if alive[taxel] { 0.0 } else { 1.0 });
-        let empty = self.features.of(&Readings { b: Mat::zeros(alive.len(), 1), masked });
-        if let (Some(own), Some(first)) = (layers.first_mut(), self.network.layers.first()) {
-            own.weights = self.features.composed(&first.weights);
-            for (parity, bias) in own.bias.iter_mut().enumerate() {
-                let of_mask = &first.weights[parity] * &empty[parity];
-                bias.iter_mut().zip(of_mask.col(0).iter()).for_each(|(bias, mask)| *bias += f64::from(*mask));
+            first.mask = Some(mask.each_ref().map(|own| wide(own.as_ref())));
+        } else {
+            let masked = Mat::from_fn(alive.len(), 1, |taxel, _| if alive[taxel] { 0.0 } else { 1.0 });
+            let masked = self.features.in_parities(&masked, &|_| 1.0);
+            for (bias, (own, masked)) in first.bias.iter_mut().zip(mask.iter().zip(&masked)) {
+                bias.iter_mut().zip((own * masked).col(0).iter()).for_each(|(bias, mask)| *bias += f64::from(*mask));
             }
         }
-        layers
+        std::iter::once(first).chain(self.network.layers[1..].iter().map(plain)).collect()
     }
 }
 
@@ -75,18 +93,18 @@ fn plain(layer: &Layer) -> ComposedLayer {
 
 impl Features {
     /// The weights of the mask in a layer of the inputs.
-    fn of_mask(&self, weights: &Parities) -> [Mat<f64>; 4] {
+    fn of_mask(&self, weights: &Parities) -> Parities {
         let (first, count) = (self.inverse[0].ncols() + self.inverse[0].nrows(), self.inverse[0].ncols());
-        weights.each_ref().map(|own| wide(own.subcols(first, count)))
+        weights.each_ref().map(|own| own.subcols(first, count).to_owned())
     }
 
     /// The weights of a layer of the inputs as weights of the parities of b/s.
-    fn composed(&self, weights: &Parities) -> [Mat<f64>; 4] {
+    fn composed(&self, weights: &Parities) -> Parities {
         std::array::from_fn(|parity| {
             let (own, inverse) = (&weights[parity], &self.inverse[parity]);
             let (q, deconvolved) = (inverse.ncols(), inverse.nrows());
             let of_both = own.subcols(0, q) + own.subcols(q, deconvolved) * inverse;
-            Mat::from_fn(own.nrows(), q, |row, col| f64::from(AMPLITUDE * of_both[(row, col)]))
+            Mat::from_fn(own.nrows(), q, |row, col| AMPLITUDE * of_both[(row, col)])
         })
     }
 }

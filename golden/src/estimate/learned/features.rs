@@ -36,6 +36,8 @@ pub(super) const AMPLITUDE: f32 = 4.0;
 /// The deconvolutions of a window.
 pub(super) struct Features {
     quads: Quads,
+    /// The taxel of each quad, of each image.
+    taxels: [Vec<usize>; 4],
     /// c_λ p_λ of each parity for all λ, stacked: (Q · levels) × Q.
     pub(super) inverse: Parities,
 }
@@ -87,29 +89,16 @@ impl Features {
         let inverse = std::array::from_fn(|parity| {
             Mat::from_fn(LEVELS.len() * q, q, |row, col| entry(parity, row / q, row % q, col) as f32)
         });
-        Ok(Features { quads, inverse })
+        let taxels = std::array::from_fn(|lane| (0..q).map(|quad| quads.taxel(quad, lane)).collect());
+        Ok(Features { quads, taxels, inverse })
     }
 
     /// The inputs of each frame.
     pub fn of(&self, readings: &Readings) -> Parities {
-        let Readings { b, masked } = readings;
-        let (q, frames, deconvolved) = (self.quads.len(), b.ncols(), LEVELS.len() * self.quads.len());
-        let scales: Vec<f32> = b.col_iter().map(|b| AMPLITUDE / power_above(b.norm_max())).collect();
-        let taxels: [Vec<usize>; 4] =
-            std::array::from_fn(|lane| (0..q).map(|quad| self.quads.taxel(quad, lane)).collect());
-        let of_taxels = |values: &Mat<f32>, factor: &dyn Fn(usize) -> f32| {
-            let mut images: Parities = std::array::from_fn(|_| Mat::zeros(q, frames));
-            for frame in 0..frames {
-                let (values, factor) = (values.col_as_slice(frame), factor(frame));
-                for (image, taxels) in images.iter_mut().zip(&taxels) {
-                    let image = image.col_as_slice_mut(frame);
-                    image.iter_mut().zip(taxels).for_each(|(image, &taxel)| *image = factor * values[taxel]);
-                }
-            }
-            exchanged(images)
-        };
-        let stress = of_taxels(b, &|frame| scales[frame]);
-        let mask = of_taxels(masked, &|_| 1.0);
+        let (q, frames, deconvolved) = (self.quads.len(), readings.b.ncols(), LEVELS.len() * self.quads.len());
+        let scales: Vec<f32> = readings.b.col_iter().map(|b| AMPLITUDE / power_above(b.norm_max())).collect();
+        let stress = self.in_parities(&readings.b, &|frame| scales[frame]);
+        let mask = self.in_parities(&readings.masked, &|_| 1.0);
         std::array::from_fn(|parity| {
             let mut inputs = Mat::<f32>::zeros(2 * q + deconvolved, frames);
             inputs.subrows_mut(0, q).copy_from(&stress[parity]);
@@ -118,6 +107,20 @@ impl Features {
             inputs.subrows_mut(q + deconvolved, q).copy_from(&mask[parity]);
             inputs
         })
+    }
+
+    /// The parities of values of taxels, n × frames, times the factor of each frame.
+    pub(super) fn in_parities(&self, values: &Mat<f32>, factor: &dyn Fn(usize) -> f32) -> Parities {
+        let (q, frames) = (self.quads.len(), values.ncols());
+        let mut images: Parities = std::array::from_fn(|_| Mat::zeros(q, frames));
+        for frame in 0..frames {
+            let (values, factor) = (values.col_as_slice(frame), factor(frame));
+            for (image, taxels) in images.iter_mut().zip(&self.taxels) {
+                let image = image.col_as_slice_mut(frame);
+                image.iter_mut().zip(taxels).for_each(|(image, &taxel)| *image = factor * values[taxel]);
+            }
+        }
+        exchanged(images)
     }
 }
 

@@ -108,7 +108,8 @@ pub(super) struct Activation {
 }
 
 impl Layer {
-    fn apply(&self, inputs: &Parities) -> Parities {
+    /// The outputs before ReLU.
+    pub fn apply(&self, inputs: &Parities) -> Parities {
         std::array::from_fn(|parity| {
             let mut outputs = Mat::zeros(self.bias.len(), inputs[parity].ncols());
             matmul(&mut outputs, Accum::Replace, &self.weights[parity], &inputs[parity], 1.0, Par::Seq);
@@ -180,8 +181,13 @@ impl Network {
 
     /// μ and σ of each frame in units of mu_max, [x, y].
     pub fn shear(&self, inputs: Parities) -> Vec<([f64; 2], [f64; 2])> {
-        let all = self.activations(inputs);
-        let last = Network::outputs(&all[all.len() - 1].parities);
+        self.shear_behind(self.layers[0].apply(&inputs))
+    }
+
+    /// The same where the first layer gives this, before its ReLU.
+    pub fn shear_behind(&self, first: Parities) -> Vec<([f64; 2], [f64; 2])> {
+        let last = self.layers[1..].iter().fold(first, |before, layer| layer.apply(&exchanged(rectified(before))));
+        let last = Network::outputs(&last);
         let sigma = |ln: f32| f64::from(ln.clamp(LN_SIGMA[0], LN_SIGMA[1])).exp();
         let of = |frame: usize| {
             let at = |k: usize| last[(k, frame)];
