@@ -59,7 +59,8 @@ pub struct Arguments {
     /// Largest rate of a step.
     #[arg(long, default_value_t = Training::default().rate)]
     rate: f64,
-    /// How the shear is spread over the contacts: full (slip), mixed, even, or its share of the friction limit.
+    /// How the shear is spread over the contacts: full (slip), mixed, held (in partial slip, most
+    /// of them), even, or its share of the friction limit.
     #[arg(long, default_value_t = Training::default().slip)]
     slip: Slip,
     /// How far the Poisson ratio of a bonded cover may be from the scene's.

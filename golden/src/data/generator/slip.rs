@@ -9,6 +9,7 @@
 //! | a number above 0 and below 1 | partial slip, the shear over the friction limit being that number |
 //! | `even` | the same everywhere on the contact |
 //! | `mixed` | of ten contacts five `full`, four in partial slip with a number from 0.1 to 1, one `even` |
+//! | `held` | of ten contacts two `full`, seven in partial slip, one `even`: those of a hand that holds more than it lets slide |
 //!
 //! The traction is that of [`crate::data::generator`].
 
@@ -17,10 +18,12 @@ use crate::random::Random;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-/// Range of shear over the friction limit in [`Slip::Mixed`].
-const MIXED: [f64; 2] = [0.1, 1.0];
+/// Range of shear over the friction limit in partial slip of [`Slip::Mixed`] and [`Slip::Held`].
+const LIMITS: [f64; 2] = [0.1, 1.0];
 /// Shares of [`Slip::Mixed`]: full slip, partial slip; the rest is even.
-const SHARES: [f64; 2] = [0.5, 0.4];
+const MIXED: [f64; 2] = [0.5, 0.4];
+/// The same of [`Slip::Held`].
+const HELD: [f64; 2] = [0.2, 0.7];
 
 /// How the shear of a contact is spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,6 +37,8 @@ pub enum Slip {
     Even,
     /// Full, partial and even, drawn for each contact.
     Mixed,
+    /// The same, most of them partial.
+    Held,
 }
 
 impl Slip {
@@ -41,15 +46,17 @@ impl Slip {
     pub const TABLE: [Slip; 6] =
         [Slip::Full, Slip::Partial(0.8), Slip::Partial(0.6), Slip::Partial(0.4), Slip::Partial(0.2), Slip::Even];
 
-    /// One kind of slip: what `Mixed` draws, else itself.
+    /// One kind of slip: what a mixture draws, else itself.
     fn drawn(self, random: &mut Random) -> Slip {
-        if self != Slip::Mixed {
-            return self;
-        }
-        let (kind, limit) = (random.between(0.0, 1.0), random.between(MIXED[0], MIXED[1]));
+        let [full, partial] = match self {
+            Slip::Mixed => MIXED,
+            Slip::Held => HELD,
+            own => return own,
+        };
+        let (kind, limit) = (random.between(0.0, 1.0), random.between(LIMITS[0], LIMITS[1]));
         match kind {
-            kind if kind < SHARES[0] => Slip::Full,
-            kind if kind < SHARES[0] + SHARES[1] => Slip::Partial(limit),
+            kind if kind < full => Slip::Full,
+            kind if kind < full + partial => Slip::Partial(limit),
             _ => Slip::Even,
         }
     }
@@ -62,7 +69,7 @@ impl Slip {
         match self.drawn(random) {
             Slip::Partial(share) if ratio > 0.0 => of("partial-slip", Some(ratio / share)),
             Slip::Even => of("even-shear", None),
-            Slip::Full | Slip::Partial(_) | Slip::Mixed => contact,
+            Slip::Full | Slip::Partial(_) | Slip::Mixed | Slip::Held => contact,
         }
     }
 }
@@ -75,9 +82,10 @@ impl FromStr for Slip {
             "full" => Ok(Slip::Full),
             "even" => Ok(Slip::Even),
             "mixed" => Ok(Slip::Mixed),
+            "held" => Ok(Slip::Held),
             number => match number.parse() {
                 Ok(share) if share > 0.0 && share < 1.0 => Ok(Slip::Partial(share)),
-                _ => Err(format!("{number:?}: allowed are full, even, mixed, or a number above 0 and below 1")),
+                _ => Err(format!("{number:?}: allowed are full, even, mixed, held, or a number above 0 and below 1")),
             },
         }
     }
@@ -90,6 +98,7 @@ impl Display for Slip {
             Slip::Partial(share) => share.fmt(f),
             Slip::Even => f.write_str("even"),
             Slip::Mixed => f.write_str("mixed"),
+            Slip::Held => f.write_str("held"),
         }
     }
 }
@@ -100,7 +109,7 @@ mod tests {
 
     #[test]
     fn names_are_read_and_refused() {
-        for slip in Slip::TABLE.into_iter().chain([Slip::Mixed]) {
+        for slip in Slip::TABLE.into_iter().chain([Slip::Mixed, Slip::Held]) {
             assert_eq!(slip.to_string().parse(), Ok(slip));
         }
         for name in ["", "none", "0", "1", "1.5", "-0.2", "NaN"] {
@@ -108,15 +117,18 @@ mod tests {
         }
     }
 
-    /// The shares of the mixture, within four standard deviations of 4000 draws.
+    /// The shares of the mixtures, within four standard deviations of 4000 draws.
     #[test]
-    fn the_mixture_has_its_shares() {
-        let mut random = Random::new(3);
-        let drawn: Vec<Slip> = (0..4000).map(|_| Slip::Mixed.drawn(&mut random)).collect();
-        let count = |of: fn(&Slip) -> bool| drawn.iter().filter(|slip| of(slip)).count() as f64 / 4000.0;
-        assert!((count(|slip| *slip == Slip::Full) - SHARES[0]).abs() < 0.03);
-        assert!((count(|slip| *slip == Slip::Even) - 0.1).abs() < 0.02);
-        assert!(count(|slip| matches!(slip, Slip::Partial(share) if *share < 0.55)) > 0.16);
-        assert!(drawn.iter().all(|slip| !matches!(slip, Slip::Partial(share) if !(0.1..1.0).contains(share))));
+    fn mixtures_have_their_shares() {
+        for (mixture, [full, partial]) in [(Slip::Mixed, MIXED), (Slip::Held, HELD)] {
+            let mut random = Random::new(3);
+            let drawn: Vec<Slip> = (0..4000).map(|_| mixture.drawn(&mut random)).collect();
+            let count = |of: fn(&Slip) -> bool| drawn.iter().filter(|slip| of(slip)).count() as f64 / 4000.0;
+            assert!((count(|slip| *slip == Slip::Full) - full).abs() < 0.03);
+            assert!((count(|slip| *slip == Slip::Even) - 0.1).abs() < 0.02);
+            let half = count(|slip| matches!(slip, Slip::Partial(share) if *share < 0.55));
+            assert!((half - partial / 2.0).abs() < 0.03, "{half}");
+            assert!(drawn.iter().all(|slip| !matches!(slip, Slip::Partial(share) if !(0.1..1.0).contains(share))));
+        }
     }
 }

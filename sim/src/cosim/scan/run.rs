@@ -91,6 +91,22 @@ pub fn expected(model: &Model, array: &Array, scans: Range<usize>) -> Vec<Expect
     scans.map(of).collect()
 }
 
+/// What a run of a device showed.
+#[derive(Default)]
+struct Observed {
+    /// Codes that the engine took of each whole frame.
+    codes: Vec<i32>,
+    beats: Vec<[i32; 3]>,
+    /// Number of beats up to each last one of a frame.
+    ends: Vec<usize>,
+    /// Bytes of an image that were not taken.
+    left: usize,
+    /// Violations of the converters' data sheet, and how many there are.
+    violations: Vec<String>,
+    violation_count: usize,
+    times: Vec<ScanTimes>,
+}
+
 /// Runs `device` from a reset until it has answered all `expected` scans of `array`, those that `image` does not break off; the
 /// receiver stalls at random if `stalls`. Returns what differs, violations of the data sheet among it, and the times of each
 /// scan.
@@ -103,24 +119,33 @@ pub fn simulate(
     image: Option<&Image>,
     stalls: bool,
 ) -> (Findings, Vec<ScanTimes>) {
-    let (Some(scan), Some(timing)) = (model.scene.hardware.adc_scan, model.scan_timing()) else {
-        return Default::default();
-    };
+    match observe(device, model, array, expected, image, stalls) {
+        Some(observed) => (compare(label, model, expected, &observed), observed.times),
+        None => Default::default(),
+    }
+}
+
+/// Runs `device`; `None` of a scene without a scan.
+fn observe(
+    device: &mut dyn ScanDevice,
+    model: &Model,
+    array: &Array,
+    expected: &[Expected],
+    image: Option<&Image>,
+    stalls: bool,
+) -> Option<Observed> {
+    let (scan, timing) = (model.scene.hardware.adc_scan?, model.scan_timing()?);
     let mut converters = Converters::new(scan, array.clone(), model.board.clock_MHz);
     let mut random = fastrand::Rng::with_seed(SEED);
-    let mut frames: Vec<Vec<i32>> = vec![Vec::new()];
-    let mut beats = Vec::new();
-    let mut times = vec![ScanTimes::default(); expected.len()];
+    let mut seen = Observed { times: vec![ScanTimes::default(); expected.len()], ..Observed::default() };
     let (taxels, wanted) = (model.scene.sensor.taxels(), expected.iter().map(|of| of.beats.len()).sum::<usize>());
     let longest = expected.iter().map(|of| of.cycles.total).max().unwrap_or(0);
     let scans = expected.last().map_or(0, |of| of.number) as u64 + SPARE_SCANS;
-    let most = RESET + scans * (timing.period + 4 * longest);
     // The numbers beyond the codes are bytes of an image.
     let most_code = rail(model.formats().code_bits);
-    let mut ends: Vec<usize> = Vec::new();
-    let mut begun = None;
+    let (mut frame, mut frames, mut begun) = (Vec::new(), 0, None);
     let mut bytes = image.map_or(&[][..], |image| &image.beats);
-    for cycle in 0..most {
+    for cycle in 0..RESET + scans * (timing.period + 4 * longest) {
         let m_ready = !stalls || random.u8(..4) > 0;
         let byte = bytes.first().filter(|_| image.is_some_and(|image| cycle >= RESET + image.at));
         let inputs = ScanInputs {
@@ -134,9 +159,7 @@ pub fn simulate(
         };
         let outputs = device.cycle(&inputs);
         // Registers are undefined until the second edge of a reset.
-        if cycle < RESET {
-            continue;
-        }
+        let Some(now) = cycle.checked_sub(RESET) else { continue };
         converters.cycle(&outputs.pins);
         if inputs.s_valid && outputs.s_ready {
             bytes = &bytes[1..];
@@ -144,51 +167,55 @@ pub fn simulate(
         let scan_now = array.scan_of(converters.frames());
         if !outputs.pins.cs_n && begun != Some(scan_now) {
             begun = Some(scan_now);
-            let place = expected.iter().position(|own| own.number == scan_now);
-            if let Some(own) = place.and_then(|place| times.get_mut(place)) {
-                own.begins = cycle - RESET;
+            if let Some(place) = expected.iter().position(|own| own.number == scan_now) {
+                seen.times[place].begins = now;
             }
         }
         if let Some(beat) = outputs.taken.filter(|beat| beat.data <= most_code) {
-            let place = frames.len() - 1;
-            frames[place].push(beat.data);
-            if beat.last && frames[place].len() == taxels {
-                if let Some(own) = times.get_mut(place) {
-                    own.last_code = cycle - RESET;
-                }
-                frames.push(Vec::new());
+            frame.push(beat.data);
+            if beat.last && frame.len() == taxels {
+                seen.codes.append(&mut frame);
+                seen.times.get_mut(frames).into_iter().for_each(|own| own.last_code = now);
+                frames += 1;
             } else if beat.last {
                 // A scan that an image broke off.
-                frames[place].clear();
+                frame.clear();
             }
         }
         if outputs.m_valid && m_ready {
-            beats.push(outputs.m_data);
+            seen.beats.push(outputs.m_data);
             if outputs.m_last {
-                if let Some(own) = times.get_mut(ends.len()) {
-                    own.last_beat = cycle - RESET;
-                }
-                ends.push(beats.len());
+                seen.times.get_mut(seen.ends.len()).into_iter().for_each(|own| own.last_beat = now);
+                seen.ends.push(seen.beats.len());
             }
         }
-        if beats.len() >= wanted {
+        if seen.beats.len() >= wanted {
             break;
         }
     }
-    let codes = frames.concat();
+    // What is left of a frame that has not ended is compared too.
+    seen.codes.append(&mut frame);
+    seen.left = bytes.len();
+    let (violations, count) = converters.violations();
+    (seen.violations, seen.violation_count) = (violations.to_vec(), count);
+    Some(seen)
+}
+
+/// What differs from the model.
+fn compare(label: &str, model: &Model, expected: &[Expected], observed: &Observed) -> Findings {
+    let Observed { codes, beats, ends, left, violations, violation_count, .. } = observed;
     let mut findings = Findings::default();
     let of_scan = |number: usize| FrameComparison::new(label, format!("scan {number}"), number);
     // First in the list: a broken time explains what is wrong after it.
     let mut comparison = of_scan(0);
-    let (violations, count) = converters.violations();
     let place = Place { stage: "converter", ..Place::default() };
     violations.iter().for_each(|text| comparison.add_violation(place, text.clone()));
-    if !bytes.is_empty() {
+    if *left > 0 {
         let place = Place { stage: "load", ..Place::default() };
-        comparison.add_violation(place, format!("{} bytes of the image are not taken", bytes.len()));
+        comparison.add_violation(place, format!("{left} bytes of the image are not taken"));
     }
     findings.extend(comparison.finish());
-    findings.count += count - violations.len();
+    findings.count += violation_count - violations.len();
     let (mut code, mut beat) = (codes.iter(), beats.iter());
     let (cols, mut end) = (model.scene.sensor.cols, 0);
     for (nth, own) in expected.iter().enumerate() {
@@ -210,7 +237,7 @@ pub fn simulate(
         }
         findings.extend(comparison.finish());
     }
-    (findings, times)
+    findings
 }
 
 /// A scanned frame.
