@@ -14,6 +14,7 @@
 //! | `window` | the taxels that are read |
 //! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
 //! | `network` | layers with the mirror symmetry |
+//! | `first_layer` | the first one behind the features, for one frame |
 //! | `options`, `frames`, `training`, `adam` | drawn frames, loss, steps |
 //! | `file` | bytes, signature |
 //! | `trial` | a network of a few steps, for tests |
@@ -32,6 +33,7 @@ mod composed;
 mod error;
 mod features;
 mod file;
+mod first_layer;
 mod frames;
 mod network;
 mod onnx;
@@ -55,9 +57,9 @@ use crate::read::bytes_up_to;
 use crate::spec::quads::Quads;
 use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
-use composed::FirstLayer;
 use faer::Mat;
 use features::{power_above, Features};
+use first_layer::FirstLayer;
 use network::Network;
 use std::borrow::Cow;
 use std::ops::ControlFlow;

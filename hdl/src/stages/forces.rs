@@ -63,7 +63,7 @@ block! {
         in framing;
         /// The coefficient signature is wrong, 1 bit; valid with `start`.
         in damaged: 1;
-        /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
+        /// Number of frames in a sliding mean, in an adaptive one with the number of its window above, otherwise one bit, 0; valid with `start`.
         in frames: unit.widths().frames;
         /// Score of the best candidate, signed, 2^−6; valid with `start`.
         in score: score_bits;

@@ -57,7 +57,7 @@ block! {
         in m_axis_tready;
         /// The word is the last of its frame; valid with `m_axis_tvalid`.
         out m_axis_tlast;
-        /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
+        /// Number of frames in a sliding mean, in an adaptive one with the number of its window above, otherwise one bit, 0; valid with `m_axis_tvalid`.
         out frames: marks.bits();
         /// Reset of the engine: `rst`, or tables are written; with several arrays `rst`.
         out restart;

@@ -11,8 +11,8 @@
 //! | out: weights of the mask in the first layer, of a window around a contact | outputs × quads | – |
 //! | out: biases of each layer and parity | outputs | – |
 
-use super::features::{Features, AMPLITUDE};
-use super::network::{Layer, Parities};
+use super::first_layer::FirstLayer;
+use super::network::Layer;
 use super::Learned;
 use crate::physics::symmetry::folded::EVEN;
 use crate::spec::window::Place;
@@ -29,30 +29,6 @@ pub struct ComposedLayer {
     pub bias: [Vec<f64>; 4],
     /// Largest output of any image on drawn frames.
     pub largest: f64,
-}
-
-/// The first layer of a network as products with the parities of b/s and of the mask: everything before its ReLU is linear in both.
-pub(super) struct FirstLayer {
-    /// Outputs × quads.
-    stress: Layer,
-    mask: Parities,
-}
-
-impl FirstLayer {
-    /// That of a network with these features.
-    pub fn new(features: &Features, layer: &Layer) -> FirstLayer {
-        let stress = Layer { weights: features.composed(&layer.weights), ..layer.clone() };
-        FirstLayer { stress, mask: features.of_mask(&layer.weights) }
-    }
-
-    /// Its outputs before ReLU; without `mask` no taxel is masked.
-    pub fn apply(&self, stress: &Parities, mask: Option<&Parities>) -> Parities {
-        let mut outputs = self.stress.apply(stress);
-        for (outputs, (own, mask)) in outputs.iter_mut().zip(self.mask.iter().zip(mask.into_iter().flatten())) {
-            *outputs += own * mask;
-        }
-        outputs
-    }
 }
 
 impl Learned {
@@ -91,28 +67,10 @@ fn plain(layer: &Layer) -> ComposedLayer {
     }
 }
 
-impl Features {
-    /// The weights of the mask in a layer of the inputs.
-    fn of_mask(&self, weights: &Parities) -> Parities {
-        let (first, count) = (self.inverse[0].ncols() + self.inverse[0].nrows(), self.inverse[0].ncols());
-        weights.each_ref().map(|own| own.subcols(first, count).to_owned())
-    }
-
-    /// The weights of a layer of the inputs as weights of the parities of b/s.
-    fn composed(&self, weights: &Parities) -> Parities {
-        std::array::from_fn(|parity| {
-            let (own, inverse) = (&weights[parity], &self.inverse[parity]);
-            let (q, deconvolved) = (inverse.ncols(), inverse.nrows());
-            let of_both = own.subcols(0, q) + own.subcols(q, deconvolved) * inverse;
-            Mat::from_fn(own.nrows(), q, |row, col| AMPLITUDE * of_both[(row, col)])
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::features::power_above;
-    use super::super::network::exchanged;
+    use super::super::network::{exchanged, Parities};
     use super::super::{Network, OneContact, Training};
     use super::*;
     use crate::spec::scene::Scene;
