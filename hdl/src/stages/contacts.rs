@@ -18,7 +18,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
 
 use crate::block;
-use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Type};
+use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Net, Type};
 use crate::primitives::{count_bits, frame_quads, position_bits};
 
 block! {
@@ -172,7 +172,7 @@ fn label_bits(contacts: usize) -> usize {
 
 impl Block for Contacts {
     fn build<'k>(&self, k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
-        let (rst, label_bits, bit) = (io.rst, label_bits(self.contacts), Type::unsigned(1));
+        let (rst, label_bits) = (io.rst, label_bits(self.contacts));
         let state = k.state("state", Type::unsigned(3), rst, State::Idle as u64);
         let is = |wanted: State| state.is(wanted as u64);
         let goes = |next: State| state.set(k.constant(3, next as u64));
@@ -186,10 +186,7 @@ impl Block for Contacts {
         let last_quad = quad.is(self.quads as u64 - 1);
         let complete = k.wire("complete", io.taxels_valid & last_quad);
         k.when(io.taxels_valid, || quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1))));
-        let pulse = |name: &str, value: Expr<'_>| {
-            let own = k.state(name, bit, rst, 0);
-            own.set(value);
-        };
+        let pulse = |name: &str, value: Expr<'_>| k.state(name, Type::unsigned(1), rst, 0).set(value);
 
         k.comment("A state ends with the pulse of the stage it waits for.");
         let segments = k.wire("segments", is(State::First) & complete);
@@ -251,6 +248,20 @@ impl Block for Contacts {
         io.label_address.set(label_address);
         io.pass_start.set(io.readable | k.named("window_start") | k.named("shear_start"));
 
+        self.keep(k, &io, (known, *contact), enabled, (is(State::Status), status_of));
+    }
+}
+
+impl Contacts {
+    /// Keeps what is known of each contact, of `contact` once it is `known`, and sends it as status while `is_status`.
+    fn keep<'k>(
+        &self,
+        k: &'k Builder,
+        io: &ContactsPorts<Inside<'k>>,
+        (known, contact): (Expr<'k>, Expr<'k>),
+        enabled: Expr<'k>,
+        (is_status, status_of): (Expr<'k>, Net<'k>),
+    ) {
         k.comment("What is known of each contact.");
         let conditions = k.register("conditions", Type::unsigned(self.contacts));
         let index = |contact: usize| contact * position_bits();
@@ -266,10 +277,10 @@ impl Block for Contacts {
         let own_condition = |at: usize| (known & contact.is(at as u64)).mux(enabled, conditions.at(at)) & !io.start;
         conditions.set(concat(&(0..self.contacts).rev().map(own_condition).collect::<Vec<_>>()));
         let ln_sigma = k.memory("ln_sigma_of", self.contacts, self.score_bits, Contents::Undefined);
-        ln_sigma.write(known, *contact, io.ln_sigma);
+        ln_sigma.write(known, contact, io.ln_sigma);
 
         k.comment("Contacts that there are not have no condition, and what has no condition has no μ.");
-        pulse("status_valid", is(State::Status));
+        k.state("status_valid", Type::unsigned(1), io.rst, 0).set(is_status);
         io.status_label.delay(*status_of);
         let condition = k.wire("condition_of", self.of_label(k, *status_of, |at| conditions.at(at)));
         io.status_condition.delay(condition);

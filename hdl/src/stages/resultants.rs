@@ -135,6 +135,28 @@ fn pick<'k>(index: Expr<'k>, values: &[Expr<'k>]) -> Expr<'k> {
     index.case(&arms, values[0])
 }
 
+/// What is summed of a force, two cycles after it is taken from `data`, at this place, [x, y]: the force, and its products; those with fz⁺
+/// are 0 for a taxel in tension.
+fn values<'k>(k: &'k Builder, data: Expr<'k>, summed: Summed, place: [Expr<'k>; 2]) -> Vec<Expr<'k>> {
+    k.comment("A force and its products; those with fz⁺ are 0 for a taxel in tension.");
+    let component = |n: usize| data.slice(n * WORD, WORD).signed();
+    let once = ["fx_1", "fy_1", "fz_1"].into_iter().enumerate().map(|(n, name)| k.delay(name, component(n)));
+    let once: Vec<Expr> = once.collect();
+    let force = [("fx", once[0]), ("fy", once[1]), ("fz", once[2])].map(|(name, value)| k.delay(name, value));
+    let places = [("x_1", place[0]), ("y_1", place[1])].map(|(name, place)| k.delay(name, place));
+    let moment = |name: &str, force: usize, axis: usize| k.delay(name, once[force] * places[axis]);
+    let moments = [moment("moment_x", 2, 0), moment("moment_y", 2, 1)];
+    let tension = k.delay("tension", once[2].top());
+    let mut values: Vec<Expr> = force.to_vec();
+    let pressing = [force[2], moments[0], moments[1]];
+    values.extend(pressing.map(|value| tension.mux(k.signed_constant(value.bits(), 0), value)));
+    if summed == Summed::Label {
+        values.extend(moments);
+        values.extend([moment("shear_x", 1, 0), moment("shear_y", 0, 1)]);
+    }
+    values
+}
+
 fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, parts: Parts) {
     let (count, grid, summed) = (parts.count(), parts.grid(), parts.summed());
     let (rows, cols) = (sensor.rows / grid.rows, sensor.cols / grid.cols);
@@ -192,22 +214,7 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, pa
         }
     };
     let part_2 = k.delay("part_2", k.delay("part_1", part));
-    k.comment("A force and its products; those with fz⁺ are 0 for a taxel in tension.");
-    let component = |n: usize| data.slice(n * WORD, WORD).signed();
-    let once = ["fx_1", "fy_1", "fz_1"].into_iter().enumerate().map(|(n, name)| k.delay(name, component(n)));
-    let once: Vec<Expr> = once.collect();
-    let force = [("fx", once[0]), ("fy", once[1]), ("fz", once[2])].map(|(name, value)| k.delay(name, value));
-    let places = [("x_1", *x), ("y_1", *y)].map(|(name, place)| k.delay(name, place));
-    let moment = |name: &str, force: usize, axis: usize| k.delay(name, once[force] * places[axis]);
-    let moments = [moment("moment_x", 2, 0), moment("moment_y", 2, 1)];
-    let tension = k.delay("tension", once[2].top());
-    let mut values: Vec<Expr> = force.to_vec();
-    let pressing = [force[2], moments[0], moments[1]];
-    values.extend(pressing.map(|value| tension.mux(k.signed_constant(value.bits(), 0), value)));
-    if summed == Summed::Label {
-        values.extend(moments);
-        values.extend([moment("shear_x", 1, 0), moment("shear_y", 0, 1)]);
-    }
+    let values = values(k, data, summed, [*x, *y]);
 
     let adds = later("valid_2", later("valid_1", take));
     let settling = later("settling_1", take & last_force);

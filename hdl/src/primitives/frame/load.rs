@@ -271,23 +271,41 @@ impl Load {
             skipping.set(fails & *took & !*took_last);
         });
 
+        self.write(k, &io, ends_word, (*index, words), (*image, *word));
+        self.begin_anew(&io, *writing, array);
+        self.keep(k, &io, array, *word, at, [right_head, done, refused.of(io.sent_array)]);
+    }
+
+    /// Writes the tables: entries of taxels and coefficients, from words of an image in their order, of which there are `words`.
+    fn write<'k>(
+        &self,
+        k: &'k Builder,
+        io: &LoadPorts<Inside<'k>>,
+        ends_word: Expr<'k>,
+        (index, words): (Expr<'k>, usize),
+        (image, word): (Expr<'k>, Expr<'k>),
+    ) {
+        let (bits, first_coefficient) = (self.code_bits, HEAD_WORDS + self.taxels);
         let [first, after] = [HEAD_WORDS, first_coefficient].map(|number| k.constant(index.bits(), number as u64));
         io.write.set(ends_word & !index.less(first) & index.less(after));
-        io.taxel.set((*index - first).low(count_bits(self.taxels)));
+        io.taxel.set((index - first).low(count_bits(self.taxels)));
         io.entry.set(word.low(bits + GAIN_BITS as usize));
-        self.write_coefficients(k, &io, ends_word & !index.less(after) & !index.is(words as u64 - 1), *image, *word);
+        self.write_coefficients(k, io, ends_word & !index.less(after) & !index.is(words as u64 - 1), image, word);
+    }
+
+    /// The array whose tables are written begins anew, or the engine where it is the only one.
+    fn begin_anew<'k>(&self, io: &LoadPorts<Inside<'k>>, writing: Expr<'k>, array: Expr<'k>) {
         match self.arrays.bits {
             0 => {
-                io.restart.set(io.rst | *writing);
+                io.restart.set(io.rst | writing);
             }
             bits => {
                 io.restart.set(io.rst);
-                let of = |number: u64| *writing & array.is(number);
+                let of = |number: u64| writing & array.is(number);
                 io.anew.set(concat(&(0..1 << bits).rev().map(of).collect::<Vec<_>>()));
                 io.array.set(array);
             }
         }
-        self.keep(k, &io, array, *word, at, [right_head, done, refused.of(io.sent_array)]);
     }
 
     /// Threshold, noise floor, version and state of the tables: from word n of an image of `array`, which is `word` when `at(n)`.
