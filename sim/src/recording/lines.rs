@@ -2,6 +2,7 @@
 
 use std::io::{Cursor, Error, Read};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use dermis_golden::data::recording::{End, FrameOptions, Frames, RecordingError};
@@ -24,7 +25,7 @@ const KEPT_BYTES: usize = 4 << 20;
 /// The lines of a file that begins again: each with when its frame was acquired.
 #[derive(Default)]
 struct Kept {
-    lines: Vec<(u64, Vec<u8>)>,
+    lines: Vec<(u64, Arc<[u8]>)>,
     bytes: usize,
     /// Number of the next line, once all are there.
     next: Option<usize>,
@@ -32,11 +33,11 @@ struct Kept {
 
 impl Kept {
     /// Keeps a line; whether there was room.
-    fn add(&mut self, time_ns: u64, line: &[u8]) -> bool {
+    fn add(&mut self, time_ns: u64, line: &Arc<[u8]>) -> bool {
         self.bytes += line.len();
         let fits = self.bytes <= KEPT_BYTES;
         if fits {
-            self.lines.push((time_ns, line.to_vec()));
+            self.lines.push((time_ns, Arc::clone(line)));
         }
         fits
     }
@@ -61,7 +62,7 @@ pub struct Lines {
     /// When the last frame was due since then, and how long after the one before.
     due: Duration,
     gap: Duration,
-    line: Cursor<Vec<u8>>,
+    line: Cursor<Arc<[u8]>>,
 }
 
 impl Lines {
@@ -87,20 +88,21 @@ impl Lines {
     }
 
     /// The next line of the file, and when its frame was acquired.
-    fn read_next(&mut self) -> Result<Option<(u64, Vec<u8>)>, RecordingError> {
+    fn read_next(&mut self) -> Result<Option<(u64, Arc<[u8]>)>, RecordingError> {
         let next = self.frames.next_frame()?;
         if let (End::Cut, Some(words), false) = (self.end(), self.end().words(), self.partial) {
             return Err(RecordingError::new(words));
         }
         let Some(frame) = next else { return Ok(None) };
         // NaN, a missing reading, is written as null.
-        let line = format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa})).into_bytes();
+        let line = format!("{}\n", json!({"time_ns": frame.time_ns, "stress_MPa": frame.stress_MPa}));
+        let line: Arc<[u8]> = line.into_bytes().into();
         self.kept = self.kept.take().and_then(|mut kept| kept.add(frame.time_ns, &line).then_some(kept));
         Ok(Some((frame.time_ns, line)))
     }
 
     /// The same of the lines that are kept, once all are: they begin again.
-    fn next_kept(&mut self) -> Option<(u64, Vec<u8>)> {
+    fn next_kept(&mut self) -> Option<(u64, Arc<[u8]>)> {
         let Kept { lines, next, .. } = self.kept.as_mut()?;
         let number = next.as_mut()?;
         let line = lines.get(*number).cloned();
@@ -194,8 +196,8 @@ mod tests {
 
     #[test]
     fn lines_are_kept_while_there_is_room() {
-        let (mut kept, line) = (Kept::default(), vec![b'1'; KEPT_BYTES / 2]);
-        assert!(kept.add(1, &line) && kept.add(2, &line) && !kept.add(3, b"1"));
+        let (mut kept, line) = (Kept::default(), Arc::from(vec![b'1'; KEPT_BYTES / 2]));
+        assert!(kept.add(1, &line) && kept.add(2, &line) && !kept.add(3, &Arc::from(*b"1")));
     }
 
     #[test]

@@ -59,7 +59,8 @@ impl<R: Read> Decoded<R> {
             Units::Bytes if !bytes.contains(&b'\r') && self.end != Some(b'\r') => {
                 self.end =
                     bytes.last().copied().filter(|byte| *byte == b'\n').or(self.end.filter(|_| bytes.is_empty()));
-                self.ready = bytes;
+                // The room of both is used again.
+                self.rest = std::mem::replace(&mut self.ready, bytes);
             }
             Units::Bytes => bytes.into_iter().for_each(|byte| self.push(byte)),
             Units::Utf16(of) => {
@@ -89,7 +90,8 @@ impl<R: Read> Decoded<R> {
 impl<R: Read> Read for Decoded<R> {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
         while self.at == self.ready.len() && !buffer.is_empty() {
-            (self.at, self.ready) = (0, Vec::new());
+            self.at = 0;
+            self.ready.clear();
             if !self.fill()? && self.ready.is_empty() {
                 return Ok(0);
             }
