@@ -22,10 +22,13 @@ pub enum Pace {
 /// Most bytes of the lines of a file that is repeated, which are kept so that it is read and put into words once.
 const KEPT_BYTES: usize = 4 << 20;
 
-/// The lines of a file that begins again: each with when its frame was acquired.
+/// When a frame was acquired, and its line.
+type TimedLine = (u64, Arc<[u8]>);
+
+/// The lines of a file that begins again.
 #[derive(Default)]
 struct Kept {
-    lines: Vec<(u64, Arc<[u8]>)>,
+    lines: Vec<TimedLine>,
     bytes: usize,
     /// Number of the next line, once all are there.
     next: Option<usize>,
@@ -87,8 +90,8 @@ impl Lines {
         self.frames.end()
     }
 
-    /// The next line of the file, and when its frame was acquired.
-    fn read_next(&mut self) -> Result<Option<(u64, Arc<[u8]>)>, RecordingError> {
+    /// The next line of the file.
+    fn read_next(&mut self) -> Result<Option<TimedLine>, RecordingError> {
         let next = self.frames.next_frame()?;
         if let (End::Cut, Some(words), false) = (self.end(), self.end().words(), self.partial) {
             return Err(RecordingError::new(words));
@@ -102,7 +105,7 @@ impl Lines {
     }
 
     /// The same of the lines that are kept, once all are: they begin again.
-    fn next_kept(&mut self) -> Option<(u64, Arc<[u8]>)> {
+    fn next_kept(&mut self) -> Option<TimedLine> {
         let Kept { lines, next, .. } = self.kept.as_mut()?;
         let number = next.as_mut()?;
         let line = lines.get(*number).cloned();
