@@ -58,7 +58,7 @@ use crate::spec::quads::Quads;
 use crate::spec::scene::{EstimatorKind, Scene};
 use crate::spec::sensor::Sensor;
 use faer::Mat;
-use features::{power_above, Features};
+use features::{power_above, Features, Readings};
 use first_layer::FirstLayer;
 use network::Network;
 use std::borrow::Cow;
@@ -193,8 +193,8 @@ impl Learned {
         self.network.widths().windows(2).map(|pair| Quads::LANES * pair[0] * pair[1]).sum()
     }
 
-    /// μ of one contact.
-    pub fn shear(&self, contact: &OneContact) -> Gaussian {
+    /// What a window has of one contact.
+    fn readings(&self, contact: &OneContact) -> Readings {
         let window = self.signature.window;
         let n = window.taxels();
         let origin = window.origin(&self.sensor, contact.centre_mm);
@@ -207,10 +207,20 @@ impl Learned {
                 None => masked[(own, 0)] = 1.0,
             }
         }
+        Readings { b, masked }
+    }
+
+    /// μ of one contact.
+    pub fn shear(&self, contact: &OneContact) -> Gaussian {
+        let Readings { b, masked } = self.readings(contact);
         let scale = power_above(b.norm_max()).recip();
         let stress = self.features.in_parities(&b, &|_| scale);
         let mask = (masked.norm_max() > 0.0).then(|| self.features.in_parities(&masked, &|_| 1.0));
-        let (mean, sigma) = self.network.shear_behind(self.first.apply(&stress, mask.as_ref()))[0];
+        self.in_scene(self.network.shear_behind(self.first.apply(&stress, mask.as_ref()))[0])
+    }
+
+    /// Mean and standard deviation in units of mu_max as those of a μ of at most mu_max.
+    fn in_scene(&self, (mean, sigma): ([f64; 2], [f64; 2])) -> Gaussian {
         let of_scene = |values: [f64; 2]| values.map(|value| value * self.signature.mu_max);
         let mut found = Gaussian { mean: of_scene(mean), sigma: of_scene(sigma) };
         let size = found.mean[0].hypot(found.mean[1]);

@@ -71,7 +71,7 @@ fn plain(layer: &Layer) -> ComposedLayer {
 mod tests {
     use super::super::features::power_above;
     use super::super::network::{exchanged, Parities};
-    use super::super::{Network, OneContact, Training};
+    use super::super::{Gaussian, Network, OneContact, Training};
     use super::*;
     use crate::spec::scene::Scene;
     use std::ops::ControlFlow::Continue;
@@ -98,6 +98,17 @@ mod tests {
         Network::outputs(&inputs)
     }
 
+    /// μ by the features and the network behind them, without a composed layer; [`Learned::shear`] gives the same.
+    fn by_features(learned: &Learned, contact: &OneContact) -> Gaussian {
+        let features = learned.features.of(&learned.readings(contact));
+        let (told, own) = (learned.in_scene(learned.network.shear(features)[0]), learned.shear(contact));
+        for axis in [0, 1] {
+            assert!((own.mean[axis] - told.mean[axis]).abs() < 1e-4, "{own:?} {told:?}");
+            assert!((own.sigma[axis] - told.sigma[axis]).abs() < 1e-4, "{own:?} {told:?}");
+        }
+        told
+    }
+
     /// Around a contact the first layer takes the mask; the window has middle lines.
     #[test]
     fn composed_layers_take_the_mask_of_a_window() {
@@ -111,7 +122,7 @@ mod tests {
         let window = learned.signature.window;
         for [row, col] in [[9, 9], [1, 17]] {
             let centre_mm = scene.sensor.position_mm(row, col);
-            let told = learned.shear(&OneContact { b: &b, alive: &alive, centre_mm });
+            let told = by_features(&learned, &OneContact { b: &b, alive: &alive, centre_mm });
             let taxels = window.taxels_of(&scene.sensor, window.origin(&scene.sensor, centre_mm));
             let taxels: Vec<Option<usize>> = taxels.into_iter().map(|t| t.filter(|t| alive[*t])).collect();
             let peak = taxels.iter().flatten().map(|t| b[*t].abs()).fold(0.0, f64::max);
@@ -141,7 +152,7 @@ mod tests {
         for dead in [vec![], vec![37, 5]] {
             let alive: Vec<bool> = (0..100).map(|taxel| !dead.contains(&taxel)).collect();
             let contact = OneContact { b: &frame.stress_MPa, alive: &alive, centre_mm: [0.0; 2] };
-            let told = learned.shear(&contact);
+            let told = by_features(&learned, &contact);
             let peak = (0..100).filter(|t| alive[*t]).map(|t| frame.stress_MPa[t].abs()).fold(0.0, f64::max);
             let s = f64::from(power_above(peak as f32));
             let quads = learned.signature.window.quads();
