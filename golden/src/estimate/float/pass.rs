@@ -45,11 +45,9 @@ impl Polynomial {
 
     /// The polynomial of a given degree; degree 0 is p₀ alone, for a subarray that is not searched.
     pub fn of_degree(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
-        let FoldedMatrices { basis, cz_pinv, ax, ay } = &matrices.folded;
+        let FoldedMatrices { basis, ax, ay, .. } = &matrices.folded;
         let n = b.len();
-        let mut first = vec![0.0; n];
-        cz_pinv.accumulate(&basis.fold(b), 1.0, &mut first);
-        let mut folded = vec![first];
+        let mut folded = vec![first(&matrices.folded, b)];
         for order in 1..=degree {
             for j in 0..=order {
                 let i = order - j;
@@ -95,12 +93,18 @@ impl Polynomial {
     }
 }
 
+/// v_00 = Cz⁺ b in the basis of parities.
+fn first(FoldedMatrices { basis, cz_pinv, .. }: &FoldedMatrices, b: &[f64]) -> Vec<f64> {
+    let mut first = vec![0.0; b.len()];
+    cz_pinv.accumulate(&basis.fold(b), 1.0, &mut first);
+    first
+}
+
 /// p(μ) in N of the series of the matrices' degree for stress `b` in MPa, where no other μ is asked for: each order is the one before
 /// times −(μ1 Ax + μ2 Ay).
 pub fn at(matrices: &Matrices, b: &[f64], mu: [f64; 2]) -> Vec<f64> {
-    let FoldedMatrices { basis, cz_pinv, ax, ay } = &matrices.folded;
-    let mut order = vec![0.0; b.len()];
-    cz_pinv.accumulate(&basis.fold(b), 1.0, &mut order);
+    let FoldedMatrices { basis, ax, ay, .. } = &matrices.folded;
+    let mut order = first(&matrices.folded, b);
     let mut sum = order.clone();
     for _ in 0..matrices.degree {
         let mut next = vec![0.0; b.len()];

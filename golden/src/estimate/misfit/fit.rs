@@ -34,9 +34,10 @@ pub(super) struct Fit<'a> {
 impl<'a> Fit<'a> {
     /// The fit of readings.
     pub fn new(kernels: &'a CellKernels, readings: &Readings) -> Fit<'a> {
-        let with_gaps = |values: &mut dyn Iterator<Item = f32>| kernels.rows.with_gaps(values);
-        let alive = with_gaps(&mut readings.alive.iter().map(|alive| if *alive { 1.0 } else { 0.0 }));
-        Fit { kernels, b: with_gaps(&mut readings.b.iter().copied()), alive, unipolar: readings.unipolar }
+        let Readings { b, alive, unipolar } = *readings;
+        let b = kernels.rows.with_gaps(b.iter().copied());
+        let alive = kernels.rows.with_gaps(alive.iter().map(|alive| if *alive { 1.0 } else { 0.0 }));
+        Fit { kernels, b, alive, unipolar }
     }
 
     /// |r| of the forces of [`STEPS`] steps.

@@ -175,7 +175,9 @@ fn observe(
             frame.push(beat.data);
             if beat.last && frame.len() == taxels {
                 seen.codes.append(&mut frame);
-                seen.times.get_mut(frames).into_iter().for_each(|own| own.last_code = now);
+                if let Some(own) = seen.times.get_mut(frames) {
+                    own.last_code = now;
+                }
                 frames += 1;
             } else if beat.last {
                 // A scan that an image broke off.
@@ -185,7 +187,9 @@ fn observe(
         if outputs.m_valid && m_ready {
             seen.beats.push(outputs.m_data);
             if outputs.m_last {
-                seen.times.get_mut(seen.ends.len()).into_iter().for_each(|own| own.last_beat = now);
+                if let Some(own) = seen.times.get_mut(seen.ends.len()) {
+                    own.last_beat = now;
+                }
                 seen.ends.push(seen.beats.len());
             }
         }
