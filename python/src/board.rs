@@ -31,7 +31,7 @@ pyo3::create_exception!(
 /// ----------
 /// port : str
 ///     Path of the port, such as "/dev/ttyUSB0", or of the pseudo-terminal of `dermis board`; or "udp:192.168.1.50", the address of
-///     a core behind Ethernet, whose results have the time at which the core had the frame in time_ns, if the frame has none.
+///     a core behind Ethernet, of several arrays with a number as in "udp:192.168.1.50#3", whose results have the time at which the core had the frame in time_ns, if the frame has none.
 /// scene : Scene
 ///     The scene for which the board was built.
 /// baud : int, optional

@@ -12,7 +12,7 @@ VERSION = 7
 
 
 @pytest.fixture(scope="module")
-def scene():
+def arrays_scene():
     """The scene beside the tables of its arrays, which have zeros of their own and the same largest gain; and an engine of each."""
     folder = BUILD / "arrays"
     folder.mkdir(parents=True, exist_ok=True)
@@ -40,8 +40,8 @@ def simulate(scene, folder, change=lambda text: text):
     return icarus(folder, "dermis_arrays_axi", [verilog], "arrays", environment("axi", 64, vectors) | more)
 
 
-def test_arrays(scene):
-    assert simulate(scene, BUILD / "arrays/axi") == (3, 0)
+def test_arrays(arrays_scene):
+    assert simulate(arrays_scene, BUILD / "arrays/axi") == (3, 0)
 
 
 @pytest.mark.parametrize(
@@ -52,10 +52,10 @@ def test_arrays(scene):
         ("image", "{write_array, write_taxel}", 1, "{s_axis_tid, write_taxel}"),
     ],
 )
-def test_a_defect_is_found(scene, name, right, count, wrong):
+def test_a_defect_is_found(arrays_scene, name, right, count, wrong):
     def change(text):
         assert text.count(right) == count, right
         return text.replace(right, wrong)
 
-    tests, failed = simulate(scene, BUILD / f"arrays/defect-{name}", change)
+    tests, failed = simulate(arrays_scene, BUILD / f"arrays/defect-{name}", change)
     assert tests == 3 and failed > 0

@@ -10,6 +10,7 @@ import subprocess
 import threading
 import zlib
 from collections import Counter
+from pathlib import Path
 
 import dermis_litex.packets
 import pytest
@@ -35,6 +36,7 @@ from gateware import Network, verilate
 from scapy.layers.inet import ICMP, IP, UDP
 from scapy.layers.l2 import ARP, Ether
 from scapy.packet import Raw
+from test_arrays import ARRAYS, arrays_scene
 from test_cores import BUILD, DERMIS, HERE, NIGHTLY, SCENE, generate
 from test_tables import HARDWARE, SPECIMEN
 from test_tables import VERSION as VERSION_OF_TABLES
@@ -351,6 +353,60 @@ def test_the_host_and_the_core_understand_each_other(wire, tmp_path):
             assert "board dropped   0 ignored, 0 refused, 0 damaged, 0 overrun, 0 cut" in done.stdout
 
 
+@pytest.fixture(scope="module")
+def hand(short_packets, arrays_scene):
+    """A core of four arrays, whose tables are written, behind a network: requests that are repeated must not count twice."""
+    text = Path(arrays_scene).read_text(encoding="utf-8")
+    mean = 'average = 2\nmean = "sliding"\n'
+    assert mean in text
+    scene = Path(arrays_scene).with_name("hand.toml")
+    scene.write_text(text.replace(mean, "").replace('"arrays"', '"hand"'), encoding="utf-8")
+    return scene, built("hand", scene=scene)
+
+
+def test_frames_of_all_arrays_at_once_are_answered_with_those_of_each(hand):
+    scene, wire = hand
+    folder = wire.folder / "alone"
+    alone = []
+    for array in range(ARRAYS):
+        generate(folder, scene=f"{scene}#{array}")
+        words = words_of(next(folder.glob("*_tb_beats.hex")))
+        alone.append([word >> 32 * at & 0xFFFFFFFF for word in words for at in range(3)][: wire.force_words])
+    assert len({tuple(own) for own in alone}) == ARRAYS
+    each = packets_of(len(wire.result))
+    frames = [(0, 0, on_the_wire(datagram(packet))) for packet in frame_packets(99, wire.codes, 4)]
+    for turn in range(6):
+        # The numbers of the arrays are those of hosts that know nothing of each other.
+        frames += [
+            (each * (1 + turn * ARRAYS), 0, on_the_wire(datagram(packet)))
+            for array in range(ARRAYS)
+            for packet in frame_packets(1000 * ARRAYS - 500 * array + turn, wire.codes, 4, array)
+        ]
+    back, counters, _ = wire.play_after_arp(frames, packets_of(len(wire.codes)))
+    found = {own.sequence: own.words[: wire.force_words] for own in results_of(back)}
+    wanted = {1000 * ARRAYS - 500 * array + turn: alone[array] for array in range(ARRAYS) for turn in range(6)}
+    assert found == wanted | {99: alone[0]}
+    assert counters == {name: len(frames) if name == "taken" else 0 for name in wire.counter_names}
+
+
+def test_the_host_and_each_array_of_a_core_understand_each_other(hand, tmp_path):
+    """`dermis host` with each array in turn, then with tables of the first in the third."""
+    scene, wire = hand
+    frame = tmp_path / "press.csv"
+    frame.write_text("0.01,0.02,0.01\n0.02,0.06,0.03\n0.01,0.04,0.02\n0,0.01,0\n")
+    host = [DERMIS, "host", "--scene", scene, "--check", "--forces", "--timeout", "5000", frame]
+    tables = ["--tables", f"{scene}#0", "--tables-version", "3"]
+    shown = []
+    with Bridge(wire) as bridge:
+        for array, more in [*((array, []) for array in range(ARRAYS)), (2, tables), (1, [])]:
+            command = [*host, "--udp", f"{bridge.address}#{array}", *more]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+            assert done.returncode == 0, done.stdout + done.stderr
+            assert done.stdout.count("against model   equal, every bit") == 1, done.stdout
+            shown.append(done.stdout)
+    assert "0 ignored, 0 refused, 0 damaged, 0 overrun, 0 cut" in shown[-1]
+
+
 def test_a_ping_is_answered(wire):
     data = bytes(range(40))
     request = Ether(src=HOST_MAC, dst=CORE_MAC) / IP(src=HOST_IP, dst=IP_ADDRESS) / ICMP(id=7, seq=3) / Raw(data)
@@ -451,7 +507,7 @@ class Traffic:
             packets.insert(chosen, (datagram(checked(head)), None))
         elif form == "a late packet between":
             old = (self.sequence - draw.randrange(LATE)) % 2**32
-            if self.reference.newest is not None and (self.reference.newest - old) % 2**32 <= LATE:
+            if self.reference.newest and (self.reference.newest[0] - old) % 2**32 <= LATE:
                 packets.insert(chosen, (datagram(frame_packets(old, wire.codes, 4)[chosen]), None))
         elif form == "a packet lost":
             packets.pop(chosen)

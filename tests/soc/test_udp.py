@@ -23,7 +23,7 @@ from dermis_litex.packets import (
     mantissa_of,
     unchecked,
 )
-from dermis_litex.udp import DermisUDP, FrameReceiver, Requesters, ResultSender, ShortForces
+from dermis_litex.udp import DermisUDP, FrameReceiver, Newest, Requesters, ResultSender, ShortForces, Waiting
 from gateware import Packets, Port, write_verilog
 from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
@@ -60,9 +60,10 @@ def crc_in_python(monkeypatch):
 class Received:
     """What a receiver does with packets that come one after the other, each once it is whole."""
 
-    def __init__(self, words):
-        self.counts = fragment_words(words)
-        self.newest, self.collected, self.come = None, None, {}
+    def __init__(self, words, arrays=1):
+        self.counts, self.arrays = fragment_words(words), arrays
+        # Sequence number of each array; array and sequence number.
+        self.newest, self.collected, self.come = {}, None, {}
         self.counters = Counter()
 
     def add(self, words, length, damaged, waits):
@@ -78,19 +79,20 @@ class Received:
             return self.tell("refused")
         waits = next(waits)
         sequence, *payload = rest
-        kind, index, count = head & 255, head >> 16 & 255, head >> 24
+        kind, array, index, count = head & 255, head >> 12 & 15, head >> 16 & 255, head >> 24
         expected = self.counts[index] if index < len(self.counts) else 0
-        if kind != KIND_FRAME or count != len(self.counts) or not expected or len(payload) != expected:
+        if kind != KIND_FRAME or array >= self.arrays or count != len(self.counts) or not expected or len(payload) != expected:
             return self.tell("refused")
-        if sequence != self.collected or waits or index in self.come:
-            late = self.newest is not None and (self.newest - sequence) % 2**32 <= LATE
-            if sequence == self.collected or late:
+        own = (array, sequence)
+        if own != self.collected or waits or index in self.come:
+            late = array in self.newest and (self.newest[array] - sequence) % 2**32 <= LATE
+            if own == self.collected or late:
                 return self.tell("ignored")
             if waits:
                 return self.tell("overrun")
             if self.collected is not None and self.come:
                 self.tell("cut")
-            self.newest, self.collected, self.come = sequence, sequence, {}
+            self.newest[array], self.collected, self.come = sequence, own, {}
         self.tell("taken")
         self.come[index] = payload
         if len(self.come) < len(self.counts):
@@ -109,15 +111,20 @@ def codes_of(words, taxels, code_bits, code_bytes):
     return [code << max(code_bits - 8 * code_bytes, 0) for code in codes]
 
 
-def traffic(draw, taxels, code_bytes):
+def traffic(draw, taxels, code_bytes, arrays):
     """Packets of frames, some lost, doubled, swapped, wrong or damaged: (words, length, damaged)."""
-    sequence = draw.randrange(2**32)
+    sequences = [draw.randrange(2**32) for _ in range(arrays)]
     waiting = []
     while True:
+        # Now and then there is no such array.
+        array = draw.randrange(arrays)
+        named = draw.randrange(16) if draw.random() < 0.02 else array
         # Now and then a host begins anew.
+        sequence = sequences[array]
         sequence = draw.randrange(2**32) if draw.random() < 0.02 else (sequence + draw.choice([1, 1, 1, 2, 90])) % 2**32
+        sequences[array] = sequence
         codes = [draw.randrange(-(2 ** (8 * code_bytes - 1)), 2 ** (8 * code_bytes - 1)) for _ in range(taxels)]
-        for data in frame_packets(sequence, codes, code_bytes):
+        for data in frame_packets(sequence, codes, code_bytes, named):
             words = [int.from_bytes(data[k : k + 4], "little") for k in range(0, len(data), 4)]
             form = draw.random()
             if form < 0.03:
@@ -148,30 +155,46 @@ def traffic(draw, taxels, code_bytes):
 
 
 @pytest.mark.parametrize(
-    "taxels, code_bits, code_bytes",
-    [(12, 20, 2), *(pytest.param(*own, marks=NIGHTLY) for own in [(7, 20, 4), (15, 14, 2), (730, 20, 2)])],
+    "taxels, code_bits, code_bytes, arrays",
+    [
+        (12, 20, 2, 1),
+        (12, 20, 2, 5),
+        *(pytest.param(*own, marks=NIGHTLY) for own in [(7, 20, 4, 1), (15, 14, 2, 16), (730, 20, 2, 1), (730, 20, 2, 2)]),
+    ],
 )
-def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes):
-    only_whole_frames_leave(taxels, code_bits, code_bytes)
+def test_only_whole_frames_leave(crc_in_python, taxels, code_bits, code_bytes, arrays):
+    only_whole_frames_leave(taxels, code_bits, code_bytes, arrays)
 
 
 def test_a_receiver_that_takes_late_packets_is_found(crc_in_python, monkeypatch):
     monkeypatch.setattr("dermis_litex.udp.LATE", 0)
     with pytest.raises(AssertionError):
-        only_whole_frames_leave(12, 20, 2)
+        only_whole_frames_leave(12, 20, 2, 1)
 
 
-def only_whole_frames_leave(taxels, code_bits, code_bytes):
-    dut = FrameReceiver(taxels, code_bits, code_bytes)
+@pytest.mark.parametrize(
+    "part, one",
+    # Numbers of all arrays are those of one; who sent the frame that leaves is who sent the one that is collected.
+    [(Newest, lambda init: lambda self, arrays: init(self, 1)), (Waiting, lambda init: lambda self, layout, banks: init(self, layout, 2))],
+)
+def test_a_receiver_that_takes_several_arrays_for_one_is_found(crc_in_python, monkeypatch, part, one):
+    monkeypatch.setattr(part, "__init__", one(part.__init__))
+    with pytest.raises(AssertionError):
+        only_whole_frames_leave(12, 20, 2, 5)
+
+
+def only_whole_frames_leave(taxels, code_bits, code_bytes, arrays):
+    dut = FrameReceiver(taxels, code_bits, code_bytes, arrays)
+    array_bits = (arrays - 1).bit_length()
     draw = random.Random(taxels)
-    reference = Received(code_words(taxels, code_bytes))
+    reference = Received(code_words(taxels, code_bytes), arrays)
     expected, left, requesters, counters, packets, waits = [], [], [], {}, [], []
     sent = 0
 
     def send():
         nonlocal sent
         yield dut.sink.ip_address.eq(1)
-        for words, length, damaged in traffic(draw, taxels, code_bytes):
+        for words, length, damaged in traffic(draw, taxels, code_bytes, arrays):
             if sent >= CYCLES + 10 * taxels:
                 break
             sent += len(words)
@@ -190,7 +213,7 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
             for _ in range(draw.choice([0, 0, 1, taxels])):
                 yield
         # What has come whole leaves.
-        for _ in range(8 * taxels):
+        for _ in range(8 * (arrays + 1) * taxels):
             yield
         for name, counter in dut.counters.items():
             counters[name] = yield counter
@@ -221,12 +244,12 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes):
     waits = iter(waits)
     for words, length, damaged in packets:
         if whole := reference.add(words, length, damaged, waits):
-            expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[1]))
+            expected.append((codes_of(whole, taxels, code_bits, code_bytes), words[0] >> 12 & 15, words[1]))
     assert next(waits, None) is None
-    assert [(frame, number) for frame, number in left] == [
-        (frame, (k + 1) % 2**ID_BITS) for k, (frame, _) in enumerate(expected)
+    assert left == [
+        (frame, (k + 1) % 2**ID_BITS << array_bits | array) for k, (frame, array, _) in enumerate(expected)
     ]
-    assert requesters == [sequence for _, sequence in expected]
+    assert requesters == [sequence for *_, sequence in expected]
     assert counters == {name: reference.counters[name] for name in counters}
     # Only a frame of several packets can lack one; of the long ones few are sent.
     rare = ["overrun", "refused"] if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else ["cut"]
@@ -413,18 +436,10 @@ def test_another_choice_is_refused(options, message):
 def test_short_resultants_are_refused():
     class Core:
         manifest = {"core": {"stream_bits": 32}}
-        taxels, code_bits, force_words, words = 12, 20, 12, 21
+        taxels, code_bits, force_words, words, arrays = 12, 20, 12, 21, 1
 
     with pytest.raises(CoreError, match="force_bits = 16, with 4 triples of resultants, not 12 of forces"):
         DermisUDP(Core(), Port(), force_bits=16)
-
-
-def test_several_arrays_are_refused():
-    class Core:
-        manifest = {"core": {"stream_bits": 32}, "input": {"arrays": 4}}
-
-    with pytest.raises(CoreError, match="input.arrays = 4, behind a network, whose packets are of one array"):
-        DermisUDP(Core(), Port())
 
 
 # Under Icarus; test_network.py has the same under Verilator, with LiteEth before it.

@@ -18,6 +18,8 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 use thiserror::Error;
 
+/// Arrays of a core, the number of which has four bits.
+pub const MOST_ARRAYS: usize = 16;
 /// Bytes of a word.
 pub const WORD_BYTES: usize = 4;
 /// Bit of a result's flags: a code was clipped.
@@ -57,6 +59,8 @@ pub struct Layout {
     pub fragment_words: usize,
     /// A sequence number so much older than the newest is late.
     pub late: u32,
+    /// Place of the number of an array in the flags of a frame and of tables; above it there is nothing.
+    array_at: u32,
     /// Names of the words of an identity.
     identity: Vec<String>,
 }
@@ -104,6 +108,14 @@ impl Kind {
 
     fn is_result(self) -> bool {
         matches!(self, Kind::Result | Kind::ShortResult)
+    }
+
+    /// Bits of the flags that every packet of a payload has; the last one alone has the others.
+    fn flags_of_all(self) -> u8 {
+        match self {
+            Kind::Frame | Kind::Tables => u8::MAX << LAYOUT.array_at,
+            _ => 0,
+        }
     }
 }
 
@@ -171,7 +183,13 @@ impl Packet {
         })
     }
 
-    /// The packets of `words` with the head of this one, at most `fragment_words` in each; its flags are those of the last.
+    /// The number of the array that a frame or tables are of.
+    pub fn array(&self) -> usize {
+        usize::from(self.flags >> LAYOUT.array_at)
+    }
+
+    /// The packets of `words` with the head of this one, at most `fragment_words` in each; its flags are those of the last, the number of
+    /// an array that of all.
     ///
     /// # Errors
     /// More words than 255 packets hold.
@@ -181,34 +199,37 @@ impl Packet {
         let count =
             u8::try_from(fragments.len()).map_err(|_| TooLong { bytes, most: MOST * WORD_BYTES * fragment_words })?;
         let packet = |(index, words): (u8, &[u32])| {
-            let flags = if index + 1 == count { self.flags } else { 0 };
+            let flags = if index + 1 == count { self.flags } else { self.flags & self.kind.flags_of_all() };
             Packet { flags, index, count, words: words.to_vec(), ..*self }
         };
         Ok(std::iter::zip(0.., fragments).map(packet).collect())
     }
 
-    /// The packets of a frame of codes, each of `code_bytes` bytes, whose lower `shift` bits are not sent.
+    /// The packets of a frame of codes of array `array`, below [`MOST_ARRAYS`], each of `code_bytes` bytes, whose lower `shift` bits are not sent.
     ///
     /// # Errors
     /// More codes than 255 packets hold.
     pub fn frame(
         sequence: u32,
+        array: u8,
         codes: &[i32],
         (code_bytes, shift): (usize, u32),
         fragment_words: usize,
     ) -> Result<Vec<Packet>, TooLong> {
         let bytes = codes.iter().flat_map(|code| (code >> shift).to_le_bytes().into_iter().take(code_bytes));
         let words = words_of_bytes(&bytes.collect::<Vec<u8>>());
-        Packet { kind: Kind::Frame, ..Packet::question(sequence) }.split(&words, fragment_words)
+        Packet { kind: Kind::Frame, flags: array << LAYOUT.array_at, ..Packet::question(sequence) }
+            .split(&words, fragment_words)
     }
 
-    /// The packets of an image of tables.
+    /// The packets of an image of tables of array `array`, below 16.
     ///
     /// # Errors
     /// More bytes than 255 packets hold.
-    pub fn tables(sequence: u32, image: &[u8], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
+    pub fn tables(sequence: u32, array: u8, image: &[u8], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
         let none = image.len().next_multiple_of(WORD_BYTES) - image.len();
-        let head = Packet { kind: Kind::Tables, flags: none as u8, ..Packet::question(sequence) };
+        let flags = array << LAYOUT.array_at | none as u8;
+        let head = Packet { kind: Kind::Tables, flags, ..Packet::question(sequence) };
         head.split(&words_of_bytes(image), fragment_words)
     }
 
@@ -396,8 +417,20 @@ mod tests {
             }
         }
         assert_eq!(Packet::of_bytes(&[]), None);
-        let too_long = Packet::tables(1, &vec![0; 255 * 1440 + 1], 360).unwrap_err();
+        let too_long = Packet::tables(1, 0, &vec![0; 255 * 1440 + 1], 360).unwrap_err();
         assert_eq!(too_long.to_string(), "367204 bytes, of which 255 packets hold 367200");
+    }
+
+    #[test]
+    fn every_packet_of_a_frame_and_of_tables_names_its_array() {
+        let codes: Vec<i32> = (0..9).collect();
+        let frame = Packet::frame(1, 13, &codes, (2, 4), 2).unwrap();
+        assert_eq!(frame.iter().map(|packet| (packet.array(), packet.flags)).collect::<Vec<_>>(), [(13, 0xd0); 3]);
+        let tables = Packet::tables(1, 3, &[0; 13], 2).unwrap();
+        assert_eq!(
+            tables.iter().map(|packet| (packet.array(), packet.flags)).collect::<Vec<_>>(),
+            [(3, 0x30), (3, 0x33)]
+        );
     }
 
     /// By another implementation: `python/litex` and zlib.

@@ -59,16 +59,6 @@ def require_choice(name, value, choices):
         raise CoreError(f"{name} = {value!r}, not {' or '.join(map(str, choices))}")
 
 
-def require_one_array(core):
-    """A core of one array: behind a network `id` says who asked.
-
-    Raises `CoreError` with field, value and what would be right.
-    """
-    arrays = core.manifest.get("input", {}).get("arrays", 1)
-    if arrays > 1:
-        raise CoreError(f"input.arrays = {arrays}, behind a network, whose packets are of one array; build with hardware.arrays = 1")
-
-
 def require_forces(core):
     """A core that sends the force of every taxel.
 
@@ -130,6 +120,7 @@ class Dermis(LiteXModule):
     - `manifest`: scales and counts, as in `manifest.json`.
     - `constants`: the content of the constant registers, by name.
     - `writable_tables`, `tables_register`: whether a specimen's tables can be written, and the register for them.
+    - `arrays`, `array_bits`: how many it serves, and the bits of `id` that name one.
     - `taxels`, `code_bits`, `words`: of a frame the codes, their bits, and the words of 32 bits that come back.
     - `force_words`: how many of those are forces, or resultants.
 
@@ -151,6 +142,7 @@ class Dermis(LiteXModule):
         words = bits // WORD_BITS
         # Earlier versions wrote none: they had as many for any number of arrays.
         id_bits = self.manifest["core"].get("id_bits", ID_BITS)
+        self.arrays, self.array_bits = self.manifest["input"].get("arrays", 1), id_bits - ID_BITS
         self.sink = stream.Endpoint([("data", WORD_BITS), ("id", id_bits)])
         self.frames = WholeFrames(words, self.words, id_bits)
         self.source = self.frames.source

@@ -15,20 +15,23 @@ All numbers are little-endian.
 
 | kind | from | payload | flags |
 |---|---|---|---|
-| `FRAME` | host | codes, row-major | |
+| `FRAME` | host | codes, row-major | bits 7:4: the array, in every fragment |
 | `RESULT` | core | words of forces and status | bit 0: a code was clipped |
 | `SHORT_RESULT` | core | mantissas of forces, two in a word | bit 0 as above, bit 1: the last mantissa is none, bits 7:3: exponent |
 | `IDENTIFY` | host | none | |
 | `IDENTITY` | core | the words of `IDENTITY`, in this order | |
-| `TABLES` | host | bytes of an image, as `dermis load` makes one | bytes of the last word that are none |
+| `TABLES` | host | bytes of an image, as `dermis load` makes one | bits 7:4 as above; bits 1:0: bytes of the last word that are none |
 | `TABLES_TAKEN` | core | none: the fragment of this index is in the core | |
 
 Fragments of a frame may come in any order and more than once. Of a frame that lacks one when the next begins, nothing is
-solved. A sequence number that is at most `LATE` older than the newest is late, and its packets are ignored. A packet whose
+solved. A sequence number that is at most `LATE` older than the newest of its array is late, and its packets are ignored. A packet whose
 CRC-32 is wrong counts as lost: LiteEth does not compare UDP's checksum, and Ethernet's guards one cable only.
 
+Each array of a core may have a host of its own. Frames of one packet may come from all of them at once; of frames of several
+packets, those of one frame must come before the next one's.
+
 A host sends a fragment of an image once the one before is taken, all with one sequence number, and again if no answer comes; the
-first fragment of another number begins anew. Whether the image is whole, the status of the next result says. Meanwhile the core
+first fragment of another number or array begins anew. Whether the image is whole, the status of the next result says. Meanwhile the core
 takes no frames: their packets are lost, and counted.
 
 An identity has the time at which it was asked for: with the times of question and answer a host knows how the core's clock and
@@ -63,6 +66,7 @@ CHECK_WORDS = LAYOUT["check_words"]
 # 1440 bytes: with the headers of UDP, IP and Ethernet less than 1500.
 FRAGMENT_WORDS = LAYOUT["fragment_words"]
 LATE = LAYOUT["late"]
+ARRAY_AT = LAYOUT["array_at"]
 IDENTITY = LAYOUT["identity"]
 FLAG_CLIPPED = 1
 FLAG_PADDED = 2
@@ -83,13 +87,13 @@ def code_words(taxels, code_bytes):
     return -(-taxels * code_bytes // 4)
 
 
-def packets(kind, sequence, words, flags=0):
-    """The packets of a payload, each as bytes; `flags` are those of the last one."""
+def packets(kind, sequence, words, flags=0, array=0):
+    """The packets of a payload, each as bytes; `flags` are those of the last one, `array` is in all of them."""
     counts = fragment_words(len(words))
     result = []
     for index, count in enumerate(counts):
         payload = words[index * FRAGMENT_WORDS :][:count]
-        own = flags if index == len(counts) - 1 else 0
+        own = array << ARRAY_AT | (flags if index == len(counts) - 1 else 0)
         head = kind | own << 8 | index << 16 | len(counts) << 24
         result.append(checked(struct.pack(f"<{HEADER_WORDS + count}I", head, sequence, *payload)))
     return result
@@ -106,12 +110,12 @@ def unchecked(packet):
     return packet[:end] if end >= 0 and checked(packet[:end]) == packet else None
 
 
-def frame_packets(sequence, codes, code_bytes=2):
-    """The packets of a frame of signed codes, row-major."""
+def frame_packets(sequence, codes, code_bytes=2, array=0):
+    """The packets of a frame of signed codes of an array, row-major."""
     form = {2: "h", 4: "i"}[code_bytes]
     data = struct.pack(f"<{len(codes)}{form}", *codes)
     data += bytes(-len(data) % 4)
-    return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data))
+    return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data), array=array)
 
 
 def identify_packet(sequence):
@@ -119,11 +123,11 @@ def identify_packet(sequence):
     return checked(struct.pack(f"<{HEADER_WORDS}I", KIND_IDENTIFY | 1 << 24, sequence))
 
 
-def tables_packets(sequence, image):
-    """The packets of an image of tables."""
+def tables_packets(sequence, image, array=0):
+    """The packets of an image of tables of an array."""
     empty = -len(image) % WORD_BYTES
     words = struct.unpack(f"<{(len(image) + empty) // WORD_BYTES}I", image + bytes(empty))
-    return packets(KIND_TABLES, sequence, words, empty)
+    return packets(KIND_TABLES, sequence, words, empty, array)
 
 
 class Result(NamedTuple):

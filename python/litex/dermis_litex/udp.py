@@ -2,7 +2,7 @@
 
 ```text
  UDP port ──> FrameReceiver ──> core ──> ResultSender ──> UDP port
-        PacketCheck, two frame buffers   a packet at a time, ShortForces before it
+        PacketCheck, frame buffers       a packet at a time, ShortForces before it
               │     └── who sent it, when, by id ──┘           │
               └──────────────── Requests ──────────────────────┘
             who are you; tables, to the core's registers over `bus`
@@ -10,7 +10,7 @@
 """
 
 from functools import reduce
-from operator import and_
+from operator import and_, or_
 
 from liteeth.common import eth_udp_user_description
 from liteeth.mac.crc import LiteEthMACCRC32, LiteEthMACCRCEngine
@@ -19,8 +19,9 @@ from litex.soc.interconnect import packet as packets
 from litex.soc.interconnect import stream, wishbone
 from litex.soc.interconnect.csr import CSRStatus
 
-from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_one_array, require_width
+from dermis_litex.core import ID_BITS, WORD_BITS, require_choice, require_forces, require_width
 from dermis_litex.packets import (
+    ARRAY_AT,
     CHECK_WORDS,
     EXPONENT_AT,
     FRAGMENT_WORDS,
@@ -204,19 +205,79 @@ class PacketCheck(LiteXModule):
         self.sync += [leaves.eq(next_leaves), If(steps, at.eq(at + 1), If(source.last, at.eq(0)))]
 
 
-class FrameReceiver(LiteXModule):
-    """Packets in, whole frames out: `source` has a code of 32 bits per beat.
+class Newest(LiteXModule):
+    """The newest sequence number of each array: `value` of array `array`, `known` once it has one; with `sets` it is `given`."""
 
-    A frame leaves only when all its packets have come; the next is collected meanwhile. Codes of 16 bits are those of the
+    def __init__(self, arrays):
+        self.array = array = Signal(max=max(arrays, 2))
+        self.value, self.given = Signal(SEQUENCE_BITS), Signal(SEQUENCE_BITS)
+        self.known, self.sets = Signal(), Signal()
+
+        # # #
+
+        have = Signal(arrays)
+        self.comb += choose(self.known, array, list(have))
+        self.sync += If(self.sets, have.eq(have | 1 << array))
+        if arrays == 1:
+            self.sync += If(self.sets, self.value.eq(self.given))
+            return
+        memory = Memory(SEQUENCE_BITS, arrays)
+        write, read = memory.get_port(write_capable=True), memory.get_port(async_read=True)
+        self.specials += memory, write, read
+        self.comb += [
+            write.adr.eq(array),
+            write.dat_w.eq(self.given),
+            write.we.eq(self.sets),
+            read.adr.eq(array),
+            self.value.eq(read.dat_r),
+        ]
+
+
+class Waiting(LiteXModule):
+    """Who sent the frame in each bank, until it leaves: `collected` is written to bank `bank` with `sets`, `leaves` is that of bank `first`.
+
+    Of two banks none waits: the frame that is collected leaves at once, or stays where it is.
+    """
+
+    def __init__(self, layout, banks):
+        self.collected, self.leaves = stream.Endpoint(layout), stream.Endpoint(layout)
+        self.bank, self.first = Signal(max=banks), Signal(max=banks)
+        self.sets = Signal()
+
+        # # #
+
+        collected, leaves = self.collected.payload.raw_bits(), self.leaves.payload.raw_bits()
+        if banks == 2:
+            self.comb += leaves.eq(collected)
+            return
+        memory = Memory(len(collected), banks)
+        write, read = memory.get_port(write_capable=True), memory.get_port(async_read=True)
+        self.specials += memory, write, read
+        self.comb += [
+            write.adr.eq(self.bank),
+            write.dat_w.eq(collected),
+            write.we.eq(self.sets),
+            read.adr.eq(self.first),
+            leaves.eq(read.dat_r),
+        ]
+
+
+class FrameReceiver(LiteXModule):
+    """Packets in, whole frames out: `source` has a code of 32 bits per beat, its `id` the array in the low bits.
+
+    A frame leaves only when all its packets have come; the next is collected meanwhile. With several arrays as many frames as there are
+    arrays wait, so that those of all may come at once. Codes of 16 bits are those of the
     converter: they are shifted up to the `code_bits` of the engine. Five numbers count packets: `taken`, `ignored` (late, or come
-    before), `refused` (another kind, number of fragments or length), `damaged` (`PacketCheck`), `overrun` (two frames wait already),
+    before), `refused` (another kind, array, number of fragments or length), `damaged` (`PacketCheck`), `overrun` (there is no room for a frame),
     and one frames: `cut` (given up without a packet). Questions and tables leave by `others`, which counts with `others_refused`.
     `time` is given to `requester`.
     """
 
-    def __init__(self, taxels, code_bits, code_bytes):
+    def __init__(self, taxels, code_bits, code_bytes, arrays=1):
         words = code_words(taxels, code_bytes)
         counts = fragment_words(words)
+        array_bits = (arrays - 1).bit_length()
+        bank_bits = max(array_bits, 1)
         self.check = check = PacketCheck(HEADER_WORDS + FRAGMENT_WORDS + CHECK_WORDS)
         # What comes from a block RAM comes late in a cycle. Its port is READ_FIRST: of another one the address has the register, and
         # Yosys would take this one into the block RAM.
@@ -226,9 +287,9 @@ class FrameReceiver(LiteXModule):
         self.others_refused = Signal()
         self.dispatcher = packets.Dispatcher(checked.source, [sink, self.others])
         self.time = Signal(TIME_BITS)
-        self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", ID_BITS)])
+        self.source = source = stream.Endpoint([("data", WORD_BITS), ("id", array_bits + ID_BITS)])
         self.requester = requester = stream.Endpoint(REQUESTER)
-        # A whole frame waits until the one before has left.
+        # A whole frame stays where it is until there is room for the next.
         self.waits = full = Signal()
         # What becomes of a packet is decided now.
         self.decides = Signal()
@@ -242,20 +303,23 @@ class FrameReceiver(LiteXModule):
             self.dispatcher.sel.eq((kind == KIND_IDENTIFY) | (kind == KIND_TABLES)),
         ]
         depth = 2 ** (words - 1).bit_length()
-        memory = Memory(WORD_BITS, 2 * depth)
+        memory = Memory(WORD_BITS, depth << bank_bits)
         write, read = memory.get_port(write_capable=True), memory.get_port(mode=READ_FIRST)
         self.specials += memory, write, read
 
-        # The frame that is collected, and the newest before it.
-        bank, collects = Signal(), Signal()
-        sequence, newest, has_newest = Signal(SEQUENCE_BITS), Signal(SEQUENCE_BITS), Signal()
+        # The frame that is collected.
+        bank, collects = Signal(bank_bits), Signal()
+        whose = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS), ("array", max(array_bits, 1))]
+        self.waiting = waiting = Waiting(whose, 2**bank_bits)
+        self.newest = newest = Newest(arrays)
+        own = stream.Endpoint(whose)
         come = Signal(len(counts))
-        ip_address, port = Signal(32), Signal(16)
 
         # The packet.
         head = Signal(WORD_BITS)
         index, expected = Signal(BYTE), Signal(max=FRAGMENT_WORDS + 1)
         base, at = Signal(max=2 * depth), Signal(max=FRAGMENT_WORDS + 1)
+        array = head[BYTE + ARRAY_AT : 2 * BYTE]
         has_come, is_right = Signal(), Signal()
         age = Signal(SEQUENCE_BITS)
         same, late = Signal(), Signal()
@@ -268,11 +332,14 @@ class FrameReceiver(LiteXModule):
                 (head[:8] == KIND_FRAME)
                 & (head[24:] == len(counts))
                 & (index < len(counts))
+                & (array < arrays)
                 & (sink.length == WORD_BYTES * (HEADER_WORDS + expected))
             ),
-            same.eq(collects & (sink.data == sequence)),
-            age.eq(newest - sink.data),
-            late.eq(has_newest & (age <= LATE)),
+            newest.array.eq(array),
+            newest.given.eq(sink.data),
+            same.eq(collects & (sink.data == own.sequence) & (array == own.array)),
+            age.eq(newest.value - sink.data),
+            late.eq(newest.known & (age <= LATE)),
         ]
 
         def count(name):
@@ -282,13 +349,13 @@ class FrameReceiver(LiteXModule):
             return [count(name), If(sink.last, NextState("HEAD")).Else(NextState("SKIP"))]
 
         begins = [
-            NextValue(sequence, sink.data),
-            NextValue(newest, sink.data),
-            NextValue(has_newest, 1),
+            newest.sets.eq(1),
+            NextValue(own.sequence, sink.data),
+            NextValue(own.array, array),
+            NextValue(own.ip_address, sink.ip_address),
+            NextValue(own.port, sink.src_port),
             NextValue(collects, 1),
             NextValue(come, 0),
-            NextValue(ip_address, sink.ip_address),
-            NextValue(port, sink.src_port),
             NextValue(at, 0),
             If(collects & (come != 0), count("cut")),
             NextState("PAYLOAD"),
@@ -326,6 +393,8 @@ class FrameReceiver(LiteXModule):
         self.comb += [
             write.adr.eq(Cat((base + at)[: depth.bit_length() - 1], bank)),
             write.dat_w.eq(sink.data),
+            own.connect(waiting.collected, omit={"ready"}),
+            waiting.sets.eq(write.we),
             full.eq(collects & reduce(and_, list(come))),
             self.decides.eq(fsm.ongoing("SEQUENCE") & sink.valid),
         ]
@@ -333,12 +402,13 @@ class FrameReceiver(LiteXModule):
         for name, happens in (("damaged", check.damaged), ("refused", self.others_refused)):
             self.sync += If(happens, self.counters[name].eq(self.counters[name] + 1))
 
-        # The other bank leaves, a code per beat.
+        # The frame of another bank leaves, a code per beat; whole ones wait in the banks between.
         per_word = WORD_BYTES // code_bytes
         leaves, taxel = Signal(), Signal(max=taxels)
-        place, next_place = Signal(max=2 * depth), Signal(max=2 * depth)
-        steps, swap = Signal(), Signal()
-        identifier = Signal(ID_BITS)
+        first, whole = Signal(bank_bits), Signal(bank_bits)
+        place, next_place = Signal(max=depth << bank_bits), Signal(max=depth << bank_bits)
+        steps, ends, takes, begins = Signal(), Signal(), Signal(), Signal()
+        identifier, of = Signal(ID_BITS), Signal(max(array_bits, 1))
         part = taxel[: per_word.bit_length() - 1] if per_word > 1 else 0
         bits = BYTE * code_bytes
         code = Signal(bits)
@@ -346,9 +416,13 @@ class FrameReceiver(LiteXModule):
         extended = Cat(Replicate(0, up), code, Replicate(code[-1], WORD_BITS))[:WORD_BITS]
         last = taxel == taxels - 1
         self.comb += [
-            swap.eq(full & ~leaves),
+            takes.eq(full & (whole != 2**bank_bits - 1)),
+            begins.eq(~leaves & ((whole != 0) | takes)),
             steps.eq(source.valid & source.ready),
-            If(swap, next_place.eq(Cat(Replicate(0, depth.bit_length() - 1), bank)))
+            ends.eq(steps & last),
+            waiting.bank.eq(bank),
+            waiting.first.eq(first),
+            If(begins, next_place.eq(Cat(Replicate(0, depth.bit_length() - 1), first)))
             .Elif(steps & (part == per_word - 1), next_place.eq(place + 1))
             .Else(next_place.eq(place)),
             read.adr.eq(next_place),
@@ -356,11 +430,9 @@ class FrameReceiver(LiteXModule):
             source.valid.eq(leaves),
             source.data.eq(extended),
             source.last.eq(last),
-            source.id.eq(identifier),
-            requester.valid.eq(swap),
-            requester.ip_address.eq(ip_address),
-            requester.port.eq(port),
-            requester.sequence.eq(sequence),
+            source.id.eq(Cat(of, identifier) if array_bits else identifier),
+            requester.valid.eq(begins),
+            waiting.leaves.connect(requester, keep={"ip_address", "port", "sequence"}),
             requester.time.eq(self.time),
         ]
         # The id of the frame that leaves next is that of the requester written.
@@ -368,8 +440,10 @@ class FrameReceiver(LiteXModule):
         self.comb += self.next_id.eq(identifier + 1)
         self.sync += [
             place.eq(next_place),
+            whole.eq(whole + takes - ends),
             If(steps, taxel.eq(taxel + 1), If(last, taxel.eq(0), leaves.eq(0))),
-            If(swap, leaves.eq(1), bank.eq(~bank), identifier.eq(self.next_id), collects.eq(0), come.eq(0)),
+            If(takes, bank.eq(bank + 1), collects.eq(0), come.eq(0)),
+            If(begins, leaves.eq(1), first.eq(first + 1), identifier.eq(self.next_id), of.eq(waiting.leaves.array)),
         ]
 
 
@@ -598,25 +672,27 @@ class ResultSender(LiteXModule):
 
 
 class TablesWriter(LiteXModule):
-    """Bytes of images in, each written into a core's register `tables` once there is room; `last` is the last of an image.
+    """Bytes of images in, each written into a core's register `tables` once there is room; `last` is the last of an image, `array` the
+    array that it is of.
 
     `register` is that of the core's `registers.json`.
     """
 
     def __init__(self, register):
-        self.sink = sink = stream.Endpoint([("data", BYTE)])
+        self.sink = sink = stream.Endpoint([("data", BYTE), ("array", BYTE - ARRAY_AT)])
         self.bus = bus = wishbone.Interface(data_width=WORD_BITS, address_width=8, addressing="word")
 
         # # #
 
         places = {field["name"]: field["low"] for field in register["fields"]}
-        last = Signal(places["last"] + 1)
+        # A core of one array has no field for it.
+        fields = [sink.data << places["octet"], sink.last << places["last"]]
+        fields += [sink.array << places["array"]] if "array" in places else []
         self.fsm = fsm = FSM(reset_state="ROOM")
         self.comb += [
-            last.eq(sink.last << places["last"]),
             bus.adr.eq(register["address"] // WORD_BYTES),
             bus.sel.eq(2**WORD_BYTES - 1),
-            bus.dat_w.eq(sink.data << places["octet"] | last),
+            bus.dat_w.eq(reduce(or_, fields)),
             bus.cyc.eq(bus.stb),
         ]
         fsm.act("ROOM", bus.stb.eq(sink.valid), If(bus.ack & ~bus.dat_r[places["waiting"]], NextState("WRITE")))
@@ -630,7 +706,7 @@ class Requests(LiteXModule):
     whose tables are not written. `refused`: a packet is not answered.
     """
 
-    def __init__(self, identity, time, udp_port, tables=None):
+    def __init__(self, identity, time, udp_port, tables=None, arrays=1):
         layout = eth_udp_user_description(WORD_BITS)
         self.sink = sink = stream.Endpoint(layout)
         self.source = source = stream.Endpoint(layout)
@@ -659,7 +735,7 @@ class Requests(LiteXModule):
         refuse = [self.refused.eq(1), If(sink.last, NextState("HEAD")).Else(NextState("SKIP"))]
         self.fsm = fsm = FSM(reset_state="HEAD")
         fsm.act("HEAD", sink.ready.eq(1), NextValue(head, sink.data), If(sink.valid, NextState("SEQUENCE"), If(sink.last, *refuse)))
-        takes_tables = self.take_tables(tables, head, sequence) if tables else refuse
+        takes_tables = self.take_tables(tables, head, arrays) if tables else refuse
         fsm.act(
             "SEQUENCE",
             sink.ready.eq(1),
@@ -687,18 +763,20 @@ class Requests(LiteXModule):
             last = [source.last.eq(ends), source.last_be.eq(ends << (WORD_BYTES - 1))]
             fsm.act(state, source.valid.eq(1), source.data.eq(data), *last, If(source.ready, after))
 
-    def take_tables(self, tables, head, sequence):
+    def take_tables(self, tables, head, arrays):
         """What becomes of a packet of tables with this head and, in this cycle, sequence number.
 
         A fragment is the next of its image, or the one before once more, whose answer was lost, or the first of another image.
         """
         sink = self.sink
         empty, index, count = head[BYTE:][:2], head[16:24], head[24:]
-        image, taken, has_image, is_open = Signal(SEQUENCE_BITS), Signal(BYTE), Signal(), Signal()
+        array = head[BYTE + ARRAY_AT : 2 * BYTE]
+        image, of, taken, has_image, is_open = Signal(SEQUENCE_BITS), Signal(len(array)), Signal(BYTE), Signal(), Signal()
         octet, is_last_word, ends = Signal(max=WORD_BYTES), Signal(), Signal()
         self.comb += [
             is_last_word.eq(sink.last & (index + 1 == count)),
             ends.eq(octet == WORD_BYTES - 1 - Mux(is_last_word, empty, 0)),
+            tables.array.eq(of),
         ]
         self.fsm.act(
             "TABLES",
@@ -724,16 +802,17 @@ class Requests(LiteXModule):
             tables.last.eq(1),
             If(tables.ready, NextValue(is_open, 0), NextState("TABLES")),
         )
-        is_same = has_image & (image == sink.data)
+        is_same = has_image & (image == sink.data) & (of == array)
         begins = [
             NextValue(image, sink.data),
+            NextValue(of, array),
             NextValue(has_image, 1),
             NextValue(taken, 0),
             If(is_open, NextState("CLOSE")).Else(NextState("TABLES")),
         ]
         refuse = [self.refused.eq(1), NextState("SKIP")]
         return [
-            If(index >= count, *refuse)
+            If((index >= count) | (array >= arrays), *refuse)
             .Elif(is_same & (index == taken), NextState("TABLES"))
             .Elif(is_same & (index + 1 == taken), NextState("AGAIN"))
             .Elif(~is_same & (index == 0), *begins)
@@ -753,12 +832,11 @@ class DermisUDP(LiteXModule):
 
     def __init__(self, core, port, code_bytes=2, force_bits=WORD_BITS, udp_port=UDP_PORT):
         require_width(core, WORD_BITS)
-        require_one_array(core)
         require_choice("code_bytes", code_bytes, (2, 4))
         require_choice("force_bits", force_bits, (MANTISSA_BITS, WORD_BITS))
         self.cycles = Cycles()
         self.requesters = Requesters()
-        self.receiver = FrameReceiver(core.taxels, core.code_bits, code_bytes)
+        self.receiver = FrameReceiver(core.taxels, core.code_bits, code_bytes, core.arrays)
         if force_bits == MANTISSA_BITS:
             require_forces(core)
             counts, _ = short_counts(core.force_words, core.words - core.force_words)
@@ -769,6 +847,7 @@ class DermisUDP(LiteXModule):
         identity = {
             "version": VERSION,
             **{name: core.constants[name] for name in ("scene", "array", "clock_Hz", "force_triples", "status_triples")},
+            "arrays": core.arrays,
             "code_bytes": code_bytes,
             "force_bits": force_bits,
             "fragment_words": FRAGMENT_WORDS,
@@ -777,7 +856,7 @@ class DermisUDP(LiteXModule):
         }
         self.writer = TablesWriter(core.tables_register) if core.writable_tables else None
         self.bus = self.writer and self.writer.bus
-        self.requests = Requests(identity, self.cycles.count, udp_port, self.writer and self.writer.sink)
+        self.requests = Requests(identity, self.cycles.count, udp_port, self.writer and self.writer.sink, core.arrays)
         # The longest paths of LiteEth and of block RAMs end here.
         self.arriving = stream.Buffer(self.receiver.sink.description)
         self.codes = stream.Buffer(self.receiver.source.description)
@@ -786,17 +865,16 @@ class DermisUDP(LiteXModule):
 
         # # #
 
+        # Behind the engine a frame is known by what is above the number of its array.
         if force_bits == MANTISSA_BITS:
-            self.comb += [
-                core.source.connect(self.short_forces.sink, omit={"keep"}),
-                self.short_forces.source.connect(self.sender.sink),
-            ]
+            results = self.short_forces.sink
+            self.comb += [results.user.eq(core.source.user), self.short_forces.source.connect(self.sender.sink)]
         else:
-            self.comb += [
-                core.source.connect(self.sender.sink, keep={"valid", "ready", "last", "data", "id"}),
-                self.sender.sink.clipped.eq(core.source.user[1]),
-            ]
+            results = self.sender.sink
+            self.comb += results.clipped.eq(core.source.user[1])
         self.comb += [
+            core.source.connect(results, keep={"valid", "ready", "last", "data"}),
+            results.id.eq(core.source.id[core.array_bits :]),
             port.source.connect(self.arriving.sink),
             self.arriving.source.connect(self.receiver.sink),
             self.receiver.source.connect(self.codes.sink),

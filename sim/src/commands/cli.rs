@@ -243,7 +243,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Host(arguments) => super::host::run(arguments),
         Command::Board { scene, udp: Some(address), target } => {
             let scene = target.apply(Scene::load(scene)?);
-            let core = NetworkCore::start(Model::new(&scene)?, &address.to_string())
+            let core = NetworkCore::start(&Model::new(&scene)?, &address.to_string())
                 .map_err(|error| anyhow!("--udp {address}: {error}"))?;
             print(&format!("udp:{}\n", core.address()))?;
             say!("{}: the bit-true model answers, with the clock of the hardware", scene.name);

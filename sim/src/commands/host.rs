@@ -31,11 +31,12 @@ pub struct Arguments {
     frames: Vec<String>,
     #[command(flatten)]
     layout: LayoutArguments,
-    /// Serial port of the board, or udp:HOST or udp:HOST:PORT of a core behind Ethernet.
+    /// Serial port of the board, or udp:HOST or udp:HOST:PORT of a core behind Ethernet; udp:HOST#3 is array 3
+    /// of several.
     #[arg(long, value_name = "PATH|udp:HOST", required_unless_present = "udp")]
     port: Option<String>,
-    /// Address of a core behind Ethernet, as --port udp:HOST.
-    #[arg(long, value_name = "HOST[:PORT]", conflicts_with_all = ["port", "baud", "scans", "save"])]
+    /// Address of a core behind Ethernet, as --port udp:HOST; HOST#3 is array 3 of several.
+    #[arg(long, value_name = "HOST[:PORT][#ARRAY]", conflicts_with_all = ["port", "baud", "scans", "save"])]
     udp: Option<String>,
     /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
     #[arg(long, required_if_eq("stream", "true"))]
@@ -82,6 +83,7 @@ const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB0 --forces --check press.json
   dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
   dermis host --udp 192.168.1.50 --scene sensor-1 --check                 a core behind Ethernet
+  dermis host --udp 192.168.1.50#3 --scene hand.toml --forces             array 3 of those that it serves
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
   dermis host --port /dev/ttyUSB0 --scene hand.toml --tables left-hand.toml press.json
   dermis host --port /dev/ttyUSB0 --scene mat.toml --scans 10 --save readings     a board that scans its array

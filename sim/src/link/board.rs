@@ -71,6 +71,11 @@ pub trait Board {
     /// No answer.
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError>;
 
+    /// The number of its array among those of one engine.
+    fn array(&self) -> usize {
+        0
+    }
+
     /// Transmission errors so far.
     fn link_errors(&self) -> LinkErrors;
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{require_one_answer, Identity, Kind};
-use dermis_golden::wire::udp::{Answer as Whole, Answers, CoreIdentity, Packet, TooLong, LAYOUT};
+use dermis_golden::wire::udp::{Answer as Whole, Answers, CoreIdentity, Packet, TooLong, LAYOUT, MOST_ARRAYS};
 
 use super::answer::Answer;
 use super::board::{Board, LinkErrors, PacketCounters};
@@ -26,6 +26,8 @@ const SHORT_BITS: u32 = 16;
 pub struct NetworkClient {
     socket: UdpSocket,
     name: String,
+    /// The array of a core that serves several; `None`: none was named.
+    array: Option<u8>,
     timeout: Duration,
     answers: Answers,
     sequence: u32,
@@ -41,13 +43,22 @@ pub struct NetworkClient {
 }
 
 impl NetworkClient {
-    /// The core at `HOST` or `HOST:PORT`; requests are repeated after `timeout` without an answer.
+    /// The core at `HOST` or `HOST:PORT`, of one that serves several arrays that of the number in `HOST#3` or `HOST:PORT#3`; requests
+    /// are repeated after `timeout` without an answer.
     ///
     /// # Errors
-    /// An address that cannot be reached.
+    /// An address that cannot be reached, no number of an array.
     pub fn open(address: &str, timeout: Duration) -> Result<Self, HostError> {
         let name = format!("udp:{address}");
-        let failed = |error: std::io::Error| HostError::Port { port: name.clone(), reason: error.to_string() };
+        let refused = |reason: String| HostError::Port { port: name.clone(), reason };
+        let failed = |error: std::io::Error| refused(error.to_string());
+        let (address, array) = match address.split_once('#') {
+            None => (address, None),
+            Some((address, number)) => match number.parse().ok().filter(|array| usize::from(*array) < MOST_ARRAYS) {
+                Some(array) => (address, Some(array)),
+                None => return Err(refused(format!("#{number}: a number from 0 to {} is wanted", MOST_ARRAYS - 1))),
+            },
+        };
         let has_port = address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
         let full = if has_port { address.to_owned() } else { format!("{address}:{}", LAYOUT.udp_port) };
         let to = std::net::ToSocketAddrs::to_socket_addrs(&full).map_err(failed)?.next();
@@ -65,6 +76,7 @@ impl NetworkClient {
         Ok(NetworkClient {
             socket,
             name,
+            array,
             timeout,
             answers: Answers::default(),
             sequence,
@@ -170,6 +182,15 @@ impl Board for NetworkClient {
         }
         let (core, _) = self.ask()?;
         check(model, &core).map_err(|reason| HostError::Identity { port: self.name.clone(), reason })?;
+        match (core.word("arrays") as usize, self.array) {
+            (arrays, None) if arrays > 1 => {
+                return Err(self.failed(&format!("the core serves {arrays} arrays: name one, as {}#0", self.name)));
+            }
+            (arrays, Some(array)) if usize::from(array) >= arrays => {
+                return Err(self.failed(&format!("the core serves {arrays} arrays, the first of which is 0")));
+            }
+            _ => (),
+        }
         let code_bits = model.formats().code_bits;
         self.clock = CoreClock::new(core.word("clock_Hz"));
         self.code_bytes = core.word("code_bytes") as usize;
@@ -209,7 +230,8 @@ impl Board for NetworkClient {
 
     fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
         let (form, fragment_words) = ((self.code_bytes, self.bits_left_out), self.fragment_words);
-        let packets = |sequence| Packet::frame(sequence, codes, form, fragment_words);
+        let array = self.array.unwrap_or_default();
+        let packets = |sequence| Packet::frame(sequence, array, codes, form, fragment_words);
         let result = |answer, wanted| match answer {
             Whole::Result { sequence, cycles, words, .. } if sequence == wanted => Some((cycles, words)),
             _ => None,
@@ -230,7 +252,8 @@ impl Board for NetworkClient {
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
         self.sequence = self.sequence.wrapping_add(1);
-        let all = Packet::tables(self.sequence, image, self.fragment_words).map_err(|error| self.failed(&error))?;
+        let all = Packet::tables(self.sequence, self.array.unwrap_or_default(), image, self.fragment_words);
+        let all = all.map_err(|error| self.failed(&error))?;
         for packet in all {
             // The same number again: the core has taken a fragment whose answer was lost.
             let taken = |answer, wanted| match answer {
@@ -240,6 +263,10 @@ impl Board for NetworkClient {
             self.request("tables", false, &|_| Ok(vec![packet.clone()]), &taken)?;
         }
         Ok(())
+    }
+
+    fn array(&self) -> usize {
+        self.array.unwrap_or_default().into()
     }
 
     fn link_errors(&self) -> LinkErrors {

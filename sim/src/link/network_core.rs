@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::wire::link::scene_hash;
 use dermis_golden::wire::udp::{CoreIdentity, Kind, Packet, LAYOUT, WORD_BYTES};
 
@@ -32,14 +32,14 @@ impl NetworkCore {
     /// Starts a core of the hardware of `model` at an address, port 0 being a free one.
     ///
     /// # Errors
-    /// An address that cannot be used.
-    pub fn start(model: Model, address: &str) -> io::Result<Self> {
+    /// An address that cannot be used, files of an array that are wrong.
+    pub fn start(model: &Model, address: &str) -> anyhow::Result<Self> {
         let socket = UdpSocket::bind(address)?;
         socket.set_read_timeout(Some(WAIT))?;
         let (address, begun) = (socket.local_addr()?, Instant::now());
         let stop = Arc::new(AtomicBool::new(false));
         let ends = stop.clone();
-        let mut core = Core::new(model, begun);
+        let mut core = Core::new(model, begun)?;
         let thread = std::thread::Builder::new().name("core".into()).spawn(move || core.serve(&socket, &ends))?;
         Ok(NetworkCore { address, begun, stop, thread: Some(thread) })
     }
@@ -72,22 +72,34 @@ impl Drop for NetworkCore {
 
 /// The core: packets in, packets out, as `FrameReceiver`, `Requests` and `ResultSender` of `python/litex`.
 struct Core {
-    model: Model,
+    /// Of each array that the engine serves.
+    models: Vec<Model>,
     begun: Instant,
     /// Of the hardware, whatever tables are written later.
     scene_hash: u32,
     counters: BTreeMap<&'static str, u32>,
-    /// Sequence number of the newest frame, and its fragments if it is not whole.
-    newest: Option<u32>,
+    /// Sequence number of the newest frame of each array.
+    newest: Vec<Option<u32>>,
+    /// Array and fragments of the frame that is not whole.
+    collected: usize,
     fragments: BTreeMap<u8, Vec<u32>>,
-    /// Sequence number of the image that is written, the fragments taken, and their bytes.
-    image: Option<(u32, u8, Vec<u8>)>,
+    /// Array and sequence number of the image that is written, the fragments taken, and their bytes.
+    image: Option<((usize, u32), u8, Vec<u8>)>,
 }
 
 impl Core {
-    fn new(model: Model, begun: Instant) -> Self {
-        let (counters, newest, fragments, image) = (BTreeMap::new(), None, BTreeMap::new(), None);
-        Core { scene_hash: scene_hash(&model), model, begun, counters, newest, fragments, image }
+    fn new(hardware: &Model, begun: Instant) -> Result<Self, FixedError> {
+        let arrays = hardware.scene.hardware.arrays;
+        Ok(Core {
+            models: (0..arrays).map(|array| hardware.of_array(array)).collect::<Result<_, _>>()?,
+            begun,
+            scene_hash: scene_hash(hardware),
+            counters: BTreeMap::new(),
+            newest: vec![None; arrays],
+            collected: 0,
+            fragments: BTreeMap::new(),
+            image: None,
+        })
     }
 
     fn serve(&mut self, socket: &UdpSocket, stop: &AtomicBool) -> io::Result<()> {
@@ -120,7 +132,12 @@ impl Core {
     }
 
     fn clock_hz(&self) -> u32 {
-        (self.model.board.clock_MHz * 1e6).round() as u32
+        (self.any().board.clock_MHz * 1e6).round() as u32
+    }
+
+    /// The model of an array: all are alike but for their tables.
+    fn any(&self) -> &Model {
+        &self.models[0]
     }
 
     fn answer(&mut self, bytes: &[u8]) -> Vec<Packet> {
@@ -130,27 +147,28 @@ impl Core {
                 let words = self.identity().words();
                 vec![Packet { kind: Kind::Identity, words, ..packet }]
             }
-            Kind::Tables => self.tables(packet),
-            Kind::Frame => self.frame(packet),
+            Kind::Tables if packet.array() < self.models.len() => self.tables(packet),
+            Kind::Frame if packet.array() < self.models.len() => self.frame(packet),
             _ => self.count("refused"),
         }
     }
 
     fn identity(&self) -> CoreIdentity {
         let cycles = self.cycles();
-        let sensor = &self.model.scene.sensor;
-        let array = [sensor.rows as u8, sensor.cols as u8, self.model.formats().code_bits as u8, WORD_BYTES as u8];
+        let sensor = &self.any().scene.sensor;
+        let array = [sensor.rows as u8, sensor.cols as u8, self.any().formats().code_bits as u8, WORD_BYTES as u8];
         CoreIdentity::of_names(|name| match name {
             "version" => LAYOUT.version,
             "scene" => self.scene_hash,
             "array" => u32::from_le_bytes(array),
+            "arrays" => self.models.len() as u32,
             "clock_Hz" => self.clock_hz(),
-            "force_triples" => self.model.force_triples() as u32,
-            "status_triples" => self.model.status_triples() as u32,
+            "force_triples" => self.any().force_triples() as u32,
+            "status_triples" => self.any().status_triples() as u32,
             "code_bytes" => CODE_BYTES as u32,
             "force_bits" => u32::BITS,
             "fragment_words" => LAYOUT.fragment_words as u32,
-            "writable_tables" => self.model.has_writable_tables().into(),
+            "writable_tables" => self.any().has_writable_tables().into(),
             "time_low" => cycles as u32,
             "time_high" => (cycles >> u32::BITS) as u32,
             counter => self.counters.get(counter).copied().unwrap_or_default(),
@@ -160,27 +178,28 @@ impl Core {
     /// A fragment of an image: the next one, or the one before once more, or the first of another image.
     fn tables(&mut self, packet: Packet) -> Vec<Packet> {
         let Packet { sequence, index, count, flags, .. } = packet;
-        let own = self.image.take().filter(|(image, ..)| *image == sequence);
-        let (_, taken, mut bytes) = own.unwrap_or((sequence, 0, Vec::new()));
+        let array = packet.array();
+        let own = self.image.take().filter(|(image, ..)| *image == (array, sequence));
+        let (image, taken, mut bytes) = own.unwrap_or(((array, sequence), 0, Vec::new()));
         let again = taken > 0 && index + 1 == taken;
-        if !self.model.has_writable_tables() || packet.words.is_empty() || !(again || index == taken) {
-            self.image = Some((sequence, taken, bytes));
+        if !self.any().has_writable_tables() || packet.words.is_empty() || !(again || index == taken) {
+            self.image = Some((image, taken, bytes));
             return self.count("refused");
         }
         if !again {
             bytes.extend(packet.words.iter().flat_map(|word| word.to_le_bytes()));
             if index + 1 == count {
-                bytes.truncate(bytes.len() - usize::from(flags).min(WORD_BYTES - 1));
-                self.model.load(&bytes);
+                bytes.truncate(bytes.len() - usize::from(flags) % WORD_BYTES);
+                self.models[array].load(&bytes);
             }
         }
-        self.image = Some((sequence, if again { taken } else { taken + 1 }, bytes));
+        self.image = Some((image, if again { taken } else { taken + 1 }, bytes));
         vec![Packet { kind: Kind::TablesTaken, flags: 0, words: Vec::new(), ..packet }]
     }
 
     /// A fragment of a frame: the result, if the frame is whole with it.
     fn frame(&mut self, packet: Packet) -> Vec<Packet> {
-        let taxels = self.model.scene.sensor.taxels();
+        let (taxels, array) = (self.any().scene.sensor.taxels(), packet.array());
         let words = (CODE_BYTES * taxels).div_ceil(WORD_BYTES);
         let count = words.div_ceil(LAYOUT.fragment_words);
         let Packet { sequence, index, .. } = packet;
@@ -189,15 +208,17 @@ impl Core {
         if usize::from(packet.count) != count || packet.words.len() != expected {
             return self.count("refused");
         }
-        let is_collected = self.newest == Some(sequence) && !self.fragments.is_empty();
+        let newest = self.newest[array];
+        let is_collected = self.collected == array && newest == Some(sequence) && !self.fragments.is_empty();
         if !is_collected {
-            if self.newest.is_some_and(|newest| newest.wrapping_sub(sequence) <= LAYOUT.late) {
+            if newest.is_some_and(|newest| newest.wrapping_sub(sequence) <= LAYOUT.late) {
                 return self.count("ignored");
             }
             if !self.fragments.is_empty() {
                 self.count("cut");
             }
-            self.newest = Some(sequence);
+            self.newest[array] = Some(sequence);
+            self.collected = array;
             self.fragments.clear();
         } else if self.fragments.contains_key(&index) {
             return self.count("ignored");
@@ -209,16 +230,16 @@ impl Core {
         }
         let words = std::mem::take(&mut self.fragments).into_values().flatten();
         let codes: Vec<i32> = words.map(|word| word as i32).take(taxels).collect();
-        self.solve(sequence, &codes)
+        self.solve(array, sequence, &codes)
     }
 
-    fn solve(&self, sequence: u32, codes: &[i32]) -> Vec<Packet> {
-        let cycles = self.cycles();
-        let formats = self.model.formats();
+    fn solve(&self, array: usize, sequence: u32, codes: &[i32]) -> Vec<Packet> {
+        let (cycles, model) = (self.cycles(), &self.models[array]);
+        let formats = model.formats();
         let most = (1i32 << (formats.code_bits - 1)) - 1;
         let clipped = codes.iter().any(|code| *code > most || *code < -most - 1);
         let codes: Vec<i32> = codes.iter().map(|code| (*code).clamp(-most - 1, most)).collect();
-        let trace = self.model.run(&codes);
+        let trace = model.run(&codes);
         let beats = trace.beats.iter().chain(&trace.status);
         let words: Vec<u32> = beats.flatten().map(|word| *word as u32).collect();
         // A result of the largest array has fewer packets than can be.

@@ -39,11 +39,11 @@ pub struct Session {
 }
 
 impl Session {
-    /// Identifies the board and checks that it was built for `hardware`. With `specimen`, the model of that hardware with other
-    /// tables, writes these into the board.
+    /// Identifies the board and checks that it was built for `hardware`; the model is then that of the board's array. With `specimen`,
+    /// the model of that hardware with other tables, writes these into the board.
     ///
     /// # Errors
-    /// No answer, another packet version, another scene, tables that are not whole afterwards.
+    /// No answer, another packet version, another scene, tables that are not whole afterwards, files of the array that are wrong.
     pub fn new(
         mut board: Box<dyn Board + Send>,
         hardware: Model,
@@ -56,7 +56,7 @@ impl Session {
         if let Some(specimen) = &specimen {
             load(board.as_mut(), specimen, !identity.supports(Kind::FrameForResultants))?;
         }
-        let model = specimen.unwrap_or(hardware);
+        let model = specimen.map_or_else(|| hardware.of_array(board.array()), Ok)?;
         let offset = tare.map(|tare| offset(&model.scene, model.input(), tare)).transpose()?;
         Ok(Session { board, model, identity, offset, forces, check })
     }
@@ -188,7 +188,7 @@ fn less(frame: &Frame, offset: &[f64]) -> Frame {
 const UDP: &str = "udp:";
 
 /// Opens the port of a board with the hardware of `model`: a serial port at its bit rate unless `baud` gives another, or
-/// `udp:HOST` or `udp:HOST:PORT` of a core behind Ethernet; `command` is that of the user. Requests are repeated after `timeout`
+/// `udp:HOST` or `udp:HOST:PORT` of a core behind Ethernet, with `#3` for an array of several; `command` is that of the user. Requests are repeated after `timeout`
 /// without an answer.
 ///
 /// # Errors

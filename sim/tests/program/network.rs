@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, UdpSocket};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
@@ -105,7 +106,7 @@ fn over_a_network_with_faults_every_answer_of_each_core_is_right_and_every_fault
     let all = ["sensor-1", "eight-by-eight"].map(|name| {
         std::thread::spawn(move || {
             let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
-            let core = NetworkCore::start(model.clone(), "127.0.0.1:0").unwrap();
+            let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
             let network = Network::to(core.address(), 12, name.len() as u64);
             let mut session = session(network.address, &model, None);
             for round in 0..60 {
@@ -131,7 +132,7 @@ fn over_a_network_with_faults_every_answer_of_each_core_is_right_and_every_fault
 #[test]
 fn the_time_of_a_frame_is_right_within_what_is_said() {
     let model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-    let core = NetworkCore::start(model.clone(), "127.0.0.1:0").unwrap();
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
     let mut session = session(core.address(), &model, None);
     let base = (Instant::now(), SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as i64);
     let begun_ns = base.1 - (base.0 - core.begun()).as_nanos() as i64;
@@ -164,7 +165,7 @@ fn tables_are_written_over_a_network_with_faults() {
     std::fs::write(path("left.toml"), format!("{hand}[search]\nnoise_floor_MPa = 0.05\n")).unwrap();
     let model = Model::new(&Scene::load(&path("hand.toml")).unwrap()).unwrap();
     let left = Scene::load(&path("left.toml")).unwrap();
-    let core = NetworkCore::start(model.clone(), "127.0.0.1:0").unwrap();
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
     let network = Network::to(core.address(), 8, 3);
     let press = Frame::from_stress("press", &left.sensor, (0..256).map(|k| f64::from(k % 7) / 10.0).collect()).unwrap();
     let mut repeated = 0;
@@ -176,6 +177,81 @@ fn tables_are_written_over_a_network_with_faults() {
         repeated += session.board.link_errors().repeated;
     }
     assert!(repeated > 0 && network.end()[0] > 0);
+}
+
+/// The hardware of a hand of four arrays with zeros of their own, whose tables are written.
+fn hand(folder: &Path) -> (String, Model) {
+    const ARRAYS: usize = 4;
+    for array in 0..ARRAYS {
+        let places = (0..64).map(|taxel| (taxel / 8, taxel % 8));
+        let lines: String =
+            places.map(|(row, col)| format!("{row},{col},{},1\n", 0.001 * (array * (1 + row)) as f64)).collect();
+        std::fs::write(folder.join(format!("zero-{array}.csv")), format!("row,col,offset,gain\n{lines}")).unwrap();
+    }
+    let path = folder.join("hand.toml").to_string_lossy().into_owned();
+    let sensor = "rows = 8\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let input = "full_scale_MPa = 1.0\ncalibration = \"zero-{array}.csv\"\n";
+    let text = format!(
+        "name = \"hand\"\n[sensor]\n{sensor}[input]\n{input}[hardware]\narrays = {ARRAYS}\ntables = \"writable\"\n"
+    );
+    std::fs::write(&path, text).unwrap();
+    let model = Model::new(&Scene::load(&path).unwrap()).unwrap();
+    (path, model)
+}
+
+/// A host for each array of one core, all at once, over a network with faults: each answer is that of the array's own model, and tables
+/// that are written for one array are those of no other.
+#[test]
+fn each_array_of_a_core_has_its_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, model) = hand(folder.path());
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
+    let press =
+        Frame::from_stress("press", &model.scene.sensor, (0..64).map(|k| f64::from(k % 7) / 10.0).collect()).unwrap();
+    let networks: Vec<Network> = (0..4).map(|array| Network::to(core.address(), 8, array)).collect();
+    let ask = |session: &mut Session| -> Vec<[i32; 3]> {
+        let answers: Vec<_> = (0..25).map(|_| session.request(&press).unwrap().1).collect();
+        assert!(answers.iter().all(|answer| answer.difference == Some(None)));
+        answers[0].forces.clone().unwrap()
+    };
+    let of_all: Vec<Vec<[i32; 3]>> = std::thread::scope(|scope| {
+        let one = |(array, network): (usize, &Network)| {
+            let address = format!("udp:{}#{array}", network.address);
+            let model = &model;
+            scope.spawn(move || {
+                let board = open_board(&address, model, None, TIMEOUT, "host").unwrap();
+                ask(&mut Session::new(board, model.clone(), None, None, true, true).unwrap())
+            })
+        };
+        let hosts: Vec<_> = networks.iter().enumerate().map(one).collect();
+        hosts.into_iter().map(|host| host.join().unwrap()).collect()
+    });
+    assert!((1..4).all(|array| of_all[array] != of_all[0]));
+    // The tables of the first array, written for the third.
+    let to = |array: usize, tables: Option<Model>| {
+        let board = open_board(&format!("udp:{}#{array}", core.address()), &model, None, TIMEOUT, "host").unwrap();
+        Session::new(board, model.clone(), tables, None, true, true).unwrap()
+    };
+    let first = model.with_tables(&model.scene.of_array(0), 5).unwrap();
+    assert_eq!(ask(&mut to(2, Some(first))), of_all[0]);
+    [0, 1, 3].into_iter().for_each(|array| assert_eq!(ask(&mut to(array, None)), of_all[array]));
+}
+
+#[test]
+fn an_array_that_a_core_has_not_is_refused_with_the_arrays_that_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, model) = hand(folder.path());
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
+    for (array, wanted) in [
+        ("", format!("the core serves 4 arrays: name one, as udp:{}#0", core.address())),
+        ("#4", "the core serves 4 arrays, the first of which is 0".to_owned()),
+        ("#left", "#left: a number from 0 to 15 is wanted".to_owned()),
+    ] {
+        let address = format!("{}{array}", core.address());
+        let refused = run(&["host", "--udp", &address, "--scene", &path], "");
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused.stderr).contains(&wanted), "{}", text(&refused.stderr));
+    }
 }
 
 /// `dermis board SCENE --udp`, and where it listens.
@@ -244,7 +320,7 @@ fn a_scene_whose_frames_count_twice_is_refused() {
     let mut scene = Scene::builtin("eight-by-eight").unwrap();
     scene.input.average = 4;
     let model = Model::new(&scene).unwrap();
-    let core = NetworkCore::start(model.clone(), "127.0.0.1:0").unwrap();
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
     let mut board = open_board(&format!("udp:{}", core.address()), &model, None, TIMEOUT, "host").unwrap();
     let error = board.identify(&model).unwrap_err().to_string();
     assert!(error.contains("input.average = 4: a board's link does not support it"), "{error}");

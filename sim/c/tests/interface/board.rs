@@ -31,7 +31,7 @@ fn now_ns() -> i64 {
 #[test]
 fn a_core_behind_ethernet_answers_with_the_forces_of_the_model_and_their_time() {
     let model = Model::new(&Scene::builtin(NAME).unwrap()).unwrap();
-    let core = NetworkCore::start(model.clone(), "127.0.0.1:0").unwrap();
+    let core = NetworkCore::start(&model, "127.0.0.1:0").unwrap();
     let (status, board) = open(NAME, &format!("udp:{}", core.address()));
     assert_eq!(status, dermis_status::Ok, "{}", last_error());
     let stress = stress();
@@ -69,7 +69,7 @@ fn a_core_behind_ethernet_answers_with_the_forces_of_the_model_and_their_time() 
 
 #[test]
 fn a_core_of_another_scene_and_one_that_is_not_there_are_told() {
-    let core = NetworkCore::start(Model::new(&Scene::builtin(NAME).unwrap()).unwrap(), "127.0.0.1:0").unwrap();
+    let core = NetworkCore::start(&Model::new(&Scene::builtin(NAME).unwrap()).unwrap(), "127.0.0.1:0").unwrap();
     let port = format!("udp:{}", core.address());
     let (status, board) = open("sensor-1", &port);
     assert_eq!((status, board.is_null()), (dermis_status::Board, true));
