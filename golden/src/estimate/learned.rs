@@ -15,8 +15,9 @@
 //! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
 //! | `network` | layers with the mirror symmetry |
 //! | `first_layer` | the first one behind the features, for one frame |
-//! | `options`, `frames`, `training`, `adam` | drawn frames, loss, steps |
-//! | `file` | bytes, signature |
+//! | `signature` | what it is trained for: a sensor, or a range of them |
+//! | `options`, `frames`, `inputs`, `training`, `adam` | drawn frames, loss, steps |
+//! | `file` | bytes |
 //! | `trial` | a network of a few steps, for tests |
 //! | `onnx` | the network as a file for other programs |
 //! | `composed` | the layers as plain matrices of the stress, for the hardware |
@@ -35,9 +36,11 @@ mod features;
 mod file;
 mod first_layer;
 mod frames;
+mod inputs;
 mod network;
 mod onnx;
 mod options;
+mod signature;
 #[cfg(test)]
 mod tests;
 mod training;
@@ -45,17 +48,17 @@ mod trial;
 
 pub use composed::ComposedLayer;
 pub use error::LearnedError;
-pub use file::Signature;
 pub(crate) use frames::{GAINS, NOISE, RATIO};
 pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
 pub use options::Training;
+pub use signature::{Cover, SensorRange, Signature};
 pub use training::{Stage, MEASURED_NOISE};
 pub use trial::with_network;
 
 use crate::read::bytes_up_to;
 use crate::spec::quads::Quads;
-use crate::spec::scene::{EstimatorKind, Scene};
+use crate::spec::scene::{EstimatorKind, Medium, Scene};
 use crate::spec::sensor::Sensor;
 use faer::Mat;
 use features::{power_above, Features, Readings};
@@ -81,7 +84,9 @@ const SHIPPED: [(&str, &[u8]); 6] = [
 /// A trained network, ready for the array of a scene.
 pub struct Learned {
     signature: Signature,
+    /// Those of the scene it was read for.
     sensor: Sensor,
+    medium: Medium,
     features: Features,
     network: Network,
     /// Its first layer behind the features.
@@ -130,10 +135,16 @@ impl Learned {
         training: &Training,
         progress: &mut dyn FnMut(&Stage) -> ControlFlow<()>,
     ) -> Result<Trained, LearnedError> {
-        let signature = Signature::of(scene);
-        let (network, losses) = training::train(scene, signature.window, training, progress)?;
+        let mut signature = Signature::of(scene);
+        if let Some(pitch_over_thickness) = training.pitch_over_thickness {
+            let poisson = matches!(scene.medium, Medium::BondedLayer { .. }).then_some(SensorRange::POISSON);
+            signature.cover = Cover::Range(SensorRange { pitch_over_thickness, poisson });
+        }
+        let (network, losses) = training::train(scene, &signature, training, progress)?;
         let bytes = file::encode(&network, &signature)?;
-        let learned = Learned::from_bytes(scene, EstimatorKind::Network, &bytes, "the trained network")?;
+        // The scene itself may lie outside the range.
+        let own = &signature.cover.scenes(scene, 1)[0];
+        let learned = Learned::from_bytes(own, EstimatorKind::Network, &bytes, "the trained network")?;
         Ok(Trained { learned, bytes, steps: losses.steps, loss: [losses.first, losses.last] })
     }
 
@@ -176,11 +187,14 @@ impl Learned {
         bytes: &[u8],
         file: &str,
     ) -> Result<Learned, LearnedError> {
-        let (network, signature) = file::decode(bytes, file)?;
+        let (mut network, signature) = file::decode(bytes, file)?;
         signature.check(scene, estimator, file)?;
+        if let Cover::Range(range) = &signature.cover {
+            network = network.with_stated(&range.place(&scene.sensor, scene.medium));
+        }
         let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         let first = FirstLayer::new(&features, &network.layers[0]);
-        Ok(Learned { signature, sensor: scene.sensor.clone(), features, network, first })
+        Ok(Learned { signature, sensor: scene.sensor.clone(), medium: scene.medium, features, network, first })
     }
 
     /// What the network was trained for.

@@ -69,6 +69,10 @@ pub struct Arguments {
     /// How far the thickness of the cover may be from the scene's, as a share of it.
     #[arg(long, default_value_t = 0.0)]
     thickness_tolerance: f64,
+    /// Train for every sensor of as many taxels whose pitches over the thickness are in this range, on
+    /// a bonded cover with any Poisson ratio from 0.3 to 0.499.
+    #[arg(long, value_name = "LEAST:LARGEST", value_parser = range)]
+    pitch_over_thickness: Option<Range>,
     /// Seed of weights and frames; equal seeds give equal files on one machine.
     #[arg(long, default_value_t = Training::default().seed)]
     seed: u64,
@@ -81,6 +85,15 @@ pub struct Arguments {
     /// Train nothing; measure the limit of the misfit for this network of the scene and write it into the file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["steps", "minutes", "batch", "hidden", "rate", "draws", "out"])]
     limit_of: Option<PathBuf>,
+}
+
+/// Two numbers, the least and the largest; a name of its own, because a list would be taken for several values.
+type Range = [f64; 2];
+
+/// LEAST:LARGEST.
+fn range(text: &str) -> Result<Range, String> {
+    let numbers = text.split_once(':').and_then(|(low, high)| Some([low.parse().ok()?, high.parse().ok()?]));
+    numbers.ok_or_else(|| format!("{text:?}: two numbers with a colon between them are wanted, as 0.5:2"))
 }
 
 /// Trains, writes the file, and returns text for stdout and whether the errors are below those of no shear.
@@ -104,6 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         slip: arguments.slip,
         poisson_tolerance: arguments.poisson_tolerance,
         thickness_tolerance: arguments.thickness_tolerance,
+        pitch_over_thickness: arguments.pitch_over_thickness,
         seed: arguments.seed,
     };
     let frames = training.contacts.min(MOST_MEASURED);
@@ -190,11 +204,8 @@ fn measured(scene: &mut Scene, file: &Path, frames: usize, seed: u64) -> Result<
 fn describe(learned: &Learned) -> String {
     let signature = learned.signature();
     format!(
-        "pitch {} × {} mm, thickness {} mm, {}, {}, {}, mu_max {}",
-        signature.pitch_x_mm,
-        signature.pitch_y_mm,
-        signature.thickness_mm,
-        signature.medium,
+        "{}, {}, {}, mu_max {}",
+        signature.cover,
         signature.window,
         if signature.unipolar { "unipolar" } else { "bipolar" },
         signature.mu_max

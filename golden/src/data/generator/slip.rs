@@ -9,7 +9,7 @@
 //! | a number above 0 and below 1 | partial slip, the shear over the friction limit being that number |
 //! | `even` | the same everywhere on the contact |
 //! | `mixed` | of ten contacts five `full`, four in partial slip with a number from 0.1 to 1, one `even` |
-//! | `held` | of ten contacts two `full`, seven in partial slip, one `even`: those of a hand that holds more than it lets slide |
+//! | `held` | of ten contacts three `full`, six in partial slip, one `even`: those of a hand that holds more than it lets slide |
 //!
 //! The traction is that of [`crate::data::generator`].
 
@@ -23,7 +23,7 @@ const LIMITS: [f64; 2] = [0.1, 1.0];
 /// Shares of [`Slip::Mixed`]: full slip, partial slip; the rest is even.
 const MIXED: [f64; 2] = [0.5, 0.4];
 /// The same of [`Slip::Held`].
-const HELD: [f64; 2] = [0.2, 0.7];
+const HELD: [f64; 2] = [0.3, 0.6];
 
 /// How the shear of a contact is spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

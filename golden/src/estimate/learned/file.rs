@@ -23,9 +23,7 @@
 use super::error::LearnedError;
 use super::features::Features;
 use super::network::{Layer, Network, OUTPUT_CHANNELS};
-use crate::spec::partition::Case;
-use crate::spec::scene::{EstimatorKind, Medium, Scene};
-use crate::spec::window::Window;
+use super::signature::Signature;
 use faer::{Mat, RowRef};
 use serde::{Deserialize, Serialize};
 
@@ -38,77 +36,12 @@ const ZERO: i32 = 2048;
 /// Widest layer, so that a damaged file asks for no more memory than it may.
 const WIDEST: usize = 1 << 14;
 
-/// The physics that a network was trained for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Signature {
-    /// Pitch along columns in mm.
-    pub pitch_x_mm: f64,
-    /// Pitch along rows in mm.
-    pub pitch_y_mm: f64,
-    /// Thickness of the cover in mm.
-    pub thickness_mm: f64,
-    /// The elastic body.
-    pub medium: Medium,
-    /// The window that is read.
-    pub window: Window,
-    /// Whether tension reads as zero.
-    pub unipolar: bool,
-    /// Largest ratio of shear to normal force.
-    pub mu_max: f64,
-}
-
 #[derive(Serialize, Deserialize)]
 struct Head {
     signature: Signature,
     widths: Vec<usize>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     misfit_limit: Option<f64>,
-}
-
-impl Signature {
-    /// The signature of a scene.
-    pub fn of(scene: &Scene) -> Signature {
-        Signature {
-            pitch_x_mm: scene.sensor.pitch_x_mm,
-            pitch_y_mm: scene.sensor.pitch_y_mm,
-            thickness_mm: scene.sensor.thickness_mm,
-            medium: scene.medium,
-            window: match scene.partition.case {
-                Case::Contacts => Window::around_contact(&scene.sensor),
-                _ => Window::of(&scene.sensor),
-            },
-            unipolar: scene.input.unipolar,
-            mu_max: scene.search.mu_max,
-        }
-    }
-
-    /// Checks that a network with this signature serves an estimator of `scene`; `file` names it in the error.
-    ///
-    /// # Errors
-    /// [`LearnedError::Mismatch`] with the first field that differs.
-    pub fn check(&self, scene: &Scene, estimator: EstimatorKind, file: &str) -> Result<(), LearnedError> {
-        let mut wanted = Signature::of(scene);
-        // An estimator with evidence takes either window.
-        let either = [Window::of(&scene.sensor), Window::around_contact(&scene.sensor)];
-        if estimator.has_evidence() && either.contains(&self.window) {
-            wanted.window = self.window;
-        }
-        let pairs = [
-            ("sensor.pitch_x_mm", self.pitch_x_mm.to_string(), wanted.pitch_x_mm.to_string()),
-            ("sensor.pitch_y_mm", self.pitch_y_mm.to_string(), wanted.pitch_y_mm.to_string()),
-            ("sensor.thickness_mm", self.thickness_mm.to_string(), wanted.thickness_mm.to_string()),
-            ("medium.kind", self.medium.to_string(), wanted.medium.to_string()),
-            ("sensor.rows and cols", self.window.to_string(), wanted.window.to_string()),
-            ("input.unipolar", self.unipolar.to_string(), wanted.unipolar.to_string()),
-            ("search.mu_max", self.mu_max.to_string(), wanted.mu_max.to_string()),
-        ];
-        match pairs.into_iter().find(|(_, own, other)| own != other) {
-            None => Ok(()),
-            Some((field, trained, scene)) => {
-                Err(LearnedError::Mismatch { file: file.to_owned(), field, trained, scene })
-            }
-        }
-    }
 }
 
 /// The bytes of a file.
@@ -175,7 +108,8 @@ fn parts<'a>(bytes: &'a [u8], file: &str) -> Result<(Head, &'a [u8]), LearnedErr
     if widths.len() < 2 || widths.iter().any(|width| !(1..=WIDEST).contains(width)) {
         return Err(damaged("its widths are out of range"));
     }
-    if widths.first() != Some(&Features::channels(&head.signature.window)) || widths.last() != Some(&OUTPUT_CHANNELS) {
+    let inputs = Features::channels(&head.signature.window) + head.signature.cover.inputs();
+    if widths.first() != Some(&inputs) || widths.last() != Some(&OUTPUT_CHANNELS) {
         return Err(damaged("its widths do not fit its window"));
     }
     if head.misfit_limit.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
@@ -232,6 +166,7 @@ fn layer(rest: &mut &[u8], inputs: usize, outputs: usize) -> Option<Layer> {
 mod tests {
     use super::*;
     use crate::random::Random;
+    use crate::spec::scene::Scene;
 
     fn network() -> (Network, Signature) {
         let mut scene = Scene::builtin("sensor-1").unwrap();
@@ -286,32 +221,6 @@ mod tests {
         for bad in [0.0, -1.0] {
             let bytes = with_limit(&plain, bad, "f").unwrap();
             assert!(matches!(decode(&bytes, "f"), Err(LearnedError::Damaged { .. })), "{bad}");
-        }
-    }
-
-    #[test]
-    fn another_physics_is_refused_by_field() {
-        let scene = Scene::builtin("sensor-1").unwrap();
-        let signature = Signature::of(&scene);
-        assert!(signature.check(&scene, EstimatorKind::Network, "n").is_ok());
-        let refused = |change: fn(&mut Scene)| {
-            let mut other = scene.clone();
-            change(&mut other);
-            signature.check(&other, EstimatorKind::Network, "n").unwrap_err().to_string()
-        };
-        type Case = (fn(&mut Scene), &'static str);
-        let cases: [Case; 7] = [
-            (|s| s.sensor.pitch_x_mm = 2.5, "sensor.pitch_x_mm = 2, the scene has 2.5"),
-            (|s| s.sensor.pitch_y_mm = 2.0, "sensor.pitch_y_mm = 4, the scene has 2"),
-            (|s| s.sensor.thickness_mm = 4.0, "sensor.thickness_mm = 3, the scene has 4"),
-            (|s| s.medium = Medium::BondedLayer { poisson: 0.48 }, "half-space, the scene has bonded-layer"),
-            (|s| s.sensor.rows = 9, "whole array of 10 × 10, the scene has whole array of 9 × 10"),
-            (|s| s.input.unipolar = true, "input.unipolar = false, the scene has true"),
-            (|s| s.search.mu_max = 1.0, "search.mu_max = 0.6, the scene has 1"),
-        ];
-        for (change, wanted) in cases {
-            let message = refused(change);
-            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
         }
     }
 }

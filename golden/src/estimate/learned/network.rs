@@ -133,6 +133,23 @@ impl Network {
         Network { layers: widths.windows(2).map(layer).collect() }
     }
 
+    /// The network whose first layer takes the inputs without the last ones, which are `stated` for every frame: their products are
+    /// part of its bias.
+    pub fn with_stated(mut self, stated: &[f32]) -> Network {
+        if let Some(first) = self.layers.first_mut() {
+            let left = first.weights[EVEN].ncols() - stated.len();
+            for (row, bias) in first.bias.iter_mut().enumerate() {
+                *bias += stated
+                    .iter()
+                    .enumerate()
+                    .map(|(own, value)| first.weights[EVEN][(row, left + own)] * value)
+                    .sum::<f32>();
+            }
+            first.weights.iter_mut().for_each(|weights| *weights = weights.subcols(0, left).to_owned());
+        }
+        self
+    }
+
     /// What every layer passes on, the inputs first and the outputs last.
     pub fn activations(&self, inputs: Parities) -> Vec<Activation> {
         let mut all = vec![Activation { images: None, parities: inputs }];

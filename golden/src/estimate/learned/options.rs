@@ -9,6 +9,9 @@ use super::error::LearnedError;
 use crate::data::generator::slip::Slip;
 use crate::spec::scene::Medium;
 
+/// Pitches over the thickness within which a range of sensors lies.
+const WIDEST_RANGE: [f64; 2] = [0.25, 4.0];
+
 /// Size of a training, and what its frames allow for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
@@ -30,6 +33,8 @@ pub struct Training {
     pub poisson_tolerance: f64,
     /// How far the thickness of the cover may be from the scene's, as a share of it, 0 to 0.2.
     pub thickness_tolerance: f64,
+    /// Least and largest pitch over the thickness of the sensors that the network serves, each above 0; `None`: the scene's sensor alone.
+    pub pitch_over_thickness: Option<[f64; 2]>,
     /// Seed of weights and frames.
     pub seed: u64,
 }
@@ -46,6 +51,7 @@ impl Default for Training {
             slip: Slip::Mixed,
             poisson_tolerance: 0.0,
             thickness_tolerance: 0.0,
+            pitch_over_thickness: None,
             seed: 1,
         }
     }
@@ -91,6 +97,21 @@ impl Training {
         }
         if !(0.0..=0.2).contains(&self.thickness_tolerance) {
             return fail("thickness_tolerance", self.thickness_tolerance, "a number from 0 to 0.2");
+        }
+        if let Some([low, high]) = self.pitch_over_thickness {
+            if !(WIDEST_RANGE[0]..=WIDEST_RANGE[1]).contains(&low) {
+                return fail("pitch_over_thickness", low, "from 0.25 to 4");
+            }
+            if !(low..=WIDEST_RANGE[1]).contains(&high) {
+                return fail("pitch_over_thickness", high, "from the least one to 4");
+            }
+            if self.poisson_tolerance != 0.0 {
+                return fail(
+                    "poisson_tolerance",
+                    self.poisson_tolerance,
+                    "0 for a range of sensors, which has every Poisson ratio",
+                );
+            }
         }
         Ok(())
     }

@@ -24,14 +24,14 @@
 
 use super::adam::{Adam, OfLayer};
 use super::error::LearnedError;
-use super::features::Features;
-use super::frames::{Frames, NOISE};
+use super::frames::NOISE;
+use super::inputs::Inputs;
 use super::network::{through_relu, Activation, Layer, Network, Parities, LN_SIGMA, OUTPUTS, OUTPUT_CHANNELS, PLACES};
 use super::options::Training;
+use super::signature::Signature;
 use crate::physics::symmetry::folded::EVEN;
 use crate::random::Random;
 use crate::spec::scene::Scene;
-use crate::spec::window::Window;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
@@ -94,9 +94,8 @@ pub(super) struct Losses {
 /// A training under way.
 struct Run<'a> {
     training: &'a Training,
-    features: Features,
-    frames: Frames,
-    others: Frames,
+    frames: Inputs,
+    others: Inputs,
     network: Network,
     /// The mean network.
     mean: Network,
@@ -109,14 +108,14 @@ struct Run<'a> {
 /// Trains a network for a scene until it is done or `progress` breaks; then the best network so far is the result.
 pub(super) fn train(
     scene: &Scene,
-    window: Window,
+    signature: &Signature,
     training: &Training,
     progress: &mut dyn FnMut(&Stage) -> ControlFlow<()>,
 ) -> Result<(Network, Losses), LearnedError> {
     training.check(scene.medium)?;
     // Until so large a block has been freed once, glibc returns the memory of every step to the system: a fifth of the time.
     drop(std::hint::black_box(Vec::<u8>::with_capacity(FREED)));
-    let mut run = Run::new(scene, window, training)?;
+    let mut run = Run::new(scene, signature, training)?;
     let (clock, mut measured) = (Instant::now(), Instant::now());
     let mut best: Option<(f64, Network)> = None;
     while let Some(done) = training.done(run.losses.len(), clock.elapsed()) {
@@ -169,9 +168,10 @@ impl Training {
 }
 
 impl<'a> Run<'a> {
-    fn new(scene: &Scene, window: Window, training: &'a Training) -> Result<Run<'a>, LearnedError> {
+    fn new(scene: &Scene, signature: &Signature, training: &'a Training) -> Result<Run<'a>, LearnedError> {
         let mut random = Random::new(training.seed);
-        let widths: Vec<usize> = std::iter::once(Features::channels(&window))
+        let frames = Inputs::new(scene, signature, training, training.seed)?;
+        let widths: Vec<usize> = std::iter::once(frames.channels())
             .chain(training.hidden.iter().copied())
             .chain(std::iter::once(OUTPUT_CHANNELS))
             .collect();
@@ -180,12 +180,11 @@ impl<'a> Run<'a> {
         if let Some(last) = network.layers.last_mut() {
             last.weights.iter_mut().for_each(|weights| *weights *= faer::Scale(0.1f32));
         }
-        let mut others = Frames::new(scene, window, training, training.seed.wrapping_add(OF_OTHERS))?;
+        let mut others = Inputs::new(scene, signature, training, training.seed.wrapping_add(OF_OTHERS))?;
         others.draw(OTHERS.min(training.contacts))?;
         Ok(Run {
             training,
-            features: Features::new(&window, &scene.sensor, scene.medium)?,
-            frames: Frames::new(scene, window, training, training.seed)?,
+            frames,
             others,
             mean: network.clone(),
             adam: Adam::new(&network),
@@ -197,11 +196,11 @@ impl<'a> Run<'a> {
 
     /// One step.
     fn step(&mut self, rate: f32) {
-        let (batch, network, features, frames) = (self.training.batch, &self.network, &self.features, &self.frames);
+        let (batch, network, frames) = (self.training.batch, &self.network, &self.frames);
         let part = |(part, random): (usize, &mut Random)| {
             let count = batch * (part + 1) / PARTS - batch * part / PARTS;
-            let (readings, truth) = frames.mix(count, NOISE, random);
-            let activations = network.activations(features.of(&readings));
+            let (inputs, truth) = frames.mix(count, NOISE, random);
+            let activations = network.activations(inputs);
             let outputs = Network::outputs(&activations[activations.len() - 1].parities);
             let (loss, slope) = slope(&outputs, &truth, batch);
             (loss, slopes(network, &activations, &slope))
@@ -226,8 +225,8 @@ impl<'a> Run<'a> {
     /// Median of |m − μ|/|μ| of the mean network on frames of other contacts, for each of [`MEASURED_NOISE`].
     fn errors(&self) -> [f64; 2] {
         MEASURED_NOISE.map(|noise| {
-            let (readings, truth) = self.others.mix(MEASURED / 4, [noise; 2], &mut Random::new(self.training.seed));
-            let found = self.mean.shear(self.features.of(&readings));
+            let (inputs, truth) = self.others.mix(MEASURED / 4, [noise; 2], &mut Random::new(self.training.seed));
+            let found = self.mean.shear(inputs);
             let error = |(frame, (mean, _)): (usize, &([f64; 2], [f64; 2]))| {
                 let [x, y] = [0, 1].map(|axis| f64::from(truth[(axis, frame)]));
                 (mean[0] - x).hypot(mean[1] - y) / x.hypot(y)
@@ -239,8 +238,8 @@ impl<'a> Run<'a> {
     /// The mean network with its σ and its largest outputs.
     fn finish(mut self) -> Result<(Network, Losses), LearnedError> {
         let random = &mut Random::new(!self.training.seed);
-        let (readings, truth) = self.others.mix(MEASURED, NOISE, random);
-        let found = self.mean.shear(self.features.of(&readings));
+        let (inputs, truth) = self.others.mix(MEASURED, NOISE, random);
+        let found = self.mean.shear(inputs);
         for axis in [0, 1] {
             let z = |(frame, (mean, sigma)): (usize, &([f64; 2], [f64; 2]))| {
                 (mean[axis] - f64::from(truth[(axis, frame)])).abs() / sigma[axis]
@@ -253,8 +252,8 @@ impl<'a> Run<'a> {
         }
         // Of a short training too: what an output exceeds later is cut off in the hardware.
         self.frames.draw(self.training.contacts)?;
-        let (readings, _) = self.frames.mix(MEASURED, NOISE, random);
-        self.mean.measure(self.features.of(&readings));
+        let (inputs, _) = self.frames.mix(MEASURED, NOISE, random);
+        self.mean.measure(inputs);
         let steps = self.losses.len();
         let ends = ((steps as f64 * ENDS) as usize).clamp(1, steps.max(1));
         let losses = Losses { steps, first: mean(&self.losses[..ends]), last: mean(&self.losses[steps - ends..]) };
