@@ -138,7 +138,8 @@ impl Learned {
         let mut signature = Signature::of(scene);
         if let Some(pitch_over_thickness) = training.pitch_over_thickness {
             let poisson = matches!(scene.medium, Medium::BondedLayer { .. }).then_some(SensorRange::POISSON);
-            signature.cover = Cover::Range(SensorRange { pitch_over_thickness, poisson });
+            signature.cover =
+                Cover::Range(SensorRange { pitch_over_thickness, poisson, least_side: training.least_side });
         }
         let (network, losses) = training::train(scene, &signature, training, progress)?;
         let bytes = file::encode(&network, &signature)?;

@@ -25,7 +25,7 @@ const LARGEST: usize = 11;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
-    /// The window is the array.
+    /// The window is the array, or as much larger on each side as on the opposite one.
     Array,
     /// The window has the contact's centre in its middle taxel.
     Contact,
@@ -77,7 +77,10 @@ impl Window {
         let line =
             |centre: f64, pitch: f64, lines: usize| (centre / pitch + (lines as f64 - 1.0) / 2.0).round() as isize;
         match self.place {
-            Place::Array => [0, 0],
+            Place::Array => {
+                let before = |lines: usize, own: usize| (lines as isize - own as isize) / 2;
+                [before(sensor.rows, self.rows), before(sensor.cols, self.cols)]
+            }
             Place::Contact => self.origin_around([
                 line(centre_mm[1], sensor.pitch_y_mm, sensor.rows),
                 line(centre_mm[0], sensor.pitch_x_mm, sensor.cols),
@@ -140,6 +143,19 @@ mod tests {
         assert_eq!(window, Window { place: Place::Array, rows: 10, cols: 12 });
         let taxels = window.taxels_of(&array, window.origin(&array, [9.0, -9.0]));
         assert_eq!(taxels, (0..120).map(Some).collect::<Vec<_>>());
+    }
+
+    /// A larger window has the array in its middle, so that mirror images of taxels are those of the array.
+    #[test]
+    fn a_window_that_is_larger_than_the_array_has_it_in_its_middle() {
+        let (array, window) = (sensor(6, 8), Window { place: Place::Array, rows: 10, cols: 12 });
+        let origin = window.origin(&array, [3.0, 1.0]);
+        let taxels = window.taxels_of(&array, origin);
+        assert_eq!(origin, [-2, -2]);
+        let within = |taxel: usize| (2..8).contains(&(taxel / 12)) && (2..10).contains(&(taxel % 12));
+        assert!((0..120).all(|taxel| taxels[taxel].is_some() == within(taxel)));
+        assert_eq!((taxels[2 * 12 + 2], taxels[7 * 12 + 9]), (Some(0), Some(47)));
+        assert_eq!(window.middle_mm(&array, origin), [0.0; 2]);
     }
 
     #[test]

@@ -73,6 +73,9 @@ pub struct Arguments {
     /// a bonded cover with any Poisson ratio from 0.3 to 0.499.
     #[arg(long, value_name = "LEAST:LARGEST", value_parser = range)]
     pitch_over_thickness: Option<Range>,
+    /// With --pitch-over-thickness: also for smaller arrays, whose rows and columns are fewer by even numbers, down to this one.
+    #[arg(long, value_name = "N", requires = "pitch_over_thickness")]
+    least_side: Option<usize>,
     /// Seed of weights and frames; equal seeds give equal files on one machine.
     #[arg(long, default_value_t = Training::default().seed)]
     seed: u64,
@@ -118,6 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         poisson_tolerance: arguments.poisson_tolerance,
         thickness_tolerance: arguments.thickness_tolerance,
         pitch_over_thickness: arguments.pitch_over_thickness,
+        least_side: arguments.least_side,
         seed: arguments.seed,
     };
     let frames = training.contacts.min(MOST_MEASURED);

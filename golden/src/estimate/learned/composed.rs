@@ -15,6 +15,7 @@ use super::first_layer::FirstLayer;
 use super::network::Layer;
 use super::Learned;
 use crate::physics::symmetry::folded::EVEN;
+use crate::spec::quads::Quads;
 use crate::spec::window::Place;
 use faer::Mat;
 
@@ -39,13 +40,33 @@ impl Learned {
         if self.signature.window.place == Place::Contact {
             first.mask = Some(mask.each_ref().map(|own| wide(own.as_ref())));
         } else {
-            let masked = Mat::from_fn(alive.len(), 1, |taxel, _| if alive[taxel] { 0.0 } else { 1.0 });
+            let window = self.signature.window;
+            let taxels = window.taxels_of(&self.sensor, window.origin(&self.sensor, [0.0; 2]));
+            let masked = |taxel: usize| taxels[taxel].is_none_or(|taxel| !alive[taxel]);
+            let masked = Mat::from_fn(taxels.len(), 1, |taxel, _| f32::from(u8::from(masked(taxel))));
             let masked = self.features.in_parities(&masked, &|_| 1.0);
             for (bias, (own, masked)) in first.bias.iter_mut().zip(mask.iter().zip(&masked)) {
                 bias.iter_mut().zip((own * masked).col(0).iter()).for_each(|(bias, mask)| *bias += f64::from(*mask));
             }
+            let quads = self.quads_of_array();
+            first.weights =
+                first.weights.map(|own| Mat::from_fn(own.nrows(), quads.len(), |row, quad| own[(row, quads[quad])]));
         }
         std::iter::once(first).chain(self.network.layers[1..].iter().map(plain)).collect()
+    }
+}
+
+impl Learned {
+    /// The quad of the window for each quad of the array: a window that is larger has the array in its middle.
+    fn quads_of_array(&self) -> Vec<usize> {
+        let window = self.signature.window;
+        let [row0, col0] = window.origin(&self.sensor, [0.0; 2]).map(isize::unsigned_abs);
+        let own = Quads { rows: self.sensor.rows, cols: self.sensor.cols };
+        let of = |quad: usize| {
+            let taxel = own.taxel(quad, 0);
+            window.quads().locate(row0 + taxel / own.cols, col0 + taxel % own.cols).address
+        };
+        (0..own.len()).map(of).collect()
     }
 }
 

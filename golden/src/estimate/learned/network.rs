@@ -251,6 +251,25 @@ mod tests {
         assert_eq!(swapped[0].0, [-1.0, 1.0]);
     }
 
+    /// Inputs that are the same for every frame are as good as a bias.
+    #[test]
+    fn stated_inputs_are_part_of_the_bias() {
+        let network = Network::random(&[7, 6, OUTPUT_CHANNELS], &mut Random::new(4));
+        let mut random = Random::new(9);
+        let own: Parities = std::array::from_fn(|_| Mat::from_fn(5, 1, |_, _| random.normal() as f32));
+        let stated = [0.5f32, -0.75];
+        let all: Parities = std::array::from_fn(|parity| {
+            let of = |row: usize| if parity == EVEN { stated[row - 5] } else { 0.0 };
+            Mat::from_fn(7, 1, |row, _| if row < 5 { own[parity][(row, 0)] } else { of(row) })
+        });
+        let (whole, folded) = (network.shear(all)[0], network.clone().with_stated(&stated).shear(own.clone())[0]);
+        let differ = |a: ([f64; 2], [f64; 2]), b: ([f64; 2], [f64; 2])| {
+            (0..2).map(|k| (a.0[k] - b.0[k]).abs() + (a.1[k] - b.1[k]).abs()).sum::<f64>()
+        };
+        assert!(differ(whole, folded) < 1e-5, "{whole:?} {folded:?}");
+        assert!(differ(whole, network.with_stated(&[0.5, 0.75]).shear(own)[0]) > 1e-2);
+    }
+
     #[test]
     fn a_mirrored_frame_has_the_mirrored_shear() {
         let network = Network::random(&[5, 7, 6, OUTPUT_CHANNELS], &mut Random::new(3));

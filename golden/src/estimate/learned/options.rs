@@ -8,7 +8,10 @@
 use super::error::LearnedError;
 use crate::data::generator::slip::Slip;
 use crate::spec::scene::Medium;
+use crate::spec::window::{Place, Window};
 
+/// Fewest rows and columns of a sensor of a range.
+const LEAST_SIDE: usize = 4;
 /// Pitches over the thickness within which a range of sensors lies.
 const WIDEST_RANGE: [f64; 2] = [0.25, 4.0];
 
@@ -35,6 +38,8 @@ pub struct Training {
     pub thickness_tolerance: f64,
     /// Least and largest pitch over the thickness of the sensors that the network serves, each above 0; `None`: the scene's sensor alone.
     pub pitch_over_thickness: Option<[f64; 2]>,
+    /// Fewest rows and columns of these sensors, which have as many as the scene's or fewer by even numbers, at least 4; `None`: as many.
+    pub least_side: Option<usize>,
     /// Seed of weights and frames.
     pub seed: u64,
 }
@@ -52,6 +57,7 @@ impl Default for Training {
             poisson_tolerance: 0.0,
             thickness_tolerance: 0.0,
             pitch_over_thickness: None,
+            least_side: None,
             seed: 1,
         }
     }
@@ -62,7 +68,7 @@ impl Training {
     ///
     /// # Errors
     /// [`LearnedError::Option`] with the first that is out of range.
-    pub(super) fn check(&self, medium: Medium) -> Result<(), LearnedError> {
+    pub(super) fn check(&self, medium: Medium, window: Window) -> Result<(), LearnedError> {
         let fail = |field, value, allowed| Err(LearnedError::Option { field, value, allowed });
         if !(1..=10_000_000).contains(&self.steps) {
             return fail("steps", self.steps as f64, "a whole number from 1 to 10 million");
@@ -113,6 +119,13 @@ impl Training {
                 );
             }
         }
+        if let Some(least) = self.least_side {
+            let largest = if window.place == Place::Array { window.rows.min(window.cols) } else { 0 };
+            if self.pitch_over_thickness.is_none() || !(LEAST_SIDE..=largest).contains(&least) {
+                let allowed = "from 4 to the rows and columns of a scene that is one window, for a range of pitches";
+                return fail("least_side", least as f64, allowed);
+            }
+        }
         Ok(())
     }
 }
@@ -123,7 +136,8 @@ mod tests {
 
     #[test]
     fn options_out_of_range() {
-        let refused = |training: Training| match training.check(Medium::HalfSpace) {
+        let window = Window { place: Place::Array, rows: 8, cols: 10 };
+        let refused = |training: Training| match training.check(Medium::HalfSpace, window) {
             Err(LearnedError::Option { field, .. }) => field,
             _ => "none",
         };
@@ -135,8 +149,18 @@ mod tests {
         assert_eq!(refused(Training { rate: f64::NAN, ..Default::default() }), "rate");
         assert_eq!(refused(Training { minutes: Some(0.0), ..Default::default() }), "minutes");
         assert_eq!(refused(Training { thickness_tolerance: 0.3, ..Default::default() }), "thickness_tolerance");
+        let range = Training { pitch_over_thickness: Some([0.5, 2.0]), least_side: Some(6), ..Default::default() };
+        assert_eq!(refused(range.clone()), "none");
+        for least_side in [Some(3), Some(9)] {
+            assert_eq!(refused(Training { least_side, ..range.clone() }), "least_side");
+        }
+        assert_eq!(refused(Training { pitch_over_thickness: None, ..range.clone() }), "least_side");
+        for pitch_over_thickness in [[2.0, 0.5], [0.1, 2.0], [0.5, 5.0], [f64::NAN, 1.0]] {
+            let range = Training { pitch_over_thickness: Some(pitch_over_thickness), ..range.clone() };
+            assert_eq!(refused(range), "pitch_over_thickness");
+        }
         let poisson = Training { poisson_tolerance: 0.02, ..Default::default() };
-        assert!(poisson.check(Medium::BondedLayer { poisson: 0.48 }).is_ok());
+        assert!(poisson.check(Medium::BondedLayer { poisson: 0.48 }, window).is_ok());
         assert_eq!(refused(poisson), "poisson_tolerance");
     }
 }

@@ -13,12 +13,14 @@ use super::error::LearnedError;
 use crate::spec::partition::Case;
 use crate::spec::scene::{EstimatorKind, Medium, Scene};
 use crate::spec::sensor::Sensor;
-use crate::spec::window::Window;
+use crate::spec::window::{Place, Window};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Fractional parts of a low-discrepancy sequence in three dimensions: powers of the reciprocal of 1.2207…, the root of x⁴ = x + 1.
-const SPREAD: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_971_5];
+/// Base of a low-discrepancy sequence in five dimensions, whose steps are powers of its reciprocal: the root of x⁶ = x + 1.
+const BASE: f64 = 1.134_724_138_401_519_5;
+/// Least width of an array in units of its thickness: on a smaller one the contacts of the training have no place.
+const LEAST_WIDTH: f64 = 5.0;
 
 /// The physics that a network was trained for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +62,9 @@ pub struct SensorRange {
     pub pitch_over_thickness: [f64; 2],
     /// Least and largest Poisson ratio of a bonded layer; `None`: a half-space, whose stress does not depend on it.
     pub poisson: Option<[f64; 2]>,
+    /// Fewest rows and columns of an array: those of the window, or fewer by even numbers. `None`: those of the window alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_side: Option<usize>,
 }
 
 impl Cover {
@@ -91,7 +96,8 @@ impl Cover {
         }
     }
 
-    /// The scene itself for one sensor; for a range `count` scenes with sensors spread evenly over it, of the scene's thickness.
+    /// The scene itself for one sensor; for a range `count` scenes with sensors spread evenly over it, of the scene's thickness; the scene
+    /// has the largest array.
     pub fn scenes(&self, scene: &Scene, count: usize) -> Vec<Scene> {
         match self {
             Cover::One { .. } => vec![scene.clone()],
@@ -135,13 +141,22 @@ impl SensorRange {
 
     /// `scene` with the sensor of this number.
     fn scene(&self, scene: &Scene, index: usize) -> Scene {
-        let [x, y, z] = SPREAD.map(|step| (0.5 + (index + 1) as f64 * step).fract());
+        let share = |axis: i32| (0.5 + (index + 1) as f64 * BASE.powi(-axis)).fract();
         let at = |[low, high]: [f64; 2], share: f64| low + share * (high - low);
         let pitch = |share: f64| at(self.pitch_over_thickness.map(f64::ln), share).exp() * scene.sensor.thickness_mm;
         let mut own = scene.clone();
-        (own.sensor.pitch_x_mm, own.sensor.pitch_y_mm) = (pitch(x), pitch(y));
+        (own.sensor.pitch_x_mm, own.sensor.pitch_y_mm) = (pitch(share(1)), pitch(share(2)));
         if let Some(poisson) = self.poisson {
-            own.medium = Medium::BondedLayer { poisson: at(poisson, z) };
+            own.medium = Medium::BondedLayer { poisson: at(poisson, share(3)) };
+        }
+        if let Some(least) = self.least_side {
+            let side = |largest: usize, pitch_mm: f64, share: f64| {
+                let fewest = ((LEAST_WIDTH * own.sensor.thickness_mm / pitch_mm).ceil() as usize).max(least);
+                let fewer = largest.saturating_sub(fewest) / 2;
+                largest - 2 * ((share * (fewer + 1) as f64) as usize).min(fewer)
+            };
+            let rows = side(own.sensor.rows, own.sensor.pitch_y_mm, share(4));
+            (own.sensor.cols, own.sensor.rows) = (side(own.sensor.cols, own.sensor.pitch_x_mm, share(5)), rows);
         }
         own
     }
@@ -195,9 +210,14 @@ impl Signature {
         if estimator.has_evidence() && either.contains(&self.window) {
             wanted.window = self.window;
         }
+        let serves = self.serves(&wanted.window);
         let others = || {
             first_difference([
-                ("sensor.rows and cols", self.window.to_string(), wanted.window.to_string()),
+                (
+                    "sensor.rows and cols",
+                    self.windows(),
+                    if serves { self.windows() } else { wanted.window.to_string() },
+                ),
                 ("input.unipolar", self.unipolar.to_string(), wanted.unipolar.to_string()),
                 ("search.mu_max", self.mu_max.to_string(), wanted.mu_max.to_string()),
             ])
@@ -207,6 +227,29 @@ impl Signature {
             Some((field, trained, scene)) => {
                 Err(LearnedError::Mismatch { file: file.to_owned(), field, trained, scene })
             }
+        }
+    }
+}
+
+impl Signature {
+    /// Whether it serves this window: its own, of a range those of smaller arrays too.
+    fn serves(&self, array: &Window) -> bool {
+        if *array == self.window {
+            return true;
+        }
+        let Cover::Range(SensorRange { least_side: Some(least), .. }) = self.cover else { return false };
+        let fits = |own: usize, largest: usize| (least..=largest).contains(&own) && (largest - own).is_multiple_of(2);
+        let (own, places) = (self.window, [self.window.place, array.place]);
+        places == [Place::Array; 2] && fits(array.rows, own.rows) && fits(array.cols, own.cols)
+    }
+
+    /// The windows that it serves, in words.
+    fn windows(&self) -> String {
+        match self.cover {
+            Cover::Range(SensorRange { least_side: Some(least), .. }) => {
+                format!("{} or fewer by even numbers, at least {least}", self.window)
+            }
+            _ => self.window.to_string(),
         }
     }
 }
@@ -251,5 +294,64 @@ mod tests {
             let message = refused(change);
             assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
         }
+    }
+
+    /// A network for a range serves every sensor in it, and names the field of one that is not.
+    #[test]
+    fn a_sensor_outside_the_range_is_refused_by_field() {
+        let scene = Scene::builtin("sensor-1-bonded").unwrap();
+        let range =
+            SensorRange { pitch_over_thickness: [0.5, 2.0], poisson: Some(SensorRange::POISSON), least_side: None };
+        let signature = Signature { cover: Cover::Range(range.clone()), ..Signature::of(&scene) };
+        let check =
+            |scene: &Scene| signature.check(scene, EstimatorKind::Network, "n").map_err(|error| error.to_string());
+        assert_eq!(check(&scene), Ok(()));
+        let spread = signature.cover.scenes(&scene, 60);
+        assert!(spread.len() == 60 && spread.iter().all(|scene| check(scene).is_ok()));
+        let places: Vec<[f32; 3]> = spread.iter().map(|scene| range.place(&scene.sensor, scene.medium)).collect();
+        for axis in 0..3 {
+            // Spread evenly: as many below the middle as above, and near both ends.
+            let own: Vec<f32> = places.iter().map(|place| place[axis]).collect();
+            assert!((25..=35).contains(&own.iter().filter(|place| **place < 0.0).count()));
+            assert!(own.iter().any(|place| *place < -0.9) && own.iter().any(|place| *place > 0.9));
+            assert!(own.iter().all(|place| (-1.0..=1.0).contains(place)));
+        }
+        let refused = |change: fn(&mut Scene)| {
+            let mut other = scene.clone();
+            change(&mut other);
+            check(&other).unwrap_err()
+        };
+        type Case = (fn(&mut Scene), &'static str);
+        let cases: [Case; 5] = [
+            (
+                |s| s.sensor.pitch_x_mm = 1.4,
+                "sensor.pitch_x_mm = 0.5 to 2 of the thickness, the scene has 0.4667 of it",
+            ),
+            (
+                |s| s.sensor.thickness_mm = 1.9,
+                "sensor.pitch_y_mm = 0.5 to 2 of the thickness, the scene has 2.1053 of it",
+            ),
+            (|s| s.medium = Medium::BondedLayer { poisson: 0.29 }, "poisson 0.3 to 0.499, the scene has bonded-layer"),
+            (|s| s.medium = Medium::HalfSpace, "poisson 0.3 to 0.499, the scene has half-space"),
+            (|s| s.sensor.rows = 9, "whole array of 10 × 10, the scene has whole array of 9 × 10"),
+        ];
+        for (change, wanted) in cases {
+            let message = refused(change);
+            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
+        }
+    }
+
+    /// Older files, of one sensor, are read as they were; a range is written beside the other fields.
+    #[test]
+    fn signatures_in_json() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let one = serde_json::to_value(Signature::of(&scene)).unwrap();
+        assert_eq!((&one["pitch_y_mm"], &one["medium"]["kind"]), (&4.0.into(), &"half-space".into()));
+        let range = SensorRange { pitch_over_thickness: [0.5, 2.0], poisson: None, least_side: None };
+        let signature = Signature { cover: Cover::Range(range), ..Signature::of(&scene) };
+        let text = serde_json::to_string(&signature).unwrap();
+        assert!(text.starts_with("{\"pitch_over_thickness\":[0.5,2.0],\"poisson\":null,\"window\":"), "{text}");
+        assert_eq!(serde_json::from_str::<Signature>(&text).unwrap(), signature);
+        assert_eq!(serde_json::from_value::<Signature>(one).unwrap(), Signature::of(&scene));
     }
 }

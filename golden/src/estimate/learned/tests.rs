@@ -122,6 +122,26 @@ fn tolerances_are_trained() {
     assert!(exact != bytes(0.02, 0.0) && exact != bytes(0.0, 0.05));
 }
 
+/// A network for a range is read for any sensor in it, and differs between sensors; equal seeds give equal files here too.
+#[test]
+fn a_range_is_trained_and_read_for_each_sensor() {
+    let scene = scene("eight-by-eight-bonded");
+    let training = Training { pitch_over_thickness: Some([1.0, 2.0]), contacts: 200, ..small(4) };
+    let train = || Learned::train(&scene, &training, &mut |_| Continue(())).unwrap();
+    let Trained { learned, bytes, .. } = train();
+    assert_eq!(bytes, train().bytes);
+    assert_eq!(learned.weights(), trained(&scene, 1).learned.weights());
+    let read = |scene: &Scene| Learned::from_bytes(scene, EstimatorKind::Network, &bytes, "n");
+    let sensors = learned.signature().cover.scenes(&scene, 3);
+    let b: Vec<f64> = (0..64).map(|taxel| f64::from(taxel % 7) - 1.0).collect();
+    let found: Vec<Gaussian> =
+        sensors.iter().map(|scene| ask(&read(scene).unwrap(), &b, &[true; 64], [0.0; 2])).collect();
+    assert!(found[0] != found[1] && found[1] != found[2]);
+    let mut finer = scene.clone();
+    finer.sensor.pitch_x_mm = 2.9;
+    assert!(matches!(read(&finer), Err(LearnedError::Mismatch { field: "sensor.pitch_x_mm", .. })));
+}
+
 /// Load, mirror image and dead taxels: what cannot matter does not.
 #[test]
 fn answers_follow_the_symmetries() {

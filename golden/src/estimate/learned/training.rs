@@ -112,7 +112,7 @@ pub(super) fn train(
     training: &Training,
     progress: &mut dyn FnMut(&Stage) -> ControlFlow<()>,
 ) -> Result<(Network, Losses), LearnedError> {
-    training.check(scene.medium)?;
+    training.check(scene.medium, signature.window)?;
     // Until so large a block has been freed once, glibc returns the memory of every step to the system: a fifth of the time.
     drop(std::hint::black_box(Vec::<u8>::with_capacity(FREED)));
     let mut run = Run::new(scene, signature, training)?;
