@@ -23,7 +23,7 @@ from dermis_litex.packets import (
     mantissa_of,
     unchecked,
 )
-from dermis_litex.udp import DermisUDP, FrameReceiver, Newest, Requesters, ResultSender, ShortForces, Waiting
+from dermis_litex.udp import DermisUDP, FrameReceiver, Newest, PacketCounter, Requesters, ResultSender, ShortForces, Waiting
 from gateware import Packets, Port, write_verilog
 from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
@@ -64,7 +64,7 @@ class Received:
         self.counts, self.arrays = fragment_words(words), arrays
         # Sequence number of each array; array and sequence number.
         self.newest, self.collected, self.come = {}, None, {}
-        self.counters = Counter()
+        self.counters, self.own = Counter(), Counter()
 
     def add(self, words, length, damaged, waits):
         """Takes a packet; the payload of a frame that is whole now.
@@ -87,13 +87,13 @@ class Received:
         if own != self.collected or waits or index in self.come:
             late = array in self.newest and (self.newest[array] - sequence) % 2**32 <= LATE
             if own == self.collected or late:
-                return self.tell("ignored")
+                return self.tell("ignored", array)
             if waits:
-                return self.tell("overrun")
+                return self.tell("overrun", array)
             if self.collected is not None and self.come:
-                self.tell("cut")
+                self.tell("cut", self.collected[0])
             self.newest[array], self.collected, self.come = sequence, own, {}
-        self.tell("taken")
+        self.tell("taken", array)
         self.come[index] = payload
         if len(self.come) < len(self.counts):
             return None
@@ -101,8 +101,9 @@ class Received:
         self.collected, self.come = None, {}
         return whole
 
-    def tell(self, name):
+    def tell(self, name, array=None):
         self.counters[name] += 1
+        self.own[name, array] += 1
 
 
 def codes_of(words, taxels, code_bits, code_bytes):
@@ -174,8 +175,12 @@ def test_a_receiver_that_takes_late_packets_is_found(crc_in_python, monkeypatch)
 
 @pytest.mark.parametrize(
     "part, one",
-    # Numbers of all arrays are those of one; who sent the frame that leaves is who sent the one that is collected.
-    [(Newest, lambda init: lambda self, arrays: init(self, 1)), (Waiting, lambda init: lambda self, layout, banks: init(self, layout, 2))],
+    # Numbers, and counters, of all arrays are those of one; who sent the frame that leaves is who sent the one that is collected.
+    [
+        (Newest, lambda init: lambda self, arrays: init(self, 1)),
+        (PacketCounter, lambda init: lambda self, arrays: init(self, 1)),
+        (Waiting, lambda init: lambda self, layout, banks: init(self, layout, 2)),
+    ],
 )
 def test_a_receiver_that_takes_several_arrays_for_one_is_found(crc_in_python, monkeypatch, part, one):
     monkeypatch.setattr(part, "__init__", one(part.__init__))
@@ -188,7 +193,7 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes, arrays):
     array_bits = (arrays - 1).bit_length()
     draw = random.Random(taxels)
     reference = Received(code_words(taxels, code_bytes), arrays)
-    expected, left, requesters, counters, packets, waits = [], [], [], {}, [], []
+    expected, left, requesters, counters, own_counters, packets, waits = [], [], [], {}, {}, [], []
     sent = 0
 
     def send():
@@ -217,6 +222,12 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes, arrays):
             yield
         for name, counter in dut.counters.items():
             counters[name] = yield counter
+        for array in range(arrays):
+            yield dut.asked.eq(array)
+            yield
+            yield
+            for name, counter in dut.own_counters.items():
+                own_counters[name, array] = yield counter
 
     @passive
     def take():
@@ -251,6 +262,10 @@ def only_whole_frames_leave(taxels, code_bits, code_bytes, arrays):
     ]
     assert requesters == [sequence for *_, sequence in expected]
     assert counters == {name: reference.counters[name] for name in counters}
+    of_all = ("refused", "damaged")
+    assert own_counters == {
+        (name, array): reference.counters[name] if name in of_all else reference.own[name, array] for name, array in own_counters
+    }
     # Only a frame of several packets can lack one; of the long ones few are sent.
     rare = ["overrun", "refused"] if code_words(taxels, code_bytes) <= FRAGMENT_WORDS else ["cut"]
     assert len(left) > 3 and min(counters[name] for name in ["taken", "ignored", "damaged", *rare]) > 0, counters

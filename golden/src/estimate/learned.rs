@@ -72,13 +72,15 @@ use std::path::Path;
 const LARGEST_FILE: u64 = 64 << 20;
 
 /// Networks that are part of the program: `search.network` without its folder, and bytes.
-const SHIPPED: [(&str, &[u8]); 6] = [
+const SHIPPED: [(&str, &[u8]); 8] = [
     ("dermis:sensor-1", include_bytes!("../../scenes/sensor-1.network")),
     ("dermis:sensor-1-unipolar", include_bytes!("../../scenes/sensor-1-unipolar.network")),
     ("dermis:sensor-1-bonded", include_bytes!("../../scenes/sensor-1-bonded.network")),
     ("dermis:sensor-3-contacts", include_bytes!("../../scenes/sensor-3-contacts.network")),
     ("dermis:eight-by-eight-bonded", include_bytes!("../../scenes/eight-by-eight-bonded.network")),
     ("dermis:eight-by-eight-contacts", include_bytes!("../../scenes/eight-by-eight-contacts.network")),
+    ("dermis:bonded", include_bytes!("../../scenes/bonded.network")),
+    ("dermis:bonded-unipolar", include_bytes!("../../scenes/bonded-unipolar.network")),
 ];
 
 /// A trained network, ready for the array of a scene.
@@ -158,6 +160,35 @@ impl Learned {
     pub fn of_scene(scene: &Scene, estimator: EstimatorKind) -> Result<Learned, LearnedError> {
         let (bytes, file) = bytes_of(scene)?;
         Learned::from_bytes(scene, estimator, &bytes, &file)
+    }
+
+    /// What the network was trained for that a scene names.
+    ///
+    /// # Errors
+    /// As [`Learned::misfit_limit`].
+    pub fn signature_of(scene: &Scene) -> Result<Signature, LearnedError> {
+        let (bytes, file) = bytes_of(scene)?;
+        file::signature(&bytes, &file)
+    }
+
+    /// The network of the program, by the name for `search.network`, that serves the hardware of a scene; `None` without one.
+    ///
+    /// ```
+    /// use dermis_golden::estimate::learned::Learned;
+    /// use dermis_golden::spec::scene::Scene;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let sensor = "rows = 8\ncols = 10\npitch_x_mm = 3.0\npitch_y_mm = 2.5\nthickness_mm = 2.0\n";
+    /// let scene = Scene::parse(&format!("[sensor]\n{sensor}[medium]\nkind = \"bonded-layer\"\npoisson = 0.47\n"), "pad.toml")?;
+    /// assert_eq!(Learned::serving(&scene), Some("dermis:bonded"));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn serving(scene: &Scene) -> Option<&'static str> {
+        let serves = |(name, bytes): &&(&str, &[u8])| {
+            file::signature(bytes, name).is_ok_and(|own| own.check(scene, EstimatorKind::Network, name).is_ok())
+        };
+        SHIPPED.iter().find(serves).map(|(name, _)| *name)
     }
 
     /// The limit of [`crate::estimate::misfit`] of the network that a scene names; `None` for a file without one.

@@ -139,7 +139,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// A question for the identity.
+    /// A question for the identity, with the counters of the first array.
     pub fn question(sequence: u32) -> Packet {
         Packet { kind: Kind::Identify, flags: 0, index: 0, count: 1, sequence, cycles: 0, words: Vec::new() }
     }
@@ -183,7 +183,12 @@ impl Packet {
         })
     }
 
-    /// The number of the array that a frame or tables are of.
+    /// The packet without flags but the number of array `array`, below [`MOST_ARRAYS`].
+    pub fn of_array(self, array: u8) -> Packet {
+        Packet { flags: array << LAYOUT.array_at, ..self }
+    }
+
+    /// The number of the array that a question, a frame or tables are of.
     pub fn array(&self) -> usize {
         usize::from(self.flags >> LAYOUT.array_at)
     }
@@ -218,8 +223,7 @@ impl Packet {
     ) -> Result<Vec<Packet>, TooLong> {
         let bytes = codes.iter().flat_map(|code| (code >> shift).to_le_bytes().into_iter().take(code_bytes));
         let words = words_of_bytes(&bytes.collect::<Vec<u8>>());
-        Packet { kind: Kind::Frame, flags: array << LAYOUT.array_at, ..Packet::question(sequence) }
-            .split(&words, fragment_words)
+        Packet { kind: Kind::Frame, ..Packet::question(sequence).of_array(array) }.split(&words, fragment_words)
     }
 
     /// The packets of an image of tables of array `array`, below 16.
@@ -228,8 +232,8 @@ impl Packet {
     /// More bytes than 255 packets hold.
     pub fn tables(sequence: u32, array: u8, image: &[u8], fragment_words: usize) -> Result<Vec<Packet>, TooLong> {
         let none = image.len().next_multiple_of(WORD_BYTES) - image.len();
-        let flags = array << LAYOUT.array_at | none as u8;
-        let head = Packet { kind: Kind::Tables, flags, ..Packet::question(sequence) };
+        let of_array = Packet::question(sequence).of_array(array);
+        let head = Packet { kind: Kind::Tables, flags: of_array.flags | none as u8, ..of_array };
         head.split(&words_of_bytes(image), fragment_words)
     }
 

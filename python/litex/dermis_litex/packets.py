@@ -18,7 +18,7 @@ All numbers are little-endian.
 | `FRAME` | host | codes, row-major | bits 7:4: the array, in every fragment |
 | `RESULT` | core | words of forces and status | bit 0: a code was clipped |
 | `SHORT_RESULT` | core | mantissas of forces, two in a word | bit 0 as above, bit 1: the last mantissa is none, bits 7:3: exponent |
-| `IDENTIFY` | host | none | |
+| `IDENTIFY` | host | none | bits 7:4: the array whose counters are asked for |
 | `IDENTITY` | core | the words of `IDENTITY`, in this order | |
 | `TABLES` | host | bytes of an image, as `dermis load` makes one | bits 7:4 as above; bits 1:0: bytes of the last word that are none |
 | `TABLES_TAKEN` | core | none: the fragment of this index is in the core | |
@@ -35,7 +35,7 @@ first fragment of another number or array begins anew. Whether the image is whol
 takes no frames: their packets are lost, and counted.
 
 An identity has the time at which it was asked for: with the times of question and answer a host knows how the core's clock and
-its own differ. The counters are those of `dermis_litex.udp.FrameReceiver`.
+its own differ. The counters are those of `dermis_litex.udp.FrameReceiver`, of the array that the question names.
 
 A core of short forces sends them as mantissas of 16 bits, two in a word, the first in its low half, with one exponent per packet:
 a force is about mantissa · 2^exponent. The packets of status are `RESULT`. With the largest force F of the packet, by its
@@ -73,6 +73,7 @@ FLAG_PADDED = 2
 EXPONENT_AT = 3
 MANTISSA_BITS = 16
 WORD_BYTES = 4
+BYTE = 8
 
 
 def fragment_words(words):
@@ -118,9 +119,9 @@ def frame_packets(sequence, codes, code_bytes=2, array=0):
     return packets(KIND_FRAME, sequence, struct.unpack(f"<{len(data) // 4}I", data), array=array)
 
 
-def identify_packet(sequence):
-    """The question for a core's identity."""
-    return checked(struct.pack(f"<{HEADER_WORDS}I", KIND_IDENTIFY | 1 << 24, sequence))
+def identify_packet(sequence, array=0):
+    """The question for a core's identity, with the counters of an array."""
+    return checked(struct.pack(f"<{HEADER_WORDS}I", KIND_IDENTIFY | array << BYTE + ARRAY_AT | 1 << 24, sequence))
 
 
 def tables_packets(sequence, image, array=0):

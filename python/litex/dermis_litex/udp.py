@@ -262,6 +262,37 @@ class Waiting(LiteXModule):
         ]
 
 
+class PacketCounter(LiteXModule):
+    """How often `happens` is high: in `all`, and for array `of` in that cycle, asked for by `asked`, in `own`."""
+
+    def __init__(self, arrays):
+        self.happens, self.of, self.asked = Signal(), Signal(max=max(arrays, 2)), Signal(max=max(arrays, 2))
+        self.all, self.own = Signal(WORD_BITS), Signal(WORD_BITS)
+
+        # # #
+
+        self.sync += If(self.happens, self.all.eq(self.all + 1))
+        if arrays == 1:
+            self.comb += self.own.eq(self.all)
+            return
+        # A memory has no reset.
+        have, has, has_asked = Signal(arrays), Signal(), Signal()
+        memory = Memory(WORD_BITS, arrays)
+        write, read, ask = memory.get_port(write_capable=True), memory.get_port(async_read=True), memory.get_port(async_read=True)
+        self.specials += memory, write, read, ask
+        self.comb += [
+            choose(has, self.of, list(have)),
+            choose(has_asked, self.asked, list(have)),
+            read.adr.eq(self.of),
+            write.adr.eq(self.of),
+            write.dat_w.eq(Mux(has, read.dat_r, 0) + 1),
+            write.we.eq(self.happens),
+            ask.adr.eq(self.asked),
+            self.own.eq(Mux(has_asked, ask.dat_r, 0)),
+        ]
+        self.sync += If(self.happens, have.eq(have | 1 << self.of))
+
+
 class FrameReceiver(LiteXModule):
     """Packets in, whole frames out: `source` has a code of 32 bits per beat, its `id` the array in the low bits.
 
@@ -270,6 +301,7 @@ class FrameReceiver(LiteXModule):
     converter: they are shifted up to the `code_bits` of the engine. Five numbers count packets: `taken`, `ignored` (late, or come
     before), `refused` (another kind, array, number of fragments or length), `damaged` (`PacketCheck`), `overrun` (there is no room for a frame),
     and one frames: `cut` (given up without a packet). Questions and tables leave by `others`, which counts with `others_refused`.
+    `counters` are of all arrays; `own_counters` of array `asked`, but for packets that are damaged or refused, whose array is not known.
     `time` is given to `requester`.
     """
 
@@ -293,7 +325,12 @@ class FrameReceiver(LiteXModule):
         self.waits = full = Signal()
         # What becomes of a packet is decided now.
         self.decides = Signal()
-        self.counters = {name: Signal(32) for name in ("taken", "ignored", "refused", "damaged", "overrun", "cut")}
+        of_each = {name: PacketCounter(arrays) for name in ("taken", "ignored", "overrun", "cut")}
+        of_all = {name: PacketCounter(1) for name in ("refused", "damaged")}
+        self.submodules += [*of_each.values(), *of_all.values()]
+        self.asked = Signal(max=max(arrays, 2))
+        self.counters = {name: counter.all for name, counter in (of_each | of_all).items()}
+        self.own_counters = {name: counter.own for name, counter in (of_each | of_all).items()}
 
         # # #
 
@@ -342,8 +379,17 @@ class FrameReceiver(LiteXModule):
             late.eq(newest.known & (age <= LATE)),
         ]
 
+        refuses = Signal()
+        self.comb += [
+            *(counter.asked.eq(self.asked) for counter in of_each.values()),
+            *(of_each[name].of.eq(array) for name in ("taken", "ignored", "overrun")),
+            of_each["cut"].of.eq(own.array),
+            of_all["damaged"].happens.eq(check.damaged),
+            of_all["refused"].happens.eq(refuses | self.others_refused),
+        ]
+
         def count(name):
-            return NextValue(self.counters[name], self.counters[name] + 1)
+            return refuses.eq(1) if name == "refused" else of_each[name].happens.eq(1)
 
         def skip(name):
             return [count(name), If(sink.last, NextState("HEAD")).Else(NextState("SKIP"))]
@@ -398,9 +444,6 @@ class FrameReceiver(LiteXModule):
             full.eq(collects & reduce(and_, list(come))),
             self.decides.eq(fsm.ongoing("SEQUENCE") & sink.valid),
         ]
-        # While a packet is one of the others, none of those above is counted.
-        for name, happens in (("damaged", check.damaged), ("refused", self.others_refused)):
-            self.sync += If(happens, self.counters[name].eq(self.counters[name] + 1))
 
         # The frame of another bank leaves, a code per beat; whole ones wait in the banks between.
         per_word = WORD_BYTES // code_bytes
@@ -711,6 +754,8 @@ class Requests(LiteXModule):
         self.sink = sink = stream.Endpoint(layout)
         self.source = source = stream.Endpoint(layout)
         self.refused = Signal()
+        # That of the question which is answered.
+        self.array = Signal(BYTE - ARRAY_AT)
 
         # # #
 
@@ -722,6 +767,7 @@ class Requests(LiteXModule):
         self.crc = crc = CRC32()
         self.comb += [
             is_question.eq(head[:BYTE] == KIND_IDENTIFY),
+            self.array.eq(head[BYTE + ARRAY_AT : 2 * BYTE]),
             words.eq(Mux(is_question, len(IDENTITY), 0)),
             choose(content, at, [identity[name] for name in IDENTITY]),
             crc.data.eq(source.data),
@@ -770,7 +816,7 @@ class Requests(LiteXModule):
         """
         sink = self.sink
         empty, index, count = head[BYTE:][:2], head[16:24], head[24:]
-        array = head[BYTE + ARRAY_AT : 2 * BYTE]
+        array = self.array
         image, of, taken, has_image, is_open = Signal(SEQUENCE_BITS), Signal(len(array)), Signal(BYTE), Signal(), Signal()
         octet, is_last_word, ends = Signal(max=WORD_BYTES), Signal(), Signal()
         self.comb += [
@@ -852,7 +898,7 @@ class DermisUDP(LiteXModule):
             "force_bits": force_bits,
             "fragment_words": FRAGMENT_WORDS,
             "writable_tables": core.writable_tables,
-            **self.receiver.counters,
+            **self.receiver.own_counters,
         }
         self.writer = TablesWriter(core.tables_register) if core.writable_tables else None
         self.bus = self.writer and self.writer.bus
@@ -884,6 +930,7 @@ class DermisUDP(LiteXModule):
             self.receiver.time.eq(self.cycles.count),
             self.receiver.others.connect(self.requests.sink),
             self.receiver.others_refused.eq(self.requests.refused),
+            self.receiver.asked.eq(self.requests.array),
             self.leaving.source.connect(port.sink),
         ]
         for name, counter in self.receiver.counters.items():

@@ -10,6 +10,7 @@ use std::path::Path;
 use anyhow::{anyhow, bail, Result};
 use clap::{value_parser, Args};
 use dermis_golden::estimate::float::Golden;
+use dermis_golden::estimate::learned::{Cover, Learned};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::Matrices;
 use dermis_golden::result::checks::pull::tare_load;
@@ -154,17 +155,26 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
     })
 }
 
-/// The command that makes a network for the hardware of a scene which has none and may have one; `None` for frames without noise.
+/// Which network the hardware of a scene may have in place of the one that it has, or of none; `None` for frames without noise, and
+/// where there is no better one.
 fn network(scene: &Scene, target: &str) -> Option<String> {
-    let wanted = scene.search.network.is_none() && scene.search.noise_floor_MPa != Some(0.0);
-    let allowed = wanted && scene.require_network().is_ok();
     let file = beside(target, scene, "network");
     let file = file.file_name().unwrap_or_default().to_string_lossy();
-    allowed.then(|| {
-        format!(
-            "dermis train {target} (minutes), then [search] network = \"{file}\", [hardware] estimator = \"network\""
-        )
-    })
+    let train = format!("dermis train {target} (minutes), then [search] network = \"{file}\"");
+    let in_hardware = "[hardware] estimator = \"network\"";
+    let none = "none, and noise misleads the search";
+    if scene.search.noise_floor_MPa == Some(0.0) || scene.require_network().is_err() {
+        return None;
+    }
+    let Some(own) = &scene.search.network else {
+        return Some(match Learned::serving(scene) {
+            Some(name) => format!("{none}: [search] network = \"{name}\", {in_hardware}; for smaller errors {train}"),
+            None => format!("{none}: {train}, {in_hardware}"),
+        });
+    };
+    let of_range = Learned::signature_of(scene).is_ok_and(|own| matches!(own.cover, Cover::Range(_)));
+    let own = own.file_name().unwrap_or_default().to_string_lossy();
+    of_range.then(|| format!("{own} serves many sensors; one for this sensor alone has smaller errors: {train}"))
 }
 
 /// The hardware of a scene on its board; the model's own scene has the estimator of the hardware already.

@@ -39,7 +39,7 @@ struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  dermis new pad.toml --rows 16 --cols 12 --pitch 3 --thickness 2.5   a scene for your sensor
+  dermis new pad.toml --rows 12 --cols 10 --pitch 3 --thickness 2.5   a scene for your sensor
   dermis check sensor-1                              degree, expected errors, whether the board holds it
   dermis reconstruct sensor-1                        the scene's first shipped frame, golden model
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file

@@ -11,14 +11,15 @@ use std::str::FromStr;
 use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::estimate::float::Golden;
-use dermis_golden::spec::board::Board;
+use dermis_golden::estimate::learned::Learned;
+use dermis_golden::spec::board::{Board, EngineKind};
 use dermis_golden::spec::scene::{Medium, Scene};
 use dermis_golden::write::write;
 
 /// Arguments of `dermis new`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  dermis new pad.toml --rows 16 --cols 12 --pitch 3 --thickness 2.5
+  dermis new pad.toml --rows 12 --cols 10 --pitch 3 --thickness 2.5
   dermis new strip.toml --rows 4 --cols 20 --pitch 5,4 --thickness 3 --noise 0.0002 --full-scale 0.25
   dermis new skin.toml --rows 8 --cols 8 --pitch 4 --thickness 4 --poisson 0.45 --friction 0.5
   dermis new block.toml --rows 8 --cols 8 --pitch 4 --thickness 6 --cover free
@@ -212,12 +213,10 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let tension =
         "whether readings go below zero in tension, yes or no; most arrays, as of FSR, read pressure alone; empty: unknown";
     let unipolar = asker.choice(arguments.tension, tension)?.map(|reads| (reads == Tension::No).to_string());
-    let mut text =
-        "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
-            .to_owned();
-    AXES.iter().for_each(|line| text += &format!("# {line}\n"));
     let number = |value: f64| Some(format!("{value:?}"));
-    for (table, lines) in [
+    let board = arguments.board.as_deref().map(|board| board_beside(board, &arguments.file)).transpose()?;
+    let of_board = board.map(|board| ("board", Some(format!("{board:?}"))));
+    let mut tables = vec![
         (
             "sensor",
             vec![
@@ -240,15 +239,38 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
                 ("dead", None),
             ],
         ),
-    ] {
+        ("hardware", of_board.into_iter().collect()),
+    ];
+    let scene = Scene::parse(&text_of(&tables)?, "the new scene").ok();
+    if let Some(network) = scene.as_ref().and_then(network) {
+        tables[2].1.push(("network", Some(format!("{network:?}"))));
+        tables[4].1.push(("estimator", Some("\"network\"".to_owned())));
+    }
+    text_of(&tables)
+}
+
+/// The network of the program for the hardware of a scene; `None` without one, without noise, where the search is more accurate, and on
+/// a board whose engine takes none.
+fn network(scene: &Scene) -> Option<&'static str> {
+    let board = Board::load(scene.hardware.board_name()).ok()?;
+    let takes_one = board.engine == EngineKind::Parallel && scene.search.noise_floor_MPa != Some(0.0);
+    takes_one.then(|| Learned::serving(scene))?
+}
+
+/// A table of a scene with its fields, of which some have no value.
+type Table = (&'static str, Vec<(&'static str, Option<String>)>);
+
+/// The text of a scene of these tables; one without fields is left out.
+fn text_of(tables: &[Table]) -> Result<String> {
+    let mut text =
+        "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n"
+            .to_owned();
+    AXES.iter().for_each(|line| text += &format!("# {line}\n"));
+    for (table, lines) in tables.iter().filter(|(_, lines)| !lines.is_empty()) {
         writeln!(text, "\n[{table}]")?;
         for (field, value) in lines {
-            writeln!(text, "{}", line(&format!("{table}.{field}"), value)?)?;
+            writeln!(text, "{}", line(&format!("{table}.{field}"), value.clone())?)?;
         }
-    }
-    if let Some(board) = &arguments.board {
-        let board = board_beside(board, &arguments.file)?;
-        write!(text, "\n[hardware]\nboard = {}\n", format_args!("{board:?}"))?;
     }
     Ok(text)
 }
@@ -303,6 +325,7 @@ fn board_beside(board: &str, file: &Path) -> Result<String> {
 mod tests {
     use super::*;
     use clap::Parser;
+    use dermis_golden::fixed::Model;
 
     #[derive(Parser)]
     struct Command {
@@ -358,7 +381,15 @@ mod tests {
         let medium = Medium::BondedLayer { poisson: 0.48 };
         // Nothing said, an empty answer, an answer.
         for (options, answers) in [(&[][..], ""), (&[], "\n"), (&[], "Bonded\n"), (&["--cover", "bonded"], "")] {
-            assert_eq!(parsed(options, answers), Scene { medium, ..free.clone() }, "{options:?} {answers:?}");
+            let found = parsed(options, answers);
+            assert_eq!(found.medium, medium, "{options:?} {answers:?}");
+            // Fields of the network aside.
+            let (search, hardware) = (free.search.clone(), free.hardware.clone());
+            assert_eq!(
+                Scene { search, hardware, ..found },
+                Scene { medium, ..free.clone() },
+                "{options:?} {answers:?}"
+            );
         }
         // Two questions before it: noise and full scale.
         for (options, answers, unipolar) in [
@@ -372,6 +403,35 @@ mod tests {
         }
         let refused = written(&[&needed[..], &["--cover", "free", "--poisson", "0.4"]].concat(), "").0.unwrap_err();
         assert!(refused.to_string().starts_with("--poisson 0.4: only with --cover bonded"), "{refused}");
+    }
+
+    /// A network that serves the sensor is named where there is one, and the hardware has it; the scene is one that the hardware takes.
+    #[test]
+    fn a_network_of_the_program_is_named_where_one_serves_the_sensor() {
+        let of = |size: [&str; 2], more: &[&str]| {
+            let needed = ["--rows", size[0], "--cols", size[1], "--pitch", "3", "--thickness", "2.5"];
+            let scene = Scene::parse(&written(&[&needed, more].concat(), "").0.unwrap(), "pad.toml").unwrap();
+            let name = scene.search.network.as_ref().map(|path| path.to_string_lossy().into_owned());
+            assert_eq!(scene.hardware.estimator.is_some(), name.is_some());
+            if name.is_some() {
+                Model::new(&scene).unwrap();
+            }
+            name
+        };
+        let bonded = Some("dermis:bonded".to_owned());
+        assert_eq!(of(["8", "10"], &[]), bonded);
+        assert_eq!(of(["12", "6"], &["--noise", "0.0002", "--full-scale", "0.2"]), bonded);
+        assert_eq!(of(["8", "8"], &["--tension", "no"]), Some("dermis:bonded-unipolar".to_owned()));
+        for more in [
+            &["--cover", "free"][..],
+            &["--friction", "0.4"],
+            &["--noise", "0"],
+            &["--board", "icebreaker"],
+            &["--poisson", "0.2"],
+        ] {
+            assert_eq!(of(["8", "10"], more), None, "{more:?}");
+        }
+        assert_eq!((of(["9", "10"], &[]), of(["14", "14"], &[]), of(["4", "4"], &[])), (None, None, None));
     }
 
     #[test]

@@ -25,6 +25,9 @@ const MEASURED: u64 = 2_000_003;
 /// Largest number of them.
 const MOST_MEASURED: usize = 4096;
 
+/// Sensors of a range on whose frames the limit of the misfit is measured.
+const RANGE_SENSORS: usize = 16;
+
 /// Arguments of `dermis train`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
@@ -33,6 +36,7 @@ const MOST_MEASURED: usize = 4096;
   dermis train my-scene.toml --minutes 15            longer, for a little more accuracy
   dermis train my-scene.toml --poisson-tolerance 0.02 --thickness-tolerance 0.05     a cover that is not known exactly
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
+  dermis train pad.toml --pitch-over-thickness 0.5:2 --least-side 6 --steps 120000     one network for many sensors
   dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
 Then, in the scene: [search] with network = \"my-scene.network\", [hardware] with estimator = \"network\".
@@ -197,11 +201,18 @@ fn trained(scene: &Scene, training: &Training) -> Result<(Trained, String)> {
 fn measured(scene: &mut Scene, file: &Path, frames: usize, seed: u64) -> Result<String> {
     scene.search.network = Some(file.to_owned());
     let bar = Progress::steps(&format!("{}: limit of the misfit", scene.name), 0);
-    let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
-    let limit = misfit_limit(scene, frames, seed.wrapping_add(MEASURED), &progress)?;
+    // Of a range the largest of any sensor.
+    let scenes = Learned::signature_of(scene)?.cover.scenes(scene, RANGE_SENSORS);
+    let of_each = frames.div_ceil(scenes.len());
+    let mut limit: Option<f64> = None;
+    for (before, scene) in scenes.iter().enumerate() {
+        let progress = |done: usize, _: usize| bar.set_of((before * of_each + done) as u64, frames as u64);
+        let own = misfit_limit(scene, of_each, seed.wrapping_add(MEASURED), &progress)?;
+        limit = own.into_iter().chain(limit).reduce(f64::max);
+    }
     let Some(limit) = limit else { bail!("{}: no frame of {frames} has a contact", file.display()) };
     write(file, &Learned::with_misfit_limit(scene, limit)?)?;
-    Ok(format!("misfit limit    {limit:.4}, on {frames} frames\n"))
+    Ok(format!("misfit limit    {limit:.4}, on {} × {of_each} frames\n", scenes.len()))
 }
 
 /// What a network was trained for.

@@ -144,13 +144,14 @@ impl NetworkClient {
         Ok(None)
     }
 
-    /// Asks what the core is.
+    /// Asks what the core is, and for the counters of its array.
     fn ask(&mut self) -> Result<(CoreIdentity, [i64; 2]), HostError> {
         let own = |answer, wanted| match answer {
             Whole::Identity { sequence, identity } if sequence == wanted => Some(identity),
             _ => None,
         };
-        self.request("identify", true, &|sequence| Ok(vec![Packet::question(sequence)]), &own)
+        let array = self.array.unwrap_or_default();
+        self.request("identify", true, &|sequence| Ok(vec![Packet::question(sequence).of_array(array)]), &own)
     }
 
     fn failed(&self, reason: &dyn std::fmt::Display) -> HostError {

@@ -18,6 +18,8 @@ use crate::stream::DATAGRAM;
 const WAIT: Duration = Duration::from_millis(20);
 /// Bytes of a code in a packet: all its bits are sent.
 const CODE_BYTES: usize = 4;
+/// Counters of packets whose array is not known.
+const OF_ALL: [&str; 2] = ["refused", "damaged"];
 const NS_PER_S: u128 = 1_000_000_000;
 
 /// A running core; stops when dropped.
@@ -77,7 +79,8 @@ struct Core {
     begun: Instant,
     /// Of the hardware, whatever tables are written later.
     scene_hash: u32,
-    counters: BTreeMap<&'static str, u32>,
+    /// By name and array; those of packets whose array is not known are of the first.
+    counters: BTreeMap<(&'static str, usize), u32>,
     /// Sequence number of the newest frame of each array.
     newest: Vec<Option<u32>>,
     /// Array and fragments of the frame that is not whole.
@@ -120,9 +123,14 @@ impl Core {
         Ok(())
     }
 
-    fn count(&mut self, name: &'static str) -> Vec<Packet> {
-        *self.counters.entry(name).or_default() += 1;
+    fn count(&mut self, name: &'static str, array: usize) -> Vec<Packet> {
+        *self.counters.entry((name, array)).or_default() += 1;
         Vec::new()
+    }
+
+    /// Counts a packet whose array is not known, or none of this core.
+    fn count_of_all(&mut self, name: &'static str) -> Vec<Packet> {
+        self.count(name, 0)
     }
 
     /// Cycles of the core's clock.
@@ -141,26 +149,27 @@ impl Core {
     }
 
     fn answer(&mut self, bytes: &[u8]) -> Vec<Packet> {
-        let Some(packet) = Packet::of_bytes(bytes) else { return self.count("damaged") };
+        let Some(packet) = Packet::of_bytes(bytes) else { return self.count_of_all("damaged") };
         match packet.kind {
             Kind::Identify => {
-                let words = self.identity().words();
+                let words = self.identity(packet.array()).words();
                 vec![Packet { kind: Kind::Identity, words, ..packet }]
             }
             Kind::Tables if packet.array() < self.models.len() => self.tables(packet),
             Kind::Frame if packet.array() < self.models.len() => self.frame(packet),
-            _ => self.count("refused"),
+            _ => self.count_of_all("refused"),
         }
     }
 
-    fn identity(&self) -> CoreIdentity {
+    /// What the core is, with the counters of an array.
+    fn identity(&self, array: usize) -> CoreIdentity {
         let cycles = self.cycles();
         let sensor = &self.any().scene.sensor;
-        let array = [sensor.rows as u8, sensor.cols as u8, self.any().formats().code_bits as u8, WORD_BYTES as u8];
+        let shape = [sensor.rows as u8, sensor.cols as u8, self.any().formats().code_bits as u8, WORD_BYTES as u8];
         CoreIdentity::of_names(|name| match name {
             "version" => LAYOUT.version,
             "scene" => self.scene_hash,
-            "array" => u32::from_le_bytes(array),
+            "array" => u32::from_le_bytes(shape),
             "arrays" => self.models.len() as u32,
             "clock_Hz" => self.clock_hz(),
             "force_triples" => self.any().force_triples() as u32,
@@ -171,7 +180,11 @@ impl Core {
             "writable_tables" => self.any().has_writable_tables().into(),
             "time_low" => cycles as u32,
             "time_high" => (cycles >> u32::BITS) as u32,
-            counter => self.counters.get(counter).copied().unwrap_or_default(),
+            counter => {
+                let of = if OF_ALL.contains(&counter) { 0 } else { array };
+                let own = self.counters.iter().find(|((name, of_array), _)| (*name, *of_array) == (counter, of));
+                own.map_or(0, |(_, count)| *count)
+            }
         })
     }
 
@@ -184,7 +197,7 @@ impl Core {
         let again = taken > 0 && index + 1 == taken;
         if !self.any().has_writable_tables() || packet.words.is_empty() || !(again || index == taken) {
             self.image = Some((image, taken, bytes));
-            return self.count("refused");
+            return self.count_of_all("refused");
         }
         if !again {
             bytes.extend(packet.words.iter().flat_map(|word| word.to_le_bytes()));
@@ -206,24 +219,24 @@ impl Core {
         let place = usize::from(index) * LAYOUT.fragment_words;
         let expected = words.saturating_sub(place).min(LAYOUT.fragment_words);
         if usize::from(packet.count) != count || packet.words.len() != expected {
-            return self.count("refused");
+            return self.count_of_all("refused");
         }
         let newest = self.newest[array];
         let is_collected = self.collected == array && newest == Some(sequence) && !self.fragments.is_empty();
         if !is_collected {
             if newest.is_some_and(|newest| newest.wrapping_sub(sequence) <= LAYOUT.late) {
-                return self.count("ignored");
+                return self.count("ignored", array);
             }
             if !self.fragments.is_empty() {
-                self.count("cut");
+                self.count("cut", self.collected);
             }
             self.newest[array] = Some(sequence);
             self.collected = array;
             self.fragments.clear();
         } else if self.fragments.contains_key(&index) {
-            return self.count("ignored");
+            return self.count("ignored", array);
         }
-        self.count("taken");
+        self.count("taken", array);
         self.fragments.insert(index, packet.words);
         if self.fragments.len() < count {
             return Vec::new();

@@ -70,7 +70,7 @@ pub struct SceneCheck {
     pub noise: StatedNoise,
     /// Whether every result of the hardware carries `noise-not-stated`.
     pub noise_not_stated: bool,
-    /// What makes a network for the hardware where the scene names none and its frames are of a sensor.
+    /// Which network the hardware may have in place of none, or of one for many sensors, where its frames are of a sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<String>,
     /// The rates of the estimators on this machine, where they were measured.
@@ -235,8 +235,8 @@ pub fn scene_check(check: &SceneCheck) -> String {
     if check.noise_not_stated {
         text += &format!("            {NOISE_NOT_STATED}\n");
     }
-    if let Some(command) = &check.network {
-        text += &format!("network     none, and noise misleads the search: {command}\n");
+    if let Some(advice) = &check.network {
+        text += &format!("network     {advice}\n");
     }
     match &check.not_drawn {
         Some(reason) => text += &format!("errors      none: {reason}\n"),

@@ -212,6 +212,8 @@ fn each_array_of_a_core_has_its_host() {
     let ask = |session: &mut Session| -> Vec<[i32; 3]> {
         let answers: Vec<_> = (0..25).map(|_| session.request(&press).unwrap().1).collect();
         assert!(answers.iter().all(|answer| answer.difference == Some(None)));
+        let counters = session.board.counters().unwrap();
+        assert!(counters.taken >= 25 && counters.taken < 80, "of this array alone: {counters:?}");
         answers[0].forces.clone().unwrap()
     };
     let of_all: Vec<Vec<[i32; 3]>> = std::thread::scope(|scope| {

@@ -194,4 +194,31 @@ mod tests {
             }
         }
     }
+
+    /// Of an array that is smaller than the window the layers take its own quads, and are the network as well.
+    #[test]
+    fn composed_layers_leave_out_what_lies_beyond_a_smaller_array() {
+        let mut scene = Scene::builtin("sensor-1-bonded").unwrap();
+        let range =
+            Training { pitch_over_thickness: Some([0.5, 2.0]), least_side: Some(6), ..Training::trial(&[6, 4]) };
+        let bytes = Learned::train(&scene, &range, &mut |_| Continue(())).unwrap().bytes;
+        (scene.sensor.rows, scene.sensor.cols, scene.search.network) = (6, 8, None);
+        let learned = Learned::from_bytes(&scene, crate::spec::scene::EstimatorKind::Network, &bytes, "n").unwrap();
+        let b: Vec<f64> = (0..48).map(|taxel| f64::from(taxel * taxel % 11) - 2.0).collect();
+        for dead in [vec![], vec![37, 5]] {
+            let alive: Vec<bool> = (0..48).map(|taxel| !dead.contains(&taxel)).collect();
+            let told = by_features(&learned, &OneContact { b: &b, alive: &alive, centre_mm: [0.0; 2] });
+            let peak = (0..48).filter(|t| alive[*t]).map(|t| b[t].abs()).fold(0.0, f64::max);
+            let s = f64::from(power_above(peak as f32));
+            let quads = Quads { rows: 6, cols: 8 };
+            let read = |taxel: usize| if alive[taxel] { (b[taxel] / s) as f32 } else { 0.0 };
+            let image = |lane| Mat::from_fn(quads.len(), 1, |quad, _| read(quads.taxel(quad, lane)));
+            let found = outputs(&learned.composed(&alive), exchanged(std::array::from_fn(image)), None);
+            for axis in [0, 1] {
+                let [mu, ln] = [0, 2].map(|first| f64::from(found[(first + axis, 0)]));
+                assert!((mu * scene.search.mu_max - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
+                assert!((ln.exp() * scene.search.mu_max - told.sigma[axis]).abs() < 1e-4, "{ln} {told:?}");
+            }
+        }
+    }
 }

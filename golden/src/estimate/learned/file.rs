@@ -123,6 +123,11 @@ pub(super) fn limit(bytes: &[u8], file: &str) -> Result<Option<f64>, LearnedErro
     Ok(parts(bytes, file)?.0.misfit_limit)
 }
 
+/// The signature in a file's bytes; `file` names it in errors.
+pub(super) fn signature(bytes: &[u8], file: &str) -> Result<Signature, LearnedError> {
+    Ok(parts(bytes, file)?.0.signature)
+}
+
 /// Network and signature of a file's bytes; `file` names it in errors.
 pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), LearnedError> {
     let damaged = |reason: &str| LearnedError::Damaged { file: file.to_owned(), reason: reason.to_owned() };

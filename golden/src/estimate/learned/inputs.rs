@@ -18,6 +18,7 @@ use crate::physics::symmetry::folded::EVEN;
 use crate::random::Random;
 use crate::spec::scene::Scene;
 use faer::Mat;
+use rayon::prelude::*;
 
 /// Sensors of a range.
 const SENSORS: usize = 96;
@@ -76,7 +77,8 @@ impl Inputs {
         let of_each = count.div_ceil(self.sensors.len());
         if of_each > self.drawn {
             self.drawn = of_each;
-            self.sensors.iter_mut().try_for_each(|sensor| sensor.frames.draw(of_each))?;
+            // Of each there may be too few for two threads.
+            self.sensors.par_iter_mut().try_for_each(|sensor| sensor.frames.draw(of_each))?;
         }
         Ok(())
     }

@@ -151,8 +151,7 @@ impl SensorRange {
         }
         if let Some(least) = self.least_side {
             let side = |largest: usize, pitch_mm: f64, share: f64| {
-                let fewest = ((LEAST_WIDTH * own.sensor.thickness_mm / pitch_mm).ceil() as usize).max(least);
-                let fewer = largest.saturating_sub(fewest) / 2;
+                let fewer = largest.saturating_sub(fewest(least, pitch_mm, own.sensor.thickness_mm)) / 2;
                 largest - 2 * ((share * (fewer + 1) as f64) as usize).min(fewer)
             };
             let rows = side(own.sensor.rows, own.sensor.pitch_y_mm, share(4));
@@ -204,54 +203,56 @@ impl Signature {
     /// # Errors
     /// [`LearnedError::Mismatch`] with the first field that differs.
     pub fn check(&self, scene: &Scene, estimator: EstimatorKind, file: &str) -> Result<(), LearnedError> {
-        let mut wanted = Signature::of(scene);
+        let own = Signature::of(scene);
         // An estimator with evidence takes either window.
         let either = [Window::of(&scene.sensor), Window::around_contact(&scene.sensor)];
-        if estimator.has_evidence() && either.contains(&self.window) {
-            wanted.window = self.window;
-        }
-        let serves = self.serves(&wanted.window);
+        let serves =
+            self.serves(&own.window, &scene.sensor) || estimator.has_evidence() && either.contains(&self.window);
+        let window = (!serves).then(|| ("sensor.rows and cols", self.windows(), own.window.to_string()));
         let others = || {
             first_difference([
-                (
-                    "sensor.rows and cols",
-                    self.windows(),
-                    if serves { self.windows() } else { wanted.window.to_string() },
-                ),
-                ("input.unipolar", self.unipolar.to_string(), wanted.unipolar.to_string()),
-                ("search.mu_max", self.mu_max.to_string(), wanted.mu_max.to_string()),
+                ("input.unipolar", self.unipolar.to_string(), own.unipolar.to_string()),
+                ("search.mu_max", self.mu_max.to_string(), own.mu_max.to_string()),
             ])
         };
-        match self.cover.difference(scene).or_else(others) {
+        match self.cover.difference(scene).or(window).or_else(others) {
             None => Ok(()),
             Some((field, trained, scene)) => {
                 Err(LearnedError::Mismatch { file: file.to_owned(), field, trained, scene })
             }
         }
     }
-}
 
-impl Signature {
-    /// Whether it serves this window: its own, of a range those of smaller arrays too.
-    fn serves(&self, array: &Window) -> bool {
+    /// Whether it serves this window of `sensor`: its own, of a range those of smaller arrays too.
+    fn serves(&self, array: &Window, sensor: &Sensor) -> bool {
         if *array == self.window {
             return true;
         }
         let Cover::Range(SensorRange { least_side: Some(least), .. }) = self.cover else { return false };
-        let fits = |own: usize, largest: usize| (least..=largest).contains(&own) && (largest - own).is_multiple_of(2);
-        let (own, places) = (self.window, [self.window.place, array.place]);
-        places == [Place::Array; 2] && fits(array.rows, own.rows) && fits(array.cols, own.cols)
+        let fits = |own: usize, largest: usize, pitch_mm: f64| {
+            let fewest = fewest(least, pitch_mm, sensor.thickness_mm);
+            (fewest..=largest).contains(&own) && (largest - own).is_multiple_of(2)
+        };
+        let places = [self.window.place, array.place];
+        places == [Place::Array; 2]
+            && fits(array.rows, self.window.rows, sensor.pitch_y_mm)
+            && fits(array.cols, self.window.cols, sensor.pitch_x_mm)
     }
 
     /// The windows that it serves, in words.
     fn windows(&self) -> String {
         match self.cover {
             Cover::Range(SensorRange { least_side: Some(least), .. }) => {
-                format!("{} or fewer by even numbers, at least {least}", self.window)
+                format!("{}, or fewer by even numbers, at least {least} and {LEAST_WIDTH} thicknesses", self.window)
             }
             _ => self.window.to_string(),
         }
     }
+}
+
+/// Fewest rows or columns of an array of a range, `least` or more.
+fn fewest(least: usize, pitch_mm: f64, thickness_mm: f64) -> usize {
+    ((LEAST_WIDTH * thickness_mm / pitch_mm).ceil() as usize).max(least)
 }
 
 /// A range in words.
@@ -339,6 +340,35 @@ mod tests {
             let message = refused(change);
             assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
         }
+    }
+
+    /// Of a range smaller arrays too, down to the least side and the least width, by even numbers.
+    #[test]
+    fn smaller_arrays_of_a_range_are_served() {
+        let mut scene = Scene::builtin("eight-by-eight-bonded").unwrap();
+        let range =
+            SensorRange { pitch_over_thickness: [0.5, 2.0], poisson: Some(SensorRange::POISSON), least_side: Some(6) };
+        let window = Window { place: Place::Array, rows: 12, cols: 12 };
+        let signature = Signature { cover: Cover::Range(range), window, ..Signature::of(&scene) };
+        let mut refused = |rows: usize, cols: usize, pitch_mm: f64| {
+            (scene.sensor.rows, scene.sensor.cols) = (rows, cols);
+            (scene.sensor.pitch_x_mm, scene.sensor.pitch_y_mm) = (pitch_mm, pitch_mm);
+            signature.check(&scene, EstimatorKind::Network, "n").map_err(|error| error.to_string()).err()
+        };
+        for (rows, cols, pitch_mm) in [(12, 12, 1.5), (8, 10, 4.0), (6, 12, 2.5), (10, 6, 3.0)] {
+            assert_eq!(refused(rows, cols, pitch_mm), None, "{rows} × {cols}");
+        }
+        for (rows, cols, pitch_mm) in [(12, 14, 3.0), (9, 10, 4.0), (4, 8, 4.0), (8, 8, 1.5)] {
+            let message = refused(rows, cols, pitch_mm).unwrap();
+            let wanted =
+                "whole array of 12 × 12, or fewer by even numbers, at least 6 and 5 thicknesses, the scene has ";
+            assert!(message.contains(wanted), "{message}");
+        }
+        let mut largest = Scene::builtin("eight-by-eight-bonded").unwrap();
+        (largest.sensor.rows, largest.sensor.cols) = (12, 12);
+        let all = signature.cover.scenes(&largest, 60);
+        assert!(all.iter().all(|scene| signature.check(scene, EstimatorKind::Network, "n").is_ok()));
+        assert!([6, 8, 10, 12].iter().all(|side| all.iter().any(|scene| scene.sensor.rows == *side)));
     }
 
     /// Older files, of one sensor, are read as they were; a range is written beside the other fields.

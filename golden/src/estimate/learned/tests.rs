@@ -79,6 +79,41 @@ fn the_shipped_networks_are_accurate() {
     }
 }
 
+/// The networks for many sensors, on sensors that their training has not drawn, at 0.2 and 1 % of noise.
+#[test]
+fn a_shipped_network_serves_sensors_that_it_has_not_seen() {
+    let study = |unipolar: bool| {
+        let mut study = ShapeStudy {
+            levels: vec![2e-3, 1e-2],
+            draws: 40,
+            candidates: vec![Candidate::Estimator(EstimatorKind::Network)],
+            ..Default::default()
+        };
+        study.options.converter.unipolar = unipolar;
+        study
+    };
+    for (rows, cols, pitches_mm, thickness_mm, poisson, limits) in [
+        (10, 10, [2.0, 4.0], 3.0, 0.48, [0.13, 0.4]),
+        (12, 8, [2.5, 3.0], 2.0, 0.45, [0.15, 0.45]),
+        (6, 12, [4.0, 2.2], 4.0, 0.33, [0.15, 0.45]),
+    ] {
+        let [pitch_x_mm, pitch_y_mm] = pitches_mm;
+        let mut scene = scene("sensor-1-bonded");
+        scene.sensor = Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm };
+        scene.medium = Medium::BondedLayer { poisson };
+        for (unipolar, network) in [(false, "dermis:bonded"), (true, "dermis:bonded-unipolar")] {
+            scene.input.unipolar = unipolar;
+            scene.search.network = Some(network.into());
+            assert_eq!(Learned::serving(&scene).is_some_and(|own| own == network), poisson != 0.48 || unipolar);
+            let rows = shape_study(&scene, &study(unipolar), &|_, _| ()).unwrap();
+            for (row, most) in rows.chunks(2).zip(limits) {
+                let median = row[1].summary.tangential.median.value;
+                assert!(median < most, "{network}, {} at {}: {median}", scene.sensor, row[1].noise);
+            }
+        }
+    }
+}
+
 #[test]
 fn equal_seeds_give_equal_files() {
     let scene = scene("eight-by-eight");
