@@ -36,7 +36,7 @@ const RANGE_SENSORS: usize = 16;
   dermis train my-scene.toml --minutes 15            longer, for a little more accuracy
   dermis train my-scene.toml --poisson-tolerance 0.02 --thickness-tolerance 0.05     a cover that is not known exactly
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
-  dermis train pad.toml --pitch-over-thickness 0.5:2 --least-side 6 --steps 120000     one network for many sensors
+  dermis train my-scene.toml --pitch-over-thickness 0.5:2 --least-side 6 --steps 120000     one network for many sensors
   dermis train my-scene.toml --limit-of my-scene.network     a network of an older version: how unlike a frame may be
 
 Then, in the scene: [search] with network = \"my-scene.network\", [hardware] with estimator = \"network\".

@@ -26,6 +26,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("dermis live sensor-1 --listen 192.168.1.7:8317", PAGE),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --udp 192.168.1.50 --scene sensor-1 --check", "network.rs"),
+    ("dermis host --udp 192.168.1.50#3 --scene hand.toml --forces", "network.rs"),
     ("dermis board eight-by-eight --udp 127.0.0.1:56850", "has no end; network.rs"),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -65,6 +66,10 @@ const NOT_RUN: &[(&str, &str)] = &[
     (
         "dermis train my-scene.toml --poisson-tolerance 0.02 --thickness-tolerance 0.05",
         "minutes; golden/src/estimate/learned/tests.rs",
+    ),
+    (
+        "dermis train my-scene.toml --pitch-over-thickness 0.5:2 --least-side 6 --steps 120000",
+        "half an hour; golden/src/estimate/learned/tests.rs",
     ),
     ("dermis train my-scene.toml --limit-of my-scene.network", "needs a network of an older version"),
     ("dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network", "minutes"),

@@ -79,7 +79,8 @@ fn the_shipped_networks_are_accurate() {
     }
 }
 
-/// The networks for many sensors, on sensors that their training has not drawn, at 0.2 and 1 % of noise.
+/// The networks for many sensors, on sensors that their training has not drawn, at 0.2 and 1 % of noise: at most a third more than
+/// the guide's tables have of the sensor that is read worst.
 #[test]
 fn a_shipped_network_serves_sensors_that_it_has_not_seen() {
     let study = |unipolar: bool| {
@@ -92,16 +93,15 @@ fn a_shipped_network_serves_sensors_that_it_has_not_seen() {
         study.options.converter.unipolar = unipolar;
         study
     };
-    for (rows, cols, pitches_mm, thickness_mm, poisson, limits) in [
-        (10, 10, [2.0, 4.0], 3.0, 0.48, [0.13, 0.4]),
-        (12, 8, [2.5, 3.0], 2.0, 0.45, [0.15, 0.45]),
-        (6, 12, [4.0, 2.2], 4.0, 0.33, [0.15, 0.45]),
-    ] {
+    for (rows, cols, pitches_mm, thickness_mm, poisson) in
+        [(10, 10, [2.0, 4.0], 3.0, 0.48), (12, 8, [2.5, 3.0], 2.0, 0.45), (6, 12, [4.0, 2.2], 4.0, 0.33)]
+    {
         let [pitch_x_mm, pitch_y_mm] = pitches_mm;
         let mut scene = scene("sensor-1-bonded");
         scene.sensor = Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm };
         scene.medium = Medium::BondedLayer { poisson };
-        for (unipolar, network) in [(false, "dermis:bonded"), (true, "dermis:bonded-unipolar")] {
+        let networks = [(false, "dermis:bonded", [0.165, 0.51]), (true, "dermis:bonded-unipolar", [0.21, 0.56])];
+        for (unipolar, network, limits) in networks {
             scene.input.unipolar = unipolar;
             scene.search.network = Some(network.into());
             assert_eq!(Learned::serving(&scene).is_some_and(|own| own == network), poisson != 0.48 || unipolar);
