@@ -518,7 +518,7 @@ dermis_status dermis_stream_push_at(dermis_stream *stream,
  * it. After an error *board is NULL.
  *
  * port is the path of a serial port, such as "/dev/ttyUSB0", at the bit rate of the scene's board, or "udp:192.168.1.50", the
- * address of a core behind Ethernet. A request is made again after timeout_ms without an answer, up to eight times.
+ * address of a core behind Ethernet, of several arrays with a number as in "udp:192.168.1.50#3". A request is made again after timeout_ms without an answer, up to eight times.
  * cross_check is that of dermis_stream_new: the frames that are answered are a stream.
  *
  * DERMIS_STATUS_BOARD: no answer, or a board of another scene or version.

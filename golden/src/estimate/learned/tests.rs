@@ -94,7 +94,7 @@ fn a_shipped_network_serves_sensors_that_it_has_not_seen() {
         study
     };
     for (rows, cols, pitches_mm, thickness_mm, poisson) in
-        [(10, 10, [2.0, 4.0], 3.0, 0.48), (12, 8, [2.5, 3.0], 2.0, 0.45), (6, 12, [4.0, 2.2], 4.0, 0.33)]
+        [(10, 10, [2.0, 4.0], 3.0, 0.48), (12, 8, [2.5, 3.0], 2.0, 0.45), (6, 12, [2.2, 4.0], 4.0, 0.33)]
     {
         let [pitch_x_mm, pitch_y_mm] = pitches_mm;
         let mut scene = scene("sensor-1-bonded");
