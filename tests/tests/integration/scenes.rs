@@ -12,8 +12,8 @@ use dermis_sim::cosim::verify::verify;
 use dermis_tests::{assert_equal, build_dir, compare, variants, with_network};
 use proptest::prelude::*;
 
-/// Name, and the difference from a default scene of 6×6 taxels; those behind the first seven run in `make nightly`.
-const SCENES: [(&str, &str); 17] = [
+/// Name, and the difference from a default scene of 6×6 taxels; those behind the first eight run in `make nightly`.
+const SCENES: [(&str, &str); 18] = [
     // One quad: a longer pause between accumulations.
     ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Six subarrays in turn, odd rows, under a bonded layer.
@@ -37,6 +37,12 @@ const SCENES: [(&str, &str); 17] = [
         "thresholds",
         "[partition]\ncondition = \"both-signs\"\n[threshold]\nmin_force_N = 0.05\n[search]\nnoise_floor_MPa = 0.001\n\
          [input]\nfull_scale_MPa = 0.05\n",
+    ),
+    // The network for many sensors, whose window is larger than the array.
+    (
+        "many-sensors",
+        "[sensor]\nrows = 6\ncols = 8\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+         [medium]\nkind = \"bonded-layer\"\n[search]\nnetwork = \"dermis:bonded\"\n[hardware]\nestimator = \"network\"\n",
     ),
     // Two quads: sweeps shorter than the pipeline that follows them.
     ("2x3", "[sensor]\nrows = 2\ncols = 3\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
@@ -100,7 +106,7 @@ fn the_scenes_have_the_limbs_they_are_here_for() {
 #[test]
 fn unlike_scenes_are_equal() {
     let mut intervals = 0;
-    let scenes = variants(&SCENES, 7);
+    let scenes = variants(&SCENES, 8);
     for (name, text) in scenes {
         let scene = parse(name, text);
         let simulators = [Simulator::Verilator, Simulator::Kernel];
