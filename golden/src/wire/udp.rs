@@ -226,7 +226,7 @@ impl Packet {
         Packet { kind: Kind::Frame, ..Packet::question(sequence).of_array(array) }.split(&words, fragment_words)
     }
 
-    /// The packets of an image of tables of array `array`, below 16.
+    /// The packets of an image of tables of array `array`, below [`MOST_ARRAYS`].
     ///
     /// # Errors
     /// More bytes than 255 packets hold.

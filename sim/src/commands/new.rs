@@ -216,37 +216,39 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
     let number = |value: f64| Some(format!("{value:?}"));
     let board = arguments.board.as_deref().map(|board| board_beside(board, &arguments.file)).transpose()?;
     let of_board = board.map(|board| ("board", Some(format!("{board:?}"))));
-    let mut tables = vec![
-        (
-            "sensor",
-            vec![
-                ("rows", Some(rows.to_string())),
-                ("cols", Some(cols.to_string())),
-                ("pitch_x_mm", number(x)),
-                ("pitch_y_mm", number(y)),
-                ("thickness_mm", number(thickness)),
-            ],
-        ),
-        ("medium", medium),
-        ("search", vec![("mu_max", arguments.friction.and_then(number)), ("noise_floor_MPa", noise.and_then(number))]),
-        (
-            "input",
-            vec![
-                ("full_scale_MPa", full_scale.and_then(number)),
-                ("unipolar", unipolar),
-                ("calibration", None),
-                ("tare", None),
-                ("dead", None),
-            ],
-        ),
-        ("hardware", of_board.into_iter().collect()),
-    ];
-    let scene = Scene::parse(&text_of(&tables)?, "the new scene").ok();
-    if let Some(network) = scene.as_ref().and_then(network) {
-        tables[2].1.push(("network", Some(format!("{network:?}"))));
-        tables[4].1.push(("estimator", Some("\"network\"".to_owned())));
-    }
-    text_of(&tables)
+    let tables = |network: Option<&str>| {
+        let quoted = |text: &str| Some(format!("{text:?}"));
+        let of_network = network.map(|name| ("network", quoted(name)));
+        let in_hardware = network.map(|_| ("estimator", quoted("network")));
+        let search = [("mu_max", arguments.friction.and_then(number)), ("noise_floor_MPa", noise.and_then(number))];
+        [
+            (
+                "sensor",
+                vec![
+                    ("rows", Some(rows.to_string())),
+                    ("cols", Some(cols.to_string())),
+                    ("pitch_x_mm", number(x)),
+                    ("pitch_y_mm", number(y)),
+                    ("thickness_mm", number(thickness)),
+                ],
+            ),
+            ("medium", medium.clone()),
+            ("search", search.into_iter().chain(of_network).collect()),
+            (
+                "input",
+                vec![
+                    ("full_scale_MPa", full_scale.and_then(number)),
+                    ("unipolar", unipolar.clone()),
+                    ("calibration", None),
+                    ("tare", None),
+                    ("dead", None),
+                ],
+            ),
+            ("hardware", of_board.clone().into_iter().chain(in_hardware).collect()),
+        ]
+    };
+    let scene = Scene::parse(&text_of(&tables(None))?, "the new scene").ok();
+    text_of(&tables(scene.as_ref().and_then(network)))
 }
 
 /// The network of the program for the hardware of a scene; `None` without one, without noise, where the search is more accurate, and on

@@ -150,8 +150,13 @@ impl NetworkClient {
             Whole::Identity { sequence, identity } if sequence == wanted => Some(identity),
             _ => None,
         };
-        let array = self.array.unwrap_or_default();
+        let array = self.number();
         self.request("identify", true, &|sequence| Ok(vec![Packet::question(sequence).of_array(array)]), &own)
+    }
+
+    /// The number of the array in packets.
+    fn number(&self) -> u8 {
+        self.array.unwrap_or_default()
     }
 
     fn failed(&self, reason: &dyn std::fmt::Display) -> HostError {
@@ -231,7 +236,7 @@ impl Board for NetworkClient {
 
     fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
         let (form, fragment_words) = ((self.code_bytes, self.bits_left_out), self.fragment_words);
-        let array = self.array.unwrap_or_default();
+        let array = self.number();
         let packets = |sequence| Packet::frame(sequence, array, codes, form, fragment_words);
         let result = |answer, wanted| match answer {
             Whole::Result { sequence, cycles, words, .. } if sequence == wanted => Some((cycles, words)),
@@ -253,7 +258,7 @@ impl Board for NetworkClient {
 
     fn write_tables(&mut self, image: &[u8]) -> Result<(), HostError> {
         self.sequence = self.sequence.wrapping_add(1);
-        let all = Packet::tables(self.sequence, self.array.unwrap_or_default(), image, self.fragment_words);
+        let all = Packet::tables(self.sequence, self.number(), image, self.fragment_words);
         let all = all.map_err(|error| self.failed(&error))?;
         for packet in all {
             // The same number again: the core has taken a fragment whose answer was lost.
@@ -267,7 +272,7 @@ impl Board for NetworkClient {
     }
 
     fn array(&self) -> usize {
-        self.array.unwrap_or_default().into()
+        self.number().into()
     }
 
     fn link_errors(&self) -> LinkErrors {

@@ -18,8 +18,6 @@ use crate::stream::DATAGRAM;
 const WAIT: Duration = Duration::from_millis(20);
 /// Bytes of a code in a packet: all its bits are sent.
 const CODE_BYTES: usize = 4;
-/// Counters of packets whose array is not known.
-const OF_ALL: [&str; 2] = ["refused", "damaged"];
 const NS_PER_S: u128 = 1_000_000_000;
 
 /// A running core; stops when dropped.
@@ -79,8 +77,8 @@ struct Core {
     begun: Instant,
     /// Of the hardware, whatever tables are written later.
     scene_hash: u32,
-    /// By name and array; those of packets whose array is not known are of the first.
-    counters: BTreeMap<(&'static str, usize), u32>,
+    /// By name and array; `None`: of packets whose array is not known, or none of this core.
+    counters: BTreeMap<&'static str, BTreeMap<Option<usize>, u32>>,
     /// Sequence number of the newest frame of each array.
     newest: Vec<Option<u32>>,
     /// Array and fragments of the frame that is not whole.
@@ -123,14 +121,9 @@ impl Core {
         Ok(())
     }
 
-    fn count(&mut self, name: &'static str, array: usize) -> Vec<Packet> {
-        *self.counters.entry((name, array)).or_default() += 1;
+    fn count(&mut self, name: &'static str, array: Option<usize>) -> Vec<Packet> {
+        *self.counters.entry(name).or_default().entry(array).or_default() += 1;
         Vec::new()
-    }
-
-    /// Counts a packet whose array is not known, or none of this core.
-    fn count_of_all(&mut self, name: &'static str) -> Vec<Packet> {
-        self.count(name, 0)
     }
 
     /// Cycles of the core's clock.
@@ -149,7 +142,7 @@ impl Core {
     }
 
     fn answer(&mut self, bytes: &[u8]) -> Vec<Packet> {
-        let Some(packet) = Packet::of_bytes(bytes) else { return self.count_of_all("damaged") };
+        let Some(packet) = Packet::of_bytes(bytes) else { return self.count("damaged", None) };
         match packet.kind {
             Kind::Identify => {
                 let words = self.identity(packet.array()).words();
@@ -157,7 +150,7 @@ impl Core {
             }
             Kind::Tables if packet.array() < self.models.len() => self.tables(packet),
             Kind::Frame if packet.array() < self.models.len() => self.frame(packet),
-            _ => self.count_of_all("refused"),
+            _ => self.count("refused", None),
         }
     }
 
@@ -181,9 +174,8 @@ impl Core {
             "time_low" => cycles as u32,
             "time_high" => (cycles >> u32::BITS) as u32,
             counter => {
-                let of = if OF_ALL.contains(&counter) { 0 } else { array };
-                let own = self.counters.iter().find(|((name, of_array), _)| (*name, *of_array) == (counter, of));
-                own.map_or(0, |(_, count)| *count)
+                let own = self.counters.get(counter);
+                own.map_or(0, |own| [None, Some(array)].iter().filter_map(|of| own.get(of)).sum())
             }
         })
     }
@@ -197,7 +189,7 @@ impl Core {
         let again = taken > 0 && index + 1 == taken;
         if !self.any().has_writable_tables() || packet.words.is_empty() || !(again || index == taken) {
             self.image = Some((image, taken, bytes));
-            return self.count_of_all("refused");
+            return self.count("refused", None);
         }
         if !again {
             bytes.extend(packet.words.iter().flat_map(|word| word.to_le_bytes()));
@@ -219,24 +211,24 @@ impl Core {
         let place = usize::from(index) * LAYOUT.fragment_words;
         let expected = words.saturating_sub(place).min(LAYOUT.fragment_words);
         if usize::from(packet.count) != count || packet.words.len() != expected {
-            return self.count_of_all("refused");
+            return self.count("refused", None);
         }
         let newest = self.newest[array];
         let is_collected = self.collected == array && newest == Some(sequence) && !self.fragments.is_empty();
         if !is_collected {
             if newest.is_some_and(|newest| newest.wrapping_sub(sequence) <= LAYOUT.late) {
-                return self.count("ignored", array);
+                return self.count("ignored", Some(array));
             }
             if !self.fragments.is_empty() {
-                self.count("cut", self.collected);
+                self.count("cut", Some(self.collected));
             }
             self.newest[array] = Some(sequence);
             self.collected = array;
             self.fragments.clear();
         } else if self.fragments.contains_key(&index) {
-            return self.count("ignored", array);
+            return self.count("ignored", Some(array));
         }
-        self.count("taken", array);
+        self.count("taken", Some(array));
         self.fragments.insert(index, packet.words);
         if self.fragments.len() < count {
             return Vec::new();

@@ -164,53 +164,14 @@ mod tests {
         }
     }
 
-    /// The composed layers give the μ of the network, also with dead taxels.
-    #[test]
-    fn composed_layers_are_the_network() {
-        let scene = Scene::builtin("sensor-1").unwrap();
-        let learned = Learned::of_scene(&scene, crate::spec::scene::EstimatorKind::Network).unwrap();
-        let frame = crate::data::frame::Frame::shipped(&scene).remove(1);
+    /// The layers for the array of `scene`, which the network reads as a whole, give its μ and σ for stress `b`, also with dead taxels.
+    fn composed_layers_are(learned: &Learned, scene: &Scene, b: &[f64]) {
         for dead in [vec![], vec![37, 5]] {
-            let alive: Vec<bool> = (0..100).map(|taxel| !dead.contains(&taxel)).collect();
-            let contact = OneContact { b: &frame.stress_MPa, alive: &alive, centre_mm: [0.0; 2] };
-            let told = by_features(&learned, &contact);
-            let peak = (0..100).filter(|t| alive[*t]).map(|t| frame.stress_MPa[t].abs()).fold(0.0, f64::max);
+            let alive: Vec<bool> = (0..b.len()).map(|taxel| !dead.contains(&taxel)).collect();
+            let told = by_features(learned, &OneContact { b, alive: &alive, centre_mm: [0.0; 2] });
+            let peak = (0..b.len()).filter(|t| alive[*t]).map(|t| b[t].abs()).fold(0.0, f64::max);
             let s = f64::from(power_above(peak as f32));
-            let quads = learned.signature.window.quads();
-            let image = |lane| {
-                Mat::from_fn(quads.len(), 1, |quad, _| {
-                    let taxel = quads.taxel(quad, lane);
-                    if alive[taxel] {
-                        (frame.stress_MPa[taxel] / s) as f32
-                    } else {
-                        0.0
-                    }
-                })
-            };
-            let found = outputs(&learned.composed(&alive), exchanged(std::array::from_fn(image)), None);
-            for axis in [0, 1] {
-                let mu = f64::from(found[(axis, 0)]) * scene.search.mu_max;
-                assert!((mu - told.mean[axis]).abs() < 1e-4, "{mu} {told:?}");
-            }
-        }
-    }
-
-    /// Of an array that is smaller than the window the layers take its own quads, and are the network as well.
-    #[test]
-    fn composed_layers_leave_out_what_lies_beyond_a_smaller_array() {
-        let mut scene = Scene::builtin("sensor-1-bonded").unwrap();
-        let range =
-            Training { pitch_over_thickness: Some([0.5, 2.0]), least_side: Some(6), ..Training::trial(&[6, 4]) };
-        let bytes = Learned::train(&scene, &range, &mut |_| Continue(())).unwrap().bytes;
-        (scene.sensor.rows, scene.sensor.cols, scene.search.network) = (6, 8, None);
-        let learned = Learned::from_bytes(&scene, crate::spec::scene::EstimatorKind::Network, &bytes, "n").unwrap();
-        let b: Vec<f64> = (0..48).map(|taxel| f64::from(taxel * taxel % 11) - 2.0).collect();
-        for dead in [vec![], vec![37, 5]] {
-            let alive: Vec<bool> = (0..48).map(|taxel| !dead.contains(&taxel)).collect();
-            let told = by_features(&learned, &OneContact { b: &b, alive: &alive, centre_mm: [0.0; 2] });
-            let peak = (0..48).filter(|t| alive[*t]).map(|t| b[t].abs()).fold(0.0, f64::max);
-            let s = f64::from(power_above(peak as f32));
-            let quads = Quads { rows: 6, cols: 8 };
+            let quads = Quads { rows: scene.sensor.rows, cols: scene.sensor.cols };
             let read = |taxel: usize| if alive[taxel] { (b[taxel] / s) as f32 } else { 0.0 };
             let image = |lane| Mat::from_fn(quads.len(), 1, |quad, _| read(quads.taxel(quad, lane)));
             let found = outputs(&learned.composed(&alive), exchanged(std::array::from_fn(image)), None);
@@ -220,5 +181,26 @@ mod tests {
                 assert!((ln.exp() * scene.search.mu_max - told.sigma[axis]).abs() < 1e-4, "{ln} {told:?}");
             }
         }
+    }
+
+    #[test]
+    fn composed_layers_are_the_network() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let learned = Learned::of_scene(&scene, crate::spec::scene::EstimatorKind::Network).unwrap();
+        let frame = crate::data::frame::Frame::shipped(&scene).remove(1);
+        composed_layers_are(&learned, &scene, &frame.stress_MPa);
+    }
+
+    /// Of an array that is smaller than the window they take its own quads.
+    #[test]
+    fn composed_layers_leave_out_what_lies_beyond_a_smaller_array() {
+        let mut scene = Scene::builtin("sensor-1-bonded").unwrap();
+        let range =
+            Training { pitch_over_thickness: Some([0.5, 2.0]), least_side: Some(6), ..Training::trial(&[6, 4]) };
+        let bytes = Learned::train(&scene, &range, &mut |_| Continue(())).unwrap().bytes;
+        (scene.sensor.rows, scene.sensor.cols, scene.search.network) = (6, 8, None);
+        let learned = Learned::from_bytes(&scene, crate::spec::scene::EstimatorKind::Network, &bytes, "n").unwrap();
+        let b: Vec<f64> = (0..48).map(|taxel| f64::from(taxel * taxel % 11) - 2.0).collect();
+        composed_layers_are(&learned, &scene, &b);
     }
 }

@@ -271,17 +271,24 @@ fn first_difference<const N: usize>(
 mod tests {
     use super::*;
 
+    /// A change of a scene, and what its refusal says.
+    type Case = (fn(&mut Scene), &'static str);
+
+    /// The signature does not serve `scene` after any of the changes.
+    fn is_refused(signature: &Signature, scene: &Scene, cases: &[Case]) {
+        for (change, wanted) in cases {
+            let mut other = scene.clone();
+            change(&mut other);
+            let message = signature.check(&other, EstimatorKind::Network, "n").unwrap_err().to_string();
+            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
+        }
+    }
+
     #[test]
     fn another_physics_is_refused_by_field() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let signature = Signature::of(&scene);
         assert!(signature.check(&scene, EstimatorKind::Network, "n").is_ok());
-        let refused = |change: fn(&mut Scene)| {
-            let mut other = scene.clone();
-            change(&mut other);
-            signature.check(&other, EstimatorKind::Network, "n").unwrap_err().to_string()
-        };
-        type Case = (fn(&mut Scene), &'static str);
         let cases: [Case; 7] = [
             (|s| s.sensor.pitch_x_mm = 2.5, "sensor.pitch_x_mm = 2, the scene has 2.5"),
             (|s| s.sensor.pitch_y_mm = 2.0, "sensor.pitch_y_mm = 4, the scene has 2"),
@@ -291,10 +298,7 @@ mod tests {
             (|s| s.input.unipolar = true, "input.unipolar = false, the scene has true"),
             (|s| s.search.mu_max = 1.0, "search.mu_max = 0.6, the scene has 1"),
         ];
-        for (change, wanted) in cases {
-            let message = refused(change);
-            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
-        }
+        is_refused(&signature, &scene, &cases);
     }
 
     /// A network for a range serves every sensor in it, and names the field of one that is not.
@@ -304,11 +308,10 @@ mod tests {
         let range =
             SensorRange { pitch_over_thickness: [0.5, 2.0], poisson: Some(SensorRange::POISSON), least_side: None };
         let signature = Signature { cover: Cover::Range(range.clone()), ..Signature::of(&scene) };
-        let check =
-            |scene: &Scene| signature.check(scene, EstimatorKind::Network, "n").map_err(|error| error.to_string());
-        assert_eq!(check(&scene), Ok(()));
+        assert!(signature.check(&scene, EstimatorKind::Network, "n").is_ok());
         let spread = signature.cover.scenes(&scene, 60);
-        assert!(spread.len() == 60 && spread.iter().all(|scene| check(scene).is_ok()));
+        let serves = |scene: &Scene| signature.check(scene, EstimatorKind::Network, "n").is_ok();
+        assert!(spread.len() == 60 && spread.iter().all(serves));
         let places: Vec<[f32; 3]> = spread.iter().map(|scene| range.place(&scene.sensor, scene.medium)).collect();
         for axis in 0..3 {
             // Spread evenly: as many below the middle as above, and near both ends.
@@ -317,12 +320,6 @@ mod tests {
             assert!(own.iter().any(|place| *place < -0.9) && own.iter().any(|place| *place > 0.9));
             assert!(own.iter().all(|place| (-1.0..=1.0).contains(place)));
         }
-        let refused = |change: fn(&mut Scene)| {
-            let mut other = scene.clone();
-            change(&mut other);
-            check(&other).unwrap_err()
-        };
-        type Case = (fn(&mut Scene), &'static str);
         let cases: [Case; 5] = [
             (
                 |s| s.sensor.pitch_x_mm = 1.4,
@@ -336,10 +333,7 @@ mod tests {
             (|s| s.medium = Medium::HalfSpace, "poisson 0.3 to 0.499, the scene has half-space"),
             (|s| s.sensor.rows = 9, "whole array of 10 × 10, the scene has whole array of 9 × 10"),
         ];
-        for (change, wanted) in cases {
-            let message = refused(change);
-            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
-        }
+        is_refused(&signature, &scene, &cases);
     }
 
     /// Of a range smaller arrays too, down to the least side and the least width, by even numbers.
