@@ -23,7 +23,7 @@ from dermis_litex.packets import (
     mantissa_of,
     unchecked,
 )
-from dermis_litex.udp import DermisUDP, FrameReceiver, Newest, PacketCounter, Requesters, ResultSender, ShortForces, Waiting
+from dermis_litex.udp import DermisUDP, FrameReceiver, PacketCounter, Requesters, ResultSender, ShortForces, Waiting, WordOfArrays
 from gateware import Packets, Port, write_verilog
 from litex.gen import LiteXModule, Signal
 from litex.gen.sim import passive, run_simulation
@@ -177,7 +177,7 @@ def test_a_receiver_that_takes_late_packets_is_found(crc_in_python, monkeypatch)
     "part, one",
     # Numbers, and counters, of all arrays are those of one; who sent the frame that leaves is who sent the one that is collected.
     [
-        (Newest, lambda init: lambda self, arrays: init(self, 1)),
+        (WordOfArrays, lambda init: lambda self, bits, arrays: init(self, bits, 1)),
         (PacketCounter, lambda init: lambda self, arrays: init(self, 1)),
         (Waiting, lambda init: lambda self, layout, banks: init(self, layout, 2)),
     ],

@@ -205,32 +205,36 @@ class PacketCheck(LiteXModule):
         self.sync += [leaves.eq(next_leaves), If(steps, at.eq(at + 1), If(source.last, at.eq(0)))]
 
 
-class Newest(LiteXModule):
-    """The newest sequence number of each array: `value` of array `array`, `known` once it has one; with `sets` it is `given`."""
+class WordOfArrays(LiteXModule):
+    """A word of each array: `value` is that of array `array`, where it is `known` since the reset; with `sets` it is `given`."""
 
-    def __init__(self, arrays):
-        self.array = array = Signal(max=max(arrays, 2))
-        self.value, self.given = Signal(SEQUENCE_BITS), Signal(SEQUENCE_BITS)
-        self.known, self.sets = Signal(), Signal()
+    def __init__(self, bits, arrays):
+        self.array = Signal(max=max(arrays, 2))
+        self.given, self.sets = Signal(bits), Signal()
+        self.has = Signal(arrays)
+        self.word = Signal(bits) if arrays == 1 else Memory(bits, arrays)
+        self.value, self.known = self.at(self.array)
 
         # # #
 
-        have = Signal(arrays)
-        self.comb += choose(self.known, array, list(have))
-        self.sync += If(self.sets, have.eq(have | 1 << array))
+        self.sync += If(self.sets, self.has.eq(self.has | 1 << self.array))
         if arrays == 1:
-            self.sync += If(self.sets, self.value.eq(self.given))
+            self.sync += If(self.sets, self.word.eq(self.given))
             return
-        memory = Memory(SEQUENCE_BITS, arrays)
-        write, read = memory.get_port(write_capable=True), memory.get_port(async_read=True)
-        self.specials += memory, write, read
-        self.comb += [
-            write.adr.eq(array),
-            write.dat_w.eq(self.given),
-            write.we.eq(self.sets),
-            read.adr.eq(array),
-            self.value.eq(read.dat_r),
-        ]
+        write = self.word.get_port(write_capable=True)
+        self.specials += self.word, write
+        self.comb += [write.adr.eq(self.array), write.dat_w.eq(self.given), write.we.eq(self.sets)]
+
+    def at(self, array):
+        """The word of an array, and whether it is known: a memory has no reset."""
+        known = Signal()
+        self.comb += choose(known, array, list(self.has))
+        if isinstance(self.word, Signal):
+            return self.word, known
+        read = self.word.get_port(async_read=True)
+        self.specials += read
+        self.comb += read.adr.eq(array)
+        return read.dat_r, known
 
 
 class Waiting(LiteXModule):
@@ -275,22 +279,14 @@ class PacketCounter(LiteXModule):
         if arrays == 1:
             self.comb += self.own.eq(self.all)
             return
-        # A memory has no reset.
-        have, has, has_asked = Signal(arrays), Signal(), Signal()
-        memory = Memory(WORD_BITS, arrays)
-        write, read, ask = memory.get_port(write_capable=True), memory.get_port(async_read=True), memory.get_port(async_read=True)
-        self.specials += memory, write, read, ask
+        self.words = words = WordOfArrays(WORD_BITS, arrays)
+        count, known = words.at(self.asked)
         self.comb += [
-            choose(has, self.of, list(have)),
-            choose(has_asked, self.asked, list(have)),
-            read.adr.eq(self.of),
-            write.adr.eq(self.of),
-            write.dat_w.eq(Mux(has, read.dat_r, 0) + 1),
-            write.we.eq(self.happens),
-            ask.adr.eq(self.asked),
-            self.own.eq(Mux(has_asked, ask.dat_r, 0)),
+            words.array.eq(self.of),
+            words.given.eq(Mux(words.known, words.value, 0) + 1),
+            words.sets.eq(self.happens),
+            self.own.eq(Mux(known, count, 0)),
         ]
-        self.sync += If(self.happens, have.eq(have | 1 << self.of))
 
 
 class FrameReceiver(LiteXModule):
@@ -348,7 +344,8 @@ class FrameReceiver(LiteXModule):
         bank, collects = Signal(bank_bits), Signal()
         whose = [("ip_address", 32), ("port", 16), ("sequence", SEQUENCE_BITS), ("array", max(array_bits, 1))]
         self.waiting = waiting = Waiting(whose, 2**bank_bits)
-        self.newest = newest = Newest(arrays)
+        # Sequence number of the newest frame of each array.
+        self.newest = newest = WordOfArrays(SEQUENCE_BITS, arrays)
         own = stream.Endpoint(whose)
         come = Signal(len(counts))
 
