@@ -11,6 +11,7 @@
 pub mod file;
 pub mod message;
 pub mod read;
+mod records;
 
 pub use file::{frame_messages, Kind, RecordingFile, Stamp};
 pub use read::{End, FrameOptions, Frames, Messages, Recorded, RecordedFrame};

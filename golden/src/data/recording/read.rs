@@ -1,4 +1,4 @@
-//! Messages of an MCAP file in its order, and the frames among them; memory is bounded by the file's largest record.
+//! Messages of an MCAP file in its order, and the frames among them.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -6,10 +6,9 @@ use std::io::Read;
 use std::path::Path;
 
 use mcap::records::{op, Record};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::McapError;
 
 use super::message::{from_cdr, Image, Message};
+use super::records::{no_mcap, Next, Records};
 use super::{RecordingError, EXACT, LIBRARY, STRESS};
 use crate::data::number::{NumberFormat, NumberKind};
 
@@ -31,12 +30,8 @@ const ENCODINGS: [(&str, NumberKind, usize); 9] = [
     ("mono8", NumberKind::Unsigned, 1),
     ("mono16", NumberKind::Unsigned, 2),
 ];
-/// Longest record in bytes that is taken.
-const LONGEST_RECORD: usize = 1 << 28;
 /// Records that are read, of those that the parser knows.
 const READ: [u8; 5] = [op::HEADER, op::FOOTER, op::SCHEMA, op::CHANNEL, op::MESSAGE];
-/// Bytes that are read at a time.
-const PART: usize = 1 << 16;
 
 /// One message of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,8 +93,7 @@ struct Channel {
 
 /// The messages of a file; errors have no file's name.
 pub struct Messages {
-    file: Box<dyn Read + Send>,
-    reader: LinearReader,
+    records: Records,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
     /// Whether a recorder of Dermis has written it; `None` before its header.
@@ -118,10 +112,8 @@ impl Messages {
 
     /// The messages in the bytes of a file.
     pub fn of(file: impl Read + Send + 'static) -> Messages {
-        let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
-        let reader = LinearReader::new_with_options(options.with_record_length_limit(LONGEST_RECORD));
         let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
-        Messages { file: Box::new(file), reader, schemas, channels, own: None, end: End::Complete }
+        Messages { records: Records::of(file), schemas, channels, own: None, end: End::Complete }
     }
 
     /// The next message; `None` at the end of the file, of which [`Messages::end`] knows more.
@@ -133,29 +125,23 @@ impl Messages {
             if self.end == End::Cut {
                 return Ok(None);
             }
-            let (opcode, data) = match self.reader.next_event() {
-                None => return Ok(None),
+            let (opcode, data) = match self.records.next()? {
+                Next::Record(opcode, data) => (opcode, data),
+                Next::End => return Ok(None),
                 // A file that is cut before its header may be anything.
-                Some(Err(McapError::UnexpectedEof | McapError::UnexpectedEoc)) if self.own.is_some() => {
+                Next::Cut if self.own.is_none() => return Err(no_mcap()),
+                Next::Cut => {
                     self.end = End::Cut;
                     continue;
                 }
-                Some(Err(error)) => return Err(named(error)),
-                // A part of what is asked for: a length that is wrong takes no memory that the file does not fill.
-                Some(Ok(LinearReadEvent::ReadRequest(_))) => {
-                    let read = self.file.read(self.reader.insert(PART))?;
-                    self.reader.notify_read(read);
-                    continue;
-                }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => (opcode, data),
             };
             if !READ.contains(&opcode) {
                 continue;
             }
-            if !lengths_fit(opcode, data) {
+            if !lengths_fit(opcode, &data) {
                 return Err(RecordingError::new("a record has a text or list that is longer than the record"));
             }
-            match mcap::parse_record(opcode, data).map_err(named)? {
+            match mcap::parse_record(opcode, &data)? {
                 Record::Header(header) => self.own = Some(header.library.starts_with(LIBRARY)),
                 Record::Footer(footer) if footer.summary_start == 0 && self.own == Some(true) => {
                     self.end = End::Unfinished;
@@ -232,17 +218,6 @@ fn lengths_fit(opcode: u8, data: &[u8]) -> bool {
         last = &last[end..];
     }
     true
-}
-
-/// An error in words of the file.
-fn named(error: McapError) -> RecordingError {
-    match error {
-        McapError::BadMagic | McapError::UnexpectedEof => RecordingError::new("is no MCAP file"),
-        McapError::UnsupportedCompression(name) => RecordingError::new(format!(
-            "its chunks are compressed by {name}: zstd, lz4 and files without compression are read"
-        )),
-        other => other.into(),
-    }
 }
 
 /// One recorded frame.
@@ -531,17 +506,22 @@ mod tests {
             }
         };
         assert_eq!(read(&text), Ok((3, End::Complete)));
-        let mut least = 0;
-        for length in 0..text.len() {
-            match read(&text[..length]) {
-                Err(error) => assert_eq!((error.as_str(), least), ("is no MCAP file", 0)),
-                Ok((count, end)) => {
-                    assert!(count >= least && end == End::Cut, "{length}: {count}, {end:?}");
-                    least = count;
+        for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
+            let own = compressed(compression, STRESS, Image::NAME, &vec![image(DOUBLE, &bytes(VALUES)); 3]);
+            let text = std::fs::read(own.path()).unwrap();
+            assert_eq!(read(&text), Ok((3, End::Complete)));
+            let mut least = 0;
+            for length in 0..text.len() {
+                match read(&text[..length]) {
+                    Err(error) => assert_eq!((error.as_str(), least), ("is no MCAP file", 0)),
+                    Ok((count, end)) => {
+                        assert!(count >= least && end == End::Cut, "{compression:?} {length}: {count}, {end:?}");
+                        least = count;
+                    }
                 }
             }
+            assert_eq!(least, 3, "{compression:?}");
         }
-        assert_eq!(least, 3);
         assert_eq!(read(b"0.1,0.2\n0.3,0.4\n").unwrap_err(), "is no MCAP file");
         let stored = VALUES[5].to_le_bytes();
         let at = text.windows(8).position(|bytes| bytes == stored).unwrap();
