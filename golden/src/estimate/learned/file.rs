@@ -112,6 +112,9 @@ fn parts<'a>(bytes: &'a [u8], file: &str) -> Result<(Head, &'a [u8]), LearnedErr
     if widths.first() != Some(&inputs) || widths.last() != Some(&OUTPUT_CHANNELS) {
         return Err(damaged("its widths do not fit its window"));
     }
+    if !head.signature.cover.is_possible() {
+        return Err(damaged("its range of sensors is none"));
+    }
     if head.misfit_limit.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
         return Err(damaged("its limit of the misfit is out of range"));
     }
@@ -169,6 +172,7 @@ fn layer(rest: &mut &[u8], inputs: usize, outputs: usize) -> Option<Layer> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::signature::{Cover, SensorRange};
     use super::*;
     use crate::random::Random;
     use crate::spec::scene::Scene;
@@ -208,6 +212,22 @@ mod tests {
         }
         for length in [0, 3, 17, bytes.len() - 1] {
             assert!(matches!(decode(&bytes[..length], "f"), Err(LearnedError::Damaged { .. })), "{length}");
+        }
+    }
+
+    #[test]
+    fn a_range_that_no_sensor_is_in_is_refused() {
+        let read = |pitch_over_thickness: [f64; 2]| {
+            let (_, mut signature) = network();
+            signature.cover = Cover::Range(SensorRange { pitch_over_thickness, poisson: None, least_side: None });
+            let inputs = Features::channels(&signature.window) + signature.cover.inputs();
+            let network = Network::random(&[inputs, 5, OUTPUT_CHANNELS], &mut Random::new(1));
+            decode(&encode(&network, &signature).unwrap(), "f")
+        };
+        assert!(read([0.5, 2.0]).is_ok() && read([1.0, 1.0]).is_ok());
+        for bad in [[0.0, 2.0], [-1.0, 2.0], [2.0, 0.5]] {
+            let error = read(bad).unwrap_err().to_string();
+            assert!(error.contains("its range of sensors is none"), "{bad:?}: {error}");
         }
     }
 

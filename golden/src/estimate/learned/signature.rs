@@ -82,6 +82,15 @@ impl Cover {
         }
     }
 
+    /// Whether there is a sensor of it.
+    pub(super) fn is_possible(&self) -> bool {
+        let ordered = |[low, high]: [f64; 2]| 0.0 < low && low <= high;
+        match self {
+            Cover::One { .. } => true,
+            Cover::Range(range) => ordered(range.pitch_over_thickness) && range.poisson.is_none_or(ordered),
+        }
+    }
+
     /// Field, value it was trained for and value of the scene where they differ.
     fn difference(&self, scene: &Scene) -> Option<(&'static str, String, String)> {
         let sensor = &scene.sensor;
