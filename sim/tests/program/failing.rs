@@ -162,6 +162,10 @@ fn wrong_write(setting: &Setting, line: &str, whole: &Run, run: &Run, why: &str)
     if run.code() == Some(0) {
         return None;
     }
+    // A compiler that cannot write says so in its log.
+    if run.code() == Some(1) && run.stderr().contains(" failed; ") && run.stderr().contains(&format!(": {why}")) {
+        return None;
+    }
     // A shell that cannot open a file has an error of its own.
     if run.code() != Some(2) || !error.contains(&format!(": {why}")) || run.stderr().contains("panicked") {
         return Some(format!("exit code {:?}: {}", run.code(), run.stderr()));

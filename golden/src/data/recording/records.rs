@@ -221,8 +221,10 @@ mod tests {
         of(op::CHUNK, &[&head.concat(), &(records.len() as u64).to_le_bytes()[..], records].concat())
     }
 
-    /// Opcodes and contents of the records of a file, and how it ends.
-    fn read(records: &[Vec<u8>]) -> std::result::Result<(Vec<(u8, Vec<u8>)>, bool), String> {
+    /// Opcodes and contents of the records of a file, and whether it has its end.
+    type Read = std::result::Result<(Vec<(u8, Vec<u8>)>, bool), String>;
+
+    fn read(records: &[Vec<u8>]) -> Read {
         let file = [MAGIC, &records.concat(), MAGIC].concat();
         let (mut read, mut all) = (Records::of(Cursor::new(file)), Vec::new());
         loop {
