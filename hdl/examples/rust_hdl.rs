@@ -32,11 +32,11 @@ impl Skin {
         Skin {
             clock: Default::default(),
             reset: Default::default(),
-            code: Wire::new(engine.s_axis_tdata.width()),
+            code: Wire::new(engine.s_axis.data.width()),
             code_valid: Default::default(),
             code_last: Default::default(),
             code_ready: Default::default(),
-            beat: Wire::new(engine.m_axis_tdata.width()),
+            beat: Wire::new(engine.m_axis.data.width()),
             beat_valid: Default::default(),
             beat_last: Default::default(),
             engine,
@@ -49,14 +49,14 @@ impl Logic for Skin {
     fn update(&mut self) {
         self.engine.clk.next = self.clock.val();
         self.engine.rst.next = self.reset.val();
-        self.engine.s_axis_tdata.next = self.code.val();
-        self.engine.s_axis_tvalid.next = self.code_valid.val();
-        self.engine.s_axis_tlast.next = self.code_last.val();
-        self.code_ready.next = self.engine.s_axis_tready.val();
-        self.beat.next = self.engine.m_axis_tdata.val();
-        self.beat_valid.next = self.engine.m_axis_tvalid.val();
-        self.beat_last.next = self.engine.m_axis_tlast.val();
-        self.engine.m_axis_tready.next = true;
+        self.engine.s_axis.data.next = self.code.val();
+        self.engine.s_axis.valid.next = self.code_valid.val();
+        self.engine.s_axis.last.next = self.code_last.val();
+        self.code_ready.next = self.engine.s_axis.ready.val();
+        self.beat.next = self.engine.m_axis.data.val();
+        self.beat_valid.next = self.engine.m_axis.valid.val();
+        self.beat_last.next = self.engine.m_axis.last.val();
+        self.engine.m_axis.ready.next = true;
     }
 }
 

@@ -18,8 +18,8 @@ module proof(
     .s_axil_wdata({32{wbit}}), .s_axil_wstrb({4{wbit}}), .s_axil_wvalid(wvalid), .s_axil_wready(wready),
     .s_axil_bresp(bresp), .s_axil_bvalid(bvalid), .s_axil_bready(bready), .s_axil_araddr(araddr),
     .s_axil_arvalid(arvalid), .s_axil_arready(arready), .s_axil_rdata(rdata), .s_axil_rresp(rresp),
-    .s_axil_rvalid(rvalid), .s_axil_rready(rready), .select(select), .write(write), .address(address), .data(data),
-    .strobe(strobe), .content({32{cbit}}), .refused(refused)
+    .s_axil_rvalid(rvalid), .s_axil_rready(rready), .access_select(select), .access_write(write), .access_address(address),
+    .access_data(data), .access_strobe(strobe), .access_content({32{cbit}}), .access_refused(refused)
   );
   // Accesses under way, the last one, its answer.
   reg writing, reading, was_write, asked, answer, error;

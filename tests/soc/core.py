@@ -121,17 +121,19 @@ class Bench:
 
     def __init__(self, dut):
         self.dut = dut
-        self.source = AxiStreamSource(
-            AxiStreamBus.from_prefix(dut, "s_axis"), dut.aclk, dut.aresetn, reset_active_level=False
-        )
+        self.source = self.source_of("s_axis")
         self.sink = AxiStreamSink(AxiStreamBus.from_prefix(dut, "m_axis"), dut.aclk, dut.aresetn, reset_active_level=False)
         self.registers = Registers(dut)
 
-    @staticmethod
-    async def begin(dut):
+    def source_of(self, prefix):
+        dut = self.dut
+        return AxiStreamSource(AxiStreamBus.from_prefix(dut, prefix), dut.aclk, dut.aresetn, reset_active_level=False)
+
+    @classmethod
+    async def begin(cls, dut):
         cocotb.start_soon(Clock(dut.aclk, 10, unit="ns").start())
         dut.aresetn.value = 0
-        bench = Bench(dut)
+        bench = cls(dut)
         await ClockCycles(dut.aclk, 20)
         dut.aresetn.value = 1
         await ClockCycles(dut.aclk, 2)

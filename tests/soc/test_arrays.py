@@ -1,6 +1,7 @@
 """Several arrays on one core: generates the core, and an engine of each array alone, and runs arrays.py under Icarus."""
 
 import os
+import re
 import shutil
 import subprocess
 
@@ -9,6 +10,7 @@ from test_cores import BUILD, DERMIS, HERE, environment, generate, icarus
 
 ARRAYS = 4
 VERSION = 7
+STREAM = ["tdata", "tvalid", "tready", "tlast"]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +29,57 @@ def arrays_scene():
     return scene
 
 
-def simulate(scene, folder, change=lambda text: text):
+# The core behind its arbiter; the sender of each array has pins of its own. `s_axis` is for the tests of a core alone.
+BEHIND_ARBITER = """
+module behind_arbiter (
+    input wire aclk, input wire aresetn,
+    {senders}
+    input wire [31:0] s_axis_tdata, input wire s_axis_tvalid, output wire s_axis_tready, input wire s_axis_tlast,
+    output wire [63:0] m_axis_tdata, output wire [7:0] m_axis_tkeep, output wire [2:0] m_axis_tuser,
+    output wire [5:0] m_axis_tid, output wire m_axis_tvalid, input wire m_axis_tready, output wire m_axis_tlast,
+    {pins}
+);
+    wire [31:0] tdata;
+    wire [3:0] tkeep;
+    wire [5:0] tid;
+    wire tvalid, tready, tlast;
+    assign s_axis_tready = 1'b0;
+    dermis_arrays_axi_arbiter arbiter (
+        .aclk(aclk), .aresetn(aresetn),
+        .s_axis_tdata({{{tdata}}}), .s_axis_tvalid({{{tvalid}}}), .s_axis_tready({{{tready}}}), .s_axis_tlast({{{tlast}}}),
+        .m_axis_tdata(tdata), .m_axis_tkeep(tkeep), .m_axis_tid(tid),
+        .m_axis_tvalid(tvalid), .m_axis_tready(tready), .m_axis_tlast(tlast)
+    );
+    dermis_arrays_axi core (
+        .aclk(aclk), .aresetn(aresetn),
+        .s_axis_tdata(tdata), .s_axis_tkeep(tkeep), .s_axis_tid(tid),
+        .s_axis_tvalid(tvalid), .s_axis_tready(tready), .s_axis_tlast(tlast),
+        .m_axis_tdata(m_axis_tdata), .m_axis_tkeep(m_axis_tkeep), .m_axis_tuser(m_axis_tuser), .m_axis_tid(m_axis_tid),
+        .m_axis_tvalid(m_axis_tvalid), .m_axis_tready(m_axis_tready), .m_axis_tlast(m_axis_tlast),
+        {connected}
+    );
+endmodule
+"""
+
+
+def behind_arbiter(core):
+    """That module, with the pins of the bus as the module of the core has them."""
+    head = core[core.index("module dermis_arrays_axi (") : core.index(");")]
+    pins = re.findall(r"(?:in|out)put (?:wire|reg) (?:\[\d+:0\] )?s_axil_\w+", head)
+    names = [pin.rsplit(" ", 1)[1] for pin in pins]
+    sender = (
+        "input wire [31:0] s{0}_axis_tdata, input wire s{0}_axis_tvalid, output wire s{0}_axis_tready, "
+        "input wire s{0}_axis_tlast,"
+    )
+    return BEHIND_ARBITER.format(
+        senders="\n    ".join(sender.format(array) for array in range(ARRAYS)),
+        pins=",\n    ".join(pin.replace(" reg ", " wire ") for pin in pins),
+        connected=",\n        ".join(f".{name}({name})" for name in names),
+        **{of: ", ".join(f"s{array}_axis_{of}" for array in reversed(range(ARRAYS))) for of in STREAM},
+    )
+
+
+def simulate(scene, folder, change=lambda text: text, module="arrays"):
     generate(folder, "--bus", "axi", "--stream-bits", "64", scene=scene)
     verilog = folder / "dermis_arrays_axi.v"
     verilog.write_text(change(verilog.read_text(encoding="utf-8")), encoding="utf-8")
@@ -36,12 +88,21 @@ def simulate(scene, folder, change=lambda text: text):
     more |= {"DERMIS_IMAGE": str(BUILD / "arrays/first.tables"), "DERMIS_VERSION": str(VERSION)}
     if "DERMIS_NIGHTLY" in os.environ:
         more["DERMIS_ROUNDS"] = "200"
-    vectors = BUILD / "arrays/alone-0/dermis_arrays_tb"
-    return icarus(folder, "dermis_arrays_axi", [verilog], "arrays", environment("axi", 64, vectors) | more)
+    more = environment("axi", 64, BUILD / "arrays/alone-0/dermis_arrays_tb") | more
+    if module == "arrays":
+        return icarus(folder, "dermis_arrays_axi", [verilog], module, more)
+    top = folder / "behind_arbiter.v"
+    top.write_text(behind_arbiter(verilog.read_text(encoding="utf-8")), encoding="utf-8")
+    arbiter = folder / "dermis_arrays_axi_arbiter.v"
+    return icarus(folder, "behind_arbiter", [top, arbiter, verilog], module, more)
 
 
 def test_arrays(arrays_scene):
     assert simulate(arrays_scene, BUILD / "arrays/axi") == (3, 0)
+
+
+def test_each_array_has_a_sender_of_its_own(arrays_scene):
+    assert simulate(arrays_scene, BUILD / "arrays/arbiter", module="arbiter") == (2, 0)
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_core(vectors, bus, bits):
         ("identifier", "assign m_axis_tid = own_label[3:0];", "assign m_axis_tid = 4'd0;"),
         # Until version 3 of the map: the output is reset too.
         ("reset", "assign stream_out__rst = rst;", "assign stream_out__rst = restart__q;"),
-        ("place", "wire part_2 = left == 3'd1;", "wire part_2 = left == 3'd0;"),
+        ("place", "wire words_part_1 = left == 3'd1;", "wire words_part_1 = left == 3'd0;"),
         pytest.param("error", "error_framing <= 1'b0;", "error_framing <= 1'b1;", marks=NIGHTLY),
     ],
 )

@@ -1,7 +1,6 @@
 //! AXI4-Lite in front of the registers.
 
-use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
-
+use super::bundles::{Accesses, AxiLitePins};
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
 
@@ -13,54 +12,10 @@ block! {
     ports AxiLitePorts {
         clock;
         reset;
-        /// Address of a write in bytes; valid with `s_axil_awvalid`.
-        in s_axil_awaddr: ADDRESS_BITS;
-        /// An address is offered; the sender holds it until `s_axil_awready`.
-        in s_axil_awvalid;
-        /// The address is accepted in this cycle.
-        out s_axil_awready;
-        /// Data of a write; valid with `s_axil_wvalid`.
-        in s_axil_wdata: REGISTER_BITS;
-        /// Bytes of a write that count; valid with `s_axil_wvalid`.
-        in s_axil_wstrb: REGISTER_BITS / 8;
-        /// Data are offered; the sender holds them until `s_axil_wready`.
-        in s_axil_wvalid;
-        /// The data are accepted in this cycle.
-        out s_axil_wready;
-        /// 0 or SLVERR; valid with `s_axil_bvalid`.
-        out s_axil_bresp: 2;
-        /// The answer of a write; it is held until `s_axil_bready`.
-        out s_axil_bvalid;
-        /// The answer is accepted in this cycle.
-        in s_axil_bready;
-        /// Address of a read in bytes; valid with `s_axil_arvalid`.
-        in s_axil_araddr: ADDRESS_BITS;
-        /// An address is offered; the sender holds it until `s_axil_arready`.
-        in s_axil_arvalid;
-        /// The address is accepted in this cycle.
-        out s_axil_arready;
-        /// Content of the register; valid with `s_axil_rvalid`.
-        out s_axil_rdata: REGISTER_BITS;
-        /// 0 or SLVERR; valid with `s_axil_rvalid`.
-        out s_axil_rresp: 2;
-        /// The answer of a read; it is held until `s_axil_rready`.
-        out s_axil_rvalid;
-        /// The answer is accepted in this cycle.
-        in s_axil_rready;
-        /// An access in this cycle.
-        out select;
-        /// The access is a write; valid with `select`.
-        out write;
-        /// Address in bytes; valid with `select`.
-        out address: ADDRESS_BITS;
-        /// Data of a write; valid with `select` and `write`.
-        out data: REGISTER_BITS;
-        /// Bytes of a write that count; valid with `select` and `write`.
-        out strobe: REGISTER_BITS / 8;
-        /// Content of the register; valid in the cycle after `select`.
-        in content: REGISTER_BITS;
-        /// The access is an error; valid in the cycle after `select`.
-        in refused;
+        /// The bus.
+        sink<AxiLitePins> s_axil: true;
+        /// Accesses that it makes.
+        source<Accesses> access: Accesses {};
     }
 }
 
@@ -70,34 +25,34 @@ impl Block for AxiLite {
         let asked = k.state("asked", bit, io.rst, 0).comment("An access was made in the last cycle.");
         let writes = k.register("writes", bit).comment("It was a write.");
         let read_next = k.state("read_next", bit, io.rst, 0).comment("The last access was a write.");
-        let [bvalid, rvalid] = [io.s_axil_bvalid, io.s_axil_rvalid].map(|output| output.state(io.rst, 0));
-        let rdata = io.s_axil_rdata.register();
+        let [bvalid, rvalid] = [io.s_axil.bvalid, io.s_axil.rvalid].map(|output| output.state(io.rst, 0));
+        let rdata = io.s_axil.rdata.register();
         let error = k.register("error", bit);
 
         let idle = k.wire("idle", !(*asked | *bvalid | *rvalid));
-        let can_write = k.wire("can_write", io.s_axil_awvalid & io.s_axil_wvalid);
-        let reads = io.s_axil_arready.set(idle & io.s_axil_arvalid & (*read_next | !can_write));
-        let write = io.write.set(idle & can_write & !(io.s_axil_arvalid & *read_next));
-        io.s_axil_awready.set(write);
-        io.s_axil_wready.set(write);
-        let select = io.select.set(reads | write);
-        io.address.set(write.mux(io.s_axil_awaddr, io.s_axil_araddr));
-        io.data.set(io.s_axil_wdata);
-        io.strobe.set(io.s_axil_wstrb);
+        let can_write = k.wire("can_write", io.s_axil.awvalid & io.s_axil.wvalid);
+        let reads = io.s_axil.arready.set(idle & io.s_axil.arvalid & (*read_next | !can_write));
+        let write = io.access.write.set(idle & can_write & !(io.s_axil.arvalid & *read_next));
+        io.s_axil.awready.set(write);
+        io.s_axil.wready.set(write);
+        let select = io.access.select.set(reads | write);
+        io.access.address.set(write.mux(io.s_axil.awaddr, io.s_axil.araddr));
+        io.access.data.set(io.s_axil.wdata);
+        io.access.strobe.set(io.s_axil.wstrb);
         asked.set(select);
         k.when(select, || {
             writes.set(write);
             read_next.set(write);
         });
         k.when(*asked, || {
-            rdata.set(io.content);
-            error.set(io.refused);
+            rdata.set(io.access.content);
+            error.set(io.access.refused);
         });
-        bvalid.set((*asked & *writes) | (*bvalid & !io.s_axil_bready));
-        rvalid.set((*asked & !*writes) | (*rvalid & !io.s_axil_rready));
+        bvalid.set((*asked & *writes) | (*bvalid & !io.s_axil.bready));
+        rvalid.set((*asked & !*writes) | (*rvalid & !io.s_axil.rready));
         let response = concat(&[*error, k.constant(1, 0)]);
-        io.s_axil_bresp.set(response);
-        io.s_axil_rresp.set(response);
+        io.s_axil.bresp.set(response);
+        io.s_axil.rresp.set(response);
     }
 }
 

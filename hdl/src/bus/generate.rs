@@ -6,19 +6,46 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{c_header, constants, core_header, system_rdl, REGISTERS};
 use serde_json::json;
 
+use super::bundles::id_bits;
 use super::core::hierarchy;
 use super::ip_xact::{component, TopPort};
 use super::testbench::testbench;
-use super::{id_bits, Bus, CoreShape};
+use super::{Bus, CoreShape, FrameArbiter};
 use crate::error::HdlError;
 use crate::generate::{top_name, Generated, Wrapper};
-use crate::language::{Change, Kernel};
+use crate::language::{kernel_of, Change, Hierarchy, Kernel};
 use crate::manifest::GeneratedFile;
 use crate::primitives::Arrays;
 
 /// The ports of a top module.
 fn top_ports(top: &Kernel) -> impl Iterator<Item = TopPort> + '_ {
     top.port_list().map(|(name, is_output, bits, meaning)| (name.to_owned(), is_output, bits, meaning.to_owned()))
+}
+
+/// Name of the module beside a core of several arrays by which each has a stream of its own.
+fn arbiter_name(top: &str) -> String {
+    format!("{top}_arbiter")
+}
+
+/// That module, in a file of its own; `None` with one array.
+fn arbiter(model: &Model, top: &str) -> Result<Option<GeneratedFile>, HdlError> {
+    let arrays = Arrays::of_model(model);
+    if arrays.bits == 0 {
+        return Ok(None);
+    }
+    let name = arbiter_name(top);
+    let hierarchy = Hierarchy::of_kernel(kernel_of(&FrameArbiter::new(arrays, model.scene.sensor.taxels())));
+    hierarchy.check()?;
+    let header = format!(
+        "\
+// {name}: frames of {count} senders, whole and in turn to s_axis of {top}; for designs in which each array has a stream of its own.
+//
+// Generated with {top}; do not edit, build it again.
+//
+",
+        count = arrays.count()
+    );
+    Ok(Some(GeneratedFile { text: header + &hierarchy.verilog(&name, None), name: format!("{name}.v") }))
 }
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
@@ -82,9 +109,15 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     let xml = component(&core.top, shape.bus, &ports, core.files.iter().map(|file| file.name.as_str()));
     core.files.extend(own);
     core.files.push(GeneratedFile { name: format!("{}.xml", core.top), text: xml });
+    let arbiter = arbiter(model, &core.top)?;
+    core.files.extend(arbiter);
     core.add_core_file(model, testbench(model, &core, shape, command));
-    core.manifest["core"] =
-        json!({ "bus": suffix, "stream_bits": 8 * bytes, "id_bits": id_bits(Arrays::of_model(model)) });
+    core.manifest["core"] = json!({
+        "bus": suffix,
+        "stream_bits": 8 * bytes,
+        "id_bits": id_bits(Arrays::of_model(model)),
+        "arbiter": (Arrays::of_model(model).bits > 0).then(|| arbiter_name(&core.top)),
+    });
     core.seal();
     Ok(core)
 }

@@ -9,7 +9,9 @@
 //! The map of the registers is [`dermis_golden::wire::registers`]. `labels` has the identifier of each frame that is under way. A reset by
 //! register resets all but `registers` and `stream_out`, which ends the frame that has begun to leave.
 
+mod arbiter;
 mod axi_lite;
+mod bundles;
 mod core;
 mod generate;
 mod ip_xact;
@@ -20,9 +22,9 @@ mod tables_in;
 mod testbench;
 mod wishbone;
 
-use crate::primitives::Arrays;
-
+pub use arbiter::FrameArbiter;
 pub use axi_lite::AxiLite;
+pub use bundles::{Accesses, AxiLitePins, CoreStream, WishbonePins, ID_BITS};
 pub use core::Core;
 pub use generate::{generate_core, generate_core_changed};
 pub use registers::Registers;
@@ -30,14 +32,6 @@ pub use stream_in::StreamIn;
 pub use stream_out::{StreamOut, WIDTHS};
 pub use tables_in::TablesIn;
 pub use wishbone::Wishbone;
-
-/// Bits of a frame's identifier, `tid`, which its sender chooses; of several arrays the number of the frame's is below them.
-pub const ID_BITS: usize = 4;
-
-/// Bits of `tid`.
-pub(crate) fn id_bits(arrays: Arrays) -> usize {
-    ID_BITS + arrays.bits
-}
 
 /// The bus of the registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,15 +1,13 @@
 //! The registers of the map, and what they control.
 
 use dermis_golden::fixed::plan::resources::count_bits;
-use dermis_golden::wire::registers::{self, Access, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS, RESET_CYCLES};
+use dermis_golden::wire::registers::{self, Access, Register, REGISTERS, REGISTER_BITS, RESET_CYCLES};
 
+use super::bundles::Accesses;
 use super::tables_in::OCTET_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::{Arrays, QUEUE_PLACES};
-
-/// Bytes of a register.
-const BYTES: usize = REGISTER_BITS / 8;
 
 block! {
     /// Answers one access in the cycle after `select`. Counters wrap. Of a write the bytes count that `strobe` names.
@@ -23,16 +21,8 @@ block! {
     ports RegistersPorts {
         clock;
         reset;
-        /// An access in this cycle.
-        in select;
-        /// The access is a write; valid with `select`.
-        in write;
-        /// Address in bytes; valid with `select`.
-        in address: ADDRESS_BITS;
-        /// Data of a write; valid with `select` and `write`.
-        in data: REGISTER_BITS;
-        /// Bytes of a write that count; valid with `select` and `write`.
-        in strobe: BYTES;
+        /// Accesses of a bus.
+        sink<Accesses> access: Accesses {};
         /// The last taxel of a frame is received in this cycle.
         in complete;
         /// The last beat of a whole frame is sent in this cycle.
@@ -53,10 +43,6 @@ block! {
         out octet: OCTET_BITS + arrays.bits;
         /// A byte is offered; it is held until `octet_taken`.
         out octet_valid;
-        /// Content of the register; valid in the cycle after `select`.
-        out content: REGISTER_BITS;
-        /// The access is an error; valid in the cycle after `select`.
-        out refused;
         /// Engine and streams are to be reset.
         out restart;
     }
@@ -72,10 +58,10 @@ impl Registers {
 
 impl Block for Registers {
     fn build<'k>(&self, k: &'k Builder, io: RegistersPorts<Inside<'k>>) {
-        let content = io.content.register();
-        let refused = io.refused.register();
+        let content = io.access.content.register();
+        let refused = io.access.refused.register();
 
-        let is = |register: &Register| io.address.is(register.address as u64);
+        let is = |register: &Register| io.access.address.is(register.address as u64);
         let any = |which: &dyn Fn(&Register) -> bool| {
             REGISTERS.iter().filter(|own| which(own)).map(is).reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
         };
@@ -90,13 +76,13 @@ impl Block for Registers {
         let writable = any(&|own| own.access.is_written() && own.access != Access::Push);
         let room = waiting.map_or(k.constant(1, 0), |waiting| any(&|own| own.access == Access::Push) & !*waiting);
         let writable = k.wire("writable", writable | room);
-        let wrong = k.wire("wrong", io.select & !io.write.mux(writable, known));
+        let wrong = k.wire("wrong", io.access.select & !io.access.write.mux(writable, known));
         // What a write does is in the low byte, but for an image's end and its array.
-        let written = k.wire("written", io.select & io.write & io.strobe.at(0));
+        let written = k.wire("written", io.access.select & io.access.write & io.access.strobe.at(0));
         let bits = |name: &str| {
             let own = REGISTERS.iter().find(|own| own.name == name);
             let reaches = own.map_or(k.constant(1, 0), |own| written & is(own));
-            move |field: registers::Field| reaches & io.data.at(field.low)
+            move |field: registers::Field| reaches & io.access.data.at(field.low)
         };
         let control = bits("control");
         let clear = k.wire("clear", control(registers::CLEAR));
@@ -114,13 +100,13 @@ impl Block for Registers {
                 let octet = io.octet.register();
                 // The byte, and what stands above it.
                 let rest = io.octet.bits() - registers::OCTET.bits;
-                let rest =
-                    io.strobe.at(registers::LAST.low / 8).repeat(rest) & io.data.slice(registers::LAST.low, rest);
+                let rest = io.access.strobe.at(registers::LAST.low / 8).repeat(rest)
+                    & io.access.data.slice(registers::LAST.low, rest);
                 let pushed = k.wire("pushed", written & room);
                 k.when(io.octet_taken, || waiting.set(k.constant(1, 0)));
                 k.when(pushed, || {
                     waiting.set(k.constant(1, 1));
-                    octet.set(rest.concat(io.data.low(registers::OCTET.bits)));
+                    octet.set(rest.concat(io.access.data.low(registers::OCTET.bits)));
                 });
             }
         }
@@ -163,8 +149,8 @@ impl Block for Registers {
         };
         let arms: Vec<(u64, Expr)> =
             REGISTERS.iter().filter_map(|own| Some((own.address as u64, value(own)?))).collect();
-        k.when(io.select, || {
-            content.set(io.address.case(&arms, k.constant(REGISTER_BITS, 0)));
+        k.when(io.access.select, || {
+            content.set(io.access.address.case(&arms, k.constant(REGISTER_BITS, 0)));
             refused.set(wrong);
         });
     }

@@ -2,13 +2,10 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 
-use super::id_bits;
+use super::bundles::{id_bits, CoreStream, WORD_BYTES};
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
-use crate::primitives::Arrays;
-
-/// Bytes of a word of the input.
-pub const WORD_BYTES: usize = 4;
+use crate::primitives::{Arrays, Stream};
 
 block! {
     /// Takes one taxel's code from each beat, as a signed number of 32 bits, into a register. A code that the engine's
@@ -26,29 +23,11 @@ block! {
         clock;
         reset;
         /// A taxel's code, 32 bits signed; valid with `s_axis_tvalid`.
-        in s_axis_tdata: 8 * WORD_BYTES;
-        /// Bytes of the beat that are there, all of them; valid with `s_axis_tvalid`.
-        in s_axis_tkeep: WORD_BYTES;
-        /// Identifier of the frame, the same in all its beats; valid with `s_axis_tvalid`.
-        in s_axis_tid: id_bits(*arrays);
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<CoreStream> s_axis: CoreStream::of_codes(*arrays);
         /// There is room for one more label.
         in room;
         /// The taxel's code, `code_bits` wide, signed; valid with `m_axis_tvalid`.
-        out m_axis_tdata: code_bits;
-        /// Array of the frame: the low bits of its identifier; valid with `m_axis_tvalid`.
-        out m_axis_tid: arrays.bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame, as the sender says; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: (*code_bits, arrays.bits);
         /// Label of the frame: its identifier, and above it whether it is spoiled; valid with `complete`.
         out label: id_bits(*arrays) + 1;
         /// The last taxel of a frame is accepted in this cycle.
@@ -78,42 +57,42 @@ impl Block for StreamIn {
         let spoiled = k.state("spoiled", bit, io.rst, 0);
         let mixed = k.state("mixed", bit, io.rst, 0).comment("The frame has beats of several identifiers.");
         let frame = k.register("frame", Type::unsigned(id_bits(arrays))).comment("Identifier of the frame.");
-        let code = io.m_axis_tdata.register();
-        let valid = io.m_axis_tvalid.state(io.rst, 0);
-        let tlast = io.m_axis_tlast.register();
+        let code = io.m_axis.data.register();
+        let valid = io.m_axis.valid.state(io.rst, 0);
+        let tlast = io.m_axis.last.register();
 
-        let moves = k.wire("moves", !*valid | io.m_axis_tready);
-        let takes = io.s_axis_tready.set(moves & io.room);
-        let taken = k.wire("taken", io.s_axis_tvalid & takes);
+        let moves = k.wire("moves", !*valid | io.m_axis.ready);
+        let takes = io.s_axis.ready.set(moves & io.room);
+        let taken = k.wire("taken", io.s_axis.valid & takes);
         let begins = k.wire("begins", count.is(0));
         let ends = k.wire("ends", count.is(taxels as u64 - 1));
         // A code fits if all bits above its sign are copies of it.
-        let above = io.s_axis_tdata.slice(code_bits - 1, 8 * WORD_BYTES + 1 - code_bits);
+        let above = io.s_axis.data.slice(code_bits - 1, 8 * WORD_BYTES + 1 - code_bits);
         let fits = k.wire("fits", above.all() | !above.any());
-        let limit = concat(&[io.s_axis_tdata.top(), (!io.s_axis_tdata.top()).repeat(code_bits - 1)]);
+        let limit = concat(&[io.s_axis.data.top(), (!io.s_axis.data.top()).repeat(code_bits - 1)]);
         let clipped = io.clipped.set(taken & !fits);
-        let partial = io.partial.set(taken & !io.s_axis_tkeep.all());
-        let foreign = k.wire("foreign", taken & !begins & io.s_axis_tid.differs(*frame));
-        io.misframed.set((taken & io.s_axis_tlast.differs(ends)) | (foreign & !*mixed));
+        let partial = io.partial.set(taken & !io.s_axis.keep.all());
+        let foreign = k.wire("foreign", taken & !begins & io.s_axis.id.differs(*frame));
+        io.misframed.set((taken & io.s_axis.last.differs(ends)) | (foreign & !*mixed));
         io.complete.set(taken & ends);
         let now_spoiled = k.wire("now_spoiled", clipped | partial | foreign | (*spoiled & !begins));
-        io.label.set(now_spoiled.concat(begins.mux(io.s_axis_tid, *frame)));
+        io.label.set(now_spoiled.concat(begins.mux(io.s_axis.id, *frame)));
         k.when(moves, || {
-            code.set(fits.mux(io.s_axis_tdata.low(code_bits), limit));
-            tlast.set(io.s_axis_tlast);
-            valid.set(io.s_axis_tvalid & io.room);
+            code.set(fits.mux(io.s_axis.data.low(code_bits), limit));
+            tlast.set(io.s_axis.last);
+            valid.set(io.s_axis.valid & io.room);
         });
         if arrays.bits > 0 {
             // The engine takes that of the first beat.
-            let array = io.m_axis_tid.register();
-            k.when(moves, || array.set(io.s_axis_tid.low(arrays.bits)));
+            let array = io.m_axis.array.register();
+            k.when(moves, || array.set(io.s_axis.id.low(arrays.bits)));
         }
         k.when(taken, || {
-            count.set((io.s_axis_tlast | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
+            count.set((io.s_axis.last | ends).mux(k.constant(count_bits(taxels), 0), count.plus(1)));
             spoiled.set(now_spoiled);
             mixed.set(foreign | (*mixed & !begins));
         });
-        k.when(taken & begins, || frame.set(io.s_axis_tid));
+        k.when(taken & begins, || frame.set(io.s_axis.id));
     }
 }
 

@@ -2,10 +2,10 @@
 
 use dermis_golden::fixed::plan::resources::count_bits;
 
-use super::id_bits;
+use super::bundles::{id_bits, CoreStream};
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
-use crate::primitives::Arrays;
+use crate::primitives::{Arrays, Stream};
 
 /// Words of a beat of the engine.
 const TRIPLE: usize = 3;
@@ -38,31 +38,13 @@ block! {
         clock;
         reset;
         /// {fz, fy, fx}, 32 bits signed each, or three words of status; valid with `s_axis_tvalid`.
-        in s_axis_tdata: TRIPLE * WORD;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: TRIPLE * WORD;
         /// Identifier of the frame, and above it whether it is spoiled; valid with `s_axis_tvalid`.
         in label: id_bits(*arrays) + 1;
         /// The rest of the frame will not come; no beat is accepted in this cycle.
         in abandon;
         /// Words, the first in the low bits; valid with `m_axis_tvalid`.
-        out m_axis_tdata: width * WORD;
-        /// Bytes of the beat that are there; valid with `m_axis_tvalid`.
-        out m_axis_tkeep: width * WORD / 8;
-        /// A bit per word that is no force, and whether the frame is spoiled; valid with `m_axis_tvalid`.
-        out m_axis_tuser: width + 1;
-        /// Identifier of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: id_bits(*arrays);
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<CoreStream> m_axis: CoreStream::of_words(*width, *arrays);
         /// The last beat of a frame is taken over in this cycle.
         out whole;
         /// The last beat of a frame that was not abandoned is accepted in this cycle.
@@ -100,19 +82,19 @@ impl Block for StreamOut {
 
         let number = |value: usize| k.constant(filled_bits, value as u64);
         let full = k.wire("full", !filled.less(number(width)));
-        let valid = io.m_axis_tvalid.set(full | *ending);
-        let ends = io.m_axis_tlast.set(*ending & !number(width).less(*filled));
-        let taken = k.wire("taken", valid & io.m_axis_tready);
+        let valid = io.m_axis.valid.set(full | *ending);
+        let ends = io.m_axis.last.set(*ending & !number(width).less(*filled));
+        let taken = k.wire("taken", valid & io.m_axis.ready);
         let left = k.wire("left", taken.mux(full.mux((*filled - number(width)).low(filled_bits), number(0)), *filled));
         let room = k.wire("room", !*ending & left.less(number(width)));
         let is_open = k.wire("is_open", beat.any());
         let closes = k.wire("closes", is_open & (io.abandon | *closing));
-        let takes = io.s_axis_tready.set(room & !closes & !io.abandon);
-        let given = k.wire("given", io.s_axis_tvalid & takes);
+        let takes = io.s_axis.ready.set(room & !closes & !io.abandon);
+        let given = k.wire("given", io.s_axis.valid & takes);
         let closed = k.wire("closed", room & closes);
         let accepted = k.wire("accepted", given | closed);
         let is_other = k.wire("is_other", beat.is(forces as u64) | closes);
-        let last = k.wire("last", io.s_axis_tlast | closes);
+        let last = k.wire("last", io.s_axis.last | closes);
         closing.set(closes & !room);
         abandoned.set(closed | (*abandoned & !(taken & ends)));
 
@@ -124,7 +106,7 @@ impl Block for StreamOut {
                 (0..width).map(|place| (place as u64, new.shift_left(place * bits).extend(kept.bits()))).collect();
             down | comes.mux(left.case(&behind[1..], behind[0].1), k.constant(1, 0).repeat(kept.bits()))
         };
-        words.set(moved(*words, io.s_axis_tdata, given));
+        words.set(moved(*words, io.s_axis.data, given));
         kinds.set(moved(*kinds, is_other.repeat(TRIPLE), accepted));
         filled.set((left + accepted.mux(number(TRIPLE), number(0))).low(filled_bits));
         ending.set((accepted & last) | (*ending & !(taken & ends)));
@@ -134,12 +116,12 @@ impl Block for StreamOut {
         });
         k.when(given & !is_open, || label.set(io.label));
 
-        io.m_axis_tdata.set(words.low(width * WORD));
+        io.m_axis.data.set(words.low(width * WORD));
         let there: Vec<_> = (0..width).rev().map(|word| number(word).less(*filled).repeat(WORD / 8)).collect();
-        io.m_axis_tkeep.set(concat(&there));
-        io.m_axis_tuser.set((label.top() | *abandoned).concat(kinds.low(width)));
-        io.m_axis_tid.set(label.low(id_bits));
-        io.whole.set(given & io.s_axis_tlast);
+        io.m_axis.keep.set(concat(&there));
+        io.m_axis.user.set((label.top() | *abandoned).concat(kinds.low(width)));
+        io.m_axis.id.set(label.low(id_bits));
+        io.whole.set(given & io.s_axis.last);
         io.sent.set(taken & ends & !*abandoned);
     }
 }

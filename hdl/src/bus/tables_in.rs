@@ -2,7 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
-use crate::primitives::{table_beat, Arrays};
+use crate::primitives::{table_beat, Arrays, Stream};
 
 block! {
     /// ```text
@@ -19,15 +19,7 @@ block! {
         clock;
         reset;
         /// A taxel's code, `code_bits` wide, signed; valid with `s_axis_tvalid`.
-        in s_axis_tdata: code_bits;
-        /// Array of the frame; valid with `s_axis_tvalid`.
-        in s_axis_tid: arrays.bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: (*code_bits, arrays.bits);
         /// A byte, above it whether it is the last of its image, and above that the array of its image; valid with `octet_valid`.
         in octet: OCTET_BITS + arrays.bits;
         /// A byte is offered; it is held until `octet_taken`.
@@ -35,15 +27,7 @@ block! {
         /// The byte is accepted in this cycle.
         out octet_taken;
         /// A code, or a byte of an image; valid with `m_axis_tvalid`.
-        out m_axis_tdata: code_bits + 1;
-        /// Array of the frame or image; valid with `m_axis_tvalid`.
-        out m_axis_tid: arrays.bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: (code_bits + 1, arrays.bits);
     }
 }
 
@@ -64,20 +48,20 @@ impl Block for TablesIn {
         let in_image = k.state("in_image", bit, io.rst, 0).comment("An image has begun and not ended.");
         let held = k.state("held", bit, io.rst, 0).comment("A code was offered and not accepted.");
         let is_byte = k.wire("is_byte", *in_image | (io.octet_valid & !*in_frame & !*held));
-        let code_taken = io.s_axis_tready.set(io.m_axis_tready & !is_byte);
-        let octet_taken = io.octet_taken.set(io.m_axis_tready & is_byte & io.octet_valid);
-        let offered = io.m_axis_tvalid.set(is_byte.mux(io.octet_valid, io.s_axis_tvalid));
-        io.m_axis_tdata.set(is_byte.mux(
+        let code_taken = io.s_axis.ready.set(io.m_axis.ready & !is_byte);
+        let octet_taken = io.octet_taken.set(io.m_axis.ready & is_byte & io.octet_valid);
+        let offered = io.m_axis.valid.set(is_byte.mux(io.octet_valid, io.s_axis.valid));
+        io.m_axis.data.set(is_byte.mux(
             table_beat(k, io.octet.low(8), self.code_bits),
-            io.s_axis_tdata.signed().extend(io.m_axis_tdata.bits()).unsigned(),
+            io.s_axis.data.signed().extend(io.m_axis.data.bits()).unsigned(),
         ));
         let last = k.wire("last", io.octet.at(OCTET_BITS - 1));
-        io.m_axis_tlast.set(is_byte.mux(last, io.s_axis_tlast));
+        io.m_axis.last.set(is_byte.mux(last, io.s_axis.last));
         if self.arrays.bits > 0 {
-            io.m_axis_tid.set(is_byte.mux(io.octet.slice(OCTET_BITS, self.arrays.bits), io.s_axis_tid));
+            io.m_axis.array.set(is_byte.mux(io.octet.slice(OCTET_BITS, self.arrays.bits), io.s_axis.array));
         }
-        held.set(offered & !is_byte & !io.m_axis_tready);
-        k.when(io.s_axis_tvalid & code_taken, || in_frame.set(!io.s_axis_tlast));
+        held.set(offered & !is_byte & !io.m_axis.ready);
+        k.when(io.s_axis.valid & code_taken, || in_frame.set(!io.s_axis.last));
         k.when(octet_taken, || in_image.set(!last));
     }
 }

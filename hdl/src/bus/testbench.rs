@@ -8,7 +8,8 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{ID, REGISTER_BITS};
 
-use super::{id_bits, Bus, CoreShape};
+use super::bundles::id_bits;
+use super::{Bus, CoreShape};
 use crate::generate::Generated;
 use crate::manifest::GeneratedFile;
 use crate::primitives::Arrays;

@@ -1,7 +1,6 @@
 //! Wishbone in front of the registers.
 
-use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
-
+use super::bundles::{Accesses, WishbonePins};
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
 
@@ -13,55 +12,27 @@ block! {
     ports WishbonePorts {
         clock;
         reset;
-        /// A cycle of the bus.
-        in wb_cyc;
-        /// An access, held with all that belongs to it until the answer; valid with `wb_cyc`.
-        in wb_stb;
-        /// The access is a write; valid with `wb_stb`.
-        in wb_we;
-        /// Number of the register; valid with `wb_stb`.
-        in wb_adr: ADDRESS_BITS - 2;
-        /// Data of a write; valid with `wb_stb` and `wb_we`.
-        in wb_dat_w: REGISTER_BITS;
-        /// Bytes of a write that count; valid with `wb_stb` and `wb_we`.
-        in wb_sel: REGISTER_BITS / 8;
-        /// Content of the register; valid with `wb_ack`.
-        out wb_dat_r: REGISTER_BITS;
-        /// The access is done.
-        out wb_ack;
-        /// The access is refused.
-        out wb_err;
-        /// An access in this cycle.
-        out select;
-        /// The access is a write; valid with `select`.
-        out write;
-        /// Address in bytes; valid with `select`.
-        out address: ADDRESS_BITS;
-        /// Data of a write; valid with `select` and `write`.
-        out data: REGISTER_BITS;
-        /// Bytes of a write that count; valid with `select` and `write`.
-        out strobe: REGISTER_BITS / 8;
-        /// Content of the register; valid in the cycle after `select`.
-        in content: REGISTER_BITS;
-        /// The access is an error; valid in the cycle after `select`.
-        in refused;
+        /// The bus.
+        sink<WishbonePins> wb: true;
+        /// Accesses that it makes.
+        source<Accesses> access: Accesses {};
     }
 }
 
 impl Block for Wishbone {
     fn build<'k>(&self, k: &'k Builder, io: WishbonePorts<Inside<'k>>) {
         let asked = k.state("asked", Type::unsigned(1), io.rst, 0).comment("An access was made in the last cycle.");
-        let wanted = k.wire("wanted", io.wb_cyc & io.wb_stb);
-        let select = io.select.set(wanted & !*asked);
+        let wanted = k.wire("wanted", io.wb.cyc & io.wb.stb);
+        let select = io.access.select.set(wanted & !*asked);
         asked.set(select);
-        io.write.set(io.wb_we);
-        io.address.set(concat(&[io.wb_adr, k.constant(2, 0)]));
-        io.data.set(io.wb_dat_w);
-        io.strobe.set(io.wb_sel);
-        io.wb_dat_r.set(io.content);
+        io.access.write.set(io.wb.we);
+        io.access.address.set(concat(&[io.wb.adr, k.constant(2, 0)]));
+        io.access.data.set(io.wb.dat_w);
+        io.access.strobe.set(io.wb.sel);
+        io.wb.dat_r.set(io.access.content);
         // A master that gives up is not answered.
-        io.wb_ack.set(*asked & wanted & !io.refused);
-        io.wb_err.set(*asked & wanted & io.refused);
+        io.wb.ack.set(*asked & wanted & !io.access.refused);
+        io.wb.err.set(*asked & wanted & io.access.refused);
     }
 }
 
@@ -71,6 +42,7 @@ mod tests {
     use crate::language::kernel_of;
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
+    use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
 
     /// Whether an access was made in the last cycle; undefined before the reset.
     struct Answering(Option<bool>);

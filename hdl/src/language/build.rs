@@ -82,15 +82,27 @@ impl Builder {
         self.kernel.borrow_mut().unused.extend(ids);
     }
 
-    /// Declares a port.
-    pub(super) fn port(&self, port: Port) {
-        self.kernel.borrow_mut().ports.push(port);
+    /// Declares a port; its number.
+    pub(super) fn port(&self, port: Port) -> usize {
+        let ports = &mut self.kernel.borrow_mut().ports;
+        ports.push(port);
+        ports.len() - 1
+    }
+
+    /// The name of the port of this number.
+    pub(super) fn port_name(&self, port: usize) -> String {
+        self.kernel.borrow().ports[port].name.clone()
+    }
+
+    /// What takes no value, and is 0.
+    pub(super) fn left_out(&self) -> Net<'_> {
+        Net { builder: self, signal: None, value: self.constant(1, 0) }
     }
 
     /// A signal that drives an input of an instance; one that is left out takes no value.
     pub(super) fn instance_input(&self, name: &str, bits: usize) -> Net<'_> {
         match bits {
-            0 => Net { builder: self, signal: None, value: self.constant(1, 0) },
+            0 => self.left_out(),
             bits => self.net(name, Type::unsigned(bits)),
         }
     }
@@ -381,7 +393,16 @@ impl Builder {
     fn declare(&self, name: &str, ty: Type, role: Role) -> Net<'_> {
         let name = self.check_name(name);
         let mut kernel = self.kernel.borrow_mut();
-        kernel.signals.push(Signal { name, ty, role, value: None, guards: Vec::new(), comment: None, output: false });
+        kernel.signals.push(Signal {
+            name,
+            ty,
+            role,
+            value: None,
+            guards: Vec::new(),
+            comment: None,
+            output: false,
+            states: &[],
+        });
         let signal = kernel.signals.len() - 1;
         let id = kernel.intern(Node::Signal(signal), ty);
         Net { builder: self, signal: Some(signal), value: Expr { kernel: &self.kernel, id } }
@@ -436,6 +457,14 @@ impl<'k> Net<'k> {
     pub fn comment(self, text: &str) -> Self {
         if let Some(signal) = self.signal {
             self.builder.kernel.borrow_mut().signals[signal].comment = Some(text.to_owned());
+        }
+        self
+    }
+
+    /// With names of its states, by their numbers.
+    pub(super) fn named_states(self, states: &'static [&'static str]) -> Self {
+        if let Some(signal) = self.signal {
+            self.builder.kernel.borrow_mut().signals[signal].states = states;
         }
         self
     }

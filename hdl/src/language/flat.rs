@@ -67,6 +67,7 @@ impl Flattener {
                 guards: Vec::new(),
                 comment: None,
                 output: false,
+                states: signal.states,
             };
             match self.signals.get(&net) {
                 None => {

@@ -171,6 +171,8 @@ pub(crate) struct Signal {
     pub(crate) comment: Option<String>,
     /// Driven port of the block.
     pub(crate) output: bool,
+    /// Names of the states that a register is in, by their numbers; else none.
+    pub(crate) states: &'static [&'static str],
 }
 
 /// Initial contents of a memory.

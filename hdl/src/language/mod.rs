@@ -9,7 +9,9 @@
 //!                                                 +--> LUTs, flip-flops, memories
 //! ```
 //! [`block!`](crate::block) declares the parameters and the ports of a block; [`Block::build`] describes what is between them with a
-//! [`Builder`]. No node holds text or a function. [`RustHdl`] makes any block one of rust-hdl.
+//! [`Builder`]. Signals between two blocks that belong together are declared once, by [`bundle!`](crate::bundle), and connected as
+//! one; [`states!`](crate::states) names the states of a machine. No node holds text or a function. [`RustHdl`] makes any block one of
+//! rust-hdl.
 //!
 //! | checked when a kernel is built | error |
 //! |---|---|
@@ -22,7 +24,9 @@
 //! | a port that the kernel lacks | [`KernelError::Port`] |
 //! | a name used twice, or none of Verilog | [`KernelError::Name`] |
 
+mod block;
 mod build;
+mod bundle;
 mod change;
 mod check;
 mod compile;
@@ -37,6 +41,7 @@ mod resources;
 mod run;
 mod rust_hdl;
 mod simulate;
+mod states;
 mod text;
 mod verilog;
 
@@ -46,6 +51,7 @@ pub(crate) mod testbench;
 mod tests;
 
 pub use build::{Builder, MemoryPort, Net};
+pub use bundle::{comment, Bundle, Drive, Flip};
 pub use change::Change;
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
@@ -59,3 +65,4 @@ pub(crate) use resources::distributed_luts;
 pub use run::{Run, Slot};
 pub use rust_hdl::{RustHdl, Signals};
 pub use simulate::Simulation;
+pub use states::{Machine, States};

@@ -91,26 +91,26 @@ pub trait View {
 
 /// Makes the ports of a view from their declaration: name, width in bits, meaning.
 pub trait Make<V: View> {
-    /// An input of one bit.
-    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> V::InBit;
-    /// An output of one bit.
-    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> V::OutBit;
+    /// An input of one bit, or of none.
+    fn in_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> V::InBit;
+    /// An output of one bit, or of none.
+    fn out_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> V::OutBit;
     /// An input of `bits` bits.
-    fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::In;
+    fn input(&mut self, name: &str, bits: usize, doc: &[&str]) -> V::In;
     /// An output of `bits` bits.
-    fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> V::Out;
+    fn output(&mut self, name: &str, bits: usize, doc: &[&str]) -> V::Out;
 }
 
 /// Sees each port of a view.
 pub trait Visit<V: View> {
     /// An input of one bit.
-    fn in_bit(&mut self, name: &'static str, port: &V::InBit);
+    fn in_bit(&mut self, name: &str, port: &V::InBit);
     /// An output of one bit.
-    fn out_bit(&mut self, name: &'static str, port: &V::OutBit);
+    fn out_bit(&mut self, name: &str, port: &V::OutBit);
     /// Another input.
-    fn input(&mut self, name: &'static str, port: &V::In);
+    fn input(&mut self, name: &str, port: &V::In);
     /// Another output.
-    fn output(&mut self, name: &'static str, port: &V::Out);
+    fn output(&mut self, name: &str, port: &V::Out);
 }
 
 /// Changes each port of a view.
@@ -162,33 +162,34 @@ impl View for Widths {
 #[derive(Clone, Copy, Debug)]
 pub struct Output<'k> {
     builder: &'k Builder,
-    name: &'static str,
+    /// Its number among the ports; none of an output that is left out.
+    port: Option<usize>,
     bits: usize,
 }
 
 impl<'k> Output<'k> {
     /// Drives the output by a wire with this value. A narrower value is extended. An output that is left out is not driven.
     pub fn set(self, value: Expr<'k>) -> Expr<'k> {
-        if self.bits == 0 {
-            return value;
-        }
-        let value = if value.bits() < self.bits { value.extend(self.bits) } else { value };
-        self.builder.unscoped(|| self.builder.wire(self.name, value))
+        let wire = |name: &str| {
+            let value = if value.bits() < self.bits { value.extend(self.bits) } else { value };
+            self.builder.wire(name, value)
+        };
+        self.driven(wire).unwrap_or(value)
     }
 
     /// Drives the output by a wire that is assigned later.
     pub fn net(self) -> Net<'k> {
-        self.builder.unscoped(|| self.builder.net(self.name, Type::unsigned(self.bits)))
+        self.by(|name| self.builder.net(name, Type::unsigned(self.bits)))
     }
 
     /// Drives the output by a register without reset.
     pub fn register(self) -> Net<'k> {
-        self.builder.unscoped(|| self.builder.register(self.name, Type::unsigned(self.bits)))
+        self.by(|name| self.builder.register(name, Type::unsigned(self.bits)))
     }
 
     /// Drives the output by a register that `reset` sets to `value`.
     pub fn state(self, reset: Expr<'k>, value: u64) -> Net<'k> {
-        self.builder.unscoped(|| self.builder.state(self.name, Type::unsigned(self.bits), reset, value))
+        self.by(|name| self.builder.state(name, Type::unsigned(self.bits), reset, value))
     }
 
     /// Drives the output by `value` one cycle later.
@@ -201,6 +202,17 @@ impl<'k> Output<'k> {
     /// Width in bits.
     pub fn bits(self) -> usize {
         self.bits
+    }
+
+    /// A signal that drives the output; where that is left out, one that takes no value.
+    fn by(self, signal: impl FnOnce(&str) -> Net<'k>) -> Net<'k> {
+        self.driven(signal).unwrap_or_else(|| self.builder.left_out())
+    }
+
+    /// What `signal` makes of the output's name; `None` where it is left out.
+    fn driven<R>(self, signal: impl FnOnce(&str) -> R) -> Option<R> {
+        let name = self.builder.port_name(self.port?);
+        Some(self.builder.unscoped(|| signal(&name)))
     }
 }
 
@@ -223,15 +235,15 @@ impl From<&usize> for Width {
 struct MakeInside<'k>(&'k Builder);
 
 impl<'k> Make<Inside<'k>> for MakeInside<'k> {
-    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Expr<'k> {
-        self.input(name, 1, doc)
+    fn in_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> Expr<'k> {
+        self.input(name, bits, doc)
     }
 
-    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Output<'k> {
-        self.output(name, 1, doc)
+    fn out_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> Output<'k> {
+        self.output(name, bits, doc)
     }
 
-    fn input(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Expr<'k> {
+    fn input(&mut self, name: &str, bits: usize, doc: &[&str]) -> Expr<'k> {
         if bits == 0 {
             return self.0.constant(1, 0);
         }
@@ -239,11 +251,9 @@ impl<'k> Make<Inside<'k>> for MakeInside<'k> {
         self.0.input(name, bits)
     }
 
-    fn output(&mut self, name: &'static str, bits: usize, doc: &'static [&'static str]) -> Output<'k> {
-        if bits > 0 {
-            self.0.port(Port { name: name.to_owned(), bits, output: true, doc: plain_text(doc) });
-        }
-        Output { builder: self.0, name, bits }
+    fn output(&mut self, name: &str, bits: usize, doc: &[&str]) -> Output<'k> {
+        let port = || self.0.port(Port { name: name.to_owned(), bits, output: true, doc: plain_text(doc) });
+        Output { builder: self.0, port: (bits > 0).then(port), bits }
     }
 }
 
@@ -259,19 +269,19 @@ impl MakeOutside<'_, '_> {
 }
 
 impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
-    fn in_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Net<'k> {
-        self.input(name, 1, doc)
+    fn in_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> Net<'k> {
+        self.input(name, bits, doc)
     }
 
-    fn out_bit(&mut self, name: &'static str, doc: &'static [&'static str]) -> Expr<'k> {
-        self.output(name, 1, doc)
+    fn out_bit(&mut self, name: &str, bits: usize, doc: &[&str]) -> Expr<'k> {
+        self.output(name, bits, doc)
     }
 
-    fn input(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Net<'k> {
+    fn input(&mut self, name: &str, bits: usize, _: &[&str]) -> Net<'k> {
         self.builder.instance_input(&self.name(name), bits)
     }
 
-    fn output(&mut self, name: &'static str, bits: usize, _: &'static [&'static str]) -> Expr<'k> {
+    fn output(&mut self, name: &str, bits: usize, _: &[&str]) -> Expr<'k> {
         self.builder.instance_output(&self.name(name), bits)
     }
 }
@@ -279,19 +289,19 @@ impl<'k> Make<Outside<'k>> for MakeOutside<'k, '_> {
 struct MakeWidths;
 
 impl Make<Widths> for MakeWidths {
-    fn in_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> usize {
-        1
-    }
-
-    fn out_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> usize {
-        1
-    }
-
-    fn input(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> usize {
+    fn in_bit(&mut self, _: &str, bits: usize, _: &[&str]) -> usize {
         bits
     }
 
-    fn output(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> usize {
+    fn out_bit(&mut self, _: &str, bits: usize, _: &[&str]) -> usize {
+        bits
+    }
+
+    fn input(&mut self, _: &str, bits: usize, _: &[&str]) -> usize {
+        bits
+    }
+
+    fn output(&mut self, _: &str, bits: usize, _: &[&str]) -> usize {
         bits
     }
 }
@@ -342,136 +352,6 @@ impl Builder {
     pub fn instance<I: Instantiate>(&self, name: &str, block: I) -> I::Ports<'_> {
         block.instantiate(self, name)
     }
-}
-
-/// Declares a block: a struct of its parameters, and a struct of its ports, each once.
-///
-/// ```text
-/// block! {
-///     /// Output queue.
-///     pub struct Queue {
-///         /// Width of a beat in bits.
-///         bits: usize,
-///     }
-///     ports QueuePorts {
-///         clock;
-///         reset;
-///         /// Writes a beat in this cycle.
-///         in write;
-///         /// Data of the beat; valid with `write`.
-///         in word: bits;
-///         /// A beat can be written in this cycle.
-///         out room;
-///     }
-/// }
-///
-/// impl Block for Queue {
-///     fn build<'k>(&self, k: &'k Builder, io: QueuePorts<Inside<'k>>) { … }
-/// }
-/// ```
-/// A port without a width is one bit wide; a width is an expression of the parameters, which are in scope by their names.
-/// A port of width 0 is left out: on either side what reads it is 0, and what drives it goes nowhere.
-/// `clock` is the port `clk`, `clock aclk` one of another name, `reset` the port `rst`. A block without `clock` is
-/// combinational.
-#[macro_export]
-macro_rules! block {
-    (
-        $(#[$meta:meta])*
-        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
-        ports $ports:ident { clock; reset; $($port:tt)* }
-    ) => {
-        $crate::block! {
-            @ Some("clk"), [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*]
-            { #[doc = " Synchronous reset, active high."] in rst; $($port)* }
-        }
-    };
-    (
-        $(#[$meta:meta])*
-        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
-        ports $ports:ident { clock; $($port:tt)* }
-    ) => {
-        $crate::block! {
-            @ Some("clk"), [$(#[$meta])*] $vis $block, $ports,
-            [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
-        }
-    };
-    (
-        $(#[$meta:meta])*
-        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
-        ports $ports:ident { clock $clock:ident; $($port:tt)* }
-    ) => {
-        $crate::block! {
-            @ Some(stringify!($clock)), [$(#[$meta])*] $vis $block, $ports,
-            [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
-        }
-    };
-    (
-        $(#[$meta:meta])*
-        $vis:vis struct $block:ident { $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty),* $(,)? }
-        ports $ports:ident { $($port:tt)* }
-    ) => {
-        $crate::block! {
-            @ None, [$(#[$meta])*] $vis $block, $ports, [$($(#[$field_meta])* $field_vis $field: $field_type,)*] { $($port)* }
-        }
-    };
-    (
-        @ $clock:expr, [$($meta:tt)*] $vis:vis $block:ident, $ports:ident,
-        [$($(#[$field_meta:meta])* $field_vis:vis $field:ident: $field_type:ty,)*]
-        { $($(#[doc = $doc:literal])+ $direction:ident $port:ident $(: $width:expr)?;)* }
-    ) => {
-        $($meta)*
-        $vis struct $block { $($(#[$field_meta])* $field_vis $field: $field_type,)* }
-
-        #[doc = concat!("Ports of [`", stringify!($block), "`].")]
-        $vis struct $ports<V: $crate::language::View> {
-            $($(#[doc = $doc])+ pub $port: $crate::block!(@type $direction V $($width)?),)*
-        }
-
-        impl $crate::language::Interface for $block {
-            type Ports<V: $crate::language::View> = $ports<V>;
-
-            const NAME: &'static str = stringify!($block);
-
-            const CLOCK: Option<&'static str> = $clock;
-
-            #[allow(unused_variables)]
-            fn ports<V: $crate::language::View>(&self, make: &mut dyn $crate::language::Make<V>) -> $ports<V> {
-                #[allow(unused_imports)]
-                use $crate::language::Interface as _;
-                let $block { $($field,)* } = self;
-                $ports { $($port: $crate::block!(@make $direction make, stringify!($port), [$($doc),+] $(, $width)?),)* }
-            }
-
-            #[allow(unused_variables)]
-            fn visit<V: $crate::language::View>(ports: &$ports<V>, visitor: &mut dyn $crate::language::Visit<V>) {
-                $($crate::block!(@visit $direction visitor, (stringify!($port), &ports.$port) $(, $width)?);)*
-            }
-
-            #[allow(unused_variables)]
-            fn visit_mut<V: $crate::language::View>(
-                ports: &mut $ports<V>,
-                visitor: &mut dyn $crate::language::VisitMut<V>,
-            ) {
-                $($crate::block!(@visit $direction visitor, (&mut ports.$port) $(, $width)?);)*
-            }
-        }
-    };
-    (@type in $view:ident) => { <$view as $crate::language::View>::InBit };
-    (@type out $view:ident) => { <$view as $crate::language::View>::OutBit };
-    (@type in $view:ident $width:expr) => { <$view as $crate::language::View>::In };
-    (@type out $view:ident $width:expr) => { <$view as $crate::language::View>::Out };
-    (@make in $make:ident, $name:expr, $doc:tt) => { $make.in_bit($name, &$doc) };
-    (@make out $make:ident, $name:expr, $doc:tt) => { $make.out_bit($name, &$doc) };
-    (@make in $make:ident, $name:expr, $doc:tt, $width:expr) => {
-        $make.input($name, $crate::language::Width::from($width).0, &$doc)
-    };
-    (@make out $make:ident, $name:expr, $doc:tt, $width:expr) => {
-        $make.output($name, $crate::language::Width::from($width).0, &$doc)
-    };
-    (@visit in $visitor:ident, $port:tt) => { $visitor.in_bit $port };
-    (@visit out $visitor:ident, $port:tt) => { $visitor.out_bit $port };
-    (@visit in $visitor:ident, $port:tt, $width:expr) => { $visitor.input $port };
-    (@visit out $visitor:ident, $port:tt, $width:expr) => { $visitor.output $port };
 }
 
 #[cfg(test)]

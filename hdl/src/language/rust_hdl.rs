@@ -56,20 +56,20 @@ port!([] Signal<Out, Bit>, self => self.val().into(), value => value.number() ==
 /// Calls a function with each port: its name, whether it is an output.
 struct Each<F>(F);
 
-impl<F: FnMut(&'static str, bool, &dyn Port)> Visit<Signals> for Each<F> {
-    fn in_bit(&mut self, name: &'static str, port: &Signal<In, Bit>) {
+impl<F: FnMut(&str, bool, &dyn Port)> Visit<Signals> for Each<F> {
+    fn in_bit(&mut self, name: &str, port: &Signal<In, Bit>) {
         self.0(name, false, port);
     }
 
-    fn out_bit(&mut self, name: &'static str, port: &Signal<Out, Bit>) {
+    fn out_bit(&mut self, name: &str, port: &Signal<Out, Bit>) {
         self.0(name, true, port);
     }
 
-    fn input(&mut self, name: &'static str, port: &Wire<In>) {
+    fn input(&mut self, name: &str, port: &Wire<In>) {
         self.0(name, false, port);
     }
 
-    fn output(&mut self, name: &'static str, port: &Wire<Out>) {
+    fn output(&mut self, name: &str, port: &Wire<Out>) {
         self.0(name, true, port);
     }
 }
@@ -97,26 +97,29 @@ impl<F: FnMut(bool, &mut dyn Port)> VisitMut<Signals> for EachMut<F> {
 
 struct MakeSignals;
 
+/// A port that is left out is one that nothing reads; an input of this kind counts as driven, or rust-hdl asks its user to connect
+/// what is not there.
+fn driven_unless<P: Port>(there: bool, mut port: P) -> P {
+    if !there {
+        port.drive();
+    }
+    port
+}
+
 impl Make<Signals> for MakeSignals {
-    fn in_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> Signal<In, Bit> {
+    fn in_bit(&mut self, _: &str, bits: usize, _: &[&str]) -> Signal<In, Bit> {
+        driven_unless(bits > 0, Default::default())
+    }
+
+    fn out_bit(&mut self, _: &str, _: usize, _: &[&str]) -> Signal<Out, Bit> {
         Default::default()
     }
 
-    fn out_bit(&mut self, _: &'static str, _: &'static [&'static str]) -> Signal<Out, Bit> {
-        Default::default()
+    fn input(&mut self, _: &str, bits: usize, _: &[&str]) -> Wire<In> {
+        driven_unless(bits > 0, Wire::new(bits.max(1)))
     }
 
-    // A port that is left out is a wire that nothing reads; an input of this kind counts as driven, or rust-hdl asks its user
-    // to connect what is not there.
-    fn input(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> Wire<In> {
-        let mut wire = Wire::new(bits.max(1));
-        if bits == 0 {
-            Logic::connect(&mut wire);
-        }
-        wire
-    }
-
-    fn output(&mut self, _: &'static str, bits: usize, _: &'static [&'static str]) -> Wire<Out> {
+    fn output(&mut self, _: &str, bits: usize, _: &[&str]) -> Wire<Out> {
         Wire::new(bits.max(1))
     }
 }
@@ -139,7 +142,7 @@ impl<B: Block> RustHdl<B> {
         let ports = block.ports(&mut MakeSignals);
         let run = Run::new(&Hierarchy::of_kernel(kernel_of(&block)), &[]);
         let mut slots = Vec::new();
-        B::visit(&ports, &mut Each(|name, _, _: &dyn Port| slots.push(run.slot("", name))));
+        B::visit(&ports, &mut Each(|name: &str, _, _: &dyn Port| slots.push(run.slot("", name))));
         RustHdl { clk: Default::default(), ports, run, slots, started: false }
     }
 }
@@ -178,7 +181,7 @@ impl<B: Interface> Logic for RustHdl<B> {
         let mut at = slots.iter();
         B::visit(
             ports,
-            &mut Each(|_, is_output: bool, port: &dyn Port| {
+            &mut Each(|_: &str, is_output: bool, port: &dyn Port| {
                 if let Some(&slot) = at.next().filter(|slot| !is_output && slot.bits() > 0) {
                     run.set(slot, port.read());
                 }
@@ -227,7 +230,7 @@ impl<B: Interface> RustHdlBlock for RustHdl<B> {
 
     fn has_changed(&self) -> bool {
         let mut changed = self.clk.has_changed() || !self.started;
-        B::visit(&self.ports, &mut Each(|_, _, port: &dyn Port| changed |= port.has_changed()));
+        B::visit(&self.ports, &mut Each(|_: &str, _, port: &dyn Port| changed |= port.has_changed()));
         changed
     }
 
@@ -236,7 +239,7 @@ impl<B: Interface> RustHdlBlock for RustHdl<B> {
         if let Some(clock) = B::CLOCK {
             self.clk.accept(clock, probe);
         }
-        B::visit(&self.ports, &mut Each(|name, _, port: &dyn Port| port.accept(name, probe)));
+        B::visit(&self.ports, &mut Each(|name: &str, _, port: &dyn Port| port.accept(name, probe)));
         probe.visit_end_scope(name, self);
     }
 }

@@ -1,4 +1,5 @@
 mod errors;
+mod states;
 
 use std::collections::BTreeMap;
 
@@ -409,6 +410,28 @@ wire unused_signals = &{1'b0, lane_2__copy};"
     let logic = kernel.logic(&Default::default());
     // 5 and 8 for the sums, 4 for the ends of each carry chain, 1 for |a; an enable of 8 flip-flops becomes 6/7 LUT each.
     assert_eq!((logic.flip_flops, logic.luts), (9, FLATTENED * (5.0 + 8.0 + 2.0 * 4.0 + 1.0 + 8.0 * 6.0 / 7.0)));
+}
+
+/// An expression more changes the names of what its own signal takes, no others.
+#[test]
+fn a_net_is_named_after_what_takes_it() {
+    let verilog = |more: bool| {
+        let k = Builder::new("named");
+        let [a, b] = ["a", "b"].map(|name| k.input(name, 8));
+        if more {
+            let shared = a.minus(1);
+            k.wire("more", (shared & b) | !shared);
+        }
+        for (name, by) in [("first", 1), ("second", 2)] {
+            let shared = a.plus(by);
+            k.wire(name, (shared & b) | !shared);
+        }
+        k.finish().verilog()
+    };
+    let (few, many) = (verilog(false), verilog(true));
+    assert!(few.contains("wire [7:0] second_part_1 = a + 8'd2;"), "{few}");
+    let kept = few.lines().filter(|line| line.starts_with("wire [7:0]")).all(|line| many.contains(line));
+    assert!(many.contains("more_part_1") && kept, "{few}\n{many}");
 }
 
 #[test]

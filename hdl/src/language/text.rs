@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use super::kernel::{Binary, Kernel, Node, NodeId, Unary};
+use super::kernel::{Binary, Kernel, Node, NodeId, Role, Unary};
 
 /// An operand's place: a text binds less tightly than an operand must.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,14 +62,42 @@ impl Kernel {
         }
         let shared = order.iter().copied().filter(|&node| readers[node] > 1 && !self.is_short(node));
         needed.extend(shared);
-        let unnamed = needed.into_iter().filter(|&node| !matches!(self.nodes[node].0, Node::Signal(_)));
-        let mut names = BTreeMap::new();
-        for (number, node) in unnamed.filter(|&node| !matches!(self.nodes[node].0, Node::Constant(_))).enumerate() {
-            let mut name = format!("part_{number}");
-            while self.signal_of(&name).is_some() {
-                name.push('_');
+        needed.retain(|&node| !matches!(self.nodes[node].0, Node::Signal(_) | Node::Constant(_)));
+        self.named_after_takers(needed)
+    }
+
+    /// Names for `nodes`, each after the first signal or memory that takes it: an expression more changes the names of its own taker's.
+    fn named_after_takers(&self, mut nodes: BTreeSet<NodeId>) -> BTreeMap<NodeId, String> {
+        let signals = self.signals.iter();
+        let values = signals.clone().filter_map(|signal| Some((&signal.name, signal.value?)));
+        let resets = signals.filter_map(|signal| match &signal.role {
+            Role::Register(register) => Some((&signal.name, register.reset?.0)),
+            _ => None,
+        });
+        let writes = self.memories.iter().flat_map(|memory| {
+            let all = memory.writes.iter().flat_map(|write| [write.enable, write.address, write.data]);
+            all.map(|node| (&memory.name, node))
+        });
+        let (mut names, mut counts) = (BTreeMap::new(), BTreeMap::new());
+        let mut seen = vec![false; self.nodes.len()];
+        for (taker, root) in values.chain(resets).chain(writes) {
+            let mut stack = vec![root];
+            while let Some(node) = stack.pop() {
+                if std::mem::replace(&mut seen[node], true) {
+                    continue;
+                }
+                stack.extend(self.nodes[node].0.operands());
+                if !nodes.remove(&node) {
+                    continue;
+                }
+                let count = counts.entry(taker).or_insert(0);
+                *count += 1;
+                let mut name = format!("{taker}_part_{count}");
+                while self.signal_of(&name).is_some() {
+                    name.push('_');
+                }
+                names.insert(node, name);
             }
-            names.insert(node, name);
         }
         names
     }

@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::kernel::{Contents, Domain, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId, Type};
+use super::states::shown;
 use super::text::{number, Text};
 
 struct Printer<'a> {
@@ -140,6 +141,9 @@ impl Printer<'_> {
                 }
                 if let Some(value) = register.initial {
                     self.line(&format!("initial {name} = {};", number(ty.bits, &[value])));
+                }
+                if !signal.states.is_empty() {
+                    shown(name, ty.bits, signal.states).iter().for_each(|line| self.line(line));
                 }
             }
             Role::Wire { declared: true } if !signal.output => self.line(&format!("wire {}{name};", range(ty.bits))),

@@ -204,14 +204,8 @@ impl Block for BoardTop {
             Source::Engine(engine) => {
                 let engine = k.instance("engine", &**engine);
                 engine.rst.set(engine_rst.q);
-                engine.s_axis_tdata.set(link.s_axis_tdata);
-                engine.s_axis_tvalid.set(link.s_axis_tvalid);
-                engine.s_axis_tlast.set(link.s_axis_tlast);
-                link.s_axis_tready.set(engine.s_axis_tready);
-                link.m_axis_tdata.set(engine.m_axis_tdata);
-                link.m_axis_tvalid.set(engine.m_axis_tvalid);
-                link.m_axis_tlast.set(engine.m_axis_tlast);
-                engine.m_axis_tready.set(link.m_axis_tready);
+                link.s_axis.connect(&engine.s_axis);
+                engine.m_axis.connect(&link.m_axis);
                 k.unused([link.requested]);
             }
             Source::Scan(scan) => {
@@ -222,23 +216,11 @@ impl Block for BoardTop {
                 engine.rst.set(engine_rst.q);
                 slice.rst.set(power_on.rst);
                 gate.rst.set(power_on.rst);
-                engine.s_axis_tdata.set(link.s_axis_tdata);
-                engine.s_axis_tvalid.set(link.s_axis_tvalid);
-                engine.s_axis_tlast.set(link.s_axis_tlast);
-                link.s_axis_tready.set(engine.s_axis_tready);
-                slice.s_axis_tdata.set(engine.m_axis_tdata);
-                slice.s_axis_tvalid.set(engine.m_axis_tvalid);
-                slice.s_axis_tlast.set(engine.m_axis_tlast);
-                engine.m_axis_tready.set(slice.s_axis_tready);
+                link.s_axis.connect(&engine.s_axis);
+                engine.m_axis.connect(&slice.s_axis);
                 gate.requested.set(link.requested);
-                gate.s_axis_tdata.set(slice.m_axis_tdata);
-                gate.s_axis_tvalid.set(slice.m_axis_tvalid);
-                gate.s_axis_tlast.set(slice.m_axis_tlast);
-                slice.m_axis_tready.set(gate.s_axis_tready);
-                link.m_axis_tdata.set(gate.m_axis_tdata);
-                link.m_axis_tvalid.set(gate.m_axis_tvalid);
-                link.m_axis_tlast.set(gate.m_axis_tlast);
-                gate.m_axis_tready.set(link.m_axis_tready);
+                slice.m_axis.connect(&gate.s_axis);
+                gate.m_axis.connect(&link.m_axis);
                 engine.enable.set(!gate.busy);
                 io.row.set(engine.row);
                 io.adc_sclk.set(engine.adc_sclk);

@@ -2,6 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
+use crate::primitives::Stream;
 
 block! {
     /// A scan gives a frame every period, and a host asks when it likes, over a link that is slower. A frame whose
@@ -18,21 +19,9 @@ block! {
         /// A request waits.
         in requested;
         /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-        in s_axis_tdata: BEAT;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: BEAT;
         /// A beat that passes; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: BEAT;
         /// A frame passes.
         out busy;
     }
@@ -47,13 +36,13 @@ impl Block for FrameGate {
         let passing = passing.comment("Also where the request is answered before the first beat is taken.");
         let dropping = k.state("dropping", Type::unsigned(1), io.rst, 0);
         let passes = k.wire("passes", *passing | (io.requested & !*dropping));
-        let accepted = io.s_axis_tready.set(io.m_axis_tready | !passes);
-        let ends = k.wire("ends", accepted & io.s_axis_tlast);
-        io.m_axis_tvalid.set(io.s_axis_tvalid & passes);
-        io.m_axis_tdata.set(io.s_axis_tdata);
-        io.m_axis_tlast.set(io.s_axis_tlast);
+        let accepted = io.s_axis.ready.set(io.m_axis.ready | !passes);
+        let ends = k.wire("ends", accepted & io.s_axis.last);
+        io.m_axis.valid.set(io.s_axis.valid & passes);
+        io.m_axis.data.set(io.s_axis.data);
+        io.m_axis.last.set(io.s_axis.last);
         io.busy.set(*passing);
-        k.when(io.s_axis_tvalid, || {
+        k.when(io.s_axis.valid, || {
             passing.set(passes & !ends);
             dropping.set(!passes & !ends);
         });

@@ -2,8 +2,8 @@
 
 use dermis_golden::wire::link::ANSWER;
 
-use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
+use crate::{block, states};
 
 block! {
     /// Sends SLIP END, header, words of twelve bytes up to the last, CRC, SLIP END.
@@ -64,12 +64,11 @@ block! {
     }
 }
 
-const IDLE: u64 = 0;
-const OPEN: u64 = 1;
-const HEADER: u64 = 2;
-const WORDS: u64 = 3;
-const SUM: u64 = 4;
-const CLOSE: u64 = 5;
+states! {
+    /// The part of a packet that is sent: an END, the header, the words of the payload, the CRC, an END.
+    enum Stage { Idle, Open, Header, Words, Sum, Close }
+}
+
 /// Index of the last byte of a word; of the header and of the CRC.
 const LAST: [u64; 2] = [11, 3];
 
@@ -82,15 +81,15 @@ impl Packer {
 
 impl Block for Packer {
     fn build<'k>(&self, k: &'k Builder, io: PackerPorts<Inside<'k>>) {
-        let stage = k.state("stage", Type::unsigned(3), io.rst, IDLE);
+        let stage = k.machine("stage", io.rst, Stage::Idle);
         let index = io.index.state(io.rst, 0);
         let source = io.source.register();
         let (kept, content) = (k.register("kept", Type::unsigned(8)), io.content.register());
         let valid = io.valid.state(io.rst, 0);
 
-        let idle = k.wire("idle", stage.is(IDLE));
-        let words = io.wanted.set(stage.is(WORDS));
-        let border = io.border.set(stage.is(OPEN) | stage.is(CLOSE));
+        let idle = k.wire("idle", stage.is(Stage::Idle));
+        let words = io.wanted.set(stage.is(Stage::Words));
+        let border = io.border.set(stage.is(Stage::Open) | stage.is(Stage::Close));
         let [last_of_word, last] = LAST.map(|last| k.constant(4, last));
         let at_end = k.wire("at_end", index.equals(words.mux(last_of_word, last)));
         let goes = k.wire("goes", *valid & io.ready);
@@ -102,8 +101,8 @@ impl Block for Packer {
         let header = k.wire("header", index.at(1).mux(index.at(0).mux(length.slice(8, 8), length.low(8)), start));
         let begun = io.begun.set(idle & io.offer);
         io.halfway.set(!*valid & index.at(0));
-        io.crc_restart.set(stage.is(OPEN));
-        io.crc_octet.set(stage.is(SUM).mux(!*content, *content));
+        io.crc_restart.set(stage.is(Stage::Open));
+        io.crc_octet.set(stage.is(Stage::Sum).mux(!*content, *content));
         io.taken.set(goes & words & at_end);
         io.crc_load.set(goes & !border);
 
@@ -112,15 +111,15 @@ impl Block for Packer {
             source.set(io.offered_source);
             kept.set(io.number);
         });
-        let next = stage.is(HEADER).mux(header, stage.is(SUM).mux(io.crc_low, io.octet));
+        let next = stage.is(Stage::Header).mux(header, stage.is(Stage::Sum).mux(io.crc_low, io.octet));
         k.when(!*valid, || content.set(next));
         let stands = k.wire("stands", border | (!idle & !io.crc_busy & (!words | io.word_valid)));
         valid.set(valid.mux(!io.ready, stands));
-        k.when(begun, || stage.set(k.constant(3, OPEN)));
+        k.when(begun, || stage.goes(Stage::Open));
         k.when(goes, || {
             index.set((border | at_end).mux(k.constant(4, 0), index.plus(1)));
-            k.when(border | (at_end & (!words | io.word_last)), || stage.set(stage.plus(1)));
-            k.when(stage.is(CLOSE), || stage.set(k.constant(3, IDLE)));
+            k.when(border | (at_end & (!words | io.word_last)), || stage.goes_to(stage.following()));
+            k.when(stage.is(Stage::Close), || stage.goes(Stage::Idle));
         });
     }
 }
@@ -132,6 +131,12 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
+    const IDLE: u64 = Stage::Idle as u64;
+    const OPEN: u64 = Stage::Open as u64;
+    const HEADER: u64 = Stage::Header as u64;
+    const WORDS: u64 = Stage::Words as u64;
+    const SUM: u64 = Stage::Sum as u64;
+    const CLOSE: u64 = Stage::Close as u64;
     const LENGTHS: [usize; 4] = [24, 12, 0x234, 0xfeed];
 
     /// Position in the packet; the byte on offer.

@@ -10,8 +10,8 @@ use super::{
 };
 use crate::block;
 use crate::language::{Block, Builder, Inside, Outside};
-use crate::primitives::RegisterSlice;
-use crate::streams::{through, Beats, BEAT_BITS};
+use crate::primitives::{through, Beats, RegisterSlice, Stream};
+use crate::streams::BEAT_BITS;
 
 block! {
     /// ```text
@@ -43,21 +43,9 @@ block! {
         /// The link accepts the byte in this cycle.
         in send_ready;
         /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
-        out s_axis_tdata: shape.stream_bits();
-        /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
-        out s_axis_tvalid;
-        /// The engine accepts the beat in this cycle.
-        in s_axis_tready;
-        /// The beat is the last of its frame or image; valid with `s_axis_tvalid`.
-        out s_axis_tlast;
+        source<Stream> s_axis: shape.stream_bits();
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
-        in m_axis_tdata: 96;
-        /// The engine offers a beat.
-        in m_axis_tvalid;
-        /// The beat is accepted in this cycle.
-        out m_axis_tready;
-        /// The beat is the frame's last; valid with `m_axis_tvalid`.
-        in m_axis_tlast;
+        sink<Stream> m_axis: 96;
         /// A frame is asked for and its answer not begun.
         out requested;
         /// A packet is being received, computed or sent.
@@ -109,12 +97,14 @@ impl Block for PacketLink {
         ingress.content.set(decoder.content);
         ingress.good.set(parser.good);
         ingress.bad.set(parser.bad);
-        let codes = Beats { data: ingress.code, valid: ingress.valid, last: ingress.last, ready: ingress.ready };
-        let codes = through!(codes, towards);
-        io.s_axis_tdata.set(codes.data);
-        io.s_axis_tvalid.set(codes.valid);
-        io.s_axis_tlast.set(codes.last);
-        codes.ready.set(io.s_axis_tready);
+        let codes = Beats {
+            data: ingress.code,
+            array: k.constant(1, 0),
+            valid: ingress.valid,
+            ready: ingress.ready,
+            last: ingress.last,
+        };
+        through!(codes, towards).connect(&io.s_axis);
 
         k.comment("Requests and counters.");
         requests.good.set(parser.good);
@@ -170,8 +160,7 @@ impl PacketLink {
         resultants.run.set(sources.answer_wanted);
         resultants.summarise.set(sources.summarise);
         resultants.taken.set(packer.taken & sources.answer_wanted);
-        let (data, valid, last) = (io.m_axis_tdata, io.m_axis_tvalid, io.m_axis_tlast);
-        let beats = through!(Beats { data, valid, last, ready: io.m_axis_tready.net() }, back);
+        let beats = through!(io.m_axis.inward(), back);
         resultants.beat.set(beats.data);
         resultants.beat_valid.set(beats.valid);
         resultants.beat_last.set(beats.last);

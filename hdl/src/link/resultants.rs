@@ -1,9 +1,9 @@
 //! From the engine's beats to the words of an answer: all beats, or sums and status.
 
 use super::{Answers, Shape};
-use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
+use crate::{block, states};
 
 block! {
     /// While `run`, beats pass as words; that is all where the board does not answer with forces and with sums. With
@@ -41,10 +41,11 @@ block! {
     }
 }
 
-const ADD: u64 = 0;
-const FINISH: u64 = 1;
-const OUT: u64 = 2;
-const STATUS: u64 = 3;
+states! {
+    /// What becomes of beats: forces are added, the sums are finished and leave, the status passes.
+    enum Stage { Add, Finish, Out, Status }
+}
+
 /// Index of the last word of the sums.
 const LAST_WORD: u64 = 3;
 
@@ -79,7 +80,7 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, [rows, cols]: [usiz
     let bits = 32 + count_bits(rows * cols + 1) + count_bits(rows.max(cols));
     let (r, c, m, l) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)), count_bits(rows * cols + 1));
     let bit = Type::unsigned(1);
-    let stage = k.state("stage", Type::unsigned(2), rst, ADD);
+    let stage = k.machine("stage", rst, Stage::Add);
     let out = k.register("out", Type::unsigned(2));
     let adding = k.state("adding", bit, rst, 0);
     let adding = adding.comment("beat_ready, separately for beats that are added and beats that pass.");
@@ -100,16 +101,16 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, [rows, cols]: [usiz
     let [moment_x, moment_y, line] = ["moment_x", "moment_y", "line"].map(sum);
     let loaded = k.register("loaded", Type::unsigned(l));
 
-    let passes = k.wire("passes", !summarise | stage.is(STATUS));
+    let passes = k.wire("passes", !summarise | stage.is(Stage::Status));
     let begins = k.wire("begins", col.is(0));
     let first = k.wire("first", row.is(0) & begins);
     let line_end = k.wire("line_end", col.is(cols as u64 - 1));
     let at_end = k.wire("at_end", line_end & row.is(rows as u64 - 1));
     let adds = k.wire("adds", *adding & beat_valid);
-    let sends = k.wire("sends", stage.is(OUT));
-    let finishes = k.wire("finishes", stage.is(FINISH));
+    let sends = k.wire("sends", stage.is(Stage::Out));
+    let finishes = k.wire("finishes", stage.is(Stage::Finish));
     let ends = passing.get() & beat_valid & beat_last;
-    adding.set(run & !passes & stage.is(ADD) & !(adds & at_end));
+    adding.set(run & !passes & stage.is(Stage::Add) & !(adds & at_end));
     passing.set(passes & *was_taken);
     was_taken.set(taken);
 
@@ -149,11 +150,10 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, [rows, cols]: [usiz
     k.when(finishes, || more.set(more.plus(1)));
     let leaves = k.wire("leaves", sends & *was_taken);
     k.when(leaves, || out.set(out.plus(1)));
-    let goes_to = |next: u64| stage.set(k.constant(2, next));
-    k.when(ends, || goes_to(ADD));
-    k.when(leaves & out.is(LAST_WORD), || goes_to(STATUS));
-    k.when(finishes & more.is(rows.max(cols) as u64 - 1), || goes_to(OUT));
-    k.when(adds & at_end, || goes_to(FINISH));
+    k.when(ends, || stage.goes(Stage::Add));
+    k.when(leaves & out.is(LAST_WORD), || stage.goes(Stage::Status));
+    k.when(finishes & more.is(rows.max(cols) as u64 - 1), || stage.goes(Stage::Out));
+    k.when(adds & at_end, || stage.goes(Stage::Finish));
 
     let sum = |sum: Expr<'k>| sum.extend(64);
     let words = [sum(*moment_y), sum(*moment_x), sum(sum_z), sum(*totals[1]), sum(*totals[0])];

@@ -3,8 +3,8 @@
 use super::control::Control;
 use super::Parallel;
 use crate::language::{Expr, Inside};
-use crate::primitives::{Arrays, BitDelay, FrameCheck, Queue, CHECK_LATENCY};
-use crate::streams::{Beats, EnginePorts};
+use crate::primitives::{Arrays, Beats, BitDelay, FrameCheck, Queue, CHECK_LATENCY};
+use crate::streams::EnginePorts;
 
 impl<'k> Parallel<'k, '_> {
     /// Case, `tlast` and number of frames follow their frame; shifts and saturations their subarray.
@@ -49,31 +49,31 @@ impl<'k> Parallel<'k, '_> {
         let (k, s) = (self.k, &self.s);
         let prepare = s.prepare.as_ref().filter(|_| Arrays::of_model(self.model).bits > 0)?;
         k.comment("Array of the frame received, in the passes, searched");
-        let received = self.held("received_array", s.receive.accept, prepare.m_axis_tid, true);
+        let received = self.held("received_array", s.receive.accept, prepare.m_axis.array, true);
         let passing = self.held("frame_array", c.begin_frame, received, true);
         Some(self.held("searched_array", c.hand_over, passing, true))
     }
 
-    /// Of several arrays the one of a frame, which was `searched`, comes out with its `beats`: those that wait in the output may be of
+    /// Of several arrays the one of the frame whose `beats` come out, which was `searched`: those that wait in the output may be of
     /// several frames.
-    pub(super) fn name_array(
+    pub(super) fn sent_array(
         &self,
         io: &EnginePorts<Inside<'k>>,
         c: &Control<'k>,
         beats: Beats<'k>,
         searched: Option<Expr<'k>>,
-    ) {
-        let (k, Some(searched)) = (self.k, searched) else { return };
+    ) -> Expr<'k> {
+        let (k, Some(searched)) = (self.k, searched) else { return self.zero(1) };
         k.comment("Arrays of the frames that are sent");
         let sent = k.instance("sent_arrays", Queue::new(searched.bits()));
         sent.reserve.set(c.begin_send);
         sent.write.set(c.begin_send);
         sent.last.set(c.begin_send);
         sent.word.set(searched);
-        sent.m_axis_tready.set(beats.valid & beats.last & io.m_axis_tready);
-        io.m_axis_tid.set(sent.m_axis_tdata);
+        sent.m_axis.ready.set(beats.valid & beats.last & io.m_axis.ready);
         // A frame has at least two beats, so that those of fewer frames than there are places wait.
-        k.unused([sent.room, sent.m_axis_tvalid, sent.m_axis_tlast]);
+        k.unused([sent.room, sent.m_axis.valid, sent.m_axis.last]);
+        sent.m_axis.data
     }
 
     /// The `codes` of a frame are checked as they arrive; their faults follow it as its other bits do, [`CHECK_LATENCY`] cycles

@@ -3,8 +3,8 @@
 use super::control::{Control, Values};
 use super::Parallel;
 use crate::language::{Expr, Inside};
-use crate::primitives::{position_bits, BitDelay};
-use crate::streams::{leave_by, sent_by, through, EnginePorts};
+use crate::primitives::{position_bits, through, Beats, BitDelay};
+use crate::streams::EnginePorts;
 
 /// What is stored of a subarray or a contact for its status.
 struct Status<'k> {
@@ -110,16 +110,15 @@ impl<'k> Parallel<'k, '_> {
         s.forces.address.set(s.send.address);
         s.forces.lane.set(s.send.lane);
 
-        s.send.m_axis_tvalid.set(s.forces.m_axis_tvalid);
-        s.send.m_axis_tlast.set(s.forces.m_axis_tlast);
-        s.send.m_axis_tready.set(*s.forces.m_axis_tready);
-        let beats = through!(sent_by!(s.forces), s.label_beats);
+        s.send.m_axis_tvalid.set(s.forces.m_axis.valid);
+        s.send.m_axis_tlast.set(s.forces.m_axis.last);
+        s.send.m_axis_tready.set(*s.forces.m_axis.ready);
+        let beats = through!(s.forces.m_axis, s.label_beats);
         if let (Some(beats), Some(segment)) = (&s.label_beats, &s.segment) {
             beats.labels.set(segment.labels);
         }
         let beats = through!(beats, s.resultants);
-        leave_by!(beats, io);
-        self.name_array(io, c, beats, searched_array);
+        Beats { array: self.sent_array(io, c, beats, searched_array), ..beats }.connect(&io.m_axis);
         if let Some(prepare) = &s.prepare {
             k.comment("Tables are written while no frame is under way");
             prepare.idle.set(!(s.receive.full | c.computes | beats.valid));

@@ -5,8 +5,8 @@ use dermis_golden::fixed::OwnTables;
 use super::control::Control;
 use super::Parallel;
 use crate::language::{Expr, Inside};
-use crate::primitives::THRESHOLD_BITS;
-use crate::streams::{arrive_at, through, Beats, EnginePorts};
+use crate::primitives::{through, THRESHOLD_BITS};
+use crate::streams::EnginePorts;
 
 impl<'k> Parallel<'k, '_> {
     /// The frame buffer has been read: by `fold`, or the last window.
@@ -18,12 +18,8 @@ impl<'k> Parallel<'k, '_> {
     pub(super) fn receive(&self, io: &EnginePorts<Inside<'k>>, c: &Control<'k>, searched_array: Option<Expr<'k>>) {
         let (k, s) = (self.k, &self.s);
         k.comment("prepare -> receive -> normalise -> fold");
-        let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
-        let codes = Beats { data, valid, last, ready: io.s_axis_tready.net() };
-        arrive_at!(through!(codes, s.prepare), s.receive);
-        if let Some(prepare) = &s.prepare {
-            prepare.s_axis_tid.set(io.s_axis_tid);
-        }
+        let codes = io.s_axis.inward();
+        through!(codes, s.prepare).connect(&s.receive.s_axis);
         self.check(codes, c);
         let fold_address = s.fold.quad_address;
         s.receive.quad_address.set(s.contacts.as_ref().map_or(fold_address, |contacts| contacts.quad_address));
@@ -73,7 +69,7 @@ impl<'k> Parallel<'k, '_> {
         let offered = match (varies, written) {
             (false, _) => self.zero(bits),
             (true, true) => prepare.noise_floor,
-            (true, false) => prepare.m_axis_tid.table(bits, &of_each(&|own| own.floor_word(bits as u32) as u64)),
+            (true, false) => prepare.m_axis.array.table(bits, &of_each(&|own| own.floor_word(bits as u32) as u64)),
         };
         let received = self.held("received_floor", s.receive.accept, offered, varies);
         s.receive.floor.set(received);

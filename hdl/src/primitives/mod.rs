@@ -32,6 +32,7 @@ pub use arithmetic::rescaler::{count_saturations, operand_of, saturating_sum, Re
 pub(crate) use arithmetic::saturated::saturated;
 pub(crate) use arithmetic::unfolder::hadamard;
 pub use arithmetic::unfolder::Unfolder;
+pub(crate) use frame::arrays::Resets;
 pub use frame::arrays::{Arrays, FrameArray};
 pub use frame::arrival::Arrival;
 #[cfg(test)]
@@ -45,7 +46,7 @@ pub use frame::frame_stats::FrameStats;
 pub(crate) use frame::frame_stats::{beyond, magnitude_of};
 pub use frame::input_mask::InputMask;
 pub(crate) use frame::load::table_beat;
-pub use frame::load::{CoefficientPlaces, Load, LoadPorts, PAIR_BITS, REST, THRESHOLD_BITS, VERSION_WORD_BITS};
+pub use frame::load::{CoefficientPlaces, Load, LoadPorts, PAIR_BITS, THRESHOLD_BITS, VERSION_WORD_BITS};
 pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;
 pub use memory::enable_register::EnableRegister;
@@ -75,6 +76,8 @@ pub use search::store::{latency as store_latency, Store};
 pub use search::sum::Sum;
 pub use search::sweep::{position_bits, BUFFER_BITS};
 pub use search::taylor::{Taylor, LATENCY as TAYLOR_LATENCY};
+pub(crate) use stream::beats::{through, Beats};
+pub use stream::beats::{Stream, StreamSignals};
 #[cfg(test)]
 pub(crate) use stream::queue::tests::List;
 pub use stream::queue::{Queue, PLACES as QUEUE_PLACES};

@@ -6,6 +6,7 @@ use dermis_golden::fixed::stages::scan::{alignment, rail};
 use super::Shape;
 use crate::block;
 use crate::language::{concat, Block, Builder, Inside, Type};
+use crate::primitives::Stream;
 
 block! {
     /// ```text
@@ -40,13 +41,7 @@ block! {
         /// For each converter whether its taxel is not dead; valid with `done`.
         in alive: shape.scan.converters;
         /// A taxel's code, two's complement; valid with `m_axis_tvalid`.
-        out m_axis_tdata: shape.code_bits as usize;
-        /// A code is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a code in this cycle.
-        in m_axis_tready;
-        /// The code is the last of its scan; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: shape.code_bits as usize;
         /// The last code of a scan is accepted in this cycle.
         out complete;
         /// A sample of the scan was at an end of the range; valid with `complete`.
@@ -85,8 +80,8 @@ impl Block for ScanCapture {
         let waiting = k.state("waiting", Type::unsigned(count_bits(count + 1)), io.rst, 0).comment("Codes that wait.");
         let is_last = k.register("is_last", bit);
         let held: Vec<_> = (0..count).map(|own| k.register(&format!("held_{own}"), Type::unsigned(code))).collect();
-        let offered = io.m_axis_tvalid.set(waiting.any());
-        let moves = k.wire("moves", offered & io.m_axis_tready);
+        let offered = io.m_axis.valid.set(waiting.any());
+        let moves = k.wire("moves", offered & io.m_axis.ready);
         k.when(moves, || {
             waiting.set(waiting.minus(1));
             held.windows(2).for_each(|pair| pair[0].set(*pair[1]));
@@ -134,8 +129,8 @@ impl Block for ScanCapture {
             waiting.set(k.constant(waiting.bits(), count as u64));
             is_last.set(io.ends);
         });
-        io.m_axis_tdata.set(*held[0]);
-        let last = io.m_axis_tlast.set(*is_last & waiting.is(1));
+        io.m_axis.data.set(*held[0]);
+        let last = io.m_axis.last.set(*is_last & waiting.is(1));
         let complete = io.complete.set(moves & last);
         io.clear.set(!offered);
         for (mark, marks) in [(io.rail, at_end), (io.other, at_other)] {

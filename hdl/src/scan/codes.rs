@@ -4,7 +4,7 @@ use dermis_golden::fixed::stages::scan::CODES_PER_BEAT;
 
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
-use crate::primitives::count_bits;
+use crate::primitives::{count_bits, Stream};
 
 block! {
     /// The codes that the engine takes are kept until the frame's forces and status have left, and follow them, as
@@ -31,21 +31,9 @@ block! {
         /// There is a slot for one more scan.
         out room;
         /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-        in s_axis_tdata: BEAT;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of the engine's frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: BEAT;
         /// A beat of the engine, or three codes; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: BEAT;
     }
 }
 
@@ -102,20 +90,20 @@ impl Block for ScanCodes {
             word.set(own.concat(word.slice(WORD, BEAT - WORD)));
         });
         let offered = k.wire("offered", held.is(whole));
-        let moves = k.wire("moves", offered & io.m_axis_tready);
+        let moves = k.wire("moves", offered & io.m_axis.ready);
         let leaves = k.wire("leaves", moves & beyond);
         k.when(moves, || [&asked, &held].iter().for_each(|count| count.set(zero(2))));
         k.when(leaves, || {
             next.set(zero(t));
             from.set(from.plus(1));
         });
-        let accepted = io.s_axis_tready.set(io.m_axis_tready & !*sends);
-        sends.set((*sends & !leaves) | (accepted & io.s_axis_tvalid & io.s_axis_tlast));
+        let accepted = io.s_axis.ready.set(io.m_axis.ready & !*sends);
+        sends.set((*sends & !leaves) | (accepted & io.s_axis.valid & io.s_axis.last));
         waiting.set((*waiting + io.complete.extend(s + 1) - leaves.extend(s + 1)).low(s + 1));
         io.room.set(waiting.less(k.constant(s + 1, MOST_WAITING + 1)));
-        io.m_axis_tvalid.set(sends.mux(offered, io.s_axis_tvalid));
-        io.m_axis_tdata.set(sends.mux(*word, io.s_axis_tdata));
-        io.m_axis_tlast.set(offered & beyond);
+        io.m_axis.valid.set(sends.mux(offered, io.s_axis.valid));
+        io.m_axis.data.set(sends.mux(*word, io.s_axis.data));
+        io.m_axis.last.set(offered & beyond);
     }
 }
 

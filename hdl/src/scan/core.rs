@@ -9,7 +9,7 @@ use crate::block;
 use crate::engine::Engine;
 use crate::error::HdlError;
 use crate::language::{kernel_of, Block, Builder, Hierarchy, Inside, Net};
-use crate::primitives::Dff;
+use crate::primitives::{Dff, Stream};
 use crate::streams::BEAT_BITS;
 
 block! {
@@ -28,13 +28,7 @@ block! {
         /// A scan may begin; high to scan all the time.
         in enable;
         /// A byte of an image of tables, as a beat of the engine's stream; valid with `s_axis_tvalid`.
-        in s_axis_tdata: tables.as_ref().map_or(0, |_| engine.widths().s_axis_tdata);
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid: usize::from(tables.is_some());
-        /// A beat is accepted in this cycle.
-        out s_axis_tready: usize::from(tables.is_some());
-        /// The beat is the last of its image; valid with `s_axis_tvalid`.
-        in s_axis_tlast: usize::from(tables.is_some());
+        sink<Stream> s_axis: tables.as_ref().map_or(0, |_| engine.widths().s_axis.data);
         /// Address of the row that is driven, unsigned; valid after the reset.
         out row: count_bits(shape.rows);
         /// Serial clock of all converters.
@@ -46,13 +40,7 @@ block! {
         /// Outputs of the converters, one bit each; valid while `adc_cs_n` is low.
         in adc_miso: shape.scan.converters;
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT_BITS;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: BEAT_BITS;
     }
 }
 
@@ -116,57 +104,32 @@ impl Block for ScanCore {
         k.comment("Codes to the engine");
         match &tables {
             Some(tables) => {
-                tables.code.set(capture.m_axis_tdata);
-                tables.code_valid.set(capture.m_axis_tvalid);
-                tables.code_last.set(capture.m_axis_tlast);
-                capture.m_axis_tready.set(tables.code_ready);
-                tables.s_axis_tdata.set(io.s_axis_tdata);
-                tables.s_axis_tvalid.set(io.s_axis_tvalid);
-                tables.s_axis_tlast.set(io.s_axis_tlast);
-                io.s_axis_tready.set(tables.s_axis_tready);
-                engine.s_axis_tdata.set(tables.m_axis_tdata);
-                engine.s_axis_tvalid.set(tables.m_axis_tvalid);
-                engine.s_axis_tlast.set(tables.m_axis_tlast);
-                tables.m_axis_tready.set(engine.s_axis_tready);
+                tables.code.set(capture.m_axis.data);
+                tables.code_valid.set(capture.m_axis.valid);
+                tables.code_last.set(capture.m_axis.last);
+                capture.m_axis.ready.set(tables.code_ready);
+                io.s_axis.connect(&tables.s_axis);
+                tables.m_axis.connect(&engine.s_axis);
             }
-            None => {
-                engine.s_axis_tdata.set(capture.m_axis_tdata);
-                engine.s_axis_tvalid.set(capture.m_axis_tvalid);
-                engine.s_axis_tlast.set(capture.m_axis_tlast);
-                capture.m_axis_tready.set(engine.s_axis_tready);
-            }
+            None => capture.m_axis.connect(&engine.s_axis),
         }
 
         k.comment("Forces, and marks in the status");
         told.complete.set(tables.as_ref().map_or(capture.complete, |tables| tables.complete));
         told.rail.set(capture.rail);
         told.other.set(capture.other);
-        told.s_axis_tdata.set(engine.m_axis_tdata);
-        told.s_axis_tvalid.set(engine.m_axis_tvalid);
-        told.s_axis_tlast.set(engine.m_axis_tlast);
-        engine.m_axis_tready.set(told.s_axis_tready);
+        engine.m_axis.connect(&told.s_axis);
         match tables.as_ref().zip(codes.as_ref()) {
             Some((tables, codes)) => {
                 k.unused([capture.complete]);
-                codes.code.set(capture.m_axis_tdata);
+                codes.code.set(capture.m_axis.data);
                 codes.passed.set(tables.passed);
                 codes.complete.set(tables.complete);
                 codes.broken.set(tables.broken);
-                codes.s_axis_tdata.set(told.m_axis_tdata);
-                codes.s_axis_tvalid.set(told.m_axis_tvalid);
-                codes.s_axis_tlast.set(told.m_axis_tlast);
-                told.m_axis_tready.set(codes.s_axis_tready);
-                io.m_axis_tdata.set(codes.m_axis_tdata);
-                io.m_axis_tvalid.set(codes.m_axis_tvalid);
-                io.m_axis_tlast.set(codes.m_axis_tlast);
-                codes.m_axis_tready.set(io.m_axis_tready);
+                told.m_axis.connect(&codes.s_axis);
+                codes.m_axis.connect(&io.m_axis);
             }
-            None => {
-                io.m_axis_tdata.set(told.m_axis_tdata);
-                io.m_axis_tvalid.set(told.m_axis_tvalid);
-                io.m_axis_tlast.set(told.m_axis_tlast);
-                told.m_axis_tready.set(io.m_axis_tready);
-            }
+            None => told.m_axis.connect(&io.m_axis),
         }
     }
 }

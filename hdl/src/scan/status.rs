@@ -4,7 +4,7 @@ use dermis_golden::result::flags::{StatusField, RAIL, STATUS_BEATS, WRONG_CHANNE
 
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
-use crate::primitives::count_bits;
+use crate::primitives::{count_bits, Stream};
 
 block! {
     /// The engine's beats pass through; in the first beat of every status the flags word gets the marks of its scan,
@@ -25,21 +25,9 @@ block! {
         /// There is room for the marks of one more scan.
         out room;
         /// A beat of the engine, three words; valid with `s_axis_tvalid`.
-        in s_axis_tdata: BEAT;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: BEAT;
         /// The beat with its marks; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: BEAT;
     }
 }
 
@@ -68,18 +56,18 @@ impl Block for ScanStatus {
         let word = k.state("word", Type::unsigned(count_bits(STATUS_BEATS)), io.rst, 0);
 
         io.room.set(!waiting.is(PLACES as u64));
-        io.s_axis_tready.set(io.m_axis_tready);
-        io.m_axis_tvalid.set(io.s_axis_tvalid);
-        io.m_axis_tlast.set(io.s_axis_tlast);
-        let moves = k.wire("moves", io.s_axis_tvalid & io.m_axis_tready);
-        let leaves = k.wire("leaves", moves & io.s_axis_tlast);
+        io.s_axis.ready.set(io.m_axis.ready);
+        io.m_axis.valid.set(io.s_axis.valid);
+        io.m_axis.last.set(io.s_axis.last);
+        let moves = k.wire("moves", io.s_axis.valid & io.m_axis.ready);
+        let leaves = k.wire("leaves", moves & io.s_axis.last);
         let in_status = k.wire("in_status", beat.is(self.forces as u64));
         let marked = k.wire("marked", in_status & word.is(0));
         k.when(moves, || {
             k.when(!in_status, || beat.set(beat.plus(1)));
             let at_end = word.is(STATUS_BEATS as u64 - 1);
             k.when(in_status, || word.set(at_end.mux(k.constant(word.bits(), 0), word.plus(1))));
-            k.when(io.s_axis_tlast, || {
+            k.when(io.s_axis.last, || {
                 beat.set(k.constant(beat.bits(), 0));
                 word.set(k.constant(word.bits(), 0));
             });
@@ -99,7 +87,7 @@ impl Block for ScanStatus {
             }
         };
         let flags: Vec<Expr> = (0..BEAT).rev().map(flag).collect();
-        io.m_axis_tdata.set(io.s_axis_tdata | concat(&flags));
+        io.m_axis.data.set(io.s_axis.data | concat(&flags));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside, Type};
+use crate::primitives::Stream;
 
 block! {
     /// The engine takes an image between frames only, and a scan takes much longer than a frame does otherwise: an
@@ -23,21 +24,9 @@ block! {
         /// The code is the last of its scan; valid with `code_valid`.
         in code_last;
         /// A byte of an image, as a beat of the engine's stream; valid with `s_axis_tvalid`.
-        in s_axis_tdata: code_bits + 1;
-        /// A byte is offered; it is held until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The byte is taken in this cycle.
-        out s_axis_tready;
-        /// The byte is the last of its image; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: code_bits + 1;
         /// A code, sign-extended, or a byte; valid with `m_axis_tvalid`.
-        out m_axis_tdata: code_bits + 1;
-        /// A beat is offered to the engine; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The engine takes a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame or image; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: code_bits + 1;
         /// The engine takes a code in this cycle.
         out passed;
         /// It is the last of a whole scan; with `passed`.
@@ -63,23 +52,23 @@ impl Block for ScanTables {
         let dropped = flag("dropped", "This scan is not passed on, or no further.");
         let open = flag("open", "The engine has got codes of a frame, and not its last beat.");
 
-        let in_image = k.wire("in_image", *image | (io.s_axis_tvalid & !*offered));
+        let in_image = k.wire("in_image", *image | (io.s_axis.valid & !*offered));
         let passes = k.wire("passes", io.code_valid & !in_image & !*dropped);
         k.comment("The early end of a frame goes before the image.");
         let ends_early = k.wire("ends_early", in_image & *open);
-        let byte_passes = k.wire("byte_passes", in_image & !*open & io.s_axis_tvalid);
-        io.m_axis_tvalid.set(passes | ends_early | byte_passes);
+        let byte_passes = k.wire("byte_passes", in_image & !*open & io.s_axis.valid);
+        io.m_axis.valid.set(passes | ends_early | byte_passes);
         let of_code = io.code.signed().extend(self.code_bits + 1).unsigned();
-        io.m_axis_tdata.set(byte_passes.mux(io.s_axis_tdata, of_code));
-        io.m_axis_tlast.set(ends_early | byte_passes.mux(io.s_axis_tlast, io.code_last));
-        let byte_ready = io.s_axis_tready.set(byte_passes & io.m_axis_tready);
-        let code_taken = io.code_ready.set(io.m_axis_tready | !passes);
-        let passed = io.passed.set(passes & io.m_axis_tready);
+        io.m_axis.data.set(byte_passes.mux(io.s_axis.data, of_code));
+        io.m_axis.last.set(ends_early | byte_passes.mux(io.s_axis.last, io.code_last));
+        let byte_ready = io.s_axis.ready.set(byte_passes & io.m_axis.ready);
+        let code_taken = io.code_ready.set(io.m_axis.ready | !passes);
+        let passed = io.passed.set(passes & io.m_axis.ready);
         let complete = io.complete.set(passed & io.code_last);
-        let broken = io.broken.set(ends_early & io.m_axis_tready);
+        let broken = io.broken.set(ends_early & io.m_axis.ready);
 
-        image.set(byte_ready.mux(!io.s_axis_tlast, *image));
-        offered.set(passes & !io.m_axis_tready);
+        image.set(byte_ready.mux(!io.s_axis.last, *image));
+        offered.set(passes & !io.m_axis.ready);
         let taken = k.wire("taken", io.code_valid & code_taken);
         begun.set(taken.mux(!io.code_last, *begun));
         let breaks = k.wire("breaks", in_image & (*begun | io.code_valid));

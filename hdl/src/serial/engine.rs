@@ -69,10 +69,7 @@ pub(crate) fn build<'k>(model: &Model, k: &'k Builder, io: EnginePorts<Inside<'k
         if model.scene.partition.condition == Condition::BothSigns { signs[0] & signs[1] } else { signs[0] | signs[1] };
     condition.d.set(begin_frame.mux(meets, condition.q));
     framing.d.set(begin_frame.mux(s.receive.framing, framing.q));
-    s.receive.s_axis_tdata.set(io.s_axis_tdata);
-    s.receive.s_axis_tvalid.set(io.s_axis_tvalid);
-    s.receive.s_axis_tlast.set(io.s_axis_tlast);
-    io.s_axis_tready.set(s.receive.s_axis_tready);
+    io.s_axis.connect(&s.receive.s_axis);
     s.receive.free.set(s.pass_sequencer.free);
     s.receive.reported.set(begin_frame);
     passes(model, k, s, begin_frame);
@@ -94,10 +91,7 @@ pub(crate) fn build<'k>(model: &Model, k: &'k Builder, io: EnginePorts<Inside<'k
     s.forces.frame_begin.set(begin_frame);
     s.forces.rounded.set(s.rounder.rounded);
     s.forces.clipped.set(s.rounder.clipped);
-    io.m_axis_tdata.set(s.forces.m_axis_tdata);
-    io.m_axis_tvalid.set(s.forces.m_axis_tvalid);
-    io.m_axis_tlast.set(s.forces.m_axis_tlast);
-    s.forces.m_axis_tready.set(io.m_axis_tready);
+    s.forces.m_axis.connect(&io.m_axis);
 
     observe(k, model);
 }

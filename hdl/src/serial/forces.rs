@@ -19,7 +19,7 @@ use super::pass_sequencer::SATURATION_BITS;
 use super::rounder::SHIFT_BITS;
 use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Net, Type};
-use crate::primitives::{count_bits, position_bits, status_bits, Balance};
+use crate::primitives::{count_bits, position_bits, status_bits, Balance, Stream};
 
 const WORD: usize = FORCE_BITS as usize;
 const FACTOR: usize = FACTOR_BITS as usize;
@@ -97,13 +97,7 @@ block! {
         /// `rounded` was saturated.
         in clipped;
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-        out m_axis_tdata: 3 * WORD;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: 3 * WORD;
         /// The frame's last beat is accepted in this cycle.
         out done;
     }
@@ -189,7 +183,7 @@ impl Block for Forces {
 
         let at = |phases: &[usize]| super::one_of(k, *phase, phases);
         let sends = k.wire("sends", !*scaling & *sending);
-        let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & io.m_axis_tready);
+        let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & io.m_axis.ready);
         let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
         let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
         let last_force = k.wire("last_force", !*status & beat.is(self.taxels - 1));
@@ -299,10 +293,10 @@ impl Block for Forces {
         io.wanted.set(io.place.extend(self.wanted).plus(1));
         io.product.set(result.extend(self.unrounded).unsigned());
         io.round_shift.set(scaling.mux(k.constant(SHIFT_BITS, MU_ROUND.into()), settled_shift));
-        io.m_axis_tdata.set(concat(&[*fz, *fy, *fx]));
-        io.m_axis_tvalid.set(*valid);
-        let last = io.m_axis_tlast.set(*valid & last_beat);
-        io.done.set(last & io.m_axis_tready);
+        io.m_axis.data.set(concat(&[*fz, *fy, *fx]));
+        io.m_axis.valid.set(*valid);
+        let last = io.m_axis.last.set(*valid & last_beat);
+        io.done.set(last & io.m_axis.ready);
     }
 }
 

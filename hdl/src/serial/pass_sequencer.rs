@@ -13,17 +13,17 @@ use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{schedule, Kind, Product};
 
 use super::rounder::SHIFT_BITS;
-use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::count_bits;
+use crate::{block, states};
 
 /// Width of the count of saturated words, in bits.
 pub const SATURATION_BITS: usize = 16;
-const FOLD_HIGH: u64 = 1;
-const FOLD_LOW: u64 = 2;
-const FIRST: u64 = 3;
-const REPLAY: u64 = 4;
-const OTHERS: u64 = 5;
+
+states! {
+    /// The steps of the module docs, from 1 on.
+    enum Step { Idle, FoldHigh, FoldLow, First, Replay, Others }
+}
 
 block! {
     /// The sequencer and its counters; steps in the module docs.
@@ -181,7 +181,7 @@ impl Block for PassSequencer {
 
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let zero = |bits: usize| k.constant(bits, 0);
-        let step = k.state("step", Type::unsigned(3), io.rst, 0);
+        let step = k.machine("step", io.rst, Step::Idle);
         let draining = k.state("draining", Type::unsigned(1), io.rst, 0);
         let row_gap = row_gap(f.quads);
         let gap_bits = count_bits(row_gap as usize + 1);
@@ -205,10 +205,10 @@ impl Block for PassSequencer {
             concat(&bits)
         };
         let wraps = |count: Expr<'k>, last: usize| count.is(last as u64);
-        let is = |number: u64| step.is(number);
+        let is = |wanted: Step| step.is(wanted);
 
-        let row_folding = k.wire("row_folding", is(FOLD_HIGH) | is(FOLD_LOW));
-        let unfolding = io.unfolding.set(is(REPLAY) | is(OTHERS));
+        let row_folding = k.wire("row_folding", is(Step::FoldHigh) | is(Step::FoldLow));
+        let unfolding = io.unfolding.set(is(Step::Replay) | is(Step::Others));
         let rescaled = k.wire("rescaled", unfolding & io.round_done);
         let drained = k.wire("drained", *draining & wait_count.is(DRAIN - 1));
         let last_quad = k.wire("last_quad", wraps(*quad, f.quads - 1));
@@ -231,14 +231,16 @@ impl Block for PassSequencer {
         length.set(seen_length);
         let runs = !*draining & !phase.at(2);
         read.set(read.at(0).concat(row_folding & runs));
-        replayed.set(is(REPLAY) & runs);
-        k.when(is(FOLD_HIGH), || {
+        replayed.set(is(Step::Replay) & runs);
+        k.when(is(Step::FoldHigh), || {
             normalise.set((k.constant(SHIFT_BITS, u64::from(f.input_bits - 1)) - *length).low(SHIFT_BITS));
         });
         let full = k.constant(SHIFT_BITS, u64::from(f.vector_bits - 1));
-        k.when(is(FIRST), || rescale.set(full.less(*length).mux((*length - full).low(SHIFT_BITS), zero(SHIFT_BITS))));
+        k.when(is(Step::First), || {
+            rescale.set(full.less(*length).mux((*length - full).low(SHIFT_BITS), zero(SHIFT_BITS)))
+        });
         k.when(rescaled & io.clipped, || saturations.set(saturations.plus(1)));
-        k.when(is(FIRST) & io.row_valid, || {
+        k.when(is(Step::First) & io.row_valid, || {
             seen.set(*seen | row_magnitude.resize(seen_bits));
             stored.set(wraps(*stored, 4 * f.quads - 1).mux(zero(words), stored.plus(1)));
         });
@@ -249,20 +251,21 @@ impl Block for PassSequencer {
             k.when(rescaled & end & !vector.is(f.operand_vectors() as u64), || vector.set(vector.plus(1)));
         });
         wait_count.set(draining.mux(wait_count.plus(1), zero(4)));
-        let (after_fold, freed) = if low == 0 { (FIRST, FOLD_HIGH) } else { (FOLD_LOW, FOLD_LOW) };
+        let (after_fold, freed) = if low == 0 { (Step::First, Step::FoldHigh) } else { (Step::FoldLow, Step::FoldLow) };
         k.when(drained, || {
             draining.set(zero(1));
-            step.set(is(FOLD_HIGH).mux(k.constant(3, after_fold), is(OTHERS).mux(zero(3), step.plus(1))));
+            let next = is(Step::Others).mux(step.number(Step::Idle), step.following());
+            step.goes_to(is(Step::FoldHigh).mux(step.number(after_fold), next));
             k.when(is(freed), || seen.set(zero(seen_bits)));
         });
-        k.when(!*draining & (row_folding | is(REPLAY)), || {
+        k.when(!*draining & (row_folding | is(Step::Replay)), || {
             phase.set(phase.plus(1));
             k.when(phase.all(), || {
                 quad.set(last_quad.mux(zero(quads), quad.plus(1)));
                 draining.set(last_quad);
             });
         });
-        let multiplies = is(FIRST) | is(OTHERS);
+        let multiplies = is(Step::First) | is(Step::Others);
         k.when(!*draining & multiplies, || {
             k.when(gap.is(0), || {
                 column.set(last_column.mux(zero(quads), column.plus(1)));
@@ -274,12 +277,12 @@ impl Block for PassSequencer {
                 quad.set(last_quad.mux(zero(quads), quad.plus(1)));
                 product.set(last_quad.mux(next_product, *first_product));
                 k.when(last_quad, || first_product.set(next_product));
-                draining.set(last_quad & (is(FIRST) | product.is(count as u64 - 1)));
+                draining.set(last_quad & (is(Step::First) | product.is(count as u64 - 1)));
             });
             k.when(!gap.is(0) & !gap.is(row_gap), || gap.set(gap.plus(1)));
         });
-        k.when(is(0) & io.start, || {
-            step.set(k.constant(3, FOLD_HIGH));
+        k.when(is(Step::Idle) & io.start, || {
+            step.goes(Step::FoldHigh);
             draining.set(zero(1));
             seen.set(io.magnitude.resize(seen_bits));
             let cleared = [
@@ -315,14 +318,14 @@ impl Block for PassSequencer {
 
         io.index.set(place);
         io.raw_read_address.set(place);
-        io.raw_write.set(is(FIRST) & io.row_valid);
+        io.raw_write.set(is(Step::First) & io.row_valid);
         io.raw_write_address.set(*stored);
-        let from = |replay, others, fold| is(REPLAY).mux(replay, is(OTHERS).mux(others, fold));
+        let from = |replay, others, fold| is(Step::Replay).mux(replay, is(Step::Others).mux(others, fold));
         let code_word = io.code.signed().shift_left(code_bits - 1).resize(unrounded).unsigned();
         io.unrounded.set(from(wide(io.raw_word, unrounded), wide(io.row_word, unrounded), code_word));
         io.round_shift.set(from(*rescale, k.constant(SHIFT_BITS, u64::from(f.a_shift)), *length));
         io.round.set(from(*replayed, io.row_valid, read.at(1)));
-        let busy = io.busy.set(step.any());
+        let busy = io.busy.set(!is(Step::Idle));
         io.transform.set(io.round_done & busy);
         io.issue.set(multiplies & !*draining & gap.is(0));
         io.last.set(row_last & last_column);
@@ -333,19 +336,19 @@ impl Block for PassSequencer {
         io.align.set(set(&|i| i.align));
         let kept = vector.less(k.constant(vectors, f.operand_vectors() as u64));
         io.write.set(folded | rescaled & kept);
-        let target = is(FOLD_HIGH)
-            .mux(zero(vectors), is(FOLD_LOW).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));
+        let target = is(Step::FoldHigh)
+            .mux(zero(vectors), is(Step::FoldLow).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));
         // An array of one quad has a quad address of one bit, which is 0.
         let written_quad = if f.quads == 1 { zero(quads) } else { written.slice(2, quads) };
         io.write_address.set(target.concat(written_quad));
         io.write_lane.set(written.at(1).concat(written.at(0) ^ !row_folding));
-        let operand = is(FOLD_HIGH).mux(high_limb, is(FOLD_LOW).mux(low_limb, wide(nearest, operands)));
+        let operand = is(Step::FoldHigh).mux(high_limb, is(Step::FoldLow).mux(low_limb, wide(nearest, operands)));
         io.write_data.set(operand);
-        io.normalised_valid.set(is(FOLD_HIGH) & io.round_done);
-        io.folding.set(is(FOLD_HIGH));
+        io.normalised_valid.set(is(Step::FoldHigh) & io.round_done);
+        io.folding.set(is(Step::FoldHigh));
         io.rescaled_valid.set(rescaled);
         io.free.set(drained & is(freed));
-        io.done.set(drained & is(OTHERS));
+        io.done.set(drained & is(Step::Others));
     }
 }
 

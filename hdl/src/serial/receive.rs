@@ -7,7 +7,7 @@ use dermis_golden::fixed::words::formats::Formats;
 
 use crate::block;
 use crate::language::{Block, Builder, Inside};
-use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};
+use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram, Stream};
 
 block! {
     /// ```text
@@ -29,13 +29,7 @@ block! {
         clock;
         reset;
         /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: bits;
         /// A beat is accepted in this cycle.
         out accept;
         /// The frame buffer holds a whole frame; high until `free`.
@@ -75,15 +69,15 @@ impl Block for Receive {
         let whole = k.instance("whole", Dff {});
         let broken = k.instance("broken", Dff {});
 
-        io.s_axis_tready.set(!whole.q & !io.rst);
-        let taken = k.wire("taken", io.s_axis_tvalid & !whole.q & !io.rst);
-        let early = k.wire("early", taken & io.s_axis_tlast & !taxels.last);
+        io.s_axis.ready.set(!whole.q & !io.rst);
+        let taken = k.wire("taken", io.s_axis.valid & !whole.q & !io.rst);
+        let early = k.wire("early", taken & io.s_axis.last & !taxels.last);
         io.accept.set(taken);
 
         taxels.enable.set(taken);
         taxels.clear.set(io.rst | early);
         frame.write_address.set(taxels.value);
-        frame.write_data.set(io.s_axis_tdata);
+        frame.write_data.set(io.s_axis.data);
         frame.write.set(taken);
         frame.read.set(k.constant(1, 1));
         frame.read_address.set(io.read_address);
@@ -92,7 +86,7 @@ impl Block for Receive {
         stats.accept.set(taken);
         stats.clear.set(io.rst | io.free | early);
         [stats.part, stats.select, stats.floor].iter().for_each(|input| input.set(k.constant(1, 0)));
-        stats.code.set(io.s_axis_tdata);
+        stats.code.set(io.s_axis.data);
         io.magnitude.set(stats.magnitude);
         io.positive.set(stats.positive);
         io.negative.set(stats.negative);
@@ -100,7 +94,7 @@ impl Block for Receive {
         io.full.set(whole.q);
         whole.d.set((whole.q | (taken & taxels.last)) & !io.free & !io.rst);
         io.framing.set(broken.q);
-        let missing = taken & taxels.last & !io.s_axis_tlast;
+        let missing = taken & taxels.last & !io.s_axis.last;
         broken.d.set(((broken.q & !io.reported) | early | missing) & !io.rst);
     }
 }

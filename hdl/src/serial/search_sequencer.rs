@@ -16,23 +16,24 @@ use dermis_golden::fixed::plan::serial::{polynomials, SELECTION, SLOT, SWEEP_TAI
 use dermis_golden::fixed::stages::search::{CENTRE, COARSE_CENTRES};
 use dermis_golden::fixed::words::formats::{Formats, HALVINGS};
 
-use crate::block;
 use crate::language::{concat, Block, Builder, Expr, Inside, Type};
 use crate::primitives::{count_bits, position_bits};
+use crate::{block, states};
 
 /// Width of x² + y² − r², in bits, signed.
 const DISC_BITS: usize = 21;
 const COARSE: u64 = COARSE_CENTRES.len() as u64;
 const LAST: u64 = COARSE + HALVINGS as u64;
-const IDLE: u64 = 0;
-const SET_UP: u64 = 1;
-const RUN: u64 = 2;
-const COMPARE: u64 = 3;
 /// Ticks from a bank's address to the word entering the chain along y; then to the word leaving it, and to its
 /// write-back.
 const ALONG_Y: u64 = TRANSPOSE + 1;
 const LEAVES: u64 = ALONG_Y + 4;
 const BACK: u64 = LEAVES + 1;
+
+states! {
+    /// What the sequencer does: a sweep is set up, runs, and its best candidate is compared.
+    enum Phase { Idle, SetUp, Run, Compare }
+}
 
 block! {
     /// Addresses of the sweeps and the best candidate; timing in the module docs.
@@ -149,7 +150,7 @@ impl Block for SearchSequencer {
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
         let zero = |bits: usize| k.constant(bits, 0);
         let one = k.constant(1, 1);
-        let state = k.state("state", Type::unsigned(2), io.rst, IDLE);
+        let state = k.machine("state", io.rst, Phase::Idle);
         let (count, sweep) = (register("count", 5), register("sweep", 4));
         let (turn, turn_then, turn_read_then) =
             (register("turn", 4), register("turn_then", 4), register("turn_read_then", 4));
@@ -171,7 +172,7 @@ impl Block for SearchSequencer {
 
         let coarse = k.wire("coarse", sweep.less(k.constant(4, COARSE)));
         let final_sweep = k.wire("final_sweep", sweep.is(LAST));
-        let running = k.wire("running", state.is(RUN));
+        let running = k.wire("running", state.is(Phase::Run));
         let run_end = k.wire("run_end", running & tick.is(SLOT * polynomials + SWEEP_TAIL - 1));
         let from = k.wire("from", coarse.mux(*current, *kept));
         let down = |axis: usize| {
@@ -220,8 +221,8 @@ impl Block for SearchSequencer {
         let whole_before = k.wire("whole_before", started & !slot.is(0) & within);
 
         done.set(run_end & final_sweep & !io.rst);
-        k.when(state.is(IDLE) & io.start, || {
-            state.set(k.constant(2, SET_UP));
+        k.when(state.is(Phase::Idle) & io.start, || {
+            state.goes(Phase::SetUp);
             sweep.set(io.enabled.mux(zero(4), k.constant(4, LAST)));
             searching.set(io.enabled);
             let cleared = [
@@ -230,8 +231,8 @@ impl Block for SearchSequencer {
             ];
             cleared.iter().for_each(|register| register.set(zero(register.bits())));
         });
-        k.when(state.is(SET_UP), || {
-            state.set(k.constant(2, RUN));
+        k.when(state.is(Phase::SetUp), || {
+            state.goes(Phase::Run);
             tick.set(zero(tick_bits));
             source.set(from);
             target.set((!from.at(1)).concat((!from.at(1)).equals(kept.at(1)) & !kept.at(0)));
@@ -268,12 +269,12 @@ impl Block for SearchSequencer {
         k.when(running, || {
             tick.set(tick.plus(1));
             k.when(run_end, || {
-                state.set(final_sweep.mux(k.constant(2, IDLE), k.constant(2, COMPARE)));
+                state.goes_to(final_sweep.mux(state.number(Phase::Idle), state.number(Phase::Compare)));
                 count.set(zero(5));
                 takes.set(zero(1));
             });
         });
-        let comparing = io.comparing.set(state.is(COMPARE));
+        let comparing = io.comparing.set(state.is(Phase::Compare));
         k.when(comparing, || {
             count.set(count.plus(1));
             turn_read_then.set(*turn);
@@ -302,7 +303,7 @@ impl Block for SearchSequencer {
                     improved.set(one);
                 });
                 k.when(count.is(SELECTION - 1), || {
-                    state.set(k.constant(2, SET_UP));
+                    state.goes(Phase::SetUp);
                     sweep.set(sweep.plus(1));
                     current.set(*target);
                     k.when(!coarse | *improved | *takes, || kept.set(*target));
@@ -333,7 +334,7 @@ impl Block for SearchSequencer {
         io.sums.set(slot.is(1).concat(slot.is(0)));
         io.value_valid.set(whole & final_sweep & !slot.is(0) & back.low(4).is(0));
         io.candidate.set(*turn_read_then);
-        io.compared.set(state.is(SET_UP) & *searching & !sweep.is(0));
+        io.compared.set(state.is(Phase::SetUp) & *searching & !sweep.is(0));
     }
 }
 

@@ -21,9 +21,9 @@ impl Receive {
         let banks: Vec<ReceivePorts<Outside<'k>>> = buffers.iter().enumerate().map(bank).collect();
         let choose = k.instance("choose", choose);
         for bank in &banks {
-            bank.s_axis_tdata.set(io.s_axis_tdata);
-            bank.s_axis_tvalid.set(io.s_axis_tvalid);
-            bank.s_axis_tlast.set(io.s_axis_tlast);
+            bank.s_axis.data.set(io.s_axis.data);
+            bank.s_axis.valid.set(io.s_axis.valid);
+            bank.s_axis.last.set(io.s_axis.last);
             bank.free.set(io.free);
             // An address beyond a smaller buffer is meant for another one; its data are not used.
             bank.quad_address.set(io.quad_address.low(bank.quad_address.bits()));
@@ -33,11 +33,11 @@ impl Receive {
         }
         // All buffers fill and become free together: the handshake of the first is that of all.
         let Some(first) = banks.first() else { return };
-        choose.code.set(io.s_axis_tdata);
+        choose.code.set(io.s_axis.data);
         choose.accept.set(first.accept);
-        choose.tlast.set(io.s_axis_tlast);
+        choose.tlast.set(io.s_axis.last);
         choose.free.set(io.free);
-        io.s_axis_tready.set(first.s_axis_tready);
+        io.s_axis.ready.set(first.s_axis.ready);
         io.accept.set(first.accept);
         io.taken_word.set(first.taken_word);
         io.row_end.set(first.row_end);
@@ -46,7 +46,7 @@ impl Receive {
         for (number, bank) in banks.iter().enumerate() {
             k.unused([bank.full, bank.which]);
             if number > 0 {
-                k.unused([bank.s_axis_tready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
+                k.unused([bank.s_axis.ready, bank.accept, bank.taken_word, bank.row_end, bank.dropped, bank.framing]);
             }
         }
         io.full.set(choose.settled);

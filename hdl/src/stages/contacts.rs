@@ -17,9 +17,9 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Condition;
 
-use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Net, Type};
 use crate::primitives::{count_bits, frame_quads, position_bits};
+use crate::{block, states};
 
 block! {
     /// Pulses of the stages in, their starts out; the μ of all contacts side by side, and for the status one after the other. The
@@ -130,16 +130,9 @@ block! {
 /// Width of the number of a section.
 const SECTION_BITS: usize = 2;
 
-#[derive(Clone, Copy)]
-enum State {
-    Idle,
-    First,
-    Segment,
-    Place,
-    Contact,
-    Step,
-    Result,
-    Status,
+states! {
+    /// What the stage waits for, or does.
+    enum State { Idle, First, Segment, Place, Contact, Step, Result, Status }
 }
 
 impl Contacts {
@@ -173,9 +166,8 @@ fn label_bits(contacts: usize) -> usize {
 impl Block for Contacts {
     fn build<'k>(&self, k: &'k Builder, io: ContactsPorts<Inside<'k>>) {
         let (rst, label_bits) = (io.rst, label_bits(self.contacts));
-        let state = k.state("state", Type::unsigned(3), rst, State::Idle as u64);
-        let is = |wanted: State| state.is(wanted as u64);
-        let goes = |next: State| state.set(k.constant(3, next as u64));
+        let state = k.machine("state", rst, State::Idle);
+        let (is, goes) = (|wanted: State| state.is(wanted), |next: State| state.goes(next));
 
         let contact = io.contact.register();
         let label = io.label.set(contact.extend(label_bits).plus(1));

@@ -6,7 +6,7 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
 use crate::primitives::{
-    count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, CYCLE_BITS,
+    count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, Stream, CYCLE_BITS,
     SATURATION_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
 };
 
@@ -85,15 +85,9 @@ block! {
         in incomplete;
         /// The frame's codes are clipped, above it whether a line repeats another; valid while the frame is sent.
         in faults: unit.widths().faults;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
         /// `{fz, fy, fx}`, 32 bits signed each, above them the label where a record of each contact is sent, or a status beat; valid
         /// with `m_axis_tvalid`.
-        out m_axis_tdata: unit.widths().beat_data;
+        source<Stream> m_axis: unit.widths().beat_data;
     }
 }
 
@@ -164,10 +158,10 @@ impl Block for Forces {
         leaving.write.set(unit.valid);
         leaving.last.set(unit.last);
         leaving.word.set(unit.beat_data);
-        leaving.m_axis_tready.set(io.m_axis_tready);
-        io.m_axis_tvalid.set(leaving.m_axis_tvalid);
-        io.m_axis_tlast.set(leaving.m_axis_tlast);
-        io.m_axis_tdata.set(leaving.m_axis_tdata);
+        leaving.m_axis.ready.set(io.m_axis.ready);
+        io.m_axis.valid.set(leaving.m_axis.valid);
+        io.m_axis.last.set(leaving.m_axis.last);
+        io.m_axis.data.set(leaving.m_axis.data);
         k.unused([quads.last]);
     }
 }

@@ -9,7 +9,7 @@ use dermis_golden::spec::quads::Quads;
 
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Type};
-use crate::primitives::{count_bits, lane_of, quad_address_of, TaxelPlace};
+use crate::primitives::{count_bits, lane_of, quad_address_of, Stream, TaxelPlace};
 use crate::streams::BEAT_BITS;
 
 block! {
@@ -28,21 +28,9 @@ block! {
         clock;
         reset;
         /// A beat, 96 bits; valid with `s_axis_tvalid`.
-        in s_axis_tdata: BEAT_BITS;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: BEAT_BITS;
         /// The beat, or one of labels; valid with `m_axis_tvalid`.
-        out m_axis_tdata: BEAT_BITS;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: BEAT_BITS;
         /// LabelBeats are being read.
         out reads;
         /// Address of the quad whose labels are needed; with `reads`.
@@ -70,8 +58,9 @@ fn label_bits(contacts: usize) -> usize {
 
 impl Block for LabelBeats {
     fn build<'k>(&self, k: &'k Builder, io: LabelBeatsPorts<Inside<'k>>) {
-        let LabelBeatsPorts { rst, s_axis_tdata: data, s_axis_tvalid: given, s_axis_tlast: last, labels, .. } = io;
-        let taken = io.m_axis_tready;
+        let LabelBeatsPorts { rst, labels, .. } = io;
+        let (data, given, last) = (io.s_axis.data, io.s_axis.valid, io.s_axis.last);
+        let taken = io.m_axis.ready;
         let (taxels, beats) = (self.layout.rows * self.layout.cols, self.beats);
         let counter = |name: &str, count: usize| k.state(name, Type::unsigned(count_bits(count)), rst, 0);
         let reads = io.reads.state(rst, 0);
@@ -121,10 +110,10 @@ impl Block for LabelBeats {
         });
         k.when(all_passed, || reads.set(k.constant(1, 1)));
 
-        io.m_axis_tdata.set(reads.mux(*word, data));
-        io.m_axis_tvalid.set(reads.mux(full, given));
-        io.m_axis_tlast.set(last & !*reads);
-        io.s_axis_tready.set(taken & !*reads);
+        io.m_axis.data.set(reads.mux(*word, data));
+        io.m_axis.valid.set(reads.mux(full, given));
+        io.m_axis.last.set(last & !*reads);
+        io.s_axis.ready.set(taken & !*reads);
     }
 }
 

@@ -10,10 +10,9 @@ use dermis_golden::fixed::Model;
 use crate::block;
 use crate::language::{Block, Builder, Expr, Inside, Outside};
 use crate::primitives::{
-    Arrays, Average, AveragePorts, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray, FrameMarks, Load,
-    LoadPorts, PAIR_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
+    through, Arrays, Average, AveragePorts, Beats, Calibrate, CalibratePorts, CoefficientPlaces, FrameArray,
+    FrameMarks, Load, LoadPorts, Stream, PAIR_BITS, THRESHOLD_BITS, VERSION_WORD_BITS,
 };
-use crate::streams::{leave_by, through, Beats};
 
 block! {
     /// Codes in, words of the frame buffer out.
@@ -38,25 +37,9 @@ block! {
         /// No frame is in the engine behind this stage.
         in idle;
         /// A taxel's code, or a byte of an image ([`Load`]), `stream_bits` wide; valid with `s_axis_tvalid`.
-        in s_axis_tdata: stream_bits;
-        /// Array of the frame, that of its first beat; valid with `s_axis_tvalid`.
-        in s_axis_tid: arrays.bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: (*stream_bits, arrays.bits);
         /// A taxel's word, `input_bits` wide, two's complement; valid with `m_axis_tvalid`.
-        out m_axis_tdata: input_bits;
-        /// Array of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: arrays.bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The word is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: (*input_bits, arrays.bits);
         /// Number of frames in a sliding mean, in an adaptive one with the number of its window above, otherwise one bit, 0; valid with `m_axis_tvalid`.
         out frames: marks.bits();
         /// Reset of the engine: `rst`, or tables are written; with several arrays `rst`.
@@ -132,39 +115,29 @@ impl Block for Prepare {
             Some(load) => {
                 // An adaptive mean takes no codes while a frame is in it.
                 let adapts = self.average.as_ref().is_some_and(Average::adapts);
-                let waits = average.as_ref().filter(|_| adapts).map(|average| average.s_axis_tready);
+                let waits = average.as_ref().filter(|_| adapts).map(|average| average.s_axis.ready);
                 let idle = waits.map_or(io.idle, |takes| io.idle & takes);
                 tables(k, &io, load, calibrate.as_ref(), idle);
             }
         }
-        let (data, valid, last) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast);
-        let codes = through!(Beats { data, valid, last, ready: io.s_axis_tready.net() }, load);
-        let array = frame_array.map_or(io.s_axis_tid, |frame| {
-            frame.s_axis_tid.set(io.s_axis_tid);
+        let codes = through!(io.s_axis.inward(), load);
+        let array = frame_array.map_or(io.s_axis.array, |frame| {
+            frame.s_axis_tid.set(io.s_axis.array);
             frame.taken.set(codes.valid & *codes.ready);
             frame.tlast.set(codes.last);
             frame.array
         });
-        let words = through!(codes, calibrate);
-        let array = calibrate.as_ref().map_or(array, |calibrate| {
-            calibrate.s_axis_tid.set(array);
-            calibrate.m_axis_tid
-        });
+        let words = through!(Beats { array, ..codes }, calibrate);
         io.frames.set(match &average {
             Some(average) => average.frames,
             None if self.marks.limited => words.data.top(),
             None => k.constant(1, 0),
         });
         let words = through!(words, average);
-        let array = average.as_ref().map_or(array, |average| {
-            average.s_axis_tid.set(array);
-            average.m_axis_tid
-        });
-        io.m_axis_tid.set(array);
         if let Some(load) = load.as_ref().filter(|_| self.arrays.bits > 0) {
-            tables_of_arrays(k, &io, load, array, calibrate.as_ref(), average.as_ref());
+            tables_of_arrays(k, &io, load, words.array, calibrate.as_ref(), average.as_ref());
         }
-        leave_by!(Beats { data: words.data.low(self.input_bits), ..words }, io);
+        Beats { data: words.data.low(self.input_bits), ..words }.connect(&io.m_axis);
     }
 }
 
@@ -177,7 +150,6 @@ fn tables_of_arrays<'k>(
     calibrate: Option<&CalibratePorts<Outside<'k>>>,
     average: Option<&AveragePorts<Outside<'k>>>,
 ) {
-    load.s_axis_tid.set(io.s_axis_tid);
     load.floor_array.set(array);
     load.sent_array.set(io.sent_array);
     k.unused([load.anew, load.array]);

@@ -11,7 +11,7 @@ use dermis_golden::spec::quads::Quads;
 use super::Choose;
 use crate::block;
 use crate::language::{Block, Builder, Inside};
-use crate::primitives::{count_bits, frame_quads, BitDelay, Delay, Dff, FrameStats, InputMask, Ram, Scan};
+use crate::primitives::{count_bits, frame_quads, BitDelay, Delay, Dff, FrameStats, InputMask, Ram, Scan, Stream};
 
 block! {
     /// ```text
@@ -35,13 +35,7 @@ block! {
         clock;
         reset;
         /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: bits;
         /// A beat is accepted in this cycle.
         out accept;
         /// The accepted code, 0 for a dead taxel and for tension of a unipolar array; valid with `accept`.
@@ -155,9 +149,9 @@ impl Receive {
         let complete = k.instance("complete", Dff {});
         let broken = k.instance("broken", Dff {});
 
-        io.s_axis_tready.set(!whole.q & !io.rst);
-        let taken = k.wire("taken", io.s_axis_tvalid & !whole.q & !io.rst);
-        let early = k.wire("early", taken & io.s_axis_tlast & !scan.last);
+        io.s_axis.ready.set(!whole.q & !io.rst);
+        let taken = k.wire("taken", io.s_axis.valid & !whole.q & !io.rst);
+        let early = k.wire("early", taken & io.s_axis.last & !scan.last);
         io.accept.set(taken);
         io.row_end.set(scan.row_end);
         io.dropped.set(early);
@@ -166,10 +160,10 @@ impl Receive {
         scan.which.set(k.constant(1, 0));
         scan.enable.set(taken);
         scan.clear.set(io.rst | early);
-        let word = input_mask.map_or(io.s_axis_tdata, |mask| {
+        let word = input_mask.map_or(io.s_axis.data, |mask| {
             mask.enable.set(taken);
             mask.clear.set(io.rst | early);
-            mask.word.set(io.s_axis_tdata);
+            mask.word.set(io.s_axis.data);
             mask.kept
         });
         io.taken_word.set(word);
@@ -201,7 +195,7 @@ impl Receive {
         complete.d.set(whole.q & !io.free & !io.rst);
         whole.d.set((whole.q | (taken & scan.last)) & !io.free & !io.rst);
         io.framing.set(broken.q);
-        broken.d.set(((broken.q & !io.reported) | early | (taken & scan.last & !io.s_axis_tlast)) & !io.rst);
+        broken.d.set(((broken.q & !io.reported) | early | (taken & scan.last & !io.s_axis.last)) & !io.rst);
     }
 }
 

@@ -8,7 +8,7 @@ use dermis_golden::spec::sensor::Sensor;
 
 use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, Net, Type};
-use crate::primitives::count_bits;
+use crate::primitives::{count_bits, Stream};
 
 block! {
     /// ```text
@@ -27,21 +27,9 @@ block! {
         reset;
         /// `{fz, fy, fx}` of a taxel, 32 bits signed each, with contacts above them its label, or a status beat; valid with
         /// `s_axis_tvalid`.
-        in s_axis_tdata: parts.force_bits();
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: parts.force_bits();
         /// A beat of sums, or a status beat, 96 bits; valid with `m_axis_tvalid`.
-        out m_axis_tdata: 3 * WORD;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: 3 * WORD;
     }
 }
 
@@ -160,8 +148,9 @@ fn values<'k>(k: &'k Builder, data: Expr<'k>, summed: Summed, place: [Expr<'k>; 
 fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, parts: Parts) {
     let (count, grid, summed) = (parts.count(), parts.grid(), parts.summed());
     let (rows, cols) = (sensor.rows / grid.rows, sensor.cols / grid.cols);
-    let ResultantsPorts { rst, s_axis_tdata: data, s_axis_tvalid: valid, s_axis_tlast: last, .. } = io;
-    let ready = io.m_axis_tready;
+    let rst = io.rst;
+    let (data, valid, last) = (io.s_axis.data, io.s_axis.valid, io.s_axis.last);
+    let ready = io.m_axis.ready;
     let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
     let restart = k.net("restart", bit);
     let counting = k.state("counting", bit, *restart, 1);
@@ -262,10 +251,10 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, pa
     let passing = k.wire("passing", !(*counting | settling[0] | settling[1] | settled | *sending));
     let finish = k.wire("finish", passing & valid & ready & last);
     restart.set(rst | finish);
-    io.s_axis_tready.set(*counting | (passing & ready));
-    io.m_axis_tvalid.set(*sending | (passing & valid));
-    io.m_axis_tlast.set(passing & last);
-    io.m_axis_tdata.set(sending.mux(pick(*beat.count, &now), data.low(3 * WORD)));
+    io.s_axis.ready.set(*counting | (passing & ready));
+    io.m_axis.valid.set(*sending | (passing & valid));
+    io.m_axis.last.set(passing & last);
+    io.m_axis.data.set(sending.mux(pick(*beat.count, &now), data.low(3 * WORD)));
 }
 
 #[cfg(test)]

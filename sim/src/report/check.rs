@@ -1,6 +1,6 @@
 //! What `dermis check` finds, as JSON and as text.
 
-use dermis_golden::fixed::plan::interval::longest_wait;
+use dermis_golden::fixed::plan::interval::{longest_wait, longest_wait_with_image};
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::checks::pull::TareLoad;
 use dermis_golden::spec::sensor::Sensor;
@@ -138,6 +138,8 @@ pub struct ArraysCheck {
     pub cycles: u64,
     /// Time of the cycles in µs.
     pub time_us: f64,
+    /// Cycles where an image of tables comes meanwhile; only with tables that are written.
+    pub cycles_with_image: Option<u64>,
 }
 
 impl HardwareCheck {
@@ -150,7 +152,8 @@ impl HardwareCheck {
     ) -> Self {
         let (board, usage, cycles) = (&model.board, total(usage), Cycles::longest(model).total);
         let (count, wait) = (model.scene.hardware.arrays, longest_wait(model));
-        let arrays = ArraysCheck { count, cycles: wait, time_us: board.microseconds(wait) };
+        let cycles_with_image = longest_wait_with_image(model);
+        let arrays = ArraysCheck { count, cycles: wait, time_us: board.microseconds(wait), cycles_with_image };
         HardwareCheck {
             arrays: (count > 1).then_some(arrays),
             degree: model.formats().degree,
@@ -176,10 +179,13 @@ impl HardwareCheck {
         text += &format!(
             "time        at most {cycles} cycles = {time_us:.2} µs at {clock_MHz} MHz, {margin} the budget of {BUDGET_US} µs\n"
         );
-        if let Some(ArraysCheck { count, cycles, time_us }) = self.arrays {
+        if let Some(ArraysCheck { count, cycles, time_us, cycles_with_image }) = &self.arrays {
             text += &format!(
-                "arrays      {count}; of frames that come at once the last result is there after at most {cycles} cycles = {time_us:.2} µs\n"
+                "arrays      {count}; of frames that come at once the last result is there after at most {cycles} cycles = {time_us:.2} µs"
             );
+            let beside =
+                cycles_with_image.map(|cycles| format!(", with an image of tables among them {cycles} cycles"));
+            text += &format!("{}\n", beside.unwrap_or_default());
         }
         if let Some(instead) = self.estimator_instead {
             text += &format!("left out    by the hardware: the model's estimator; it computes {instead}\n");

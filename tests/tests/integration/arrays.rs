@@ -2,7 +2,7 @@
 //! come in any order. Stalls, resets and frames cut short meanwhile are those of `streams.rs`, here with arrays.
 
 use dermis_golden::data::input::calibration::Calibration;
-use dermis_golden::fixed::plan::interval::{frame_interval, longest_wait};
+use dermis_golden::fixed::plan::interval::{frame_interval, longest_wait, longest_wait_with_image};
 use dermis_golden::fixed::plan::resources::{Holds, Memory};
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::spec::scene::{MeanKind, RunningZero, Scene, Zero};
@@ -155,6 +155,32 @@ fn frames_that_come_at_once_are_answered_within_the_bound() {
         // It is no more than an interval away.
         let interval = frame_interval(&hardware.model, hardware.model.first());
         assert!(taken <= bound && taken + interval >= bound, "{what}: {taken} of {bound}, interval {interval}");
+    }
+}
+
+/// The same with an image of tables at each place among the frames.
+#[test]
+fn an_image_among_frames_delays_them_by_no_more_than_the_bound() {
+    let written: Vec<_> = SCENES.iter().filter(|(_, [hardware, _])| hardware.contains("writable")).collect();
+    for (what, more) in variants(&written, 1) {
+        let (_folder, scene) = scene(*more);
+        let hardware = hardware(&scene);
+        let mut frames = vectors(&hardware.model);
+        frames.truncate(ARRAYS);
+        frames.iter_mut().for_each(|vector| vector.codes.fill(12_000));
+        let image = Vector { array: 1, ..Vector::of_image(&hardware.model.of_array(1).unwrap()) };
+        let taken = |place: usize| {
+            let mut vectors = frames.clone();
+            vectors.insert(place, image.clone());
+            let mut device = hardware.device_for(Simulator::Verilator, &vectors, 1).unwrap();
+            let (taps, vectors) = hardware.observable(Simulator::Verilator, &vectors);
+            let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
+            let (_, times) = run(dut, &vectors, Stimulus::BackToBack);
+            times[ARRAYS].last_out.unwrap() - times[0].first_in.unwrap() + 1
+        };
+        let (most, bound) = ((0..ARRAYS).map(taken).max().unwrap(), longest_wait_with_image(&hardware.model).unwrap());
+        let interval = frame_interval(&hardware.model, hardware.model.first());
+        assert!(most <= bound && most + interval >= bound, "{what}: {most} of {bound}, interval {interval}");
     }
 }
 

@@ -17,11 +17,13 @@ use super::contact_cycles::{ContactCycles, ContactTiming};
 use super::contents::{CasePlan, Plan};
 use super::cycles::{early_values, forces, passes, search, split_latency, Cycles, ACCEPT, FOLDED, LABELS, NEXT, SEND};
 use super::serial;
-use crate::fixed::stages::{choose, resultants};
+use crate::fixed::stages::{choose, load, resultants};
 use crate::spec::board::EngineKind;
 
 /// Cycles from the hand-over of a frame's last subarray, or from the end of the last frame, to the next frame.
 const BEGIN: u64 = 2;
+/// Cycles from a frame's last output beat until an image rests, and from its last byte until a code is taken, together.
+const IMAGE: u64 = 4;
 /// Frames after which the interval no longer changes.
 const SETTLED: usize = 8;
 
@@ -43,6 +45,16 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
 pub fn longest_wait(plan: &Plan) -> u64 {
     let interval = plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0);
     (plan.scene.hardware.arrays as u64 - 1) * interval + Cycles::longest(plan).total
+}
+
+/// As [`longest_wait`], with the image of the tables of one array anywhere among the frames, whose bytes come as they are taken, one in two cycles: it waits for
+/// the frames before it, and those behind it for its end. `None` where tables are not written.
+pub fn longest_wait_with_image(plan: &Plan) -> Option<u64> {
+    let image = load::REST + IMAGE + 2 * plan.tables()?.image_bytes() as u64;
+    let (arrays, total) = (plan.scene.hardware.arrays as u64, Cycles::longest(plan).total);
+    let interval = plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0);
+    // At worst between two frames, of which neither overlaps the other.
+    Some(image + if arrays > 1 { (arrays - 2) * interval + 2 * total } else { total })
 }
 
 /// The longest of the intervals before the third and each later one of frames that follow one another, each with the contacts

@@ -32,6 +32,9 @@ pub const VERSION_BITS: u32 = 15;
 pub const HEAD_WORDS: usize = 3;
 /// Coefficients in a word.
 pub const COEFFICIENTS_PER_WORD: usize = 2;
+/// Cycles after the last code, and without a frame in the engine, after which an image begins: none is in the first or last registers
+/// either.
+pub const REST: u64 = 31;
 /// Bytes of the CRC.
 const CRC_BYTES: usize = 4;
 

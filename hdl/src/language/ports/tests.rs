@@ -1,6 +1,7 @@
 //! Declared ports from both sides, and what is wrong with a block that does not keep to them.
 
 use super::*;
+use crate::block;
 use crate::language::{Hierarchy, KernelError, Run};
 use crate::wire::Word;
 

@@ -47,7 +47,7 @@ impl Arrays {
     }
 
     /// A state named `name` for each array, `value` after a reset.
-    pub(super) fn state<'k>(
+    pub(crate) fn state<'k>(
         self,
         k: &'k Builder,
         name: &str,
@@ -78,7 +78,7 @@ impl Arrays {
 
 /// What resets the states of the arrays.
 #[derive(Clone, Copy)]
-pub(super) struct Resets<'k> {
+pub(crate) struct Resets<'k> {
     /// All of them.
     pub rst: Expr<'k>,
     /// A bit for each array that begins anew, where single arrays do.
@@ -93,13 +93,18 @@ impl<'k> Resets<'k> {
 }
 
 /// A state for each array.
-pub(super) struct PerArray<'k> {
+pub(crate) struct PerArray<'k> {
     states: Vec<Net<'k>>,
 }
 
 impl<'k> PerArray<'k> {
+    /// That of array number `array`.
+    pub(crate) fn number(&self, array: usize) -> Expr<'k> {
+        *self.states[array]
+    }
+
     /// That of array `array`.
-    pub(super) fn of(&self, array: Expr<'k>) -> Expr<'k> {
+    pub(crate) fn of(&self, array: Expr<'k>) -> Expr<'k> {
         let mut states: Vec<Expr<'k>> = self.states.iter().map(|state| **state).collect();
         let mut bit = 0;
         while states.len() > 1 {
@@ -110,7 +115,7 @@ impl<'k> PerArray<'k> {
     }
 
     /// Array `array` gets `value`, where the surrounding conditions hold.
-    pub(super) fn set(&self, k: &'k Builder, array: Expr<'k>, value: Expr<'k>) {
+    pub(crate) fn set(&self, k: &'k Builder, array: Expr<'k>, value: Expr<'k>) {
         match self.states.as_slice() {
             [only] => only.set(value),
             states => states.iter().enumerate().for_each(|(number, state)| {

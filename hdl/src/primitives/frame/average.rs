@@ -12,6 +12,7 @@ use super::sliding_mean::{frames_bits, MeanPorts, SlidingMean};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::stream::beats::Stream;
 
 block! {
     /// ```text
@@ -45,25 +46,9 @@ block! {
         clock;
         reset;
         /// A taxel's word, `bits` wide, two's complement, where zeros run with a bit above it; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits + usize::from(marks.limited);
-        /// Array of the frame; valid with `s_axis_tvalid`.
-        in s_axis_tid: arrays.bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: (bits + usize::from(marks.limited), arrays.bits);
         /// A taxel's sum, `bits + power` wide, two's complement; valid with `m_axis_tvalid`.
-        out m_axis_tdata: bits + power;
-        /// Array of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: arrays.bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of the sums; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: (bits + power, arrays.bits);
         /// Number of frames in a sliding mean, up to 2^(k+1) − 1, with the window of an adaptive one above; above it, where zeros run, whether one is at its limit. Valid
         /// with `m_axis_tvalid`. Otherwise one bit, 0.
         out frames: marks.bits();
@@ -127,41 +112,41 @@ impl Average {
         let taxel = k.state("taxel", index, io.rst, 0);
         let frame = k.state("frame", Type::unsigned(self.power), io.rst, 0);
         let [missed, held] = ["missed", "held"].map(|name| k.state(name, bit, io.rst, 0));
-        let valid = io.m_axis_tvalid.state(io.rst, 0);
+        let valid = io.m_axis.valid.state(io.rst, 0);
         let held_taxel = k.register("held_taxel", index);
         let [held_first, held_leaves, held_last] =
             ["held_first", "held_leaves", "held_last"].map(|name| k.register(name, bit));
         let (word, sofar) = (k.register("word", Type::unsigned(self.bits)), k.register("sofar", Type::unsigned(wide)));
-        let (sum_out, last_out) = (io.m_axis_tdata.register(), io.m_axis_tlast.register());
+        let (sum_out, last_out) = (io.m_axis.data.register(), io.m_axis.last.register());
 
         let zero = |bits: usize| k.constant(bits, 0);
         let at_end = k.wire("at_end", taxel.is(self.taxels as u64 - 1));
         let final_frame = k.wire("final_frame", frame.all());
-        let early = k.wire("early", io.s_axis_tlast & !at_end);
+        let early = k.wire("early", io.s_axis.last & !at_end);
         let before = held_first.mux(zero(wide), *sofar);
         let sum = k.wire("sum", (word.signed().extend(wide).unsigned() + before).low(wide));
-        let moves = k.wire("moves", !*valid | io.m_axis_tready);
-        io.s_axis_tready.set(moves & !io.rst);
+        let moves = k.wire("moves", !*valid | io.m_axis.ready);
+        io.s_axis.ready.set(moves & !io.rst);
         k.when(moves, || {
-            held.set(io.s_axis_tvalid);
+            held.set(io.s_axis.valid);
             valid.set(*held & *held_leaves);
-            k.when(io.s_axis_tvalid, || {
+            k.when(io.s_axis.valid, || {
                 taxel.set((early | at_end).mux(zero(taxel.bits()), taxel.plus(1)));
                 k.when(at_end, || {
                     frame.set(frame.plus(1));
-                    missed.set(!final_frame & (*missed | !io.s_axis_tlast));
+                    missed.set(!final_frame & (*missed | !io.s_axis.last));
                 });
                 k.when(early, || {
                     frame.set(zero(self.power));
                     missed.set(zero(1));
                 });
             });
-            word.set(io.s_axis_tdata.low(self.bits));
+            word.set(io.s_axis.data.low(self.bits));
             sofar.set(sums.read(*taxel));
             held_taxel.set(*taxel);
             held_first.set(frame.is(0));
             held_leaves.set(final_frame | early);
-            held_last.set(io.s_axis_tlast & (early | !*missed));
+            held_last.set(io.s_axis.last & (early | !*missed));
             sum_out.set(sum);
             last_out.set(*held_last);
         });
@@ -169,7 +154,7 @@ impl Average {
         if self.marks.limited {
             let (held_limit, frames) = (k.register("held_limit", bit), io.frames.register());
             k.when(moves, || {
-                held_limit.set(io.s_axis_tdata.top());
+                held_limit.set(io.s_axis.data.top());
                 frames.set(*held_limit);
             });
         } else {
@@ -185,16 +170,16 @@ impl Block for Average {
         let ports = MeanPorts {
             rst: io.rst,
             resets: arrays.resets(io.rst, io.anew, written),
-            data: io.s_axis_tdata,
-            array: io.s_axis_tid,
-            offered: io.s_axis_tvalid,
-            tlast: io.s_axis_tlast,
-            ready_out: io.s_axis_tready,
-            data_out: io.m_axis_tdata,
-            array_out: io.m_axis_tid,
-            valid_out: io.m_axis_tvalid,
-            last_out: io.m_axis_tlast,
-            ready: io.m_axis_tready,
+            data: io.s_axis.data,
+            array: io.s_axis.array,
+            offered: io.s_axis.valid,
+            tlast: io.s_axis.last,
+            ready_out: io.s_axis.ready,
+            data_out: io.m_axis.data,
+            array_out: io.m_axis.array,
+            valid_out: io.m_axis.valid,
+            last_out: io.m_axis.last,
+            ready: io.m_axis.ready,
             frames: io.frames,
         };
         match (mean, adaptive) {

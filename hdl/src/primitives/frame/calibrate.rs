@@ -9,6 +9,7 @@ use super::running_zero::{follow, Beat, Followed, RECOVERY};
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, MemoryPort, Net, Type};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::stream::beats::Stream;
 
 block! {
     /// ```text
@@ -33,26 +34,10 @@ block! {
         clock;
         reset;
         /// A taxel's code, `bits` wide, two's complement; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits;
-        /// Array of the frame; valid with `s_axis_tvalid`.
-        in s_axis_tid: arrays.bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: (*bits, arrays.bits);
         /// A taxel's stress in codes, `bits` wide, two's complement, saturated; above it, where zeros run, whether one is at its
         /// limit. Valid with `m_axis_tvalid`.
-        out m_axis_tdata: bits + usize::from(running.is_some());
-        /// Array of the frame; valid with `m_axis_tvalid`.
-        out m_axis_tid: arrays.bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: (bits + usize::from(running.is_some()), arrays.bits);
         /// Writes `write_entry` to taxel `write_taxel`, where tables are writable; while no frame is under way.
         in write;
         /// Array of the taxel; valid with `write`.
@@ -117,11 +102,11 @@ impl Calibrate {
     }
 
     fn calibrated<'k>(&self, k: &'k Builder, io: CalibratePorts<Inside<'k>>) {
-        let (bits, gain_bits, rst, tlast) = (self.bits, self.gain_bits(), io.rst, io.s_axis_tlast);
+        let (bits, gain_bits, rst, tlast) = (self.bits, self.gain_bits(), io.rst, io.s_axis.last);
         let entries = self.entries(k, &io);
         let steps = 2 + if self.gain.is_some() { 2 } else { 0 } + if self.running.is_some() { 2 } else { 0 };
         let taxel = k.state("taxel", Type::unsigned(io.write_taxel.bits()), rst, 0);
-        let place = self.arrays.place(k, io.s_axis_tid, *taxel);
+        let place = self.arrays.place(k, io.s_axis.array, *taxel);
         let entry = entries.map(|entries| {
             let entry = k.register("entry", Type::unsigned(bits + gain_bits));
             (entry, entries)
@@ -129,17 +114,17 @@ impl Calibrate {
         let code = k.register("code", Type::signed(bits));
         let valids = k.state("valids", Type::unsigned(steps), rst, 0);
         let lasts = k.register("lasts", Type::unsigned(steps));
-        let moves = k.wire("moves", !valids.top() | io.m_axis_tready);
+        let moves = k.wire("moves", !valids.top() | io.m_axis.ready);
         let running = self.running.as_ref().map(|zero| {
             let waits = k.state("waits", Type::unsigned(RECOVERY), rst, 0).comment("After an early `tlast`.");
             let end = k.wire("at_end", taxel.is(self.taxels as u64 - 1));
             (zero, waits, end)
         });
         let takes = running.map_or(moves, |(_, waits, _)| k.wire("takes", moves & !waits.any()));
-        let offered = running.map_or(io.s_axis_tvalid, |(_, waits, _)| io.s_axis_tvalid & !waits.any());
-        io.s_axis_tready.set(takes & !rst);
-        io.m_axis_tvalid.set(valids.top());
-        io.m_axis_tlast.set(lasts.top());
+        let offered = running.map_or(io.s_axis.valid, |(_, waits, _)| io.s_axis.valid & !waits.any());
+        io.s_axis.ready.set(takes & !rst);
+        io.m_axis.valid.set(valids.top());
+        io.m_axis.last.set(lasts.top());
 
         let difference = match &entry {
             None => *code,
@@ -181,7 +166,7 @@ impl Calibrate {
         let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
         let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
         let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
-        let stress = io.m_axis_tdata.register();
+        let stress = io.m_axis.data.register();
         k.when(moves, || {
             valids.set(valids.low(steps - 1).concat(offered));
             let after = tlast | taxel.is(self.taxels as u64 - 1);
@@ -190,7 +175,7 @@ impl Calibrate {
             if let Some((entry, entries)) = &entry {
                 entry.set(entries.read(place));
             }
-            code.set(io.s_axis_tdata.signed());
+            code.set(io.s_axis.data.signed());
             let calibrated = clipped.mux(limit, result.low(bits));
             let calibrated = limited.map_or(calibrated, |limited| limited.concat(calibrated));
             stress.set(match self.written {
@@ -202,8 +187,8 @@ impl Calibrate {
         if array_bits > 0 {
             let arrays =
                 k.register("arrays", Type::unsigned(steps * array_bits)).comment("Of the beats in the registers.");
-            k.when(moves, || arrays.set(arrays.low((steps - 1) * array_bits).concat(io.s_axis_tid)));
-            io.m_axis_tid.set(arrays.slice((steps - 1) * array_bits, array_bits));
+            k.when(moves, || arrays.set(arrays.low((steps - 1) * array_bits).concat(io.s_axis.array)));
+            io.m_axis.array.set(arrays.slice((steps - 1) * array_bits, array_bits));
             if self.written {
                 io.incomplete_array.set(arrays.slice((steps - 2) * array_bits, array_bits));
             }

@@ -1,7 +1,7 @@
 //! Takes images of tables from the input stream and passes frames on.
 
 use dermis_golden::fixed::stages::load::{
-    beats, Tables, COEFFICIENTS_PER_WORD, HEAD_WORDS, MAGIC, VERSION_BITS, WORD_BYTES,
+    beats, Tables, COEFFICIENTS_PER_WORD, HEAD_WORDS, MAGIC, REST, VERSION_BITS, WORD_BYTES,
 };
 use dermis_golden::fixed::stages::prepare::GAIN_BITS;
 use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
@@ -13,6 +13,7 @@ use super::arrays::{Arrays, Resets};
 use crate::block;
 use crate::language::{concat, Block, Builder, Contents, Expr, Inside, MemoryPort, Type};
 use crate::primitives::address::counter::count_bits;
+use crate::primitives::stream::beats::Stream;
 
 block! {
     /// ```text
@@ -42,23 +43,9 @@ block! {
         /// No frame is in the engine.
         in idle;
         /// A code, sign-extended, or a byte of an image, `stream_bits` wide; valid with `s_axis_tvalid`.
-        in s_axis_tdata: code_bits + 1;
-        /// Array of the frame or image, that of its first beat; valid with `s_axis_tvalid`.
-        in s_axis_tid: arrays.bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame or image; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: (code_bits + 1, arrays.bits);
         /// A code, `code_bits` wide; valid with `m_axis_tvalid`.
-        out m_axis_tdata: code_bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: code_bits;
         /// Reset of the engine: `rst`, or tables are written; with several arrays `rst`.
         out restart;
         /// Of several arrays the one whose tables are written, a bit each.
@@ -99,8 +86,6 @@ block! {
     }
 }
 
-/// Cycles after the last code, and without a frame in the engine, after which none is in its first or last registers either.
-pub const REST: u64 = 31;
 /// Width of the threshold.
 pub const THRESHOLD_BITS: usize = 32;
 /// Width of the version with the bit above it.
@@ -184,7 +169,7 @@ impl Load {
     /// Frames pass, images are taken.
     fn take_tables<'k>(&self, k: &'k Builder, io: LoadPorts<Inside<'k>>) {
         let (bits, bit, word_bits) = (self.code_bits, Type::unsigned(1), 8 * WORD_BYTES);
-        let (data, offered, tlast, ready) = (io.s_axis_tdata, io.s_axis_tvalid, io.s_axis_tlast, io.m_axis_tready);
+        let (data, offered, tlast, ready) = (io.s_axis.data, io.s_axis.valid, io.s_axis.last, io.m_axis.ready);
         let zero = k.constant(1, 0);
 
         let image = k.state("image", bit, io.rst, 0);
@@ -194,7 +179,7 @@ impl Load {
         let took = k.state("took", bit, io.rst, 0);
         let refused = self.arrays.state(k, "refused", bit, Resets { rst: io.rst, anew: None }, 0);
         let own = (self.arrays.bits > 0).then(|| k.register("own", Type::unsigned(self.arrays.bits)));
-        let array = own.map_or(io.s_axis_tid, |own| *own);
+        let array = own.map_or(io.s_axis.array, |own| *own);
         let in_frame = k.state("in_frame", bit, io.rst, 0);
         let rests = k.state("rests", Type::unsigned(count_bits(REST as usize + 1)), io.rst, 0);
         let place = k.state("place", Type::unsigned(count_bits(WORD_BYTES)), io.rst, 0);
@@ -211,10 +196,10 @@ impl Load {
         let rested = k.wire("rested", rests.is(REST));
         let takes = k.wire("takes", offered & is_byte & !*took & (busy | *in_frame | rested) & !io.rst);
         let passes = k.wire("passes", offered & !is_byte & !busy & !*took & !*writing & !io.rst);
-        io.m_axis_tvalid.set(passes);
-        io.m_axis_tdata.set(data.low(bits));
-        io.m_axis_tlast.set(tlast);
-        io.s_axis_tready.set(takes | (passes & ready));
+        io.m_axis.valid.set(passes);
+        io.m_axis.data.set(data.low(bits));
+        io.m_axis.last.set(tlast);
+        io.s_axis.ready.set(takes | (passes & ready));
         k.when(rested.is(0), || rests.set(rests.plus(1)));
         k.when(!io.idle | (passes & ready), || rests.set(k.constant(rests.bits(), 0)));
         k.when(passes & ready, || in_frame.set(!tlast));
@@ -231,9 +216,9 @@ impl Load {
         k.when(begins, || {
             image.set(!*in_frame);
             skipping.set(*in_frame);
-            k.when(*in_frame, || refused.set(k, io.s_axis_tid, k.constant(1, 1)));
+            k.when(*in_frame, || refused.set(k, io.s_axis.array, k.constant(1, 1)));
             if let Some(own) = own {
-                own.set(io.s_axis_tid);
+                own.set(io.s_axis.array);
             }
         });
 

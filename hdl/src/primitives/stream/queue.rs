@@ -2,6 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Contents, Inside, Type};
+use crate::primitives::stream::beats::Stream;
 
 block! {
     /// ```text
@@ -27,14 +28,8 @@ block! {
         in last;
         /// Data of the beat; valid with `write`.
         in word: bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
         /// Data of the beat; valid with `m_axis_tvalid`.
-        out m_axis_tdata: bits;
+        source<Stream> m_axis: bits;
     }
 }
 
@@ -57,12 +52,12 @@ impl Block for Queue {
         let places = k.memory("places", PLACES, self.bits + 1, Contents::Undefined);
         let [written, read, reserved] = ["written", "read", "reserved"].map(|name| k.state(name, count, io.rst, 0));
         let room = io.room.state(io.rst, 1);
-        let valid = io.m_axis_tvalid.state(io.rst, 0);
-        let tlast = io.m_axis_tlast.state(io.rst, 0);
-        let tdata = io.m_axis_tdata.register();
+        let valid = io.m_axis.valid.state(io.rst, 0);
+        let tlast = io.m_axis.last.state(io.rst, 0);
+        let tdata = io.m_axis.data.register();
 
-        let taken = k.wire("taken", *valid & io.m_axis_tready);
-        let moves = k.wire("moves", !*valid | io.m_axis_tready);
+        let taken = k.wire("taken", *valid & io.m_axis.ready);
+        let moves = k.wire("moves", !*valid | io.m_axis.ready);
         let waits = k.wire("waits", written.differs(*read));
         k.comment("Both counts are at hand when reserve arrives, which is late.");
         let kept = k.wire("kept", (*reserved - taken).low(PLACE_BITS + 1));

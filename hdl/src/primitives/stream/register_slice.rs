@@ -2,6 +2,7 @@
 
 use crate::block;
 use crate::language::{Block, Builder, Inside};
+use crate::primitives::stream::beats::Stream;
 
 block! {
     /// ```text
@@ -17,21 +18,9 @@ block! {
         clock;
         reset;
         /// Data of the beat; valid with `s_axis_tvalid`.
-        in s_axis_tdata: bits;
-        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-        in s_axis_tvalid;
-        /// The block accepts a beat in this cycle.
-        out s_axis_tready;
-        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-        in s_axis_tlast;
+        sink<Stream> s_axis: bits;
         /// Data of the beat; valid with `m_axis_tvalid`.
-        out m_axis_tdata: bits;
-        /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-        out m_axis_tvalid;
-        /// The receiver accepts a beat in this cycle.
-        in m_axis_tready;
-        /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-        out m_axis_tlast;
+        source<Stream> m_axis: bits;
     }
 }
 
@@ -44,15 +33,15 @@ impl RegisterSlice {
 
 impl Block for RegisterSlice {
     fn build<'k>(&self, k: &'k Builder, io: RegisterSlicePorts<Inside<'k>>) {
-        let tdata = io.m_axis_tdata.register();
-        let valid = io.m_axis_tvalid.state(io.rst, 0);
-        let tlast = io.m_axis_tlast.register();
-        io.s_axis_tready.set(!*valid);
+        let tdata = io.m_axis.data.register();
+        let valid = io.m_axis.valid.state(io.rst, 0);
+        let tlast = io.m_axis.last.register();
+        io.s_axis.ready.set(!*valid);
         k.when(!*valid, || {
-            tdata.set(io.s_axis_tdata);
-            tlast.set(io.s_axis_tlast);
+            tdata.set(io.s_axis.data);
+            tlast.set(io.s_axis.last);
         });
-        valid.set(valid.mux(!io.m_axis_tready, io.s_axis_tvalid));
+        valid.set(valid.mux(!io.m_axis.ready, io.s_axis.valid));
     }
 }
 

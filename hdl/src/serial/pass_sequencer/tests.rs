@@ -12,6 +12,12 @@ use crate::language::kernel_of;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
+const FOLD_HIGH: u64 = Step::FoldHigh as u64;
+const FOLD_LOW: u64 = Step::FoldLow as u64;
+const FIRST: u64 = Step::First as u64;
+const REPLAY: u64 = Step::Replay as u64;
+const OTHERS: u64 = Step::Others as u64;
+
 /// Inputs in the order of the kernel.
 const INPUTS: [&str; 12] = [
     "rst",

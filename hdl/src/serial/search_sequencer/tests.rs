@@ -14,6 +14,11 @@ const ENABLED: usize = 3;
 const WANTED: usize = 4;
 const TOTAL: usize = 5;
 
+const IDLE: u64 = Phase::Idle as u64;
+const SET_UP: u64 = Phase::SetUp as u64;
+const RUN: u64 = Phase::Run as u64;
+const COMPARE: u64 = Phase::Compare as u64;
+
 fn bit(inputs: &[Word], index: usize) -> bool {
     inputs[index].number() == 1
 }
