@@ -78,7 +78,7 @@ pub(super) fn parse(text: &str, wanted: &Wanted, source: &Source) -> Result<Reco
                 first.insert(First { name: name.clone(), model, shape, calibrated }).calibrated
             }
         };
-        let all = values(&own, calibrated).filter(|all| all.len() == AXES * own.taxels);
+        let all = values(&own, calibrated).filter(|all| own.taxels.checked_mul(AXES) == Some(all.len()));
         let all = all.ok_or_else(|| wrong("x, y and z of each taxel"))?;
         // As it is written: a floating-point number rounds the digits of a date.
         let time_ns = message.get("time").and_then(|time| number_ns(time.get(), 0));
@@ -163,6 +163,10 @@ mod tests {
         assert_eq!(text, "xela.log: the size is missing; give it with --size ROWSxCOLS; this XELA sensor has 4 taxels");
         let short = read(&one.replace(",0001\"", "\""), Some([2, 2]), Some(1)).unwrap_err();
         assert!(short.starts_with("xela.log, line 1: ") && short.ends_with("x, y and z of each taxel"), "{short}");
+        // Behind the first, whose number of taxels is that of the size: one that three times is none that there is.
+        let many = one.clone() + &one.replace("\"taxels\": 4", "\"taxels\": 9223372036854775812");
+        let many = read(&many, Some([2, 2]), Some(1)).unwrap_err();
+        assert!(many.starts_with("xela.log, line 2: ") && many.ends_with("x, y and z of each taxel"), "{many}");
         let two = one.replace("\"1\": {", "\"2\": {\"data\": \"\", \"taxels\": 0}, \"1\": {");
         assert!(read(&two, Some([2, 2]), Some(1)).unwrap_err().contains("name it with --sensor, one of 1, 2"));
         let cut = one.clone() + &one[..40];
