@@ -195,7 +195,7 @@ netlist: setup ## co-simulate the synthesised netlist of a small scene with sear
 
 fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
 	@echo '== fuzz'
-	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --locked --release -p dermis-tests --test fuzz -- --nocapture
+	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --locked --profile checked -p dermis-tests --test fuzz -- --nocapture
 
 # Without READER it says which there are; new inputs go to build/fuzz, of which `-merge=1` keeps those that reach other code.
 coverage: ## fuzz READER, a folder of tests/corpus, by coverage with libFuzzer for MINUTES
