@@ -1,4 +1,4 @@
-//! What both engines have: the ports, streams between blocks, and how their stages are listed.
+//! What both engines have: the ports, and how their stages are listed.
 
 use crate::block;
 use crate::primitives::{Arrays, Stream};

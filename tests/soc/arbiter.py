@@ -13,8 +13,8 @@ class Senders(Bench):
     """The core behind the arbiter, with a source for each array."""
 
     def __init__(self, dut):
-        super().__init__(dut)
-        self.sources = [self.source_of(f"s{array}_axis") for array in range(ARRAYS)]
+        super().__init__(dut, "s0_axis")
+        self.sources = [self.source] + [self.source_of(f"s{array}_axis") for array in range(1, ARRAYS)]
 
     async def send_of(self, array, codes=None):
         self.source = self.sources[array]

@@ -119,9 +119,9 @@ class Registers:
 class Bench:
     """The core after a reset, with a source, a sink and the registers."""
 
-    def __init__(self, dut):
+    def __init__(self, dut, source="s_axis"):
         self.dut = dut
-        self.source = self.source_of("s_axis")
+        self.source = self.source_of(source)
         self.sink = AxiStreamSink(AxiStreamBus.from_prefix(dut, "m_axis"), dut.aclk, dut.aresetn, reset_active_level=False)
         self.registers = Registers(dut)
 

@@ -29,12 +29,11 @@ def arrays_scene():
     return scene
 
 
-# The core behind its arbiter; the sender of each array has pins of its own. `s_axis` is for the tests of a core alone.
+# The core behind its arbiter; the sender of each array has pins of its own.
 BEHIND_ARBITER = """
 module behind_arbiter (
     input wire aclk, input wire aresetn,
     {senders}
-    input wire [31:0] s_axis_tdata, input wire s_axis_tvalid, output wire s_axis_tready, input wire s_axis_tlast,
     output wire [63:0] m_axis_tdata, output wire [7:0] m_axis_tkeep, output wire [2:0] m_axis_tuser,
     output wire [5:0] m_axis_tid, output wire m_axis_tvalid, input wire m_axis_tready, output wire m_axis_tlast,
     {pins}
@@ -43,7 +42,6 @@ module behind_arbiter (
     wire [3:0] tkeep;
     wire [5:0] tid;
     wire tvalid, tready, tlast;
-    assign s_axis_tready = 1'b0;
     dermis_arrays_axi_arbiter arbiter (
         .aclk(aclk), .aresetn(aresetn),
         .s_axis_tdata({{{tdata}}}), .s_axis_tvalid({{{tvalid}}}), .s_axis_tready({{{tready}}}), .s_axis_tlast({{{tlast}}}),

@@ -102,14 +102,14 @@ impl Block for FrameArbiter {
         let at_end = k.wire("at_end", at.equals(index.of(*sent)));
         k.when(!*sends, || {
             sends.set(waits.any());
-            sent.set(waits.any().mux(next, *sent));
             at.set(k.constant(index_bits, 0));
+            k.when(waits.any(), || sent.set(next));
         });
         k.when(moves, || {
             valid.set(*sends);
             data.set(frames.read(sent.concat(*at)));
             last.set(at_end);
-            id.set(sent.extend(id.bits()));
+            id.set(*sent);
         });
         k.when(*sends & moves, || {
             at.set(at.plus(1));

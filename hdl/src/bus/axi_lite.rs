@@ -13,7 +13,7 @@ block! {
         clock;
         reset;
         /// The bus.
-        sink<AxiLitePins> s_axil: true;
+        sink<AxiLitePins> s_axil: AxiLitePins { there: true };
         /// Accesses that it makes.
         source<Accesses> access: Accesses {};
     }

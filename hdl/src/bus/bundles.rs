@@ -23,14 +23,14 @@ bundle! {
         id_bits: usize,
     }
     signals CoreStreamSignals: true => {
-        out data "tdata": *bits;
+        out data "tdata": bits;
         /// Bytes of the beat that are there; valid with `{}_tvalid`.
-        out keep "tkeep": *bits / 8;
+        out keep "tkeep": bits / 8;
         /// A bit per word that is no force, and above them whether the frame is spoiled; valid with `{}_tvalid`.
-        out user "tuser": *user_bits;
+        out user "tuser": user_bits;
         /// Identifier of the frame, the same in all its beats; of several arrays the low bits are the number of the frame's. Valid
         /// with `{}_tvalid`.
-        out id "tid": *id_bits;
+        out id "tid": id_bits;
         /// A beat is offered on `{}_tdata`; it is held until `{}_tready`.
         out valid "tvalid";
         /// The beat is accepted in this cycle.
@@ -56,7 +56,7 @@ bundle! {
     /// AXI4-Lite.
     pub struct AxiLitePins {
         /// The block has this bus.
-        there: bool,
+        pub(super) there: bool,
     }
     signals AxiLiteSignals: *there => {
         /// Address of a write in bytes; valid with `{}_awvalid`.
@@ -96,17 +96,11 @@ bundle! {
     }
 }
 
-impl From<bool> for AxiLitePins {
-    fn from(there: bool) -> Self {
-        AxiLitePins { there }
-    }
-}
-
 bundle! {
     /// Wishbone B4, classic, with addresses of words.
     pub struct WishbonePins {
         /// The block has this bus.
-        there: bool,
+        pub(super) there: bool,
     }
     signals WishboneSignals: *there => {
         /// A cycle of the bus.
@@ -127,12 +121,6 @@ bundle! {
         in ack "ack";
         /// The access is refused.
         in err "err";
-    }
-}
-
-impl From<bool> for WishbonePins {
-    fn from(there: bool) -> Self {
-        WishbonePins { there }
     }
 }
 

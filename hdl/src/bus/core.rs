@@ -34,9 +34,9 @@ block! {
         /// Words of 32 bits, fx, fy, fz of a taxel after the other, then status; valid with `m_axis_tvalid`.
         source<CoreStream> m_axis: CoreStream::of_words(shape.words, *arrays);
         /// The bus, where it is AXI4-Lite.
-        sink<AxiLitePins> s_axil: shape.bus == Bus::AxiLite;
+        sink<AxiLitePins> s_axil: AxiLitePins { there: shape.bus == Bus::AxiLite };
         /// The bus, where it is Wishbone.
-        sink<WishbonePins> wb: shape.bus == Bus::Wishbone;
+        sink<WishbonePins> wb: WishbonePins { there: shape.bus == Bus::Wishbone };
     }
 }
 

@@ -22,18 +22,13 @@ fn top_ports(top: &Kernel) -> impl Iterator<Item = TopPort> + '_ {
     top.port_list().map(|(name, is_output, bits, meaning)| (name.to_owned(), is_output, bits, meaning.to_owned()))
 }
 
-/// Name of the module beside a core of several arrays by which each has a stream of its own.
-fn arbiter_name(top: &str) -> String {
-    format!("{top}_arbiter")
-}
-
-/// That module, in a file of its own; `None` with one array.
-fn arbiter(model: &Model, top: &str) -> Result<Option<GeneratedFile>, HdlError> {
+/// The module `name` beside the core `top` of several arrays, by which each has a stream of its own, in a file of its own; `None` with
+/// one array.
+fn arbiter(model: &Model, name: &str, top: &str) -> Result<Option<GeneratedFile>, HdlError> {
     let arrays = Arrays::of_model(model);
     if arrays.bits == 0 {
         return Ok(None);
     }
-    let name = arbiter_name(top);
     let hierarchy = Hierarchy::of_kernel(kernel_of(&FrameArbiter::new(arrays, model.scene.sensor.taxels())));
     hierarchy.check()?;
     let header = format!(
@@ -45,7 +40,7 @@ fn arbiter(model: &Model, top: &str) -> Result<Option<GeneratedFile>, HdlError> 
 ",
         count = arrays.count()
     );
-    Ok(Some(GeneratedFile { text: header + &hierarchy.verilog(&name, None), name: format!("{name}.v") }))
+    Ok(Some(GeneratedFile { text: header + &hierarchy.verilog(name, None), name: format!("{name}.v") }))
 }
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
@@ -109,14 +104,16 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     let xml = component(&core.top, shape.bus, &ports, core.files.iter().map(|file| file.name.as_str()));
     core.files.extend(own);
     core.files.push(GeneratedFile { name: format!("{}.xml", core.top), text: xml });
-    let arbiter = arbiter(model, &core.top)?;
+    let name = format!("{}_arbiter", core.top);
+    let arbiter = arbiter(model, &name, &core.top)?;
+    let arbiter_name = arbiter.is_some().then_some(name);
     core.files.extend(arbiter);
     core.add_core_file(model, testbench(model, &core, shape, command));
     core.manifest["core"] = json!({
         "bus": suffix,
         "stream_bits": 8 * bytes,
         "id_bits": id_bits(Arrays::of_model(model)),
-        "arbiter": (Arrays::of_model(model).bits > 0).then(|| arbiter_name(&core.top)),
+        "arbiter": arbiter_name,
     });
     core.seal();
     Ok(core)

@@ -8,6 +8,7 @@
 //! ```
 //! The map of the registers is [`dermis_golden::wire::registers`]. `labels` has the identifier of each frame that is under way. A reset by
 //! register resets all but `registers` and `stream_out`, which ends the frame that has begun to leave.
+//! `arbiter` is a module of its own before `s_axis`, where each of several arrays has a stream of its own.
 
 mod arbiter;
 mod axi_lite;

@@ -13,7 +13,7 @@ block! {
         clock;
         reset;
         /// The bus.
-        sink<WishbonePins> wb: true;
+        sink<WishbonePins> wb: WishbonePins { there: true };
         /// Accesses that it makes.
         source<Accesses> access: Accesses {};
     }

@@ -76,7 +76,7 @@ pub fn comment(own: &[&str], port: &str, of_port: &[&str]) -> Vec<String> {
 ///     /// A stream of beats.
 ///     pub struct Stream { bits: usize }
 ///     signals StreamSignals: *bits > 0 => {
-///         out data "tdata": *bits;
+///         out data "tdata": bits;
 ///         /// A beat is offered on `{}_tdata`.
 ///         out valid "tvalid";
 ///         /// The beat is accepted in this cycle.
@@ -84,7 +84,7 @@ pub fn comment(own: &[&str], port: &str, of_port: &[&str]) -> Vec<String> {
 ///     }
 /// }
 /// ```
-/// Behind the name of the struct of signals is whether there are any: where there are none, all are left out. The port of a signal has
+/// Widths are as in [`block!`](crate::block). Behind the name of the struct of signals is whether there are any: where there are none, all are left out. The port of a signal has
 /// the name of the bundle's port, an underscore, and the name in quotes. `connect` connects a sender with a receiver; of the bundle
 /// that a block receives, `inward` makes one that something inside it sends.
 #[macro_export]
@@ -202,10 +202,10 @@ macro_rules! bundle {
         $crate::bundle!(@made $make.out_bit, $port, $of_port, $doc $name, $there)
     };
     (@make in $make:ident, $port:ident, $of_port:ident, $there:ident, $doc:tt $name:literal, $width:expr) => {
-        $crate::bundle!(@made $make.input, $port, $of_port, $doc $name, $there * $width)
+        $crate::bundle!(@made $make.input, $port, $of_port, $doc $name, $there * $crate::language::Width::from($width).0)
     };
     (@make out $make:ident, $port:ident, $of_port:ident, $there:ident, $doc:tt $name:literal, $width:expr) => {
-        $crate::bundle!(@made $make.output, $port, $of_port, $doc $name, $there * $width)
+        $crate::bundle!(@made $make.output, $port, $of_port, $doc $name, $there * $crate::language::Width::from($width).0)
     };
     (@made $make:ident.$method:ident, $port:ident, $of_port:ident, $doc:tt $name:literal, $bits:expr) => {{
         let lines = $crate::language::comment(&$doc, $port, $of_port);

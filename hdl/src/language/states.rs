@@ -5,6 +5,8 @@
 
 use std::marker::PhantomData;
 
+use dermis_golden::fixed::plan::resources::count_bits;
+
 use super::build::{Builder, Net};
 use super::expression::Expr;
 use super::kernel::Type;
@@ -18,7 +20,7 @@ pub trait States: Copy {
     fn number(self) -> u64;
 }
 
-/// Declares the states of a state machine, in the order of their numbers; with a width in bits where they are not as many as can be.
+/// Declares the states of a state machine, in the order of their numbers.
 ///
 /// ```text
 /// states! {
@@ -56,8 +58,8 @@ pub struct Machine<'k, S> {
 impl Builder {
     /// A register that `reset` sets to the state `first`.
     pub fn machine<'k, S: States>(&'k self, name: &str, reset: Expr<'k>, first: S) -> Machine<'k, S> {
-        let bits = (S::NAMES.len().max(2) - 1).ilog2() as usize + 1;
-        let register = self.state(name, Type::unsigned(bits), reset, first.number()).named_states(S::NAMES);
+        let ty = Type::unsigned(count_bits(S::NAMES.len()));
+        let register = self.state(name, ty, reset, first.number()).named_states(S::NAMES);
         Machine { builder: self, register, states: PhantomData }
     }
 }

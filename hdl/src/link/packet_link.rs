@@ -45,7 +45,7 @@ block! {
         /// A taxel's code, or a byte of an image of tables, `stream_bits` wide; to the engine.
         source<Stream> s_axis: shape.stream_bits();
         /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
-        sink<Stream> m_axis: 96;
+        sink<Stream> m_axis: BEAT_BITS;
         /// A frame is asked for and its answer not begun.
         out requested;
         /// A packet is being received, computed or sent.

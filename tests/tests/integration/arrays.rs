@@ -136,25 +136,37 @@ fn every_array_is_as_if_alone() {
     }
 }
 
-/// The bound that `dermis check` prints: one frame of each array, back to back, on an idle engine.
+/// A frame of each array, loaded above the noise floor of any.
+fn one_of_each(model: &Model) -> Vec<Vector> {
+    let mut frames = vectors(model);
+    frames.truncate(ARRAYS);
+    frames.iter_mut().for_each(|vector| vector.codes.fill(12_000));
+    frames
+}
+
+/// Cycles from the first input beat to the last output beat of `vectors`, back to back, on an idle engine.
+fn taken(hardware: &Hardware, vectors: &[Vector]) -> u64 {
+    let mut device = hardware.device_for(Simulator::Verilator, vectors, 1).unwrap();
+    let (taps, vectors) = hardware.observable(Simulator::Verilator, vectors);
+    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
+    let (_, times) = run(dut, &vectors, Stimulus::BackToBack);
+    times[times.len() - 1].last_out.unwrap() - times[0].first_in.unwrap() + 1
+}
+
+/// What was taken is within the bound, and no more than an interval away.
+fn is_near(what: &str, model: &Model, taken: u64, bound: u64) {
+    let interval = frame_interval(model, model.first());
+    assert!(taken <= bound && taken + interval >= bound, "{what}: {taken} of {bound}, interval {interval}");
+}
+
+/// The bound that `dermis check` prints.
 #[test]
 fn frames_that_come_at_once_are_answered_within_the_bound() {
     for (what, more) in variants(&SCENES, 1) {
         let (_folder, scene) = scene(*more);
         let hardware = hardware(&scene);
-        let mut vectors = vectors(&hardware.model);
-        vectors.truncate(ARRAYS);
-        // Each is loaded, above the noise floor of any array.
-        vectors.iter_mut().for_each(|vector| vector.codes.fill(12_000));
-        let mut device = hardware.device_for(Simulator::Verilator, &vectors, 1).unwrap();
-        let (taps, vectors) = hardware.observable(Simulator::Verilator, &vectors);
-        let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
-        let (_, times) = run(dut, &vectors, Stimulus::BackToBack);
-        let taken = times[ARRAYS - 1].last_out.unwrap() - times[0].first_in.unwrap() + 1;
-        let bound = longest_wait(&hardware.model);
-        // It is no more than an interval away.
-        let interval = frame_interval(&hardware.model, hardware.model.first());
-        assert!(taken <= bound && taken + interval >= bound, "{what}: {taken} of {bound}, interval {interval}");
+        let model = &hardware.model;
+        is_near(what, model, taken(&hardware, &one_of_each(model)), longest_wait(model));
     }
 }
 
@@ -165,22 +177,15 @@ fn an_image_among_frames_delays_them_by_no_more_than_the_bound() {
     for (what, more) in variants(&written, 1) {
         let (_folder, scene) = scene(*more);
         let hardware = hardware(&scene);
-        let mut frames = vectors(&hardware.model);
-        frames.truncate(ARRAYS);
-        frames.iter_mut().for_each(|vector| vector.codes.fill(12_000));
-        let image = Vector { array: 1, ..Vector::of_image(&hardware.model.of_array(1).unwrap()) };
-        let taken = |place: usize| {
-            let mut vectors = frames.clone();
+        let model = &hardware.model;
+        let image = Vector { array: 1, ..Vector::of_image(&model.of_array(1).unwrap()) };
+        let at = |place: usize| {
+            let mut vectors = one_of_each(model);
             vectors.insert(place, image.clone());
-            let mut device = hardware.device_for(Simulator::Verilator, &vectors, 1).unwrap();
-            let (taps, vectors) = hardware.observable(Simulator::Verilator, &vectors);
-            let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
-            let (_, times) = run(dut, &vectors, Stimulus::BackToBack);
-            times[ARRAYS].last_out.unwrap() - times[0].first_in.unwrap() + 1
+            taken(&hardware, &vectors)
         };
-        let (most, bound) = ((0..ARRAYS).map(taken).max().unwrap(), longest_wait_with_image(&hardware.model).unwrap());
-        let interval = frame_interval(&hardware.model, hardware.model.first());
-        assert!(most <= bound && most + interval >= bound, "{what}: {most} of {bound}, interval {interval}");
+        let most = (0..ARRAYS).map(at).max().unwrap();
+        is_near(what, model, most, longest_wait_with_image(model).unwrap());
     }
 }
 

@@ -132,7 +132,7 @@ impl Messages {
                 Next::Cut if self.own.is_none() => return Err(no_mcap()),
                 Next::Cut => {
                     self.end = End::Cut;
-                    continue;
+                    return Ok(None);
                 }
             };
             if !READ.contains(&opcode) {

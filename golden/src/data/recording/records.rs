@@ -24,7 +24,6 @@ const WINDOW_LOG: u32 = 23;
 const HEAD: u64 = 9;
 
 /// What comes next in a file.
-#[derive(Debug)]
 pub(super) enum Next {
     /// A record: its opcode and its content.
     Record(u8, Vec<u8>),
@@ -42,7 +41,6 @@ pub(super) struct Records {
 }
 
 /// Where a file is read.
-#[derive(PartialEq)]
 enum At {
     Begin,
     Records,
@@ -53,7 +51,7 @@ enum At {
 
 /// A chunk whose records are read.
 struct Chunk {
-    records: Counted<Box<dyn Read + Send>>,
+    records: Counted,
     /// Bytes and CRC-32 that its head states; a CRC of 0 is none.
     size: u64,
     crc: u32,
@@ -62,13 +60,13 @@ struct Chunk {
 }
 
 /// Counts what is read, and takes its CRC.
-struct Counted<R> {
-    inner: R,
+struct Counted {
+    inner: Box<dyn Read + Send>,
     count: u64,
     crc: crc32fast::Hasher,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl Read for Counted {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let read = self.inner.read(buffer)?;
         self.count += read as u64;

@@ -43,18 +43,21 @@ pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
 /// Cycles from the first input beat to the last output beat of frames of all arrays that come at once, one of each, to an idle engine
 /// whose receiver never waits: what the last of them waits at most for its result. Of one array the longest frame.
 pub fn longest_wait(plan: &Plan) -> u64 {
-    let interval = plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0);
-    (plan.scene.hardware.arrays as u64 - 1) * interval + Cycles::longest(plan).total
+    (plan.scene.hardware.arrays as u64 - 1) * slowest_interval(plan) + Cycles::longest(plan).total
 }
 
-/// As [`longest_wait`], with the image of the tables of one array anywhere among the frames, whose bytes come as they are taken, one in two cycles: it waits for
-/// the frames before it, and those behind it for its end. `None` where tables are not written.
+/// As [`longest_wait`], with the image of the tables of one array anywhere among the frames, whose bytes come as they are taken, one in
+/// two cycles: it waits for the frames before it, and those behind it for its end. `None` where tables are not written.
 pub fn longest_wait_with_image(plan: &Plan) -> Option<u64> {
     let image = load::REST + IMAGE + 2 * plan.tables()?.image_bytes() as u64;
     let (arrays, total) = (plan.scene.hardware.arrays as u64, Cycles::longest(plan).total);
-    let interval = plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0);
     // At worst between two frames, of which neither overlaps the other.
-    Some(image + if arrays > 1 { (arrays - 2) * interval + 2 * total } else { total })
+    Some(image + if arrays > 1 { (arrays - 2) * slowest_interval(plan) + 2 * total } else { total })
+}
+
+/// The frame interval of the case that has the longest.
+fn slowest_interval(plan: &Plan) -> u64 {
+    plan.cases().iter().map(|case| frame_interval(plan, case)).max().unwrap_or(0)
 }
 
 /// The longest of the intervals before the third and each later one of frames that follow one another, each with the contacts

@@ -8,7 +8,7 @@ bundle! {
     /// Numbers, each of which is taken.
     struct Numbers { bits: usize }
     signals NumbersSignals: *bits > 0 => {
-        out number "number": *bits;
+        out number "number": bits;
         /// There is one on `{}_number`.
         out given "given";
         /// It is taken in this cycle.

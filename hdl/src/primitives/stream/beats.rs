@@ -12,9 +12,9 @@ bundle! {
         array_bits: usize,
     }
     signals StreamSignals: *bits > 0 => {
-        out data "tdata": *bits;
+        out data "tdata": bits;
         /// Array of the frame; valid with `{}_tvalid`.
-        out array "tid": *array_bits;
+        out array "tid": array_bits;
         /// A beat is offered on `{}_tdata`; it is held until `{}_tready`.
         out valid "tvalid";
         /// The beat is accepted in this cycle.
