@@ -19,7 +19,7 @@ impl Plan {
         self.has_writable_tables().then(|| Tables {
             version: self.own().version,
             threshold: self.own().threshold_word(),
-            noise_floor: self.own().floor_word(self.formats().input_bits),
+            noise_floor: self.own().floor_word(self.floor_bits()),
             zero,
             gain,
             coefficients: match self.scene.hardware.has_writable_coefficients() {
@@ -61,7 +61,9 @@ impl Plan {
             Outcome::Refused => self.refuse(),
             Outcome::Broken => (self.own_mut().version, self.own_mut().outcome) = (0, Outcome::Broken),
             Outcome::Whole => {
-                let Tables { version, noise_floor, .. } = tables;
+                let version = tables.version;
+                // The bits that the hardware has of it.
+                let noise_floor = tables.noise_floor & ((1 << self.floor_bits()) - 1);
                 let threshold = tables.threshold.into();
                 *self.own_mut() = OwnTables { noise_floor, threshold, version, outcome: Outcome::Whole };
                 (self.prepare.zero, self.prepare.gain) = (Some(tables.zero), Some(tables.gain));

@@ -56,7 +56,7 @@ block! {
         out quad: 4 * bits;
         /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
         in part: count_bits(*parts);
-        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+        /// Noise floor in codes, unsigned, where it is written, else one bit; constant between resets, valid from one on.
         in floor: floor_bits;
         /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid from two cycles after its last code
         /// until `free`.
@@ -343,7 +343,7 @@ pub(crate) mod tests {
         let tables = noise.replace("[input]", "[hardware]\ntables = \"writable\"\n[input]");
         let written = model(4, 5, &tables).with_changed_plan(|plan| plan.own_mut().noise_floor += 17).unwrap();
         for (model, case, defect) in [
-            (written, 0, Change::value("", "stats__floor", |k| k.constant(20, (1 << 19) - 1))),
+            (written, 0, Change::value("", "stats__floor", |k| k.constant(19, (1 << 19) - 1))),
             (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),
             (dead, 0, Change::value("", "input_mask__clear", |k| k.named("rst"))),
         ] {

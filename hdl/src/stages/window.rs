@@ -59,7 +59,7 @@ block! {
         in quad: 4 * bits;
         /// Labels of the quad's four taxels; two cycles after `quad_address`.
         in labels: 4 * label_bits;
-        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
+        /// Noise floor in codes, unsigned, where it is written, else one bit; constant between resets, valid from one on.
         in floor: floor_bits;
         /// A quad is written to the window memory.
         out write;

@@ -68,9 +68,9 @@ pub struct OwnTables {
 }
 
 impl OwnTables {
-    /// The noise floor as a word as wide as a code of `bits` bits, which has none above the largest floor.
+    /// The noise floor as an unsigned word of `bits` bits: no code is above the largest of [`Plan::floor_bits`].
     pub fn floor_word(&self, bits: u32) -> i32 {
-        i64::from(self.noise_floor).clamp(0, (1 << (bits - 1)) - 1) as i32
+        i64::from(self.noise_floor).clamp(0, (1 << bits) - 1) as i32
     }
 
     /// The threshold as a word of 32 bits.
@@ -279,11 +279,12 @@ impl Plan {
         self.formats().code_bits + u32::from(self.has_writable_tables())
     }
 
-    /// Width of the noise floor on its way through the engine; one bit, 0, where it is built in.
+    /// Width of the noise floor on its way through the engine; one bit, 0, where it is built in. It has no sign: a word that
+    /// is damaged is a floor too, above which no stress of 0 is.
     pub fn floor_bits(&self) -> u32 {
         match self.built_in_floor() {
             Some(_) => 1,
-            None => self.formats().input_bits,
+            None => self.formats().input_bits - 1,
         }
     }
 

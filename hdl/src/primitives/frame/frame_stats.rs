@@ -28,8 +28,8 @@ block! {
         in part: count_bits(*parts);
         /// Index of the subarray on the outputs; combinational.
         in select: count_bits(*parts);
-        /// Noise floor in codes, ≥ 0, where it is written, else one bit; constant between resets, valid from one on.
-        in floor: noise_floor.map_or(*bits, |_| 1);
+        /// Noise floor in codes, unsigned, where it is written, else one bit; constant between resets, valid from one on.
+        in floor: noise_floor.map_or(bits - 1, |_| 1);
         /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code; includes a code from
         /// the cycle after its `accept`.
         out magnitude: bits - 1;
@@ -78,7 +78,7 @@ pub(crate) fn magnitude_of(code: Expr<'_>) -> Expr<'_> {
 }
 
 /// Whether a signed code is above the noise floor of `floor` codes, and whether it is below minus the noise floor; without a
-/// number the floor is that of `written`, as wide as the code.
+/// number the floor is `written`, unsigned, a bit narrower than the code.
 pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: Option<i32>, written: Expr<'k>) -> [Expr<'k>; 2] {
     let (code, bits) = (code.signed(), code.bits());
     let [most, least] = match floor {
@@ -87,7 +87,10 @@ pub(crate) fn beyond<'k>(k: &'k Builder, code: Expr<'k>, floor: Option<i32>, wri
             let floor = i64::from(floor).min((1 << (bits - 1)) - 1);
             [floor, -floor].map(|limit| k.signed_constant(bits, limit))
         }
-        None => [written.signed(), (k.signed_constant(bits, 0) - written.signed()).resize(bits)],
+        None => {
+            let written = written.extend(bits).signed();
+            [written, (k.signed_constant(bits, 0) - written).resize(bits)]
+        }
     };
     [most.less(code), code.less(least)]
 }
@@ -134,7 +137,7 @@ mod tests {
     fn codes_of_each_subarray_are_gathered() {
         for (floor, parts, written) in [(7, 3, false), (255, 1, false), (100, 4, false), (31, 2, true), (255, 1, true)]
         {
-            let floor_bits = if written { BITS } else { 1 };
+            let floor_bits = if written { BITS - 1 } else { 1 };
             let mut stimulus = random_words(4000, &[1, 1, BITS, count_bits(parts), count_bits(parts), floor_bits]);
             for (cycle, inputs) in stimulus.iter_mut().enumerate() {
                 inputs[0] = (cycle % 29 == 0).into();

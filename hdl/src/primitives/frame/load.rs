@@ -28,7 +28,7 @@ block! {
     /// memories, which a reset leaves and the bitstream initialises.
     pub struct Load {
         code_bits: usize,
-        input_bits: usize,
+        floor_bits: usize,
         taxels: usize,
         coefficients: CoefficientPlaces,
         /// Number of the layout of an image.
@@ -69,8 +69,8 @@ block! {
         out coefficient_data: PAIR_BITS;
         /// Array whose noise floor is read.
         in floor_array: arrays.bits;
-        /// Noise floor in codes, `input_bits` wide, ≥ 0; valid unless `restart`.
-        out noise_floor: input_bits;
+        /// Noise floor in codes, unsigned; valid unless `restart`.
+        out noise_floor: floor_bits;
         /// Array whose forces and status are sent.
         in sent_array: arrays.bits;
         /// Threshold in force LSBs, 32 bits; valid unless `restart`, of several arrays a cycle after `sent_array`.
@@ -105,7 +105,7 @@ impl Load {
         let tables: Option<Vec<Tables>> = arrays.map(|array| plan.of_array(array).tables()).collect();
         Some(Load {
             code_bits: formats.code_bits as usize,
-            input_bits: formats.input_bits as usize,
+            floor_bits: plan.floor_bits() as usize,
             taxels: plan.scene.sensor.taxels(),
             coefficients: CoefficientPlaces::new(plan),
             layout: plan.table_layout(),
@@ -311,7 +311,7 @@ impl Load {
         };
         let place = |array: Expr<'k>| if self.arrays.bits == 0 { k.constant(1, 0) } else { array };
         let thresholds = kept("thresholds", THRESHOLD_BITS, &|tables| tables.threshold.into());
-        let floors = kept("noise_floors", self.input_bits, &|tables| tables.noise_floor as u64);
+        let floors = kept("noise_floors", self.floor_bits, &|tables| tables.noise_floor as u64);
         let whole_version = |tables: &Tables| 1 << VERSION_BITS | u64::from(tables.version);
         let states = kept("states", 1 + VERSION_BITS as usize, &whole_version);
         let state = k.wire("state", states.read(place(io.sent_array)));
@@ -321,7 +321,7 @@ impl Load {
         let second = k.wire("second", at(1));
         k.when(second, || new_version.set(word.slice(THRESHOLD_BITS, VERSION_BITS as usize)));
         thresholds.write(second, place(array), word.low(THRESHOLD_BITS));
-        floors.write(at(2), place(array), word.low(self.input_bits));
+        floors.write(at(2), place(array), word.low(self.floor_bits));
         let new_state = done.mux(k.constant(1, 1).concat(*new_version), k.constant(1 + VERSION_BITS as usize, 0));
         states.write(done | right_head, place(array), new_state);
 

@@ -33,7 +33,11 @@ fn random_tables(model: &Model, coefficients: &[Vec<i64>], random: &mut fastrand
     Tables {
         version: random.u16(1..1 << VERSION_BITS),
         threshold: random.u32(..) >> random.u32(..32),
-        noise_floor: (random.u32(..) >> (33 - code_bits)) as i32 >> random.u32(..code_bits),
+        noise_floor: match random.u8(..4) {
+            // With bits that the hardware does not have.
+            0 => random.i32(..),
+            _ => (random.u32(..) >> (33 - code_bits)) as i32 >> random.u32(..code_bits),
+        },
         zero,
         gain,
         coefficients: match coefficients {

@@ -189,7 +189,7 @@ impl Reference for Loader {
                 let is_first = intake.image().len() + 1 == WORD_BYTES;
                 match written {
                     Some((1, word)) => self.thresholds[own] = low(word, THRESHOLD_BITS),
-                    Some((2, word)) => self.floors[own] = low(word, plans[own].formats().input_bits as usize),
+                    Some((2, word)) => self.floors[own] = low(word, plans[own].floor_bits() as usize),
                     _ => {}
                 }
                 self.ended = intake.byte(&mut plans[own], byte, last, false) == Some(Outcome::Broken) && is_first;
