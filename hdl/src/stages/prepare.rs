@@ -52,8 +52,8 @@ block! {
         out coefficient_pair: coefficients.pair_bits();
         /// The coefficients of two lanes; valid with `coefficient_write`.
         out coefficient_data: PAIR_BITS;
-        /// Noise floor in codes, where it is written, else one bit, 0; valid unless `restart`, of several arrays that of the word on
-        /// `m_axis_tdata`.
+        /// Noise floor in codes, unsigned, where it is written, else one bit, 0; valid unless `restart`, of several arrays that of the
+        /// word on `m_axis_tdata`.
         out noise_floor: written_bits(load.is_some(), *floor_bits);
         /// Of several arrays whose tables are written that of the frame whose forces are sent.
         in sent_array: if load.is_some() { arrays.bits } else { 0 };

@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | 0 | layout, 32 bits: [`Plan::table_layout`](crate::fixed::Plan::table_layout) | [`MAGIC`], 16 bits |
 //! | 1 | threshold in force LSBs, 32 bits | version, 15 bits |
-//! | 2 | noise floor in codes, `input_bits` | 0 |
+//! | 2 | noise floor in codes, unsigned, `input_bits` − 1 | 0 |
 //! | 3 … | zero of a taxel, `code_bits` signed | its gain, 18 bits signed ([`prepare`](super::prepare)); 0 for a dead one |
 //! | then … | coefficient of a lane, 18 bits signed | that of the next lane, 18 bits signed |
 //! | last | 0, 16 bits | CRC-32 |
