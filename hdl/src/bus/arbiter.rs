@@ -296,10 +296,10 @@ mod tests {
             )
         };
         let defects = [
-            // A frame is sent before it is there; always that of the first sender first; one that is too long has no end.
+            // A frame is sent before it is there; always that of the first sender first; one that is too long begins again.
             Change::value("", "waits", |k| !k.constant(4, 0)),
             Change::value("", "next", |k| k.constant(2, 0)),
-            Change::value("", "place", |k| k.named("place").low(2).extend(3)),
+            Change::within("", "index_of_0", |k| [k.named("place").is(TAXELS as u64), k.constant(1, 0)]),
         ];
         check_with_defects(subject, &stimulus(6000), Senders::default, &defects);
     }
