@@ -39,6 +39,11 @@ use dermis_sim::{output, say};
 
 use patches::{CarrierName, PatchFile};
 
+/// Results and messages are made and dropped by several threads thousands of times a second: with the allocator of the system that is a
+/// tenth of the time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Publish the forces of the sensors in a patch file as topics of ROS 2, over Zenoh or DDS, until interrupted.
 #[derive(Parser, Debug)]
 #[command(name = "dermis-ros", version, after_help = EXAMPLES)]

@@ -6,7 +6,7 @@
 //! | in: readings | taxels | of their peak |
 //! | out: norm of what is left | scalar | of their peak |
 
-use super::kernels::CellKernels;
+use super::kernels::{padded, CellKernels};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Steps of the projected gradient; with three times as many, the limit of sensor-1's network changes by 1 %.
@@ -22,7 +22,7 @@ pub(super) struct Readings<'a> {
     pub unipolar: bool,
 }
 
-/// A fit of compressive forces; values of taxels lie in rows with gaps.
+/// A fit of compressive forces; values of taxels are padded.
 pub(super) struct Fit<'a> {
     kernels: &'a CellKernels,
     b: Vec<f32>,
@@ -35,8 +35,8 @@ impl<'a> Fit<'a> {
     /// The fit of readings.
     pub fn new(kernels: &'a CellKernels, readings: &Readings) -> Fit<'a> {
         let Readings { b, alive, unipolar } = *readings;
-        let b = kernels.rows.with_gaps(b.iter().copied());
-        let alive = kernels.rows.with_gaps(alive.iter().map(|alive| if *alive { 1.0 } else { 0.0 }));
+        let b = padded(kernels.cells(), b.iter().copied());
+        let alive = padded(kernels.cells(), alive.iter().map(|alive| if *alive { 1.0 } else { 0.0 }));
         Fit { kernels, b, alive, unipolar }
     }
 
@@ -62,8 +62,8 @@ impl<'a> Fit<'a> {
     #[inline(always)]
     fn step<S: Simd>(&self, simd: S, [taxels, cells]: [&mut [f32]; 2]) -> f32 {
         let largest = |sums: &[f32]| sums.iter().copied().fold(0.0, f32::max);
-        let (magnitudes, rows) = (self.kernels.magnitudes(), self.kernels.rows);
-        let ones = rows.with_gaps(std::iter::repeat(1.0));
+        let magnitudes = self.kernels.magnitudes();
+        let ones = padded(self.kernels.cells(), std::iter::repeat(1.0));
         cells.fill(1.0);
         magnitudes.stress(simd, cells, taxels);
         taxels.iter_mut().zip(&ones).for_each(|(sum, one)| *sum *= one);
@@ -79,7 +79,7 @@ impl WithSimd for Fit<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f32 {
         let zeros = || vec![0.0f32; self.kernels.cells()];
-        let (mut left, mut slope) = (vec![0.0; self.kernels.rows.len()], zeros());
+        let (mut left, mut slope) = (vec![0.0; self.b.len()], zeros());
         let step = self.step(simd, [&mut left, &mut slope]);
         let (mut p, mut ahead, mut inertia) = (zeros(), zeros(), 1.0f32);
         for _ in 0..STEPS {

@@ -108,10 +108,10 @@ impl History {
         let torn = (!self.last.is_empty() && fine).then(|| {
             let live = || live().filter(|k| !self.last[*k].is_nan());
             let change = |k: usize| (now[k] - self.last[k]).abs();
-            let changed: Vec<usize> = live().filter(|k| change(*k) > 0.0).collect();
-            let (Some(first), Some(last)) = (changed.first(), changed.last()) else { return 0.0 };
-            let largest = changed.iter().map(|k| change(*k)).fold(0.0, f64::max);
-            let equal = of(&mut live().take_while(|k| k < first)).max(of(&mut live().skip_while(|k| k <= last)));
+            let changed = || live().filter(|k| change(*k) > 0.0);
+            let (Some(first), Some(last)) = (changed().next(), changed().next_back()) else { return 0.0 };
+            let largest = changed().map(change).fold(0.0, f64::max);
+            let equal = of(&mut live().take_while(|k| *k < first)).max(of(&mut live().skip_while(|k| *k <= last)));
             equal.min(largest) / whole
         });
         let beside = |taxel: usize| self.beside[taxel].iter().map(|k| now[*k]);

@@ -48,8 +48,11 @@ pub fn pull_share(scene: &Scene, frame: &Frame) -> Option<f64> {
     };
     let sums: Vec<f64> = (0..rows * cols).map(sum).collect();
     let (push, pull) = sums.iter().fold((0.0f64, 0.0f64), |(push, pull), sum| (push.max(*sum), pull.max(-sum)));
-    let noise = noise_MPa(frame, &alive)?.max(scene.search.noise_floor_MPa() * scene.input.noise_share());
-    (pull > SIGNIFICANT * AROUND.sqrt() * noise).then(|| pull / (push + pull))
+    let stated = scene.search.noise_floor_MPa() * scene.input.noise_share();
+    let is_pull = |noise: f64| pull > SIGNIFICANT * AROUND.sqrt() * noise;
+    // What the readings show of the noise takes as long as the sums.
+    let counts = is_pull(stated) && is_pull(noise_MPa(frame, &alive)?);
+    counts.then(|| pull / (push + pull))
 }
 
 /// What a tare has that its calibration table has not.

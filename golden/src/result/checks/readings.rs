@@ -48,7 +48,10 @@ impl Checks {
             full_scale_share: input.full_scale_share(readings),
             plateau: largest(&|own| own.plateau()),
             line_share: largest(&|own| own.line_share()),
-            coarse_share: coarse_share(input, readings),
+            coarse_share: match &upward[..] {
+                [one] => coarse_share(input, &one.sorted),
+                _ => coarse_share(input, &sorted_sums(input, readings)),
+            },
             missing_share: readings.iter().filter_map(|frame| missing_share(input, frame)).reduce(f64::max),
             ..self
         }
@@ -68,17 +71,21 @@ const EQUAL: f64 = 0.25;
 /// Share of the range below which a difference of readings is rounding, of stress that was computed.
 const ROUNDING: f64 = 1e-9;
 
-/// The coarse share of the mean of `readings`; `None` where few are equal. Zeros of a unipolar array do not count: they are clipped.
-fn coarse_share(input: &Input, readings: &[Frame]) -> Option<f64> {
-    let sensor = &readings.first()?.sensor;
-    let (alive, unipolar) = (input.spec().alive(sensor), input.spec().unipolar);
+/// The sums over `readings` of each live taxel that all of them have, sorted; they rise with the load.
+fn sorted_sums(input: &Input, readings: &[Frame]) -> Vec<f64> {
+    let Some(first) = readings.first() else { return Vec::new() };
+    let alive = input.spec().alive(&first.sensor);
     let there = |k: &usize| alive[*k] && readings.iter().all(|frame| !frame.lacks(*k));
-    let sum = |k: usize| readings.iter().map(|frame| frame.stress_MPa[k]).sum::<f64>();
-    let mut sums: Vec<f64> = (0..sensor.taxels()).filter(there).map(sum).collect();
-    let taxels = sums.len();
-    sums.retain(|sum| !unipolar || input.sign() * sum > 0.0);
-    sums.sort_unstable_by(f64::total_cmp);
-    let groups: Vec<&[f64]> = sums.chunk_by(|a, b| a == b).collect();
+    let sum = |k: usize| input.sign() * readings.iter().map(|frame| frame.stress_MPa[k]).sum::<f64>();
+    sorted((0..first.sensor.taxels()).filter(there).map(sum))
+}
+
+/// The coarse share of readings that rise with the load, or of their sums, in rising order; `None` where few are equal. Zeros of a
+/// unipolar array do not count: they are clipped.
+fn coarse_share(input: &Input, sums: &[f64]) -> Option<f64> {
+    let (taxels, unipolar) = (sums.len(), input.spec().unipolar);
+    let clipped = if unipolar { sums.partition_point(|sum| *sum <= 0.0) } else { 0 };
+    let groups: Vec<&[f64]> = sums[clipped..].chunk_by(|a, b| a == b).collect();
     let at = (0..groups.len()).max_by_key(|at| groups[*at].len())?;
     let distances =
         (0..groups.len()).filter(|other| *other != at).map(|other| (groups[other][0] - groups[at][0]).abs());
@@ -93,10 +100,22 @@ pub(super) fn range(readings: impl Iterator<Item = f64>) -> f64 {
     (high - low).max(0.0)
 }
 
+/// Readings in rising order.
+fn sorted(readings: impl Iterator<Item = f64>) -> Vec<f64> {
+    // A filter does not say how many it leaves.
+    let mut sorted = Vec::with_capacity(readings.size_hint().1.unwrap_or(0));
+    sorted.extend(readings);
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted
+}
+
 /// The smallest difference of two readings; `None` where all are equal.
 pub(super) fn step(readings: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = readings.collect();
-    sorted.sort_unstable_by(f64::total_cmp);
+    step_of_sorted(&sorted(readings))
+}
+
+/// The same of readings in rising order.
+fn step_of_sorted(sorted: &[f64]) -> Option<f64> {
     let least = ROUNDING * (sorted.last()? - sorted.first()?);
     sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > least).reduce(f64::min)
 }
@@ -115,6 +134,8 @@ fn has_steps(range: f64, step: f64) -> bool {
 struct Upward {
     rows: Vec<Line>,
     cols: Vec<Line>,
+    /// All, in rising order.
+    sorted: Vec<f64>,
     /// Largest less smallest of all.
     range: f64,
     /// As [`step`] has it.
@@ -154,8 +175,9 @@ impl Upward {
         let reading = |k: usize| (alive[k] && !frame.lacks(k)).then(|| sign * frame.stress_MPa[k]);
         let rows_of = (0..rows).map(|i| (0..cols).map(|j| reading(i * cols + j)).collect()).collect();
         let cols_of = (0..cols).map(|j| (0..rows).map(|i| reading(i * cols + j)).collect()).collect();
-        let readings = || (0..rows * cols).filter_map(reading);
-        Upward { rows: rows_of, cols: cols_of, range: range(readings()), step: step(readings()) }
+        let sorted = sorted((0..rows * cols).filter_map(reading));
+        let (range, step) = (range(sorted.iter().copied()), step_of_sorted(&sorted));
+        Upward { rows: rows_of, cols: cols_of, sorted, range, step }
     }
 
     /// Whether line k of rows or columns repeats the one before it.
