@@ -218,18 +218,18 @@ fn faults_of_codes_are_in_the_status() {
     assert_eq!(flags_of(false, "[hardware]\ncode_check = \"off\"\n"), [clean; 10]);
 }
 
-/// The source with the first number that is not 0 of a table negated.
+/// The source with the number of largest magnitude of a table negated: a weight of an output that is never active changes nothing.
 fn with_wrong_word(source: &CSource, table: &str) -> CSource {
     let mut wrong = source.clone();
     let file = wrong.files.iter_mut().find(|file| file.name == format!("{}.c", source.name)).unwrap();
     let begin = file.text.find(&format!("static const int32_t {table}[")).unwrap();
     let begin = begin + file.text[begin..].find('{').unwrap() + 1;
-    let is_digit = |c: char| c.is_ascii_digit() && c != '0';
-    let digit = begin + file.text[begin..].find(is_digit).unwrap();
-    match file.text[..digit].ends_with('-') {
-        true => file.text.replace_range(digit - 1..digit, " "),
-        false => file.text.insert(digit, '-'),
-    }
+    let end = begin + file.text[begin..].find('}').unwrap();
+    let mut words: Vec<i64> = file.text[begin..end].split(',').filter_map(|word| word.trim().parse().ok()).collect();
+    let largest = words.iter_mut().max_by_key(|word| word.abs()).unwrap();
+    *largest = -*largest;
+    let words: Vec<String> = words.iter().map(i64::to_string).collect();
+    file.text.replace_range(begin..end, &words.join(","));
     wrong
 }
 

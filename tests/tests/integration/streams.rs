@@ -154,7 +154,7 @@ fn are_found(scene: &Scene, defects: &[(&str, Change)]) {
     let mut hardware = hardware(scene);
     for (experiment, defect) in variants(defects, 1) {
         hardware.generated = generate_changed(&hardware.model, std::slice::from_ref(defect)).unwrap();
-        let outcomes = stress(&hardware, &[], 20_000, 1).unwrap();
+        let outcomes = stress(&hardware, &[], 100_000, 1).unwrap();
         let found = outcomes.iter().find(|outcome| outcome.experiment == *experiment).unwrap();
         assert!(found.violations > 0, "the defect in {defect} went unnoticed: {outcomes:#?}");
     }

@@ -145,7 +145,7 @@ fn a_defect_is_found() {
         // An image begins while a frame is computed.
         Change::value("prepare", "load__idle", |k| k.constant(1, 1)),
         // The noise floor stays that of the bitstream.
-        Change::value("", "receive__floor", |k| k.constant(20, 0)),
+        Change::value("", "receive__floor", |k| k.constant(19, 0)),
         // The threshold stays that of the bitstream.
         Change::value("", "forces__threshold", |k| k.constant(32, 0)),
         // The coefficients stay those of the bitstream.
