@@ -124,12 +124,16 @@ pub fn run_together(stop: &Stop, members: Vec<Member>, output: &mut Outputs) -> 
     let (ring, rung) = channel();
     let mut running = Vec::new();
     let mut done: Vec<Option<Result<Counts>>> = Vec::new();
-    for (index, Member { estimators, input, options, zero }) in members.into_iter().enumerate() {
-        let (bell, clock) = (Bell::new(index, ring.clone()), estimators.clock().clone());
-        let lines = Lines::begin(input, (options.queue, options.policy), clock, bell, stop);
-        let stream = Stream::new(estimators, options.layout, zero);
+    let made = |Member { estimators, input, options, zero }| {
+        let clock = estimators.clock().clone();
+        (Stream::new(estimators, options.layout, zero), input, options, clock)
+    };
+    // No stream is read, and none loses a line, while others are made.
+    let streams: Vec<_> = members.into_iter().map(made).collect();
+    for (index, (stream, input, options, clock)) in streams.into_iter().enumerate() {
         let said = stream.choice(&mut |outcome| output(index, outcome));
         done.push(said.err().map(|error| Err(error.into())));
+        let lines = Lines::begin(input, (options.queue, options.policy), clock, Bell::new(index, ring.clone()), stop);
         running.push(Some(Running { stream, lines, options }));
     }
     while done.iter().any(Option::is_none) && !stop.stopped() {
