@@ -47,9 +47,10 @@
 //! | [`estimate`] | forces from stress in floating point; the golden engine |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
 //! | [`wire`] | packets and registers between a computer and the hardware |
-//! | [`study`] | errors against noise, conditioning and the paper |
 //!
-//! Beside them stand [`mod@write`], atomic file writing, [`plain_words`], what readers of JSON and TOML say, and what is private: bounded reading, random numbers.
+//! Beside them stand [`mod@write`], atomic file writing, [`plain_words`], what readers of JSON and TOML say, [`random`], seeded random
+//! numbers, [`quantile`], and bounded reading, which is private. The crate `dermis-study` measures errors against noise, sensor faults,
+//! conditioning and the paper.
 //!
 //! # Conventions
 //!
@@ -64,13 +65,13 @@ pub mod estimate;
 pub mod fixed;
 pub mod physics;
 pub mod plain_words;
+pub mod quantile;
+pub mod random;
 pub mod result;
 pub mod spec;
-pub mod study;
 pub mod wire;
 pub mod write;
 
-mod random;
 mod read;
 #[cfg(test)]
 mod reference;

@@ -8,11 +8,11 @@ use rand_xoshiro::SplitMix64;
 
 /// A random number generator.
 #[derive(Clone, Debug)]
-pub(crate) struct Random(SplitMix64);
+pub struct Random(SplitMix64);
 
 impl Random {
     /// The generator with a seed.
-    pub(crate) fn new(seed: u64) -> Random {
+    pub fn new(seed: u64) -> Random {
         Random(SplitMix64::seed_from_u64(seed))
     }
 
@@ -21,24 +21,24 @@ impl Random {
     }
 
     /// Uniform in `low` … `high`.
-    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         // 53 bits, every one of them exact.
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// True or false, equally likely.
-    pub(crate) fn coin(&mut self) -> bool {
+    pub fn coin(&mut self) -> bool {
         self.bits() >> 63 == 1
     }
 
     /// One element, all equally likely; `None` if there are none, which draws a number as well.
-    pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
+    pub fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
         let at = self.between(0.0, of.len() as f64) as usize;
         of.get(at)
     }
 
     /// Normally distributed with mean 0 and standard deviation 1.
-    pub(crate) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         // 1 − u is above 0.
         let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
         radius * (TAU * self.between(0.0, 1.0)).cos()

@@ -6,7 +6,7 @@ use std::time::Duration;
 use dermis_golden::data::frame::Frame as Stress;
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::fixed::Model;
-use dermis_sim::link::{open_board, HostError, Session};
+use dermis_host::link::{open_board, HostError, Session};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;

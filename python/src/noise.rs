@@ -4,8 +4,7 @@ use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::DrawOptions;
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind};
-use dermis_golden::study::noise::{shape_study, study, Candidate, ShapeStudy, Study};
-use dermis_sim::commands::noise::{by_name, shapes_named, AVERAGED};
+use dermis_study::noise::{by_name, shape_study, shapes_named, study, Candidate, ShapeStudy, Study, AVERAGED};
 use pyo3::prelude::*;
 
 use crate::exceptions::{input, not_allowed};

@@ -1,6 +1,6 @@
 //! The stages of one frame: the integers of the hardware beside the same in floating point.
 
-use dermis_sim::report::{trace, ComparedWords};
+use dermis_report::{trace, ComparedWords};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use dermis_golden::data::frame::Frame as Stress;
 use dermis_golden::engine::{CheckPace, CheckedEngine, StreamChecks};
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{typed, SharedEngine};
+use dermis_host::engine::{typed, SharedEngine};
 use pyo3::prelude::*;
 
 use crate::exceptions::{input, model};

@@ -15,7 +15,7 @@ import pytest
 
 from conftest import ROOT
 
-PAGE = ROOT / "sim" / "guide" / "learning.md"
+PAGE = ROOT / "docs" / "learning.md"
 OUTPUT = re.compile(r"(<!-- output: ball_on_pad\.py -->\n)(.*?)(<!-- end of output -->)", re.DOTALL)
 NOISE = 0.001
 

@@ -89,7 +89,7 @@ def tried(text: str, name: str) -> tuple[int, int]:
 
 @pytest.mark.parametrize(("name", "least"), [("python.md", 15), ("learning.md", 10)])
 def test_the_examples_of_a_page_print_what_they_show(name: str, least: int) -> None:
-    page = (ROOT / "sim" / "guide" / name).read_text()
+    page = (ROOT / "docs" / name).read_text()
     blocks = re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
     failed, count = tried("\n".join(blocks), name)
     assert failed == 0 and count > least

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use dermis_golden::data::recording::message::{DiagnosticStatus, KeyValue};
 use dermis_golden::result::flags::Flag;
-use dermis_sim::stream::Answer;
+use dermis_host::stream::Answer;
 
 /// Time between reports of all patches.
 pub const PERIOD: Duration = Duration::from_secs(1);

@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 use dermis_golden::engine::CheckedEngine;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{EngineName, SharedEngine};
-use dermis_sim::link::{open_board, BoardEngine, Session};
+use dermis_host::engine::{EngineName, SharedEngine};
+use dermis_host::link::{open_board, BoardEngine, Session};
 
 use crate::patches::PatchFile;
 
@@ -39,7 +39,7 @@ impl Engines {
             let key = (patch.path.clone(), patch.fields.estimator.clone(), patch.engine);
             let engine = match built.get(&key) {
                 Some(engine) => Arc::clone(engine),
-                None => dermis_sim::engine::Engines::default()
+                None => dermis_host::engine::Engines::default()
                     .of_stream(patch.engine, &patch.scene)
                     .with_context(|| format!("patch[{index}].scene"))?,
             };

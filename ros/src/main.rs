@@ -35,7 +35,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::{value_parser, Parser};
-use dermis_sim::{output, say};
+use dermis_flow::{output, say};
 
 use patches::{CarrierName, PatchFile};
 

@@ -12,8 +12,8 @@ use dermis_golden::data::recording::message::{
 use dermis_golden::result::reconstruct::{ContactTrack, FoundContact, Reconstruction};
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
-use dermis_sim::recording::{header, torque, Arrows, Points, METRES};
-use dermis_sim::stream::Answer;
+use dermis_host::recording::{header, torque, Arrows, Points, METRES};
+use dermis_host::stream::Answer;
 
 use crate::patches::{Patch, Pose};
 

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{anyhow, Result};
+use dermis_flow::jobs::Interrupt;
+use dermis_flow::say;
 use dermis_golden::data::recording::message::DiagnosticArray;
 use dermis_golden::data::text::Stated;
 use dermis_golden::engine::CheckPace;
-use dermis_sim::jobs::Interrupt;
-use dermis_sim::recording::header;
-use dermis_sim::say;
-use dermis_sim::stream::{
+use dermis_host::recording::header;
+use dermis_host::stream::{
     run_together, Answer, Clock, Estimators, Faster, Member, Outcome, Policy, Stop, StreamOptions, ZeroRequest,
 };
 

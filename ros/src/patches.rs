@@ -1,6 +1,6 @@
 //! The patch file: a node of ROS 2, and the sensors that it publishes.
 //!
-//! Fields, their defaults and ranges are in the guide's page `sim/guide/ros.md`. Paths are relative to the file.
+//! Fields, their defaults and ranges are in the guide's page `docs/ros.md`. Paths are relative to the file.
 
 mod fields;
 #[cfg(test)]
@@ -14,8 +14,8 @@ use std::str::FromStr;
 use anyhow::{anyhow, bail, Context, Result};
 use dermis_golden::plain_words::of_toml;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
-use dermis_sim::engine::EngineName;
-use dermis_sim::stream::Source;
+use dermis_host::engine::EngineName;
+use dermis_host::stream::Source;
 
 pub use fields::{CarrierName, NodeFields, PatchFields, Pose};
 

@@ -11,11 +11,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use dermis_flow::say;
 use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::spec::board::Board;
-use dermis_sim::recording::{Lines, Pace};
-use dermis_sim::say;
-use dermis_sim::stream::Source;
+use dermis_host::recording::{Lines, Pace};
+use dermis_host::stream::Source;
 
 use crate::diagnostics::PatchState;
 use crate::patches::{Origin, Patch};

@@ -20,8 +20,8 @@ use dermis_golden::data::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
 use dermis_golden::spec::sensor::Sensor;
+use dermis_host::stream::{Answer, Outcome};
 use dermis_sim::live::{Newest, Server, Show};
-use dermis_sim::stream::{Answer, Outcome};
 use serde_json::json;
 
 const MOST_MS: f64 = 8.0;

@@ -11,11 +11,11 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use dermis_cosim::drive::{record, InputFrame, Stimulus};
+use dermis_cosim::hardware::{Hardware, Simulator};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
 
 /// Runs of each simulator, of which the fastest counts.
 const RUNS: usize = 20;

@@ -14,8 +14,8 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::data::text::Stated;
 use dermis_golden::engine::CheckPace;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
-use dermis_sim::engine::EngineName;
-use dermis_sim::stream::{as_lines, run, Estimators, Policy, StreamOptions};
+use dermis_host::engine::EngineName;
+use dermis_host::stream::{as_lines, run, Estimators, Policy, StreamOptions};
 
 /// Least rate of the search, in frames per second.
 const LEAST: f64 = 2000.0;

@@ -1,6 +1,6 @@
 //! Guide: pages for people who use Dermis or extend it; [`index`] lists them by task.
 //!
-//! The pages are the Markdown files of `sim/guide`, readable in a Git web view as well. A link between pages is written
+//! The pages are the Markdown files of `docs`, readable in a Git web view as well. A link between pages is written
 //! `[text][page.md]` with a definition at the page's end, which names the file. Here the definitions of `links!` stand
 //! before a page's own, and Markdown takes the first of two: they name the page's module.
 
@@ -16,12 +16,12 @@ macro_rules! modules {
     ($all:tt $($file:literal $page:ident,)*) => { $(modules! { @one $all $file $page })* };
     (@one { $($all:tt)* } $file:literal $page:ident) => {
         #[doc = links!($($all)*)]
-        #[doc = include_str!(concat!("../guide/", $file))]
+        #[doc = include_str!(concat!("../../docs/", $file))]
         pub mod $page {}
     };
 }
 
-/// The pages: file in `sim/guide`, module here.
+/// The pages: file in `docs`, module here.
 macro_rules! pages {
     ($($list:tt)*) => { modules! { { $($list)* } $($list)* } };
 }

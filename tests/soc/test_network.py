@@ -54,7 +54,7 @@ HOST_MAC, HOST_IP, HOST_PORT = "02:00:00:00:00:09", "192.168.1.100", 4321
 CORE_MAC = ":".join(f"{byte:02x}" for byte in MAC_ADDRESS.to_bytes(6, "big"))
 PREAMBLE = bytes([0x55] * 7 + [0xD5])
 CHECK_BYTES = 4
-GUIDE = HERE.parent.parent / "sim/guide/robustness.md"
+GUIDE = HERE.parent.parent / "docs/robustness.md"
 # So few words that a frame and its result have several packets, whose last Ethernet pads.
 FRAGMENT_WORDS = 11
 # Bytes of the headers of Ethernet and IP, and where UDP has its length and its checksum.

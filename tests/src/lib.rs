@@ -41,14 +41,14 @@ mod variants;
 use std::fmt::Display;
 use std::path::PathBuf;
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::estimate::learned::{self, Training};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use tempfile::NamedTempFile;
 pub use variants::{nightly, variants};
 

@@ -37,7 +37,7 @@ pub mod presses;
 mod random;
 pub mod slip;
 mod stress;
-pub(crate) mod support;
+pub mod support;
 #[cfg(test)]
 mod tests;
 mod traction;

@@ -2,7 +2,7 @@
 //!
 //! A search gives the best μ, not how far it may be off. The physics is linear, so that the relative error of a frame depends
 //! on its noise over its peak and on the shape of its contact, not on the size of its load. The table has the error that 68 %
-//! of drawn frames do not exceed, per level of noise and class of sizes; [`crate::study::noise::measure_deviations`] makes it. A
+//! of drawn frames do not exceed, per level of noise and class of sizes; `dermis deviations` makes it. A
 //! subarray is looked up by
 //!
 //! ```text
@@ -80,7 +80,7 @@ pub struct Subject(BTreeMap<String, String>);
 #[serde(deny_unknown_fields)]
 pub struct Deviations {
     /// Version of the file.
-    pub(crate) version: u32,
+    pub version: u32,
     /// What it was measured for.
     pub subject: Subject,
     /// Number of frames per level.
@@ -230,7 +230,7 @@ impl Deviations {
     }
 
     /// A table of these levels, sizes and deviations.
-    pub(crate) fn new(
+    pub fn new(
         subject: Subject,
         [draws, seed]: [u64; 2],
         levels: Vec<f64>,
@@ -332,7 +332,7 @@ impl Deviations {
 }
 
 /// What is looked up of a subarray.
-pub(crate) struct Load {
+pub struct Load {
     /// Normal force in N, above 0.
     pub normal_N: f64,
     /// Standard deviation of noise and rounding over max |b|.

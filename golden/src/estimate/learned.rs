@@ -48,7 +48,7 @@ mod trial;
 
 pub use composed::ComposedLayer;
 pub use error::LearnedError;
-pub(crate) use frames::{GAINS, NOISE, RATIO};
+pub use frames::{GAINS, NOISE, RATIO};
 pub(crate) use network::LN_SIGMA;
 pub use network::PLACES;
 pub use options::Training;

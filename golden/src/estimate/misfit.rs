@@ -10,7 +10,7 @@
 //!
 //! σ is the noise as the scene states it, at most, and where none is stated, the largest of the training, 2 % of max |b|. A
 //! reading of 0 on a unipolar array counts if p presses there. With the true σ the misfit of drawn frames hardly depends on
-//! the noise. The limit is measured after the training ([`crate::study::noise::misfit_limit`]) and stands in the network's file;
+//! the noise. The limit is measured after the training (`dermis_study::noise::misfit_limit`) and stands in the network's file;
 //! without one there is no check.
 //!
 //! What contacts can cause is not found: an offset of all taxels looks like a contact larger than the array, a thicker
@@ -67,7 +67,7 @@ impl Misfit {
     }
 
     /// The check with this limit.
-    pub(crate) fn new(scene: &Scene, limit: f64) -> Misfit {
+    pub fn new(scene: &Scene, limit: f64) -> Misfit {
         let sensor = scene.sensor.clone();
         let kernels = Kernels::new(&sensor, scene.medium);
         Misfit { alive: scene.input.alive(&sensor), sensor, kernels, unipolar: scene.input.unipolar, limit }

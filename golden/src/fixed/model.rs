@@ -138,7 +138,7 @@ impl Model {
     }
 
     /// The model of a scene, whether it fits its board or not.
-    pub(crate) fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
+    pub fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
         Model::of_plan(planned(scene)?)
     }
 

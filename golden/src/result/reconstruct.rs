@@ -213,7 +213,7 @@ impl SubarrayResult {
     }
 
     /// The subarray.
-    pub(crate) fn part(&self) -> Subarray {
+    pub fn part(&self) -> Subarray {
         Subarray { row0: self.row0, col0: self.col0, rows: self.rows, cols: self.cols }
     }
 }

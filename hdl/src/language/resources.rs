@@ -29,7 +29,7 @@ pub(super) const FLATTENED: f64 = 0.85;
 /// LUTs by which place and route connects both ends of a carry chain to other logic.
 const CHAIN_ENDS: f64 = 4.0;
 
-/// Fewest flip-flops that share an enable or a reset: our flow makes logic of smaller groups (`sim/src/flow/family.rs`).
+/// Fewest flip-flops that share an enable or a reset: our flow makes logic of smaller groups (`sim/flow/src/family.rs`).
 const SMALLEST_GROUP: usize = 16;
 
 /// Logic of a block.

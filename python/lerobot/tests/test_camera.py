@@ -487,7 +487,7 @@ def test_a_configuration_that_cannot_be_used_is_named(settings: dict[str, Any], 
 def test_the_source_of_the_guide_reads_a_serial_port(
     camera: Callable[..., Camera], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = (Path(__file__).resolve().parents[3] / "sim" / "guide" / "learning.md").read_text()
+    page = (Path(__file__).resolve().parents[3] / "docs" / "learning.md").read_text()
     [text] = [block for block in page.split("```") if block.startswith("python\nimport numpy as np\nimport serial")]
     ours, theirs = os.openpty()
     text = text.removeprefix("python\n").replace("/dev/ttyACM2", os.ttyname(theirs))

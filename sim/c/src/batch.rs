@@ -5,8 +5,8 @@ use std::mem::MaybeUninit;
 
 use dermis_golden::result::flags::FlagSet;
 use dermis_golden::result::reconstruct::Reconstruction;
-use dermis_sim::batch::Batch;
-use dermis_sim::engine::EngineName;
+use dermis_host::batch::Batch;
+use dermis_host::engine::EngineName;
 
 use crate::guard::{copy, dermis_status, guarded, reference, room, text, values, Error};
 use crate::scene::dermis_scene;

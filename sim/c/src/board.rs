@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
-use dermis_sim::link::{open_board, HostError, Session};
+use dermis_host::link::{open_board, HostError, Session};
 
 use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text, Error};
 use crate::result::dermis_result;

@@ -16,7 +16,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::StreamChecks;
 use dermis_golden::fixed::Model;
 use dermis_golden::wire::link::{codes_to_bytes, payloads, supports, Decoder, Identity, Kind, Packet, OVERHEAD};
-use dermis_sim::link::{check_identity, Answer, PhysicalAnswer};
+use dermis_host::link::{check_identity, Answer, PhysicalAnswer};
 
 use crate::guard::{attempt, copy, dermis_status, exclusive, free, guarded, place, reference, room, values, Error};
 use crate::result::dermis_result;
@@ -68,7 +68,7 @@ impl dermis_link {
     fn answer(&mut self, packet: &Packet) -> Result<(dermis_answer, Option<dermis_result>), Error> {
         let forces = match packet.kind {
             Kind::Identity => {
-                let board = |error: dermis_sim::link::IdentityError| Error {
+                let board = |error: dermis_host::link::IdentityError| Error {
                     status: dermis_status::Board,
                     text: error.to_string(),
                 };

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use dermis_golden::data::frame::Forces;
 use dermis_golden::result::flags::FlagSet;
 use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
-use dermis_sim::link::PhysicalAnswer;
+use dermis_host::link::PhysicalAnswer;
 
 use crate::guard::{attempt, copy, dermis_status, free, guarded, place, reference, room, Error};
 

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::physics::forward::ForwardModel;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::{self, EngineName, Engines};
+use dermis_host::engine::{self, EngineName, Engines};
 
 use crate::guard::{attempt, dermis_status, free, guarded, place, reference, text, values, Error};
 use crate::result::dermis_result;

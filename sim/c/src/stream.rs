@@ -12,7 +12,7 @@ use std::path::Path;
 
 use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
-use dermis_sim::engine::{typed, EngineName};
+use dermis_host::engine::{typed, EngineName};
 
 use crate::guard::{dermis_status, exclusive, free, guarded, place, reference, text};
 use crate::result::dermis_result;

@@ -9,10 +9,10 @@ use dermis_golden::spec::board::SEARCH_WIDTHS;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_hardware;
-use crate::flow::baseline::{with_search_width, Baselines};
-use crate::flow::bitstream::{make, Effort};
-use crate::progress::Progress;
-use crate::report::{self, BitstreamReport, Summary};
+use dermis_flow::baseline::{with_search_width, Baselines};
+use dermis_flow::bitstream::{make, Effort};
+use dermis_flow::progress::Progress;
+use dermis_report::{self as report, BitstreamReport, Summary};
 
 /// Arguments of `dermis bitstream`.
 #[derive(Args, Debug)]

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use clap::{value_parser, Args};
-use dermis_golden::study::noise::{BlindStudy, Candidate};
+use dermis_study::noise::{BlindStudy, Candidate};
 
-use crate::report::study::blind_gains;
+use dermis_report::study::blind_gains;
 
 /// Arguments of `dermis study blind-gains`.
 #[derive(Args, Debug)]

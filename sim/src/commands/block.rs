@@ -13,8 +13,8 @@ use dermis_golden::write::write;
 use dermis_hdl::describe::{block, block_source, block_verilog, blocks};
 
 use super::inputs::BoardOverride;
-use crate::cosim::block_timing::{traces, SCENE};
-use crate::report;
+use dermis_cosim::block_timing::{traces, SCENE};
+use dermis_report as report;
 
 /// What `dermis block` is asked for.
 #[derive(Args, Debug)]

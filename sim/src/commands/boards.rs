@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use dermis_golden::spec::board::{Board, Device};
 
-use crate::report::{self, BoardList, NamedBoard};
+use dermis_report::{self as report, BoardList, NamedBoard};
 
 /// Arguments of `dermis boards`.
 #[derive(Args, Debug)]

@@ -16,9 +16,9 @@ use dermis_hdl::scan::generate_scan;
 use dermis_hdl::GeneratedFile;
 
 use super::inputs::{note_hardware, BoardOverride};
-use crate::microcontroller::{self, target::measure_all};
-use crate::progress::Progress;
-use crate::report;
+use dermis_flow::microcontroller::{self, target::measure_all};
+use dermis_flow::progress::Progress;
+use dermis_report as report;
 
 /// Arguments of `dermis build`.
 #[derive(Args, Debug)]

@@ -17,7 +17,7 @@ use toml_edit::{Array, Value};
 
 use super::layout::LayoutArguments;
 use super::scene_file::{has_file, lines, state, Measured};
-use crate::report;
+use dermis_report as report;
 
 /// Arguments of `dermis calibrate`.
 #[derive(Args, Debug)]

@@ -15,15 +15,15 @@ use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::Matrices;
 use dermis_golden::result::checks::pull::tare_load;
 use dermis_golden::spec::scene::{Scene, MAX_FLOAT_DEGREE};
-use dermis_golden::study::noise::expected::{expected, of_other_medium, Expectation, StatedNoise};
 use dermis_hdl::{explain::explain, generate, manifest};
+use dermis_study::noise::expected::{expected, of_other_medium, Expectation, StatedNoise};
 
 use super::check_noise::NoiseArguments;
 use super::check_rate::rates;
 use super::inputs::{beside, estimator_instead, noise_not_stated, BoardOverride};
-use crate::microcontroller;
-use crate::progress::Progress;
-use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
+use dermis_flow::microcontroller;
+use dermis_flow::progress::Progress;
+use dermis_report::{self as report, BuildCheck, HardwareCheck, SceneCheck};
 
 /// Arguments of `dermis check`.
 #[derive(Args, Debug)]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{anyhow, bail, ensure, Context, Result};
 use clap::{value_parser, Args};
+use dermis_flow::say;
 use dermis_golden::data::input::unloaded::noise_MPa;
 use dermis_golden::data::input::Input;
 use dermis_golden::data::text::Decoded;
@@ -13,9 +14,9 @@ use dermis_golden::spec::scene::{Scene, SearchSpec};
 use super::layout::LayoutArguments;
 use super::reconstruct_stream::open;
 use super::scene_file::{has_file, state, Measured};
-use crate::progress::Progress;
-use crate::stream::line::{self, Piece};
-use crate::stream::Source;
+use dermis_flow::progress::Progress;
+use dermis_host::stream::line::{self, Piece};
+use dermis_host::stream::Source;
 
 /// Digits of the noise that is written.
 const DIGITS: i32 = 3;

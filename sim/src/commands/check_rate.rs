@@ -8,10 +8,10 @@ use dermis_golden::engine::{CheckPace, Engine, StreamChecks};
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::spec::scene::Scene;
 
-use crate::engine::typed;
-use crate::progress::Progress;
-use crate::report::RateRow;
-use crate::stream::Faster;
+use dermis_flow::progress::Progress;
+use dermis_host::engine::typed;
+use dermis_host::stream::Faster;
+use dermis_report::RateRow;
 
 /// Time for which an estimator is measured; a result that is begun is completed.
 const MEASURED: Duration = Duration::from_millis(300);

@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use anyhow::{anyhow, Result};
 use clap::{CommandFactory, Parser, Subcommand};
+use dermis_flow::say;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::physics::matrices::cache;
 use dermis_golden::spec::scene::Scene;
@@ -19,13 +20,13 @@ use dermis_golden::write::FileError;
 use dermis_hdl::HdlError;
 
 use super::inputs::BoardOverride;
-use crate::cosim::hardware::{DeviceTimeout, Hardware};
-use crate::cosim::verilator::VerilatorError;
-use crate::flow::tools::ToolError;
-use crate::jobs::Interrupted;
-use crate::link::{HostError, IdentityError, NetworkCore, PseudoTerminal};
-use crate::output::write;
-use crate::report;
+use dermis_cosim::hardware::{DeviceTimeout, Hardware};
+use dermis_cosim::verilator::VerilatorError;
+use dermis_flow::jobs::Interrupted;
+use dermis_flow::output::write;
+use dermis_flow::tools::ToolError;
+use dermis_host::link::{HostError, IdentityError, NetworkCore, PseudoTerminal};
+use dermis_report as report;
 
 /// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
 #[derive(Parser, Debug)]

@@ -3,14 +3,14 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::report;
+use dermis_report as report;
 
 /// Arguments of `dermis converters`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis converters                                  their interface and its times
 
-A scene names one in [hardware.adc_scan]: `sim/guide/architecture/scan.md`.")]
+A scene names one in [hardware.adc_scan]: `docs/architecture/scan.md`.")]
 pub struct Arguments {}
 
 /// Runs the command.

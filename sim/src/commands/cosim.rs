@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 
 use super::inputs::{resolve_specimen, BoardOverride};
 use super::layout::LayoutArguments;
-use crate::cosim::hardware::Simulator;
-use crate::cosim::scan::{verify_scan, Fault};
-use crate::cosim::verify::verify_specimen;
-use crate::cosim::waves::waves;
-use crate::report::{self, CosimReport, ScanReport};
+use dermis_cosim::hardware::Simulator;
+use dermis_cosim::scan::{verify_scan, Fault};
+use dermis_cosim::verify::verify_specimen;
+use dermis_cosim::waves::waves;
+use dermis_report::{self as report, CosimReport, ScanReport};
 
 /// Arguments of `dermis cosim`.
 #[derive(Args, Debug)]

@@ -6,12 +6,12 @@ use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::estimate::deviations::Deviations;
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
-use dermis_golden::study::noise::{deviations_coverage, measure_deviations};
 use dermis_golden::write::write;
+use dermis_study::noise::{deviations_coverage, measure_deviations};
 
 use super::inputs::beside;
-use crate::progress::Progress;
-use crate::report;
+use dermis_flow::progress::Progress;
+use dermis_report as report;
 
 /// Noise levels at which the table is tried, between its own.
 const LEVELS: [f64; 4] = [2e-6, 5e-5, 6e-4, 2e-2];

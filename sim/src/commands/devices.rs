@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{value_parser, Args};
 
-use crate::report::measure::{DeviceOptions, DEVICE_FRAMES};
-use crate::report::study::devices;
+use dermis_report::measure::{DeviceOptions, DEVICE_FRAMES};
+use dermis_report::study::devices;
 
 /// Arguments of `dermis study devices`.
 #[derive(Args, Debug)]

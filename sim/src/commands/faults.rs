@@ -9,11 +9,11 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 
-use crate::cosim::faults::{inject_faults, Row};
-use crate::cosim::hardware::Hardware;
-use crate::report;
-use crate::run_log::{RunLog, TargetCounts};
+use dermis_cosim::faults::{inject_faults, Row};
+use dermis_cosim::hardware::Hardware;
 use dermis_hdl::state::{StorageClass, CLASSES};
+use dermis_report as report;
+use dermis_report::run_log::{RunLog, TargetCounts};
 
 /// Arguments of `dermis faults`.
 #[derive(Args, Debug)]

@@ -20,8 +20,8 @@ use dermis_golden::data::generator::{generate, random_contacts, Draw};
 use dermis_golden::spec::scene::Scene;
 
 use super::generate_press::{self, PressArguments};
-use crate::drawn_frames::Shapes;
 use dermis_golden::write::write;
+use dermis_report::drawn_frames::Shapes;
 
 /// Arguments of `dermis generate`.
 #[derive(Args, Debug)]

@@ -19,8 +19,8 @@ use dermis_golden::write::write;
 use serde_json::json;
 
 use super::noise::motion;
-use crate::progress::Progress;
-use crate::recording::{header, FRAME_ID};
+use dermis_flow::progress::Progress;
+use dermis_host::recording::{header, FRAME_ID};
 
 /// Channel of the known force.
 const KNOWN_FORCE: &str = "/dermis/known_force";

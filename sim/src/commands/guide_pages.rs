@@ -13,7 +13,7 @@
 //! | [`marker`] | finds the markers of a page |
 //! | [`markdown`] | reads, selects and compares Markdown tables |
 //!
-//! The pictures are drawn by [`crate::report`]; that of run times is measured anew each time and not compared.
+//! The pictures are drawn by [`dermis_report`]; that of run times is measured anew each time and not compared.
 
 pub mod markdown;
 pub mod marker;
@@ -26,16 +26,17 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail, ensure, Context, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::write::write;
 
-use crate::jobs::{parallel, Interrupt};
-use crate::progress::Progress;
-use crate::report::{fixed_pictures, time_picture, PictureFile};
+use dermis_flow::jobs::{parallel, Interrupt};
+use dermis_flow::progress::Progress;
+use dermis_report::{fixed_pictures, time_picture, PictureFile};
 use markdown::{tables, Difference, Table};
 use marker::{markers, Marker};
 
 /// The guide's folder, from the repository's root.
-pub const GUIDE: &str = "sim/guide";
+pub const GUIDE: &str = "docs";
 /// Folder of the pictures in the guide's.
 const PICTURES: &str = "pictures";
 /// What every marker's command begins with.
@@ -48,7 +49,7 @@ const PROGRAM: &str = "dermis";
   dermis guide --only stability                      those whose command contains `stability`
   dermis guide --check                               compare in place of writing; exit code 1 when a table is stale
   dermis guide --check --quick                       the same with the markers' cheaper check commands
-  dermis guide --pictures                            draw sim/guide/pictures/*.svg
+  dermis guide --pictures                            draw docs/pictures/*.svg
 
 A table or code stands between two lines of a Markdown page:
   <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 -->
@@ -68,7 +69,7 @@ Attributes follow the command after semicolons, all of them optional:
   part: N                 of a figure: the N-th of several that `/` separates in its cell
   takes: 40 s             how long the command takes, for the reader")]
 pub struct Arguments {
-    /// Folder of the repository, which holds README.md and sim/guide; commands run in it.
+    /// Folder of the repository, which holds README.md and docs; commands run in it.
     #[arg(long, value_name = "DIR", default_value = ".")]
     root: PathBuf,
     /// Compare with the pages, write nothing.
@@ -419,11 +420,11 @@ mod tests {
     fn pages_are_the_root_s_and_the_guide_s_in_order() {
         let folder = tempfile::tempdir().unwrap();
         assert!(page_names(folder.path()).unwrap_err().to_string().contains("no README.md"));
-        std::fs::create_dir_all(folder.path().join("sim/guide/stages")).unwrap();
-        for name in ["README.md", "sim/guide/b.md", "sim/guide/a.svg", "sim/guide/stages/fold.md"] {
+        std::fs::create_dir_all(folder.path().join("docs/stages")).unwrap();
+        for name in ["README.md", "docs/b.md", "docs/a.svg", "docs/stages/fold.md"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        let wanted = ["README.md", "sim/guide/b.md", "sim/guide/stages/fold.md"];
+        let wanted = ["README.md", "docs/b.md", "docs/stages/fold.md"];
         assert_eq!(page_names(folder.path()).unwrap(), wanted);
     }
 }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{bail, Context, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::reception::full_scale;
 use dermis_golden::engine::CrossCheck;
@@ -17,10 +18,10 @@ use dermis_golden::write::write;
 
 use super::inputs::{frames_of, resolve, BoardOverride};
 use super::layout::LayoutArguments;
-use crate::link::stream::{self, FramesSent};
-use crate::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
-use crate::progress::Progress;
-use crate::report;
+use dermis_flow::progress::Progress;
+use dermis_host::link::stream::{self, FramesSent};
+use dermis_host::link::{open_board, Answer, LinkErrors, PhysicalAnswer, Session};
+use dermis_report as report;
 
 /// Arguments of `dermis host`.
 #[derive(Args, Debug)]

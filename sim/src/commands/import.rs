@@ -12,7 +12,7 @@ use dermis_golden::data::import::{load, Correction, Crop, Format, Settings, Summ
 use dermis_golden::data::text::Form;
 
 use super::layout::LayoutArguments;
-use crate::report::document::percent_text;
+use dermis_report::document::percent_text;
 
 /// Arguments of `dermis import`.
 #[derive(Args, Debug)]

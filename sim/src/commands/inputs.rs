@@ -12,13 +12,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{bail, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::input::Input;
 use dermis_golden::result::flags;
 use dermis_golden::spec::scene::Scene;
 
 use super::layout::LayoutArguments;
-use crate::report;
+use dermis_report as report;
 
 /// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";

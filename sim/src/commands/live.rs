@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::data::recording::FrameOptions;
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::fixed::Model;
@@ -17,12 +18,12 @@ use dermis_golden::spec::scene::Scene;
 use super::inputs::{note_hardware, BoardOverride};
 use super::layout::LayoutArguments;
 use super::reconstruct_stream::{open, rate_Hz, software_engine, stream_engine};
-use crate::engine::EngineName;
-use crate::link::{open_board, BoardEngine, Session};
 use crate::live::server::open_to_others;
 use crate::live::{Hand, Newest, Server, Show};
-use crate::recording::{Lines, Pace};
-use crate::stream::{run as run_stream, Clock, Estimators, Faster, Outcome, Policy, Source, StreamOptions};
+use dermis_host::engine::EngineName;
+use dermis_host::link::{open_board, BoardEngine, Session};
+use dermis_host::recording::{Lines, Pace};
+use dermis_host::stream::{run as run_stream, Clock, Estimators, Faster, Outcome, Policy, Source, StreamOptions};
 
 /// Arguments of `dermis live`.
 #[derive(Args, Debug)]

@@ -11,8 +11,8 @@ use dermis_golden::spec::scene::Scene;
 use dermis_golden::write::write;
 
 use super::inputs::BoardOverride;
-use crate::link::{open_board, Session};
-use crate::report::{self, LoadReport};
+use dermis_host::link::{open_board, Session};
+use dermis_report::{self as report, LoadReport};
 
 /// Arguments of `dermis load`.
 #[derive(Args, Debug)]

@@ -448,7 +448,7 @@ mod tests {
     fn axes_are_those_of_the_guide_and_of_the_model() {
         let text = written(&["--rows", "4", "--cols", "4", "--pitch", "4", "--thickness", "4"], "").0.unwrap();
         assert!(AXES.iter().all(|line| text.contains(&format!("# {line}\n"))), "{text}");
-        assert!(include_str!("../../guide/your-sensor.md").contains(&AXES.join("\n")));
+        assert!(include_str!("../../../docs/your-sensor.md").contains(&AXES.join("\n")));
         // The first reading is that of the taxel with the least x and y, the next one has more x.
         let sensor = Scene::parse(&text, "pad.toml").unwrap().sensor;
         let [first, next, below] = [(0, 0), (0, 1), (1, 0)].map(|(row, col)| sensor.position_mm(row, col));

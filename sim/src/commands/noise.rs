@@ -9,21 +9,19 @@
 //! | `--time` | errors and lag over whole presses, with each kind of mean |
 //! | `--unlike` | how many frames like and unlike a network's training are flagged |
 
-use anyhow::{anyhow, Result};
+use anyhow::Result;
 use clap::Args;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Shape};
 use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
-use dermis_golden::study::noise::{press_study, sensitivities, shape_study, slip_study, study, unlike_study};
-use dermis_golden::study::noise::{Candidate, PressEngine, PressStudy, ShapeStudy, Study};
+use dermis_study::noise::{by_name, press_study, sensitivities, shape_study, slip_study, study, unlike_study};
+use dermis_study::noise::{shapes_named, Candidate, PressEngine, PressStudy, ShapeStudy, Study, AVERAGED};
 
-use crate::progress::Progress;
-use crate::report::{self, Format};
+use dermis_flow::progress::Progress;
+use dermis_report::{self as report, Format};
 
-/// Frames averaged in the second half of the table of elliptic contacts.
-pub const AVERAGED: usize = 64;
 /// Noise level of the table of sensitivities.
 const SENSITIVITY_LEVEL: f64 = 1e-3;
 
@@ -295,31 +293,7 @@ fn named<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
     by_name(name, names).map_err(|known| format!("one of {known}"))
 }
 
-/// The value with a name.
-///
-/// # Errors
-/// For an unknown name all that are known, separated by commas.
-pub fn by_name<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
-    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(known)
-}
-
 /// Parses a list of shapes.
-fn shapes(text: &str) -> Result<Shapes> {
+fn shapes(text: &str) -> Result<Shapes, String> {
     shapes_named(text).map(Shapes)
-}
-
-/// The shapes of a list as `--shapes` takes it: names separated by commas, `mixed`, `all` or `table`.
-///
-/// # Errors
-/// An unknown name.
-pub fn shapes_named(text: &str) -> Result<Vec<Shape>> {
-    match text {
-        "all" | "mixed" => Ok(Shape::NAMES.map(|(_, shape)| shape).to_vec()),
-        "table" => Ok(Shape::TABLE.to_vec()),
-        list => {
-            let shape = |name: &str| named(name.trim(), &Shape::NAMES).map_err(|known| anyhow!("{name:?}: {known}"));
-            list.split(',').map(shape).collect()
-        }
-    }
 }

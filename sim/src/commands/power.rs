@@ -8,9 +8,9 @@ use dermis_golden::fixed::Model;
 
 use super::inputs::{note_hardware, resolve, BoardOverride};
 use super::layout::LayoutArguments;
-use crate::cosim::hardware::Hardware;
-use crate::cosim::power::{energies, estimate_power};
-use crate::report;
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::power::{energies, estimate_power};
+use dermis_report as report;
 
 /// Arguments of `dermis power`.
 #[derive(Args, Debug)]

@@ -14,10 +14,10 @@ use dermis_golden::spec::scene::Scene;
 use super::inputs::{note_hardware, resolve_one, BoardOverride};
 use super::layout::LayoutArguments;
 use super::reconstruct_stream::StreamArguments;
-use crate::compare::{comparable_forces, difference};
-use crate::engine::{self, EngineName};
-use crate::progress::Progress;
-use crate::report;
+use dermis_cosim::compare::{comparable_forces, difference};
+use dermis_flow::progress::Progress;
+use dermis_host::engine::{self, EngineName};
+use dermis_report as report;
 
 /// Arguments of `dermis reconstruct`.
 #[derive(Args, Debug)]

@@ -7,15 +7,18 @@ use std::time::Instant;
 use anyhow::{anyhow, bail, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{value_parser, Args, ValueEnum};
+use dermis_flow::say;
 use dermis_golden::engine::{CheckPace, Engine};
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::note_hardware;
 use super::layout::LayoutArguments;
-use crate::engine::EngineName;
-use crate::jobs::{Interrupt, Interrupted};
-use crate::recording::Recorder;
-use crate::stream::{as_lines, run_until, Clock, Estimators, Faster, Outcome, Policy, Source, Stop, StreamOptions};
+use dermis_flow::jobs::{Interrupt, Interrupted};
+use dermis_host::engine::EngineName;
+use dermis_host::recording::Recorder;
+use dermis_host::stream::{
+    as_lines, run_until, Clock, Estimators, Faster, Outcome, Policy, Source, Stop, StreamOptions,
+};
 
 /// Lines that wait with `--all` while the source waits too: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;

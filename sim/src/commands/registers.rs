@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dermis_golden::wire::registers::{c_header, system_rdl, REGISTERS};
 
-use crate::report;
+use dermis_report as report;
 
 /// Arguments of `dermis registers`.
 #[derive(Args, Debug)]

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::data::recording::message::Text;
 use dermis_golden::data::recording::{End, FrameOptions, Messages};
 
-use crate::output::write;
-use crate::recording::{Lines, Pace, RESULT};
+use dermis_flow::output::write;
+use dermis_host::recording::{Lines, Pace, RESULT};
 
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 16;

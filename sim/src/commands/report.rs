@@ -10,18 +10,18 @@ use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::{Condition, Scene};
 
 use super::inputs::scenes_or;
-use crate::jobs::Interrupt;
-use crate::report::document::{Document, Section};
-use crate::report::measure::{
+use dermis_flow::jobs::Interrupt;
+use dermis_report::document::{Document, Section};
+use dermis_report::measure::{
     self, clock, machine, measure, recorded, sweep, ContactCount, DeviceOptions, Measured, Options, SweepPoint,
     DEVICE_FRAMES, MOST_FRAMES,
 };
-use crate::report::save::save;
-use crate::report::sections::{
+use dermis_report::run_log::RunLog;
+use dermis_report::save::save;
+use dermis_report::sections::{
     choice, choose, devices, extremes, fields, frames, noise, paper, power, published, ratios, recordings, resources,
     run_logs, search, stability, stages, sweeps, time, Choice, DEVICE_SCENES,
 };
-use crate::run_log::RunLog;
 
 /// Number of random frames of a sweep in addition to the shipped ones: quick, full variant.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];

@@ -6,7 +6,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
 
-use crate::report;
+use dermis_report as report;
 
 /// Arguments of `dermis schema`.
 #[derive(Args, Debug)]

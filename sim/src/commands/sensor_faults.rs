@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use clap::{value_parser, Args};
-use dermis_golden::study::sensor_faults::SensorFaults;
+use dermis_study::sensor_faults::SensorFaults;
 
-use crate::report::study::sensor_faults;
+use dermis_report::study::sensor_faults;
 
 /// Arguments of `dermis study sensor-faults`.
 #[derive(Args, Debug)]

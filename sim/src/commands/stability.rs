@@ -2,7 +2,7 @@
 //!
 //! | arguments | prints |
 //! |---|---|
-//! | no scenes | the table of [`dermis_golden::study::stability::settings`] |
+//! | no scenes | the table of [`dermis_study::stability::settings`] |
 //! | scenes | one row for each |
 //! | `--extreme` | results on extreme frames of each scene, by default sensor-1 |
 //! | `--plot FILE` | additionally writes error against condition number as SVG |
@@ -12,12 +12,12 @@ use std::path::PathBuf;
 use anyhow::{ensure, Result};
 use clap::Args;
 use dermis_golden::spec::scene::Scene;
-use dermis_golden::study::stability::extreme::{frames, outcome};
-use dermis_golden::study::stability::{measure, settings, Setting};
+use dermis_study::stability::extreme::{frames, outcome};
+use dermis_study::stability::{measure, settings, Setting};
 
-use crate::progress::Progress;
-use crate::report::{self, Format};
+use dermis_flow::progress::Progress;
 use dermis_golden::write::write;
+use dermis_report::{self as report, Format};
 
 /// Arguments of `dermis stability`.
 #[derive(Args, Debug)]

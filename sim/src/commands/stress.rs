@@ -9,11 +9,11 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::{Scene, TableStorage};
 
-use crate::cosim::hardware::Hardware;
-use crate::cosim::stress::{stress, Outcome};
-use crate::progress::Progress;
-use crate::report;
-use crate::run_log::{RunLog, TargetCounts};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::stress::{stress, Outcome};
+use dermis_flow::progress::Progress;
+use dermis_report as report;
+use dermis_report::run_log::{RunLog, TargetCounts};
 
 /// Arguments of `dermis stress`.
 #[derive(Args, Debug)]

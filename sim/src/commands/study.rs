@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use super::{blind_gains, devices, sensor_faults};
-use crate::report::study::{contacts, dead_taxels, input_bits, link_times};
+use dermis_report::study::{contacts, dead_taxels, input_bits, link_times};
 
 /// What to compare.
 #[derive(Args, Debug)]

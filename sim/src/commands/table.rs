@@ -9,13 +9,13 @@ use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::scenes_or;
-use crate::cosim::hardware::Simulator;
-use crate::cosim::verify::{verify, Verified};
-use crate::cosim::QUICK_SCENES;
-use crate::drawn_frames::DrawnFrames;
-use crate::progress::Progress;
-use crate::report::tabulate::tabulate;
-use crate::report::{self, Format};
+use dermis_cosim::hardware::Simulator;
+use dermis_cosim::verify::{verify, Verified};
+use dermis_cosim::QUICK_SCENES;
+use dermis_flow::progress::Progress;
+use dermis_report::drawn_frames::DrawnFrames;
+use dermis_report::tabulate::tabulate;
+use dermis_report::{self as report, Format};
 
 /// Arguments of `dermis table`.
 #[derive(Args, Debug)]

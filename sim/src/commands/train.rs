@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{bail, Result};
 use clap::Args;
+use dermis_flow::say;
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::estimate::learned::{Learned, Stage, Trained, Training, MEASURED_NOISE};
 use dermis_golden::spec::scene::{EstimatorKind, Scene};
-use dermis_golden::study::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 use dermis_golden::write::write;
+use dermis_study::noise::{misfit_limit, shape_study, Candidate, ShapeStudy};
 
 use super::inputs::beside;
-use crate::jobs::Interrupt;
-use crate::progress::Progress;
-use crate::report;
+use dermis_flow::jobs::Interrupt;
+use dermis_flow::progress::Progress;
+use dermis_report as report;
 
 /// Noise levels of the table that follows a training.
 const LEVELS: [f64; 4] = [0.0, 5e-4, 2e-3, 1e-2];
@@ -163,9 +164,8 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let bar = Progress::steps(&format!("{}: errors on fresh frames", scene.name), 0);
     let rows = shape_study(&scene, &study, &|done, total| bar.set_of(done as u64, total as u64))?;
     text.push_str(&report::shapes(&rows, report::Format::Markdown)?);
-    let better = |row: &dermis_golden::study::noise::ShapeRow| {
-        row.estimator == "none" || row.summary.tangential.median.value < 1.0
-    };
+    let better =
+        |row: &dermis_study::noise::ShapeRow| row.estimator == "none" || row.summary.tangential.median.value < 1.0;
     Ok((text, rows.iter().all(better)))
 }
 

@@ -19,8 +19,8 @@ use dermis_golden::plain_words::JsonError;
 use dermis_golden::spec::scene::Scene;
 use serde::Deserialize;
 
-use crate::engine::typed;
-use crate::stream::{nanoseconds, seconds, Answer, Estimators, Note, Outcome, Output};
+use dermis_host::engine::typed;
+use dermis_host::stream::{nanoseconds, seconds, Answer, Estimators, Note, Outcome, Output};
 
 /// Radius of the finger over the larger pitch: some dozen taxels are pressed.
 const RADIUS_IN_PITCHES: f64 = 2.0;

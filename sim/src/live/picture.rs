@@ -5,7 +5,7 @@ use dermis_golden::result::reconstruct::{FoundContact, Reconstruction};
 use serde::Serialize;
 
 use super::newest::Newest;
-use crate::stream::{Answer, Outcome};
+use dermis_host::stream::{Answer, Outcome};
 
 /// The newest result with its frame.
 #[derive(Serialize)]

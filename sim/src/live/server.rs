@@ -18,7 +18,7 @@ use super::finger::{Finger, Hand};
 use super::newest::Newest;
 use super::places::{Places, Taken, CLIENTS, OF_AN_ADDRESS};
 use super::request::{read, Request};
-use crate::report::style::{escape, variables};
+use dermis_report::style::{escape, variables};
 
 /// Longest wait of `/newest`.
 const WAIT: Duration = Duration::from_secs(1);

@@ -5,10 +5,10 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use dermis_flow::baseline::{Baseline, Baselines};
 use dermis_golden::fixed::Model;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::usage::{total, Usage};
-use dermis_sim::flow::baseline::{Baseline, Baselines};
 
 use crate::fake;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// The page with the example.
-const PAGE: &str = include_str!("../../guide/your-board.md");
+const PAGE: &str = include_str!("../../../docs/your-board.md");
 /// Names of the example's files.
 const FILES: [&str; 3] = ["my-board.toml", "my-board.v", "my-board.pcf"];
 

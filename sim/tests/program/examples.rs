@@ -76,7 +76,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("dermis study input-bits", "a minute; accuracy.rs measures the same"),
     ("dermis study contacts ellipses", "a minute; guide.rs"),
     ("dermis study sensor-faults", "minutes; guide.rs"),
-    ("dermis study sensor-faults my-scene.toml --quick", "a minute; golden/src/study/sensor_faults/tests.rs"),
+    ("dermis study sensor-faults my-scene.toml --quick", "a minute; golden/study/src/sensor_faults/tests.rs"),
     ("dermis study sensor-faults sensor-1-noisy --noise 0.002 --json", "minutes"),
     ("dermis study devices", "minutes; make bench"),
     ("dermis study devices my-scene.toml --frames 2000", "minutes"),

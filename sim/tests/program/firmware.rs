@@ -55,7 +55,7 @@ fn run(folder: &Path, program: &str, arguments: &[&str], input: &[u8]) -> Output
 
 #[test]
 fn the_firmware_of_the_guide_gives_lines_that_are_calibrated_and_read() {
-    let page = include_str!("../../guide/your-sensor.md");
+    let page = include_str!("../../../docs/your-sensor.md");
     let sketch = page.split("```cpp\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -21,7 +21,7 @@ use dermis_sim::commands::guide_pages::markdown::tables;
 /// Longest README in lines: one page.
 const README_LINES: usize = 140;
 /// Folders whose files pages name in backticks.
-const FOLDERS: [&str; 7] = ["golden", "hdl", "sim", "python", "ros", "constraints", "tests"];
+const FOLDERS: [&str; 8] = ["docs", "golden", "hdl", "sim", "python", "ros", "constraints", "tests"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -42,7 +42,7 @@ fn markdown(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn guide() -> PathBuf {
-    root().join("sim/guide")
+    root().join("docs")
 }
 
 /// Everything that is wrong with a page's text; `file` is where it stands.
@@ -161,14 +161,14 @@ fn first_cells(page: &str, head: &str) -> Vec<String> {
 }
 
 #[test]
-fn each_folder_of_sim_is_named() {
+fn each_crate_of_sim_is_named() {
     let text = read("CONTRIBUTING.md");
-    let list = text.split_once("the folders of `sim/src` (").unwrap().1.split_once(')').unwrap().0;
+    let list = text.split_once("the crates in `sim` (").unwrap().1.split_once(')').unwrap().0;
     let mut named: Vec<&str> = code(list).collect();
     named.sort();
-    let entries = fs::read_dir(root().join("sim/src")).unwrap().map(|entry| entry.unwrap().path());
+    let entries = fs::read_dir(root().join("sim")).unwrap().map(|entry| entry.unwrap().path());
     let mut folders: Vec<String> = entries
-        .filter(|path| path.is_dir())
+        .filter(|path| path.join("Cargo.toml").exists())
         .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
         .collect();
     folders.sort();
@@ -177,9 +177,9 @@ fn each_folder_of_sim_is_named() {
 
 #[test]
 fn the_stages_are_those_of_the_hardware() {
-    let all = first_cells("sim/guide/architecture.md", "stage");
-    let of_contacts = first_cells("sim/guide/architecture/contacts.md", "stage");
-    let blocks = first_cells("sim/guide/architecture/blocks.md", "block");
+    let all = first_cells("docs/architecture.md", "stage");
+    let of_contacts = first_cells("docs/architecture/contacts.md", "stage");
+    let blocks = first_cells("docs/architecture/blocks.md", "block");
     let stages: Vec<&String> = blocks.iter().filter(|name| *name != "`butterfly`").collect();
     assert!(stages.len() > 10, "{stages:?}");
     for stage in stages {
@@ -188,12 +188,12 @@ fn the_stages_are_those_of_the_hardware() {
     // The page counts those of the other page in words.
     let words = ["none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"];
     let count = format!("have {} more: [stages of contacts]", words[of_contacts.len()]);
-    assert!(read("sim/guide/architecture.md").contains(&count), "{count}");
+    assert!(read("docs/architecture.md").contains(&count), "{count}");
 }
 
 #[test]
 fn the_limits_know_both_kinds_of_tables() {
-    let page = read("sim/guide/limits.md");
+    let page = read("docs/limits.md");
     let specimen = page.split("\n- ").find(|item| item.contains("serves one specimen")).unwrap();
     let scene = |kind: &str| {
         let text = format!(
@@ -212,7 +212,7 @@ fn the_limits_know_both_kinds_of_tables() {
 #[test]
 fn a_column_of_cycles_says_of_which_frames() {
     let heads = |page: &str| tables(&read(page)).into_iter().flat_map(|table| table.head).collect::<Vec<String>>();
-    let heads = ["README.md", "sim/guide/boards.md"].map(heads).concat();
+    let heads = ["README.md", "docs/boards.md"].map(heads).concat();
     let cycles: Vec<&String> = heads.iter().filter(|head| head.contains("cycles")).collect();
     let which = ["shipped frames", "worst case", "frame interval"];
     assert!(

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
+use dermis_cosim::hardware::Hardware;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::hardware::Hardware;
-use dermis_sim::link::{open, Session};
-use dermis_sim::link::{ChannelFaults, NoisyChannel, PseudoTerminal};
+use dermis_host::link::{open, Session};
+use dermis_host::link::{ChannelFaults, NoisyChannel, PseudoTerminal};
 
 /// Eight clock cycles per bit, to keep the simulation short.
 const BAUD: u32 = 12_500_000;

@@ -10,7 +10,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::link::ChannelFaults;
+use dermis_host::link::ChannelFaults;
 use serde_json::{json, Value};
 
 use super::host::board;

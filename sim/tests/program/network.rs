@@ -12,7 +12,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::link::{open_board, NetworkCore, Session};
+use dermis_host::link::{open_board, NetworkCore, Session};
 
 use super::host::{run, text};
 

@@ -4,13 +4,13 @@
 
 use std::path::PathBuf;
 
+use dermis_cosim::drive::{record, InputFrame, Stimulus, Times};
+use dermis_cosim::toggles::ToggleCounter;
+use dermis_cosim::verilator::{Design, Optimisation, Verilated, VerilatorError};
+use dermis_cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap, TapSignal};
 use dermis_hdl::state::{StateElement, StorageClass};
-use dermis_sim::cosim::drive::{record, InputFrame, Stimulus, Times};
-use dermis_sim::cosim::toggles::ToggleCounter;
-use dermis_sim::cosim::verilator::{Design, Optimisation, Verilated, VerilatorError};
-use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 
 const TOY: &str = include_str!("../toy/toy.v");
 const GAIN: i64 = 3;

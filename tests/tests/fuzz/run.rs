@@ -6,8 +6,8 @@ use std::path::Path;
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
-use dermis_sim::jobs::{parallel, Interrupt};
-use dermis_sim::run_log::{RunLog, TargetCounts};
+use dermis_flow::jobs::{parallel, Interrupt};
+use dermis_report::run_log::{RunLog, TargetCounts};
 use dermis_tests::build_dir;
 
 use super::counting::{mark, most_since};

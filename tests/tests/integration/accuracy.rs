@@ -6,7 +6,7 @@
 //! exactly with the compiler and on the processor of its last renewal, else within 0.2 points.
 
 use dermis_golden::estimate::float::Golden;
-use dermis_sim::report::study::{input_bits, tangential};
+use dermis_report::study::{input_bits, tangential};
 use dermis_tests::{baseline, scene};
 
 /// Bound of the golden model's median tangential error on sensor 1: twice the 1.4 % of a study in double precision.

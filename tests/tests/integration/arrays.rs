@@ -1,6 +1,10 @@
 //! Several arrays on one engine: hardware and bit-true models of the arrays, each alone, are equal over a run in which their frames
 //! come in any order. Stalls, resets and frames cut short meanwhile are those of `streams.rs`, here with arrays.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::stress::stress;
+use dermis_cosim::{run, DeviceUnderTest, Vector};
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::plan::interval::{frame_interval, longest_wait, longest_wait_with_image};
 use dermis_golden::fixed::plan::resources::{Holds, Memory};
@@ -8,10 +12,6 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::spec::scene::{MeanKind, RunningZero, Scene, Zero};
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::stress::stress;
-use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
 use dermis_tests::{assert_equal, build_dir, compare, variants, wanted};
 use tempfile::TempDir;
 

@@ -3,13 +3,13 @@
 
 use std::fs;
 
+use dermis_flow::synthesis::{commands, NETLIST};
 use dermis_golden::fixed::plan::resources::Resources;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::Family;
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate, generate_changed, Generated};
-use dermis_sim::flow::synthesis::{commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
 use dermis_tests::{nightly, variants};
 use serde_json::Value;

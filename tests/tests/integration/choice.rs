@@ -3,20 +3,20 @@
 
 use std::collections::BTreeSet;
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::quantise::quantise;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::stages::choose::{FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
+use dermis_golden::quantile::median;
 use dermis_golden::spec::partition::{Case, Grid};
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::compare::median;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
-use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
+use dermis_report::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::{assert_equal, build_dir, variants};
 
 /// Number of frames of one run.

@@ -357,8 +357,24 @@ fn hdl_has_none() {
 }
 
 #[test]
+fn study_has_none() {
+    none(&modules("dermis_study", "golden/study"), 25);
+}
+
+/// The crates of `sim`, each with its folder and a number of modules that it has at least.
+const SIM: [(&str, &str, usize); 5] = [
+    ("dermis_flow", "sim/flow", 15),
+    ("dermis_cosim", "sim/cosim", 20),
+    ("dermis_host", "sim/host", 25),
+    ("dermis_report", "sim/report", 60),
+    ("dermis_sim", "sim", 40),
+];
+
+#[test]
 fn sim_has_none() {
-    none(&modules("dermis_sim", "sim"), 100);
+    for (name, folder, least) in SIM {
+        none(&modules(name, folder), least);
+    }
 }
 
 #[test]
@@ -393,9 +409,11 @@ fn in_order(modules: &Modules, parent: &[&str], layers: &[&str], above: bool) {
 
 #[test]
 fn no_rooms_use_one_another() {
-    let (golden, hdl, sim) = (golden(), modules("dermis_hdl", "hdl"), modules("dermis_sim", "sim"));
-    let rooms = [(&golden, vec![]), (&hdl, vec![]), (&sim, vec![]), (&sim, vec!["report"]), (&sim, vec!["commands"])];
-    for (modules, parent) in rooms {
+    let crates = [("dermis_golden", "golden"), ("dermis_study", "golden/study"), ("dermis_hdl", "hdl")];
+    let crates = crates.into_iter().chain(SIM.map(|(name, folder, _)| (name, folder)));
+    let rooms = crates.map(|(name, folder)| (name, folder, vec![])).chain([("dermis_sim", "sim", vec!["commands"])]);
+    for (name, folder, parent) in rooms {
+        let modules = modules(name, folder);
         let circles = circles_of(&modules.rooms(&parent));
         assert!(circles.is_empty(), "rooms of {} {parent:?} that use one another: {circles:#?}", modules.crate_name);
     }
@@ -415,7 +433,8 @@ fn a_circle_of_rooms_is_found_where_no_modules_are_in_one() {
 #[test]
 fn the_floors_of_golden_are_in_order() {
     let floors = [
-        "random", "read", "write", "spec", "physics", "data", "result", "estimate", "fixed", "engine", "wire", "study",
+        "quantile", "random", "read", "write", "spec", "physics", "data", "result", "estimate", "fixed", "engine",
+        "wire",
     ];
     in_order(&golden(), &[], &floors, false);
 }
@@ -426,25 +445,8 @@ fn the_layers_of_fixed_are_in_order() {
 }
 
 #[test]
-fn the_layers_of_sim_are_in_order() {
-    in_order(
-        &modules("dermis_sim", "sim"),
-        &[],
-        &[
-            "flow",
-            "microcontroller",
-            "cosim",
-            "engine",
-            "batch",
-            "stream",
-            "recording",
-            "link",
-            "report",
-            "live",
-            "commands",
-        ],
-        false,
-    );
+fn the_layers_of_host_are_in_order() {
+    in_order(&modules("dermis_host", "sim/host"), &[], &["engine", "batch", "stream", "recording", "link"], false);
 }
 
 #[test]

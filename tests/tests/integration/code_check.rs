@@ -1,6 +1,9 @@
 //! Checks of the codes of a frame: hardware and bit-true model raise the same flags over a run of sound and faulty frames, at full
 //! speed, back to back and with stalls, wherever the frames go from one stage to the next.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::Model;
@@ -8,9 +11,6 @@ use dermis_golden::result::flags::{Flag, FlagSet};
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::Vector;
 use dermis_tests::{assert_equal, build_dir, compare, variants};
 use tempfile::TempDir;
 

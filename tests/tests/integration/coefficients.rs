@@ -1,6 +1,10 @@
 //! The coefficient check: no false alarm on the shipped frames, every tried flip of a bit in the coefficient memory
 //! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
+use dermis_cosim::drive::{record, InputFrame, Stimulus};
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::verify::verify;
+use dermis_cosim::{Vector, QUICK_SCENES};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::plan::check::undetected;
 use dermis_golden::fixed::plan::storage::word_bits;
@@ -9,10 +13,6 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::{CoefficientCheck, Scene};
 use dermis_hdl::{generate, usage::total, GeneratedFile};
-use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::{Vector, QUICK_SCENES};
 use dermis_tests::{assert_equal, build_dir, scene, variants, verilog_code};
 
 /// The scenes that are simulated in seconds, first the one whose subarray has several signatures.

@@ -3,15 +3,15 @@
 //!
 //! `dermis study dead-taxels` prints the table of errors.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::verify::verify;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::verify::verify;
-use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_sim::report::study::dead_taxels::{self, LINES as SCENES};
+use dermis_report::drawn_frames::{DrawnFrames, Shapes};
+use dermis_report::study::dead_taxels::{self, LINES as SCENES};
 use dermis_tests::{assert_equal, build_dir, compare};
 
 /// Bound of the bit-true model's additional median tangential error at 20 bits; as for whole arrays.

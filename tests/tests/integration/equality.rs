@@ -2,13 +2,13 @@
 //! Verilog (full speed, back to back, and with stalls after an interrupted frame) and kernel simulation
 //! against the bit-true model, on every shipped frame, with exact cycle counts, none above those of the committed table.
 
+use dermis_cosim::hardware::Simulator;
+use dermis_cosim::verify::{verify, Verified};
+use dermis_cosim::QUICK_SCENES;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::hardware::Simulator;
-use dermis_sim::cosim::verify::{verify, Verified};
-use dermis_sim::cosim::QUICK_SCENES;
-use dermis_sim::report;
+use dermis_report as report;
 use dermis_tests::{assert_equal, build_dir, check_cycles, scene};
 
 fn check(scene: &Scene, frames: &[Frame]) -> Verified {

@@ -1,13 +1,13 @@
-//! Extreme frames in hardware: the codes of every one of [`dermis_golden::study::stability::extreme::frames`], through the generated
+//! Extreme frames in hardware: the codes of every one of [`dermis_study::stability::extreme::frames`], through the generated
 //! Verilog (full speed and with stalls) and kernel simulation, against the bit-true model, to the bit and the cycle.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::Vector;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::Scene;
-use dermis_golden::study::stability::extreme::frames;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::Vector;
+use dermis_study::stability::extreme::frames;
 use dermis_tests::{assert_equal, build_dir, compare};
 
 /// The frames with the scene's own partition, as codes with their own full scales.

@@ -1,13 +1,13 @@
 //! Flipped bits under Verilator: every bit of state is found, faults that must be flagged are flagged, and a reset
 //! always recovers.
 
+use dermis_cosim::faults::{inject_faults, Shares};
+use dermis_cosim::hardware::Hardware;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::state::StorageClass;
-use dermis_sim::cosim::faults::{inject_faults, Shares};
-use dermis_sim::cosim::hardware::Hardware;
-use dermis_sim::report;
+use dermis_report as report;
 use dermis_tests::build_dir;
 
 /// Few taxels and no search, so that the library with access to every signal is built quickly.

@@ -1,10 +1,10 @@
 //! The comparison can fail: one flipped bit in a coefficient, an input vector or the expected output is found, in the
 //! stage concerned.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::{Findings, Vector};
 use dermis_golden::fixed::Model;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{Findings, Vector};
 use dermis_tests::{build_dir, compare, scene};
 
 fn setup() -> (Hardware, Vec<Vector>) {

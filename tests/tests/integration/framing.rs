@@ -2,10 +2,10 @@
 //! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
 //! `framing`, once.
 
+use dermis_cosim::hardware::{Hardware, Simulator};
 use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
 /// Limit of cycles, far more than a frame takes.

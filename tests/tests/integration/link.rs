@@ -4,6 +4,7 @@
 
 use std::ops::Deref;
 
+use dermis_cosim::hardware::{Hardware, Simulator};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
@@ -12,8 +13,7 @@ use dermis_golden::wire::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
+use dermis_host::link::{Answer, HostUart, PhysicalAnswer, UartSymbol};
 use dermis_tests::{build_dir, scene, variants, with_network};
 
 mod scan;

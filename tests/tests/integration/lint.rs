@@ -3,6 +3,7 @@
 
 use std::process::Command;
 
+use dermis_cosim::QUICK_SCENES;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::adc::{AdcScan, CONVERTERS};
 use dermis_golden::spec::link_kind::LinkKind;
@@ -12,7 +13,6 @@ use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::generate_scan;
 use dermis_hdl::{generate, Generated};
-use dermis_sim::cosim::QUICK_SCENES;
 use dermis_tests::tools::folder_of;
 use dermis_tests::{scene, variants};
 

@@ -4,13 +4,13 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use dermis_flow::microcontroller::target::{expected, measure_all, Measured};
+use dermis_flow::microcontroller::{generate, generate_for, needs, CSource};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::{Model, Plan};
 use dermis_golden::result::flags::{Flag, FlagSet};
 use dermis_golden::spec::scene::{largest_code, Scene};
-use dermis_sim::microcontroller::target::{expected, measure_all, Measured};
-use dermis_sim::microcontroller::{generate, generate_for, needs, CSource};
 use dermis_tests::{scene, variants};
 
 /// Flags under which the C must be free of warnings; a compiler of a microcontroller has its own.

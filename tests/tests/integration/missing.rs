@@ -13,8 +13,8 @@ use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::recording::{Lines, Pace, Recorder};
-use dermis_sim::stream::{run, Estimators, Outcome, Policy, StreamOptions};
+use dermis_host::recording::{Lines, Pace, Recorder};
+use dermis_host::stream::{run, Estimators, Outcome, Policy, StreamOptions};
 
 /// Missing taxels of eight-by-eight, [row, col].
 const MISSING: [[usize; 2]; 3] = [[3, 3], [3, 4], [6, 2]];

@@ -1,13 +1,13 @@
 //! The netlist after synthesis computes the same bits in the same cycles, and the test finds a defect that simulation
 //! of the Verilog cannot: a constant whose sign two tools read differently.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::{Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{Findings, Vector};
-use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
+use dermis_report::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::{build_dir, compare, with_network};
 
 /// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;

@@ -1,12 +1,12 @@
 //! Means over time: hardware and bit-true model are equal in every word and cycle over whole presses.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::Vector;
 use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::fixed::stages::send::{Status, WINDOW};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::{MeanKind, Scene};
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::Vector;
 use dermis_tests::{assert_equal, build_dir, compare, nightly};
 
 /// Frames of a press.

@@ -1,11 +1,11 @@
 //! The estimate of power: what changes in the simulated Verilog, times the energies of the device.
 
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::power::{count_toggles, energies, estimate_power, Toggles};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::state::StorageClass;
-use dermis_sim::cosim::hardware::Hardware;
-use dermis_sim::cosim::power::{count_toggles, energies, estimate_power, Toggles};
 use dermis_tests::build_dir;
 
 /// Few taxels and no search, so that the library with access to every signal is built quickly; the same as that of the faults.

@@ -7,6 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::thread::scope;
 
+use dermis_flow::baseline::{Baseline, Baselines};
+use dermis_flow::synthesis::{cells, commands, NETLIST};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::board::Family;
@@ -14,8 +16,6 @@ use dermis_golden::spec::scene::Scene;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::usage::{total, Usage};
 use dermis_hdl::{generate, Generated};
-use dermis_sim::flow::baseline::{Baseline, Baselines};
-use dermis_sim::flow::synthesis::{cells, commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
 use dermis_tests::{variants, with_network};
 use serde_json::Value;

@@ -1,6 +1,9 @@
 //! A zero that runs: hardware and bit-true model are equal over a run with drift and presses, at full speed, back to back and
 //! with stalls. Resets, frames cut short and tables written meanwhile are in `streams.rs` and `tables.rs`.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::send::Status;
 use dermis_golden::fixed::Model;
@@ -8,9 +11,6 @@ use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::{Scene, Zero};
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::Vector;
 use dermis_tests::{assert_equal, build_dir, compare, variants};
 use tempfile::TempDir;
 

@@ -1,13 +1,13 @@
 //! Co-simulation at scale, under Verilator, with all stages compared: the largest array with a foot on it, and hundreds of
 //! random frames of small sensors with random gaps and back-pressure on both streams.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::verify::verify;
+use dermis_cosim::{run, DeviceUnderTest, Vector};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
 use dermis_tests::{assert_equal, build_dir, check_cycles, nightly, scene};
 
 /// Number of frames of one run; all their traces are in memory.

@@ -1,6 +1,8 @@
 //! Scan by the hardware: codes and beats equal the bit-true model to the bit in Verilator and in kernel simulation, with
 //! converters modelled from their data sheet, none of whose times is broken; what faults of the wires do; seeded defects.
 
+use dermis_cosim::hardware::Simulator;
+use dermis_cosim::scan::{expected, simulate, verify_scan, Array, Fault, Image, VerifiedScan, VerilatedScan};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;
@@ -10,8 +12,6 @@ use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::scan::{generate_scan, generate_scan_changed};
-use dermis_sim::cosim::hardware::Simulator;
-use dermis_sim::cosim::scan::{expected, simulate, verify_scan, Array, Fault, Image, VerifiedScan, VerilatedScan};
 use dermis_tests::{build_dir, scene, variants, verilog_code};
 
 use crate::tables::specimen;

@@ -3,12 +3,12 @@
 //! A few go through Verilator and the kernel simulation; many random ones through kernel simulation alone, which
 //! needs no compiler.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::verify::verify;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::verify::verify;
 use dermis_tests::{assert_equal, build_dir, compare, variants, with_network};
 use proptest::prelude::*;
 
@@ -178,7 +178,7 @@ proptest! {
             })
             .collect();
         let expected = hardware.model.run(&codes);
-        let vectors = [dermis_sim::cosim::Vector::new(&hardware.model, "random".into(), codes, expected)];
+        let vectors = [dermis_cosim::Vector::new(&hardware.model, "random".into(), codes, expected)];
         let findings = compare(&hardware, Simulator::Kernel, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
     }

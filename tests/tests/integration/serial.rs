@@ -1,15 +1,15 @@
 //! The serial engine: equal to the bit-true model in every stage, beat and cycle, in kernel simulation and under Verilator;
 //! scenes that it does not support are rejected by field.
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::verify::verify;
+use dermis_cosim::Vector;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::Vector;
-use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
+use dermis_report::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::tools::cells;
 use dermis_tests::{assert_equal, build_dir, compare, scene};
 

@@ -2,14 +2,14 @@
 //! lost or invented, and the frame after any disturbance is correct. Longer with `DERMIS_STRESS_CYCLES` (`make
 //! stress`).
 
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::stress::{stress, Outcome};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::cosim::hardware::Hardware;
-use dermis_sim::cosim::stress::{stress, Outcome};
-use dermis_sim::report;
+use dermis_report as report;
 use dermis_tests::{build_dir, nightly, scene, variants, wanted};
 
 /// A running zero under blocks of frames.

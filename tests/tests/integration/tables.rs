@@ -3,15 +3,15 @@
 
 use std::fs;
 
+use dermis_cosim::drive::Stimulus;
+use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::load::{beats, Outcome};
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::{Scene, TableStorage};
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::cosim::drive::Stimulus;
-use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::Vector;
 use dermis_tests::{assert_equal, build_dir, compare, variants, with_network};
 use tempfile::TempDir;
 

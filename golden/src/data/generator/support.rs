@@ -24,7 +24,7 @@ const ALONG: usize = 8;
 const AROUND: usize = 16;
 
 /// A contact as point loads.
-pub(crate) struct Support {
+pub struct Support {
     /// Place of each node in mm from the array's centre.
     pub at_mm: Vec<[f64; 2]>,
     /// Share of the load on each node; their sum is 1.
@@ -82,7 +82,7 @@ fn nodes(piece: &Piece) -> Vec<([f64; 2], f64)> {
 }
 
 /// The elastic body under an array.
-pub(crate) struct Kernels {
+pub struct Kernels {
     body: Body,
     taxels_mm: Vec<[f64; 2]>,
 }

@@ -24,6 +24,7 @@
 //! | in: stress of all frames, dead taxels | MPa | finite |
 //! | out: [`Noise`], [`Codes`], [`Idle`] | MPa, shares of a frame's peak | ≥ 0 |
 
+use crate::quantile::median;
 use serde::{Deserialize, Serialize};
 
 /// Share of a frame's peak from which a taxel counts as loaded.
@@ -171,12 +172,6 @@ fn spreads(frames: &[&[f64]], held: &[Option<[f64; 2]>], alive: &[bool]) -> Vec<
 /// Largest |b|.
 fn size(frame: &[f64]) -> f64 {
     frame.iter().fold(0.0f64, |peak, b| peak.max(b.abs()))
-}
-
-/// Median; of an even number of values the larger of the two middle ones.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Standard deviation in time, root mean square over the selected taxels.

@@ -6,8 +6,7 @@ use crate::data::generator::draws::{DrawOptions, Draws};
 use crate::estimate::float::Golden;
 use crate::fixed::Model;
 use crate::result::flags::Flag;
-use crate::spec::scene::{Condition, ForceOutput, Medium};
-use crate::study::noise::{deviations_coverage, measure_deviations};
+use crate::spec::scene::{Condition, ForceOutput};
 
 /// max |b| of the frames in MPa.
 const PEAK: f64 = 0.1;
@@ -202,30 +201,6 @@ fn the_noise_is_that_of_the_reading() {
     }
 }
 
-/// A scene whose case is chosen per frame has a table of its own, and so has one of several subarrays that sends records.
-#[test]
-fn chosen_cases_and_records_have_their_tables() {
-    let folder = tempfile::tempdir().unwrap();
-    for (case, forces) in [(Case::Adaptive, ForceOutput::Taxels), (Case::numbered(1).unwrap(), ForceOutput::Resultants)]
-    {
-        let mut scene = stated("eight-by-eight", 1e-4);
-        scene.partition.case = case;
-        let path = folder.path().join("t.deviations");
-        std::fs::write(&path, measure_deviations(&scene, 60, 1, &|_, _| ()).unwrap().to_text()).unwrap();
-        scene.search.deviations = Some(path);
-        scene.output.forces = forces;
-        let own = frame(&scene, 1e-4, 4);
-        let result = Model::new(&scene).unwrap().reconstruct(&own).unwrap();
-        let searched = |own: &&crate::result::reconstruct::SubarrayResult| own.objective_value.is_some();
-        assert!(result
-            .subarrays
-            .iter()
-            .filter(searched)
-            .any(|own| own.normal_sigma_N.is_some_and(|sigma| sigma > 0.0)));
-        assert!(result.checks.shear_spread.is_some(), "{case}");
-    }
-}
-
 /// Each searched subarray has its own; one without a contact has none.
 #[test]
 fn each_searched_subarray_has_its_own() {
@@ -235,44 +210,4 @@ fn each_searched_subarray_has_its_own() {
     let known = result.subarrays.iter().filter(|own| own.shear_sigma_N.is_some()).count();
     let searched = result.subarrays.iter().filter(|own| own.objective_value.is_some()).count();
     assert!(known > 0 && known <= searched && searched < 9 * known, "{known} of {searched}");
-}
-
-/// One standard deviation covers 55 to 80 % of the errors of other frames, at levels between the table's; a third of it does
-/// not.
-#[test]
-fn one_standard_deviation_covers_two_thirds_of_the_errors() {
-    let levels = [2e-6, 5e-5, 6e-4, 2e-2];
-    for (name, draws) in [("eight-by-eight", 300), ("sensor-1", 300), ("sensor-2", 300), ("sensor-3", 100)] {
-        let scene = searched(name);
-        let mut table = Deviations::of_scene(&scene, scene.model_estimator()).unwrap().unwrap();
-        let covered =
-            |table: &Deviations| deviations_coverage(&scene, table, &levels, [draws, 77], &|_, _| ()).unwrap();
-        for (level, shares) in levels.iter().zip(covered(&table)) {
-            assert!(shares.iter().all(|share| (0.55..=0.8).contains(share)), "{name} {level}: {shares:?}");
-        }
-        table.sigma.iter_mut().flatten().for_each(|own| *own = own.map(|sigma| sigma / 3.0));
-        assert!(covered(&table).iter().flatten().all(|share| *share < 0.5), "{name}");
-    }
-}
-
-#[test]
-fn a_table_is_measured_again_from_its_seed() {
-    let scene = searched("eight-by-eight");
-    let measured = |seed| measure_deviations(&scene, 100, seed, &|_, _| ()).unwrap();
-    assert_eq!(measured(3), measured(3));
-    assert_ne!(measured(3), measured(4));
-    let mut contacts = scene.clone();
-    contacts.partition.case = Case::Contacts;
-    let error = measure_deviations(&contacts, 100, 1, &|_, _| ()).unwrap_err().to_string();
-    assert!(error.contains("one that is searched"), "{error}");
-    // A medium without hardware is measured by the golden model.
-    let bonded = Scene { medium: Medium::BondedLayer { poisson: 0.48 }, ..scene.clone() };
-    assert!(measure_deviations(&bonded, 40, 1, &|_, _| ()).is_ok());
-    // The same for one that no board holds; few frames leave classes without errors.
-    let mut large = scene;
-    large.hardware.board = Some("icebreaker".into());
-    (large.sensor.rows, large.sensor.cols) = (12, 12);
-    assert!(Model::new(&large).is_err() && measure_deviations(&large, 40, 1, &|_, _| ()).is_ok());
-    let error = measure_deviations(&large, 2, 1, &|_, _| ()).unwrap_err().to_string();
-    assert!(error.contains("at a noise of"), "{error}");
 }

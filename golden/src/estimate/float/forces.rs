@@ -32,7 +32,7 @@ pub fn threshold(mut forces: Forces, min_force_N: f64) -> Forces {
 }
 
 /// What forces leave of the stress `b` in MPa: b − Cx fx − Cy fy − Cz fz.
-pub(crate) fn residual(matrices: &Matrices, b: &[f64], forces: &Forces) -> Vec<f64> {
+pub fn residual(matrices: &Matrices, b: &[f64], forces: &Forces) -> Vec<f64> {
     let mut rest = b.to_vec();
     for (c, f) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
         accumulate(c, f, -1.0, &mut rest);

@@ -17,8 +17,8 @@
 
 mod auto;
 mod compressive;
-pub(crate) mod disc;
-pub(crate) mod ellipse;
+pub mod disc;
+pub mod ellipse;
 mod estimate;
 mod fit;
 pub(crate) mod multi_ellipse;
@@ -27,7 +27,7 @@ mod radial;
 mod sparse;
 mod symmetric;
 mod symmetric_pressure;
-pub(crate) mod taxels;
+pub mod taxels;
 
 pub use auto::Auto;
 pub use compressive::Compressive;

@@ -38,11 +38,11 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Largest ratio of shear to normal force, in units of mu_max.
-pub(crate) const RATIO: f64 = 0.85;
+pub const RATIO: f64 = 0.85;
 /// Range of the noise in units of the peak.
-pub(crate) const NOISE: [f64; 2] = [5e-5, 2e-2];
+pub const NOISE: [f64; 2] = [5e-5, 2e-2];
 /// Range of the gain spread where there is one.
-pub(crate) const GAINS: [f64; 2] = [2e-3, 3e-2];
+pub const GAINS: [f64; 2] = [2e-3, 3e-2];
 /// Share of the frames with a baseline.
 const DRIFTED: f64 = 0.25;
 /// Range of the largest entry of a baseline in units of the peak.

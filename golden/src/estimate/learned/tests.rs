@@ -4,7 +4,6 @@ use crate::estimate::float::Golden;
 use crate::spec::partition::Case;
 use crate::spec::scene::EstimatorKind;
 use crate::spec::window::{Place, Window};
-use crate::study::noise::{shape_study, Candidate, ShapeStudy};
 use std::ops::ControlFlow::{Break, Continue};
 
 fn scene(name: &str) -> Scene {
@@ -49,69 +48,6 @@ fn a_small_network_learns() {
     }
     errors.sort_by(f64::total_cmp);
     assert!(errors[30] < 0.7 && errors[48] < 1.0, "median {}, four of five {}", errors[30], errors[48]);
-}
-
-/// Networks that the program carries, on fresh frames at three levels of noise.
-#[test]
-fn the_shipped_networks_are_accurate() {
-    let study = ShapeStudy {
-        levels: vec![5e-4, 2e-3, 1e-2],
-        draws: 40,
-        candidates: vec![
-            Candidate::Estimator(EstimatorKind::EvidenceNetwork),
-            Candidate::Estimator(EstimatorKind::Combined),
-        ],
-        ..Default::default()
-    };
-    // Shear shows better under a bonded layer, worse with a wide pitch.
-    for (name, limits) in [
-        ("sensor-1", [0.06, 0.13, 0.42]),
-        ("sensor-1-bonded", [0.05, 0.1, 0.36]),
-        ("eight-by-eight-bonded", [0.07, 0.13, 0.42]),
-    ] {
-        let rows = shape_study(&Scene::builtin(name).unwrap(), &study, &|_, _| ()).unwrap();
-        for (row, most) in rows.chunks(3).zip(limits) {
-            for own in &row[1..] {
-                let median = own.summary.tangential.median.value;
-                assert!(median < most, "{name}, {} at {}: {median}", own.estimator, own.noise);
-            }
-        }
-    }
-}
-
-/// The networks for many sensors, on sensors that their training has not drawn, at 0.2 and 1 % of noise: at most a third more than
-/// the guide's tables have of the sensor that is read worst.
-#[test]
-fn a_shipped_network_serves_sensors_that_it_has_not_seen() {
-    let study = |unipolar: bool| {
-        let mut study = ShapeStudy {
-            levels: vec![2e-3, 1e-2],
-            draws: 40,
-            candidates: vec![Candidate::Estimator(EstimatorKind::Network)],
-            ..Default::default()
-        };
-        study.options.converter.unipolar = unipolar;
-        study
-    };
-    for (rows, cols, pitches_mm, thickness_mm, poisson) in
-        [(10, 10, [2.0, 4.0], 3.0, 0.48), (12, 8, [2.5, 3.0], 2.0, 0.45), (6, 12, [2.2, 4.0], 4.0, 0.33)]
-    {
-        let [pitch_x_mm, pitch_y_mm] = pitches_mm;
-        let mut scene = scene("sensor-1-bonded");
-        scene.sensor = Sensor { rows, cols, pitch_x_mm, pitch_y_mm, thickness_mm };
-        scene.medium = Medium::BondedLayer { poisson };
-        let networks = [(false, "dermis:bonded", [0.165, 0.51]), (true, "dermis:bonded-unipolar", [0.21, 0.56])];
-        for (unipolar, network, limits) in networks {
-            scene.input.unipolar = unipolar;
-            scene.search.network = Some(network.into());
-            assert_eq!(Learned::serving(&scene).is_some_and(|own| own == network), poisson != 0.48 || unipolar);
-            let rows = shape_study(&scene, &study(unipolar), &|_, _| ()).unwrap();
-            for (row, most) in rows.chunks(2).zip(limits) {
-                let median = row[1].summary.tangential.median.value;
-                assert!(median < most, "{network}, {} at {}: {median}", scene.sensor, row[1].noise);
-            }
-        }
-    }
 }
 
 #[test]

@@ -23,7 +23,7 @@ impl Reconstruction {
     }
 
     /// The share of Σ|fz| that is below zero; `None` where no taxel has a force.
-    pub(crate) fn negative_share(&self) -> Option<f64> {
+    pub fn negative_share(&self) -> Option<f64> {
         let (below, all) =
             self.forces_N.fz.iter().fold((0.0, 0.0), |(below, all), fz| (below + (-fz).max(0.0), all + fz.abs()));
         (all > 0.0).then(|| below / all)

@@ -10,7 +10,7 @@ use dermis_c::result::*;
 use dermis_c::scene::*;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::link::NetworkCore;
+use dermis_host::link::NetworkCore;
 
 use super::input::{last_error, scene, stress};
 

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use dermis_cosim::hardware::Hardware;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::CheckedEngine;
 use dermis_golden::estimate::float::Golden;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::cosim::hardware::Hardware;
-use dermis_sim::link::PseudoTerminal;
+use dermis_host::link::PseudoTerminal;
 use tempfile::TempDir;
 
 use super::header::folder;
@@ -186,7 +186,7 @@ fn the_address_sanitizer_finds_nothing_in_it_and_what_is_wrong_elsewhere() {
 /// The programs of the guide's page print what stands there.
 #[test]
 fn the_programs_of_the_guide_print_what_stands_there() {
-    let page = fs::read_to_string(folder().join("../guide/c.md")).unwrap();
+    let page = fs::read_to_string(folder().join("../../docs/c.md")).unwrap();
     let blocks = |language: &str| -> Vec<String> {
         let fence = format!("```{language}\n");
         page.split(&fence).skip(1).map(|after| after.split_once("```").unwrap().0.to_owned()).collect()

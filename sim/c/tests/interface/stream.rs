@@ -13,7 +13,7 @@ use dermis_golden::data::frame::Frame;
 use dermis_golden::engine::{CheckPace, StreamChecks};
 use dermis_golden::result::flags::Flag;
 use dermis_golden::spec::scene::Scene;
-use dermis_sim::engine::EngineName;
+use dermis_host::engine::EngineName;
 
 use super::input::{last_error, stress};
 

@@ -9,8 +9,8 @@ use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
 
 use super::{full_scale_field, lines, save, table_field, Arguments};
-use crate::progress::Progress;
-use crate::report;
+use dermis_flow::progress::Progress;
+use dermis_report as report;
 
 /// The JSON of the command.
 #[derive(Serialize)]

@@ -7,7 +7,7 @@ use std::fmt;
 use anyhow::{anyhow, bail, ensure, Result};
 
 use super::marker::Cell;
-use crate::report::aligned;
+use dermis_report::aligned;
 
 /// A table.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! A board that scans its array: a request is answered with a scan, whose codes follow the forces.
 
+use dermis_cosim::scan::ScannedBoard;
+use dermis_cosim::VerilatedBoard;
 use dermis_golden::fixed::stages::load::Outcome;
 use dermis_hdl::link::{board_simulator, generate_board};
-use dermis_sim::cosim::scan::ScannedBoard;
-use dermis_sim::cosim::VerilatedBoard;
 
 use super::tables::image;
 use super::*;

@@ -1,5 +1,7 @@
 //! The link over SPI: a controller with rates from 1 MHz to the highest allowed, and transactions that end anywhere.
 
+use dermis_cosim::hardware::Simulator;
+use dermis_cosim::VerilatedBoard;
 use dermis_golden::fixed::{Cycles, Model, Plan};
 use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::Scene;
@@ -7,9 +9,7 @@ use dermis_golden::wire::link::slip::{END, IDLE};
 use dermis_golden::wire::link::{Counters, Decoder, Identity, Kind, Packet, PacketError};
 use dermis_hdl::language::Change;
 use dermis_hdl::link::{generate_board, generate_board_changed, BoardDevice};
-use dermis_sim::cosim::hardware::Simulator;
-use dermis_sim::cosim::VerilatedBoard;
-use dermis_sim::link::SpiController;
+use dermis_host::link::SpiController;
 use dermis_tests::{build_dir, scene, variants};
 
 use super::{device, shipped, small, Questions, BOTH, RESET, SINGLE_BYTE, TWO_SUBARRAYS};

@@ -21,11 +21,13 @@ const EXPONENT_RANGE: [f64; 2] = [0.0, 2.0];
 const MIN_RADIUS: f64 = 0.1;
 
 /// Length of θ = x₀, y₀, L₁₁, L₂₂, L₁₂, g: five in mm, g without unit.
-pub(crate) const PARAMETERS: usize = 6;
+pub const PARAMETERS: usize = 6;
 
 /// Stress model of one elliptic contact.
-pub(crate) struct Ellipse<'a> {
+pub struct Ellipse<'a> {
+    /// The taxels that read it.
     pub taxels: &'a Taxels,
+    /// Nodes of the unit disc.
     pub disc: &'a Disc,
 }
 
