@@ -33,7 +33,7 @@ COMPILE    = $(BUILD)/packaging/bin/uv pip compile -q --no-config --universal --
              --custom-compile-command 'make lock'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling packaging advisories lock clippy unit lint quick python wheel package lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging advisories lock clippy unit lint quick python wheel package release lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 12
@@ -132,6 +132,16 @@ package: program wheel ## write what a release has into build/package: programs 
 	cp $(BUILD)/wheels/dermis-$(VERSION)-*.whl $(PACKAGE)
 	git archive --prefix=dermis-$(VERSION)/ --output=$(PACKAGE)/dermis-$(VERSION).tar.gz HEAD
 	cd $(PACKAGE) && sha256sum *.tar.gz *.whl >SHA256SUMS
+
+# The list of what is left is that of CONTRIBUTING.md.
+release: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
+release: ## check that the last commit can be released, run `make package`, and print what is left to do
+	@test -z "$$(git status --porcelain)" || { git status --short; echo 'the working tree is not clean' >&2; exit 1; }
+	@! git rev-parse --quiet --verify refs/tags/v$(VERSION) || { echo 'version $(VERSION) has a tag' >&2; exit 1; }
+	@! sed -n '/^## \[Unreleased\]/,/^## \[[0-9]/p' CHANGELOG.md | grep -v '^## ' | grep . || { echo '[Unreleased] in CHANGELOG.md is not empty' >&2; exit 1; }
+	$(CARGO) test --locked -p dermis-tests --test integration -- versions::
+	$(MAKE) --no-print-directory package
+	@sed -n '/^## Release/,/^## [^R]/{/^[0-9]/p}' CONTRIBUTING.md | sed 's/VERSION/$(VERSION)/g'
 
 # Its interface of cameras needs few of the requirements of LeRobot, which as a whole bring PyTorch and CUDA and are not locked.
 lerobot: setup ## test the camera for LeRobot in build/lerobot; WHOLE=1 tests it with all of LeRobot, which loads 4.6 GB

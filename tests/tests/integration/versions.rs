@@ -1,7 +1,18 @@
-//! What states a version twice states the same one: the files from which pip installs.
+//! What states a version twice states the same one: that of this project, and those of what pip installs.
 
 use std::fs;
 use std::path::Path;
+
+/// Files that state the version of this project, and what stands before and behind it where they do so first. The heading of a
+/// release in CHANGELOG.md has a date behind it, `[Unreleased]` has none.
+const STATED: [(&str, &str, &str); 6] = [
+    ("Cargo.toml", "version = \"", "\""),
+    ("CHANGELOG.md", "## [", "] - "),
+    ("CITATION.cff", "version: \"", "\""),
+    ("python/lerobot/pyproject.toml", "version = \"", "\""),
+    ("python/litex/pyproject.toml", "version = \"", "\""),
+    ("tests/fuzz-targets/Cargo.toml", "version = \"", "\""),
+];
 
 /// Files of requirements: what is asked for in `.in`, and with all that it brings, and hashes, in `.txt`.
 const REQUIREMENTS: [&str; 8] = [
@@ -17,6 +28,37 @@ const REQUIREMENTS: [&str; 8] = [
 
 fn read(file: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file)).unwrap()
+}
+
+/// The version that a text states first.
+fn stated<'a>(text: &'a str, before: &str, behind: &str) -> Option<&'a str> {
+    text.lines().find_map(|line| Some(line.strip_prefix(before)?.split_once(behind)?.0))
+}
+
+/// Files whose version is not that of Cargo.toml.
+fn others(read: impl Fn(&str) -> String) -> Vec<&'static str> {
+    let versions = STATED.map(|(file, before, behind)| (file, stated(&read(file), before, behind).map(str::to_owned)));
+    assert!(versions[0].1.is_some());
+    versions.iter().filter(|(_, version)| *version != versions[0].1).map(|(file, _)| *file).collect()
+}
+
+#[test]
+fn the_version_is_the_same_everywhere() {
+    assert_eq!(others(read), [""; 0], "their version is not that of Cargo.toml");
+}
+
+#[test]
+fn another_version_is_found() {
+    for (changed, before, behind) in STATED {
+        let text = read(changed);
+        let version = format!("{before}{}{behind}", stated(&text, before, behind).unwrap());
+        let text = text.replacen(&version, &format!("{before}0.0.1{behind}"), 1);
+        let found = others(|file| if file == changed { text.clone() } else { read(file) });
+        match changed {
+            "Cargo.toml" => assert_eq!(found.len(), STATED.len() - 1),
+            _ => assert_eq!(found, [changed]),
+        }
+    }
 }
 
 /// Requirements that the locked file has not in this version. Names are compared as pip does.
