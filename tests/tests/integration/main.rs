@@ -40,6 +40,7 @@ mod serial;
 mod streams;
 mod synthesis;
 mod tables;
+mod versions;
 mod words;
 
 /// The compiler does not tell of a file that no `mod` names, and its tests would not run.
