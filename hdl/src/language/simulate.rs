@@ -7,7 +7,7 @@
 //! complement, so that using it shows as an error.
 
 use super::compile::{limbs, mask, Op, Operand, Program, Wide};
-use super::kernel::{Binary, Contents, Domain, Kernel, Node, Role, Unary};
+use super::kernel::{Binary, Contents, Domain, Kernel, Node, Role, Type, Unary};
 
 /// A register's transition: its slot, the next value, the reset.
 #[derive(Clone, Debug)]
@@ -321,28 +321,7 @@ fn run_wide(op: &Wide, slots: &mut [u64], memories: &[Words]) {
     let at = |slot: u32| slot as usize;
     match op {
         Wide::Arithmetic { operator, to, a, b } => {
-            let (x, y) = (number(slots, a), number(slots, b));
-            let value = match operator {
-                Binary::Add => x.wrapping_add(y),
-                Binary::Sub => x.wrapping_sub(y),
-                Binary::Mul => x.wrapping_mul(y),
-                Binary::Less => i128::from(x < y),
-                Binary::ShiftLeft => {
-                    if (0..128).contains(&y) {
-                        x << y
-                    } else {
-                        0
-                    }
-                }
-                // Numbers are at most 127 bits wide, so that the sign of an unsigned one is 0.
-                Binary::ShiftRight => x >> y.clamp(0, 127),
-                Binary::Equal | Binary::And | Binary::Or | Binary::Xor => 0,
-            };
-            let unused = 128 - to.ty.bits;
-            let value = match to.ty.signed {
-                true => value << unused >> unused,
-                false => ((value as u128) << unused >> unused) as i128,
-            };
+            let value = arithmetic(*operator, to.ty, number(slots, a), number(slots, b));
             slots[at(to.slot)] = value as u64;
             if to.limbs == 2 {
                 slots[at(to.slot) + 1] = (value >> 64) as u64;
@@ -362,23 +341,7 @@ fn run_wide(op: &Wide, slots: &mut [u64], memories: &[Words]) {
             let of = |slot: &u32| &slots[at(*slot)..][..at(*limbs)];
             slots[at(*to)] = u64::from(of(a) == of(b));
         }
-        Wide::Unary { operator, to, a } => {
-            let last = at(a.limbs) - 1;
-            let used = |limb: usize| if limb == last { mask(a.ty.bits - 64 * last) } else { u64::MAX };
-            let own = |limb: usize| slots[at(a.slot) + limb] & used(limb);
-            match operator {
-                Unary::Not => {
-                    for limb in 0..=last {
-                        slots[at(to.slot) + limb] = !slots[at(a.slot) + limb] & used(limb);
-                    }
-                }
-                Unary::All => slots[at(to.slot)] = u64::from((0..=last).all(|limb| own(limb) == used(limb))),
-                Unary::Any => slots[at(to.slot)] = u64::from((0..=last).any(|limb| own(limb) != 0)),
-                Unary::Parity => {
-                    slots[at(to.slot)] = u64::from((0..=last).map(|limb| own(limb).count_ones()).sum::<u32>() & 1);
-                }
-            }
-        }
+        Wide::Unary { operator, to, a } => unary(*operator, slots, to, a),
         Wide::Mux { to, c, a, b } => {
             let from = at(if slots[at(*c)] != 0 { *a } else { *b });
             slots.copy_within(from..from + at(to.limbs), at(to.slot));
@@ -426,6 +389,38 @@ fn run_wide(op: &Wide, slots: &mut [u64], memories: &[Words]) {
             trim(slots, to);
         }
     }
+}
+
+/// The result of an operator on numbers, in the width of `ty`.
+fn arithmetic(operator: Binary, ty: Type, x: i128, y: i128) -> i128 {
+    let value = match operator {
+        Binary::Add => x.wrapping_add(y),
+        Binary::Sub => x.wrapping_sub(y),
+        Binary::Mul => x.wrapping_mul(y),
+        Binary::Less => i128::from(x < y),
+        Binary::ShiftLeft if (0..128).contains(&y) => x << y,
+        // Numbers are at most 127 bits wide, so that the sign of an unsigned one is 0.
+        Binary::ShiftRight => x >> y.clamp(0, 127),
+        Binary::ShiftLeft | Binary::Equal | Binary::And | Binary::Or | Binary::Xor => 0,
+    };
+    let unused = 128 - ty.bits;
+    match ty.signed {
+        true => value << unused >> unused,
+        false => ((value as u128) << unused >> unused) as i128,
+    }
+}
+
+/// The inverse of the limbs of `a`, or one bit from all of them.
+fn unary(operator: Unary, slots: &mut [u64], to: &Operand, a: &Operand) {
+    let (to, from, last) = (to.slot as usize, a.slot as usize, a.limbs as usize - 1);
+    let used = |limb: usize| if limb == last { mask(a.ty.bits - 64 * last) } else { u64::MAX };
+    let own = |limb: usize| slots[from + limb] & used(limb);
+    slots[to] = match operator {
+        Unary::Not => return (0..=last).for_each(|limb| slots[to + limb] = !slots[from + limb] & used(limb)),
+        Unary::All => u64::from((0..=last).all(|limb| own(limb) == used(limb))),
+        Unary::Any => u64::from((0..=last).any(|limb| own(limb) != 0)),
+        Unary::Parity => u64::from((0..=last).map(|limb| own(limb).count_ones()).sum::<u32>() & 1),
+    };
 }
 
 /// A number of at most two limbs.

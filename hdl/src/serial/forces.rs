@@ -165,37 +165,98 @@ impl<'k> Status<'k> {
     }
 }
 
-impl Block for Forces {
-    fn build<'k>(&self, k: &'k Builder, io: ForcesPorts<Inside<'k>>) {
-        let Forces { places, value: value_bits, .. } = *self;
-        let best = [io.best_x, io.best_y];
-        let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
-        let [scaling, sending, valid] = ["scaling", "sending", "valid"].map(|name| k.state(name, bit, io.rst, 0));
-        let [status, counting, contact] = ["status", "counting", "contact"].map(|name| k.register(name, bit));
-        let phase = k.register("phase", Type::unsigned(4));
-        let [beat, ahead] = ["beat", "ahead"].map(|name| k.register(name, Type::unsigned(places)));
-        let factor_a = k.register("factor_a", Type::signed(value_bits));
-        let [factor_b, mu_x, mu_y] = ["factor_b", "mu_x", "mu_y"].map(|name| k.register(name, Type::signed(FACTOR)));
-        let result = k.register("result", Type::signed(value_bits + FACTOR));
-        let words = ["fx", "fy", "fz"].map(|name| k.register(name, Type::unsigned(WORD)));
-        let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
-        let first_cycles = k.register("first_cycles", Type::unsigned(CYCLES));
+/// Registers of the products and of the beats.
+struct Registers<'k> {
+    /// The μ words are computed; beats are sent; the beat is there.
+    scaling: Net<'k>,
+    sending: Net<'k>,
+    valid: Net<'k>,
+    /// The beat is one of the status; cycles are counted; the frame has a contact.
+    status: Net<'k>,
+    counting: Net<'k>,
+    contact: Net<'k>,
+    phase: Net<'k>,
+    /// Number of the beat, and of the taxel that is read.
+    beat: Net<'k>,
+    ahead: Net<'k>,
+    factor_a: Net<'k>,
+    factor_b: Net<'k>,
+    mu: [Net<'k>; 2],
+    result: Net<'k>,
+    /// fx, fy, fz.
+    words: [Net<'k>; 3],
+    force_saturations: Net<'k>,
+    first_cycles: Net<'k>,
+}
 
-        let at = |phases: &[usize]| super::one_of(k, *phase, phases);
-        let sends = k.wire("sends", !*scaling & *sending);
-        let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & io.m_axis.ready);
-        let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
-        let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
-        let last_force = k.wire("last_force", !*status & beat.is(self.taxels - 1));
-        let [fx, fy, fz] = words;
-        let size = fz.top().mux((k.constant(WORD, 0) - *fz).low(WORD), *fz);
-        let too_small = match self.threshold {
-            0 => zero,
-            threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
-        };
-        let settled_shift = force_shift(k, self.shift_base, io.normalise, io.rescale);
+/// The sum of the normal forces, if it is taken.
+type Balanced<'k> = Option<(Balance, Net<'k>)>;
+
+impl<'k> Registers<'k> {
+    fn new(k: &'k Builder, rst: Expr<'k>, of: &Forces) -> Self {
+        let bit = Type::unsigned(1);
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        let signed = |name: &str, bits: usize| k.register(name, Type::signed(bits));
+        Registers {
+            scaling: k.state("scaling", bit, rst, 0),
+            sending: k.state("sending", bit, rst, 0),
+            valid: k.state("valid", bit, rst, 0),
+            status: register("status", 1),
+            counting: register("counting", 1),
+            contact: register("contact", 1),
+            phase: register("phase", 4),
+            beat: register("beat", of.places),
+            ahead: register("ahead", of.places),
+            factor_a: signed("factor_a", of.value),
+            factor_b: signed("factor_b", FACTOR),
+            mu: ["mu_x", "mu_y"].map(|name| signed(name, FACTOR)),
+            result: signed("result", of.value + FACTOR),
+            words: ["fx", "fy", "fz"].map(|name| register(name, WORD)),
+            force_saturations: register("force_saturations", SATURATION_BITS),
+            first_cycles: register("first_cycles", CYCLES),
+        }
+    }
+
+    fn at(&self, k: &'k Builder, phases: &[usize]) -> Expr<'k> {
+        super::one_of(k, *self.phase, phases)
+    }
+
+    /// The two μ words, from the `best` position.
+    fn scale(&self, k: &'k Builder, of: &Forces, best: [Expr<'k>; 2], rounded: Expr<'k>) {
+        let scaled = self.at(k, &[MU_WORDS as usize - 1]);
+        k.when(*self.scaling, || {
+            self.phase.set(scaled.mux(k.constant(4, 0), self.phase.plus(1)));
+            k.when(self.at(k, &[0]), || {
+                self.factor_a.set(k.signed_constant(of.value, of.mu_step));
+                self.factor_b.set(best[0].signed());
+            });
+            k.when(self.at(k, &[1]), || self.factor_b.set(best[1].signed()));
+            for (word, phase) in self.mu.iter().zip([6, 7]) {
+                k.when(self.at(k, &[phase]), || word.set(rounded.low(FACTOR).signed()));
+            }
+            k.when(scaled, || {
+                self.scaling.set(k.constant(1, 0));
+                self.sending.set(k.constant(1, 1));
+            });
+        });
+    }
+
+    /// The start of a frame's beats.
+    fn start(&self, k: &'k Builder, start: Expr<'k>, balance: &Balanced<'k>) {
+        k.when(!*self.scaling & !*self.sending & start, || {
+            self.scaling.set(k.constant(1, 1));
+            let cleared = [self.phase, self.status, self.beat, self.ahead, self.force_saturations, self.contact];
+            cleared.iter().for_each(|register| register.set(k.constant(register.bits(), 0)));
+            balance.iter().for_each(|(own, sum)| sum.set(k.signed_constant(own.ty().bits, 0)));
+        });
+    }
+}
+
+impl Forces {
+    /// The word of the status in the place of fx, fy or fz; the sum that a flag tells the sign of.
+    fn status<'k>(&self, k: &'k Builder, io: &ForcesPorts<Inside<'k>>, r: &Registers<'k>) -> (Expr<'k>, Balanced<'k>) {
         let mut bits =
-            vec![(FRAMING, io.framing), (NO_CONTACT, !*contact), (FOUND, io.found), (CONDITION, io.condition)];
+            vec![(FRAMING, io.framing), (NO_CONTACT, !*r.contact), (FOUND, io.found), (CONDITION, io.condition)];
         bits.extend(self.score_limit.map(|limit| {
             let low = io.found & k.signed_constant(self.score, limit).less(io.score.signed());
             (SCORE_LOW, k.wire("score_low", low))
@@ -204,20 +265,42 @@ impl Block for Forces {
         bits.extend(balance.as_ref().map(|(_, sum)| (NEGATIVE_PRESSURE, sum.top())));
         let highest = bits.iter().map(|(field, _)| field.low).fold(0, u32::max);
         let state = Status {
-            best,
+            best: [io.best_x, io.best_y],
             score: io.score,
             flags: concat(&status_bits(k, &bits, highest + 1)),
             found: io.found,
             normalise: io.normalise,
             rescale: io.rescale,
-            counts: [io.saturations, *force_saturations, *first_cycles],
+            counts: [io.saturations, *r.force_saturations, *r.first_cycles],
         };
-        let own = beat.low(places.min(2));
+        let own = r.beat.low(self.places.min(2));
         let [status_x, status_y, status_z] = [0, 1, 2].map(|axis| {
             let name = ["status_x", "status_y", "status_z"][axis];
             k.wire(name, state.word(k, own, axis))
         });
-        let of_status = phase.at(1).mux(status_z, phase.at(0).mux(status_y, status_x));
+        (r.phase.at(1).mux(status_z, r.phase.at(0).mux(status_y, status_x)), balance)
+    }
+}
+
+impl Block for Forces {
+    fn build<'k>(&self, k: &'k Builder, io: ForcesPorts<Inside<'k>>) {
+        let r = Registers::new(k, io.rst, self);
+        let Registers { scaling, sending, valid, status, counting, phase, beat, ahead, .. } = r;
+        let Registers { factor_a, factor_b, mu: [mu_x, mu_y], result, words: [fx, fy, fz], first_cycles, .. } = r;
+        let (one, zero) = (k.constant(1, 1), k.constant(1, 0));
+        let at = |phases: &[usize]| r.at(k, phases);
+        let sends = k.wire("sends", !*scaling & *sending);
+        let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & io.m_axis.ready);
+        let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
+        let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
+        let last_force = k.wire("last_force", !*status & beat.is(self.taxels - 1));
+        let size = fz.top().mux((k.constant(WORD, 0) - *fz).low(WORD), *fz);
+        let too_small = match self.threshold {
+            0 => zero,
+            threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
+        };
+        let settled_shift = force_shift(k, self.shift_base, io.normalise, io.rescale);
+        let (of_status, balance) = self.status(k, &io, &r);
         let captured = k.wire("captured", (!*status).mux(io.rounded, of_status));
 
         result.set(*factor_a * *factor_b);
@@ -226,7 +309,7 @@ impl Block for Forces {
         k.when(sends, || {
             k.when(!at(&[LAST_PHASE as usize]), || phase.set(phase.plus(1)));
             k.when(take_value, || {
-                factor_a.set(io.value.low(value_bits).signed());
+                factor_a.set(io.value.low(self.value).signed());
                 factor_b.set(*mu_x);
                 ahead.set(ahead.plus(1));
             });
@@ -237,11 +320,11 @@ impl Block for Forces {
                 fx.set(*fy);
                 fy.set(*fz);
                 fz.set(captured);
-                k.when(io.clipped & is_force, || force_saturations.set(force_saturations.plus(1)));
+                k.when(io.clipped & is_force, || r.force_saturations.set(r.force_saturations.plus(1)));
             });
             k.when(at(&[11]), || {
-                k.when(is_force & too_small, || words.iter().for_each(|word: &Net<'_>| word.set(k.constant(WORD, 0))));
-                k.when(is_force & !too_small & fz.any(), || contact.set(one));
+                k.when(is_force & too_small, || r.words.iter().for_each(|word| word.set(k.constant(WORD, 0))));
+                k.when(is_force & !too_small & fz.any(), || r.contact.set(one));
                 counting.set(zero);
                 valid.set(one);
             });
@@ -251,38 +334,13 @@ impl Block for Forces {
             k.when(beat_taken, || {
                 phase.set(k.constant(4, AGAIN_PHASE));
                 valid.set(zero);
-                beat.set(last_force.mux(k.constant(places, 0), beat.plus(1)));
+                beat.set(last_force.mux(k.constant(self.places, 0), beat.plus(1)));
                 k.when(last_force, || status.set(one));
                 k.when(last_beat, || sending.set(zero));
             });
         });
-        // The two μ words.
-        let scaled = at(&[MU_WORDS as usize - 1]);
-        k.when(*scaling, || {
-            phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
-            k.when(at(&[0]), || {
-                factor_a.set(k.signed_constant(value_bits, self.mu_step));
-                factor_b.set(best[0].signed());
-            });
-            k.when(at(&[1]), || factor_b.set(best[1].signed()));
-            for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
-                k.when(at(&[phase]), || word.set(io.rounded.low(FACTOR).signed()));
-            }
-            k.when(scaled, || {
-                scaling.set(zero);
-                sending.set(one);
-            });
-        });
-        k.when(!*scaling & !*sending & io.start, || {
-            scaling.set(one);
-            phase.set(k.constant(4, 0));
-            status.set(zero);
-            beat.set(k.constant(places, 0));
-            ahead.set(k.constant(places, 0));
-            force_saturations.set(k.constant(SATURATION_BITS, 0));
-            contact.set(zero);
-            balance.iter().for_each(|(own, sum)| sum.set(k.signed_constant(own.ty().bits, 0)));
-        });
+        r.scale(k, self, [io.best_x, io.best_y], io.rounded);
+        r.start(k, io.start, &balance);
         k.when(*counting, || first_cycles.set(first_cycles.plus(1)));
         k.when(io.frame_begin, || {
             counting.set(one);

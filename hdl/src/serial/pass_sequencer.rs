@@ -13,7 +13,7 @@ use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{schedule, Kind, Product};
 
 use super::rounder::SHIFT_BITS;
-use crate::language::{concat, Block, Builder, Expr, Inside, Type};
+use crate::language::{concat, Block, Builder, Expr, Inside, Machine, Net, Type};
 use crate::primitives::count_bits;
 use crate::{block, states};
 
@@ -167,188 +167,309 @@ fn program(f: &Formats) -> Vec<Instruction> {
     instructions.map(instruction).collect()
 }
 
-impl Block for PassSequencer {
-    fn build<'k>(&self, k: &'k Builder, io: PassSequencerPorts<Inside<'k>>) {
-        let (f, unrounded) = (&self.formats, self.unrounded);
-        let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
-        let program = program(f);
-        let (count, operands) = (program.len(), OPERAND_BITS as usize);
-        let pc = count_bits(count + 1);
-        let vectors = vector_bits(f);
-        let (acc, code_bits, data) = (f.acc_bits as usize, f.input_bits as usize, f.data_bits as usize);
-        let seen_bits = acc.max(code_bits) - 1;
-        let (low, extra) = (f.input_low_bits as usize, SEARCH_EXTRA_BITS as usize);
+/// The program, at the product that is issued next.
+struct Program<'k> {
+    k: &'k Builder,
+    instructions: Vec<Instruction>,
+    product: Expr<'k>,
+}
 
+impl<'k> Program<'k> {
+    /// Whether the product has a property. As gates: synthesis would map a table to a memory.
+    fn set(&self, bit: &dyn Fn(&Instruction) -> bool) -> Expr<'k> {
+        let own = self.instructions.iter().zip(0..).filter(|(instruction, _)| bit(instruction));
+        let terms = own.map(|(_, at)| self.product.is(at));
+        terms.reduce(|any, term| any | term).unwrap_or(self.k.constant(1, 0))
+    }
+
+    /// A number of `bits` bits of the product.
+    fn field(&self, bits: usize, of: &dyn Fn(&Instruction) -> usize) -> Expr<'k> {
+        let bits: Vec<Expr> = (0..bits).rev().map(|bit| self.set(&|i| of(i) >> bit & 1 == 1)).collect();
+        concat(&bits)
+    }
+}
+
+/// Registers of the sequencer.
+struct Registers<'k> {
+    step: Machine<'k, Step>,
+    /// The step's last words reach their memory.
+    draining: Net<'k>,
+    /// Lane of the word of a quad that is read, then a gap.
+    phase: Net<'k>,
+    /// Cycles of the gap after a row; cycles of `draining`.
+    gap: Net<'k>,
+    wait_count: Net<'k>,
+    /// Quad that is read, or row of the product; column of the product.
+    quad: Net<'k>,
+    column: Net<'k>,
+    /// Product of the program; the first one of its row.
+    product: Net<'k>,
+    first_product: Net<'k>,
+    /// OR of the magnitudes, and its length.
+    seen: Net<'k>,
+    length: Net<'k>,
+    /// A code was addressed one and two cycles before; a raw word was.
+    read: Net<'k>,
+    replayed: Net<'k>,
+    /// Places of the next operand and of the next raw word; vector of the operand.
+    written: Net<'k>,
+    stored: Net<'k>,
+    vector: Net<'k>,
+    normalise: Net<'k>,
+    rescale: Net<'k>,
+    saturations: Net<'k>,
+}
+
+impl<'k> Registers<'k> {
+    /// `pc` is the width of the number of a product.
+    fn new(k: &'k Builder, io: &PassSequencerPorts<Inside<'k>>, f: &Formats, pc: usize) -> Self {
         let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
-        let zero = |bits: usize| k.constant(bits, 0);
-        let step = k.machine("step", io.rst, Step::Idle);
-        let draining = k.state("draining", Type::unsigned(1), io.rst, 0);
-        let row_gap = row_gap(f.quads);
-        let gap_bits = count_bits(row_gap as usize + 1);
-        let (phase, gap, wait_count) = (register("phase", 3), register("gap", gap_bits), register("wait_count", 4));
-        let (quad, column) = (register("quad", quads), register("column", quads));
-        let (product, first_product) = (register("product", pc), register("first_product", pc));
-        let (seen, length) = (register("seen", seen_bits), register("length", SHIFT_BITS));
-        let (read, replayed) = (register("read", 2), register("replayed", 1));
-        let (written, stored, vector) =
-            (register("written", words), register("stored", words), register("vector", vectors));
-        let (normalise, rescale) = (io.normalise.register(), io.rescale.register());
-        let saturations = io.saturations.register();
-
-        // As gates: synthesis would map a table to a memory.
-        let set = |bit: &dyn Fn(&Instruction) -> bool| {
-            let terms = (0..count).filter(|&at| bit(&program[at])).map(|at| product.is(at as u64));
-            terms.reduce(|any, term| any | term).unwrap_or(zero(1))
-        };
-        let field = |bits: usize, of: &dyn Fn(&Instruction) -> usize| {
-            let bits: Vec<Expr> = (0..bits).rev().map(|bit| set(&|i| of(i) >> bit & 1 == 1)).collect();
-            concat(&bits)
-        };
-        let wraps = |count: Expr<'k>, last: usize| count.is(last as u64);
-        let is = |wanted: Step| step.is(wanted);
-
-        let row_folding = k.wire("row_folding", is(Step::FoldHigh) | is(Step::FoldLow));
-        let unfolding = io.unfolding.set(is(Step::Replay) | is(Step::Others));
-        let rescaled = k.wire("rescaled", unfolding & io.round_done);
-        let drained = k.wire("drained", *draining & wait_count.is(DRAIN - 1));
-        let last_quad = k.wire("last_quad", wraps(*quad, f.quads - 1));
-        let last_column = k.wire("last_column", wraps(*column, f.quads - 1));
-        let row_last = k.wire("row_last", set(&|i| i.last));
-        let next_product = k.wire("next_product", product.plus(1));
-        let place = k.wire("place", quad.concat(phase.low(2)).low(words));
-        let folded = k.wire("folded", row_folding & io.transformed_valid);
-        let row_magnitude = k.wire("row_magnitude", io.row_word.low(acc - 1) ^ io.row_word.top().repeat(acc - 1));
-        k.comment("Binary search for the leading one.");
-        let (mut rest, mut leading) = (seen.resize(64), Vec::new());
-        for half in [32, 16, 8, 4, 2] {
-            let upper = rest.slice(half, half);
-            leading.push(upper.any());
-            rest = upper.any().mux(upper, rest.low(half));
+        let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
+        Registers {
+            step: k.machine("step", io.rst, Step::Idle),
+            draining: k.state("draining", Type::unsigned(1), io.rst, 0),
+            phase: register("phase", 3),
+            gap: register("gap", count_bits(row_gap(f.quads) as usize + 1)),
+            wait_count: register("wait_count", 4),
+            quad: register("quad", quads),
+            column: register("column", quads),
+            product: register("product", pc),
+            first_product: register("first_product", pc),
+            seen: register("seen", f.acc_bits.max(f.input_bits) as usize - 1),
+            length: register("length", SHIFT_BITS),
+            read: register("read", 2),
+            replayed: register("replayed", 1),
+            written: register("written", words),
+            stored: register("stored", words),
+            vector: register("vector", vector_bits(f)),
+            normalise: io.normalise.register(),
+            rescale: io.rescale.register(),
+            saturations: io.saturations.register(),
         }
-        leading.push(rest.at(1));
-        let seen_length = k.wire("seen_length", (concat(&leading) + rest.any()).low(SHIFT_BITS));
+    }
 
-        length.set(seen_length);
-        let runs = !*draining & !phase.at(2);
-        read.set(read.at(0).concat(row_folding & runs));
-        replayed.set(is(Step::Replay) & runs);
-        k.when(is(Step::FoldHigh), || {
-            normalise.set((k.constant(SHIFT_BITS, u64::from(f.input_bits - 1)) - *length).low(SHIFT_BITS));
+    fn is(&self, step: Step) -> Expr<'k> {
+        self.step.is(step)
+    }
+
+    /// Products are issued.
+    fn multiplies(&self) -> Expr<'k> {
+        self.is(Step::First) | self.is(Step::Others)
+    }
+}
+
+/// `count` + 1, or 0 after `last`.
+fn next<'k>(k: &'k Builder, count: Net<'k>, last: Expr<'k>) -> Expr<'k> {
+    last.mux(k.constant(count.bits(), 0), count.plus(1))
+}
+
+/// Length of the largest of the magnitudes whose OR is `seen`.
+fn length<'k>(k: &'k Builder, seen: Expr<'k>) -> Expr<'k> {
+    k.comment("Binary search for the leading one.");
+    let (mut rest, mut leading) = (seen.resize(64), Vec::new());
+    for half in [32, 16, 8, 4, 2] {
+        let upper = rest.slice(half, half);
+        leading.push(upper.any());
+        rest = upper.any().mux(upper, rest.low(half));
+    }
+    leading.push(rest.at(1));
+    k.wire("seen_length", (concat(&leading) + rest.any()).low(SHIFT_BITS))
+}
+
+impl PassSequencer {
+    /// The step with whose end the frame buffer has been read.
+    fn freed(&self) -> Step {
+        if self.formats.input_low_bits == 0 {
+            Step::FoldHigh
+        } else {
+            Step::FoldLow
+        }
+    }
+
+    /// Magnitudes and shifts, and places of the words that are `folded`, stored raw or `rescaled`.
+    fn words<'k>(
+        &self,
+        k: &'k Builder,
+        io: &PassSequencerPorts<Inside<'k>>,
+        r: &Registers<'k>,
+        [row_folding, folded, rescaled]: [Expr<'k>; 3],
+    ) {
+        let (f, acc) = (&self.formats, self.formats.acc_bits as usize);
+        let row_magnitude = k.wire("row_magnitude", io.row_word.low(acc - 1) ^ io.row_word.top().repeat(acc - 1));
+        r.length.set(length(k, *r.seen));
+        let runs = !*r.draining & !r.phase.at(2);
+        r.read.set(r.read.at(0).concat(row_folding & runs));
+        r.replayed.set(r.is(Step::Replay) & runs);
+        k.when(r.is(Step::FoldHigh), || {
+            r.normalise.set((k.constant(SHIFT_BITS, u64::from(f.input_bits - 1)) - *r.length).low(SHIFT_BITS));
         });
         let full = k.constant(SHIFT_BITS, u64::from(f.vector_bits - 1));
-        k.when(is(Step::First), || {
-            rescale.set(full.less(*length).mux((*length - full).low(SHIFT_BITS), zero(SHIFT_BITS)))
+        k.when(r.is(Step::First), || {
+            r.rescale.set(full.less(*r.length).mux((*r.length - full).low(SHIFT_BITS), k.constant(SHIFT_BITS, 0)))
         });
-        k.when(rescaled & io.clipped, || saturations.set(saturations.plus(1)));
-        k.when(is(Step::First) & io.row_valid, || {
-            seen.set(*seen | row_magnitude.resize(seen_bits));
-            stored.set(wraps(*stored, 4 * f.quads - 1).mux(zero(words), stored.plus(1)));
+        k.when(rescaled & io.clipped, || r.saturations.set(r.saturations.plus(1)));
+        let last = 4 * f.quads as u64 - 1;
+        k.when(r.is(Step::First) & io.row_valid, || {
+            r.seen.set(*r.seen | row_magnitude.resize(r.seen.bits()));
+            r.stored.set(next(k, r.stored, r.stored.is(last)));
         });
         k.when(folded | rescaled, || {
-            let end = wraps(*written, 4 * f.quads - 1);
-            written.set(end.mux(zero(words), written.plus(1)));
+            let end = r.written.is(last);
+            r.written.set(next(k, r.written, end));
             // The vectors of the highest degree are not kept: the count stays at their first.
-            k.when(rescaled & end & !vector.is(f.operand_vectors() as u64), || vector.set(vector.plus(1)));
+            let kept = !r.vector.is(f.operand_vectors() as u64);
+            k.when(rescaled & end & kept, || r.vector.set(r.vector.plus(1)));
         });
-        wait_count.set(draining.mux(wait_count.plus(1), zero(4)));
-        let (after_fold, freed) = if low == 0 { (Step::First, Step::FoldHigh) } else { (Step::FoldLow, Step::FoldLow) };
+    }
+
+    /// The steps, one after the other; the quads of those that do not multiply.
+    fn steps<'k>(
+        &self,
+        k: &'k Builder,
+        r: &Registers<'k>,
+        drained: Expr<'k>,
+        row_folding: Expr<'k>,
+        last_quad: Expr<'k>,
+    ) {
+        r.wait_count.set(r.draining.mux(r.wait_count.plus(1), k.constant(4, 0)));
+        let after_fold = if self.formats.input_low_bits == 0 { Step::First } else { Step::FoldLow };
         k.when(drained, || {
-            draining.set(zero(1));
-            let next = is(Step::Others).mux(step.number(Step::Idle), step.following());
-            step.goes_to(is(Step::FoldHigh).mux(step.number(after_fold), next));
-            k.when(is(freed), || seen.set(zero(seen_bits)));
+            r.draining.set(k.constant(1, 0));
+            let next = r.is(Step::Others).mux(r.step.number(Step::Idle), r.step.following());
+            r.step.goes_to(r.is(Step::FoldHigh).mux(r.step.number(after_fold), next));
+            k.when(r.is(self.freed()), || r.seen.set(k.constant(r.seen.bits(), 0)));
         });
-        k.when(!*draining & (row_folding | is(Step::Replay)), || {
-            phase.set(phase.plus(1));
-            k.when(phase.all(), || {
-                quad.set(last_quad.mux(zero(quads), quad.plus(1)));
-                draining.set(last_quad);
+        k.when(!*r.draining & (row_folding | r.is(Step::Replay)), || {
+            r.phase.set(r.phase.plus(1));
+            k.when(r.phase.all(), || {
+                r.quad.set(next(k, r.quad, last_quad));
+                r.draining.set(last_quad);
             });
         });
-        let multiplies = is(Step::First) | is(Step::Others);
-        k.when(!*draining & multiplies, || {
+    }
+
+    /// The products of a row, a gap, the next row.
+    fn products<'k>(
+        &self,
+        k: &'k Builder,
+        r: &Registers<'k>,
+        [last_quad, last_column, row_last, next_product]: [Expr<'k>; 4],
+        last_product: Expr<'k>,
+    ) {
+        let (gap, row_gap) = (r.gap, row_gap(self.formats.quads));
+        k.when(!*r.draining & r.multiplies(), || {
             k.when(gap.is(0), || {
-                column.set(last_column.mux(zero(quads), column.plus(1)));
-                k.when(last_column & row_last, || gap.set(k.constant(gap_bits, 1)));
-                k.when(last_column & !row_last, || product.set(next_product));
+                r.column.set(next(k, r.column, last_column));
+                k.when(last_column & row_last, || gap.set(k.constant(gap.bits(), 1)));
+                k.when(last_column & !row_last, || r.product.set(next_product));
             });
             k.when(gap.is(row_gap), || {
-                gap.set(zero(gap_bits));
-                quad.set(last_quad.mux(zero(quads), quad.plus(1)));
-                product.set(last_quad.mux(next_product, *first_product));
-                k.when(last_quad, || first_product.set(next_product));
-                draining.set(last_quad & (is(Step::First) | product.is(count as u64 - 1)));
+                gap.set(k.constant(gap.bits(), 0));
+                r.quad.set(next(k, r.quad, last_quad));
+                r.product.set(last_quad.mux(next_product, *r.first_product));
+                k.when(last_quad, || r.first_product.set(next_product));
+                r.draining.set(last_quad & (r.is(Step::First) | last_product));
             });
             k.when(!gap.is(0) & !gap.is(row_gap), || gap.set(gap.plus(1)));
         });
-        k.when(is(Step::Idle) & io.start, || {
-            step.goes(Step::FoldHigh);
-            draining.set(zero(1));
-            seen.set(io.magnitude.resize(seen_bits));
-            let cleared = [
-                phase,
-                gap,
-                quad,
-                column,
-                product,
-                first_product,
-                length,
-                saturations,
-                read,
-                replayed,
-                written,
-                stored,
-                vector,
-                normalise,
-                rescale,
-            ];
-            cleared.iter().for_each(|register| register.set(zero(register.bits())));
-        });
+    }
 
+    /// The start of a frame.
+    fn start<'k>(&self, k: &'k Builder, io: &PassSequencerPorts<Inside<'k>>, r: &Registers<'k>) {
+        k.when(r.is(Step::Idle) & io.start, || {
+            r.step.goes(Step::FoldHigh);
+            r.seen.set(io.magnitude.resize(r.seen.bits()));
+            let Registers { draining, phase, gap, quad, column, product, first_product, length, .. } = *r;
+            let Registers { saturations, read, replayed, written, stored, vector, normalise, rescale, .. } = *r;
+            let counts = [draining, phase, gap, quad, column, product, first_product, length];
+            let words = [saturations, read, replayed, written, stored, vector, normalise, rescale];
+            let cleared = counts.iter().chain(&words);
+            cleared.for_each(|register| register.set(k.constant(register.bits(), 0)));
+        });
+    }
+
+    /// The operand that is written: a limb of the folded input, or a word of a v_ij.
+    fn operand<'k>(&self, k: &'k Builder, io: &PassSequencerPorts<Inside<'k>>, r: &Registers<'k>) -> Expr<'k> {
+        let (f, operands) = (&self.formats, OPERAND_BITS as usize);
+        let (data, low, extra) = (f.data_bits as usize, f.input_low_bits as usize, SEARCH_EXTRA_BITS as usize);
         k.comment("Adds half an LSB of the operand; only the largest positive values can overflow.");
         let (top, half) = (data + extra - 1, extra - 1);
-        let most = zero(1).concat(k.constant(1, 1).repeat(data - 1));
+        let most = k.constant(1, 0).concat(k.constant(1, 1).repeat(data - 1));
         let overflows = !io.rounded.at(top) & io.rounded.slice(half, top - half).all();
         let nearest = (io.rounded.slice(extra, data) + io.rounded.at(half)).low(data);
         let nearest = k.wire("nearest", overflows.mux(most, nearest));
-        let wide = |word: Expr<'k>, bits: usize| word.signed().resize(bits).unsigned();
         let high_limb = wide(io.transformed.slice(low, (io.transformed.bits() - low).min(operands)), operands);
         let align = (f.limb_align as usize).saturating_sub(low);
         let low_limb = if low == 0 { high_limb } else { io.transformed.low(low).shift_left(align).resize(operands) };
+        r.is(Step::FoldHigh).mux(high_limb, r.is(Step::FoldLow).mux(low_limb, wide(nearest, operands)))
+    }
+}
+
+/// A signed word in `bits` bits.
+fn wide(word: Expr<'_>, bits: usize) -> Expr<'_> {
+    word.signed().resize(bits).unsigned()
+}
+
+impl Block for PassSequencer {
+    fn build<'k>(&self, k: &'k Builder, io: PassSequencerPorts<Inside<'k>>) {
+        let (f, unrounded) = (&self.formats, self.unrounded);
+        let (quads, words, vectors) = (count_bits(f.quads), count_bits(4 * f.quads), vector_bits(f));
+        let (instructions, code_bits) = (program(f), f.input_bits as usize);
+        let count = instructions.len();
+        let r = Registers::new(k, &io, f, count_bits(count + 1));
+        let program = Program { k, instructions, product: *r.product };
+
+        let row_folding = k.wire("row_folding", r.is(Step::FoldHigh) | r.is(Step::FoldLow));
+        let unfolding = io.unfolding.set(r.is(Step::Replay) | r.is(Step::Others));
+        let rescaled = k.wire("rescaled", unfolding & io.round_done);
+        let drained = k.wire("drained", *r.draining & r.wait_count.is(DRAIN - 1));
+        let last_quad = k.wire("last_quad", r.quad.is(f.quads as u64 - 1));
+        let last_column = k.wire("last_column", r.column.is(f.quads as u64 - 1));
+        let row_last = k.wire("row_last", program.set(&|i| i.last));
+        let next_product = k.wire("next_product", r.product.plus(1));
+        let place = k.wire("place", r.quad.concat(r.phase.low(2)).low(words));
+        let folded = k.wire("folded", row_folding & io.transformed_valid);
+        self.words(k, &io, &r, [row_folding, folded, rescaled]);
+        self.steps(k, &r, drained, row_folding, last_quad);
+        let last_product = r.product.is(count as u64 - 1);
+        self.products(k, &r, [last_quad, last_column, row_last, next_product], last_product);
+        self.start(k, &io, &r);
+        let operand = self.operand(k, &io, &r);
 
         io.index.set(place);
         io.raw_read_address.set(place);
-        io.raw_write.set(is(Step::First) & io.row_valid);
-        io.raw_write_address.set(*stored);
-        let from = |replay, others, fold| is(Step::Replay).mux(replay, is(Step::Others).mux(others, fold));
+        io.raw_write.set(r.is(Step::First) & io.row_valid);
+        io.raw_write_address.set(*r.stored);
+        let from = |replay, others, fold| r.is(Step::Replay).mux(replay, r.is(Step::Others).mux(others, fold));
         let code_word = io.code.signed().shift_left(code_bits - 1).resize(unrounded).unsigned();
         io.unrounded.set(from(wide(io.raw_word, unrounded), wide(io.row_word, unrounded), code_word));
-        io.round_shift.set(from(*rescale, k.constant(SHIFT_BITS, u64::from(f.a_shift)), *length));
-        io.round.set(from(*replayed, io.row_valid, read.at(1)));
-        let busy = io.busy.set(!is(Step::Idle));
+        io.round_shift.set(from(*r.rescale, k.constant(SHIFT_BITS, u64::from(f.a_shift)), *r.length));
+        io.round.set(from(*r.replayed, io.row_valid, r.read.at(1)));
+        let busy = io.busy.set(!r.is(Step::Idle));
         io.transform.set(io.round_done & busy);
-        io.issue.set(multiplies & !*draining & gap.is(0));
+        io.issue.set(r.multiplies() & !*r.draining & r.gap.is(0));
         io.last.set(row_last & last_column);
-        io.address.set(concat(&[field(2, &|i| i.matrix), *quad, *column]));
-        io.low.set(set(&|i| i.low));
-        io.operand_address.set(field(vectors, &|i| i.operand).concat(*column));
-        io.flip.set(set(&|i| i.flip));
-        io.align.set(set(&|i| i.align));
-        let kept = vector.less(k.constant(vectors, f.operand_vectors() as u64));
+        io.address.set(concat(&[program.field(2, &|i| i.matrix), *r.quad, *r.column]));
+        io.low.set(program.set(&|i| i.low));
+        io.operand_address.set(program.field(vectors, &|i| i.operand).concat(*r.column));
+        io.flip.set(program.set(&|i| i.flip));
+        io.align.set(program.set(&|i| i.align));
+        let kept = r.vector.less(k.constant(vectors, f.operand_vectors() as u64));
         io.write.set(folded | rescaled & kept);
-        let target = is(Step::FoldHigh)
-            .mux(zero(vectors), is(Step::FoldLow).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));
+        let target = r.is(Step::FoldHigh).mux(
+            k.constant(vectors, 0),
+            r.is(Step::FoldLow).mux(k.constant(vectors, 1), r.vector.plus(first_vector(f) as u64)),
+        );
         // An array of one quad has a quad address of one bit, which is 0.
-        let written_quad = if f.quads == 1 { zero(quads) } else { written.slice(2, quads) };
+        let written_quad = if f.quads == 1 { k.constant(quads, 0) } else { r.written.slice(2, quads) };
         io.write_address.set(target.concat(written_quad));
-        io.write_lane.set(written.at(1).concat(written.at(0) ^ !row_folding));
-        let operand = is(Step::FoldHigh).mux(high_limb, is(Step::FoldLow).mux(low_limb, wide(nearest, operands)));
+        io.write_lane.set(r.written.at(1).concat(r.written.at(0) ^ !row_folding));
         io.write_data.set(operand);
-        io.normalised_valid.set(is(Step::FoldHigh) & io.round_done);
-        io.folding.set(is(Step::FoldHigh));
+        io.normalised_valid.set(r.is(Step::FoldHigh) & io.round_done);
+        io.folding.set(r.is(Step::FoldHigh));
         io.rescaled_valid.set(rescaled);
-        io.free.set(drained & is(freed));
-        io.done.set(drained & is(Step::Others));
+        io.free.set(drained & r.is(self.freed()));
+        io.done.set(drained & r.is(Step::Others));
     }
 }
 

@@ -145,9 +145,70 @@ fn values<'k>(k: &'k Builder, data: Expr<'k>, summed: Summed, place: [Expr<'k>; 
     values
 }
 
+/// The taxel of the next force.
+struct Taxel<'k> {
+    /// Row and column of its subarray.
+    part: [Lines<'k>; 2],
+    /// Coordinates x and y in half pitches.
+    place: [Expr<'k>; 2],
+    /// Its force is taken in this cycle.
+    take: Expr<'k>,
+    is_last: Expr<'k>,
+}
+
+impl<'k> Taxel<'k> {
+    /// Moves on with each force that is `valid`, until `counting` ends with the last one.
+    fn new(k: &'k Builder, sensor: &Sensor, grid: Grid, restart: Expr<'k>, counting: Net<'k>, valid: Expr<'k>) -> Self {
+        k.comment("The taxel of the next force: row and column in its subarray, and of its subarray.");
+        let col = Lines::new(k, "col", sensor.cols / grid.cols, restart);
+        let part_col = Lines::new(k, "part_col", grid.cols, restart);
+        let row = Lines::new(k, "row", sensor.rows / grid.rows, restart);
+        let part_row = Lines::new(k, "part_row", grid.rows, restart);
+        let line_last = k.wire("line_last", col.is_last & part_col.is_last);
+        let is_last = k.wire("last_force", line_last & row.is_last & part_row.is_last);
+        let take = k.wire("take", *counting & valid);
+        let start_of = |lines: usize| 1 - lines as i64;
+        let axis = |name: &str, lines: usize| {
+            let start = start_of(lines) as u64 & ((1 << PLACE) - 1);
+            k.state(name, Type::signed(PLACE), restart, start)
+        };
+        let (x, y) = (axis("x", sensor.cols), axis("y", sensor.rows));
+        let pitch = k.signed_constant(PLACE, 2);
+        k.when(take, || {
+            col.step(k);
+            x.set(line_last.mux(k.signed_constant(PLACE, start_of(sensor.cols)), (*x + pitch).resize(PLACE)));
+            k.when(col.is_last, || part_col.step(k));
+            k.when(line_last, || {
+                y.set((*y + pitch).resize(PLACE));
+                row.step(k);
+                k.when(row.is_last, || part_row.step(k));
+            });
+            k.when(is_last, || counting.set(k.constant(1, 0)));
+        });
+        Taxel { part: [part_row, part_col], place: [*x, *y], take, is_last }
+    }
+
+    /// The number of the sums to which its force, on `data`, is added.
+    fn part(&self, k: &'k Builder, parts: Parts, data: Expr<'k>) -> Expr<'k> {
+        let (count, bits) = (parts.count(), count_bits(parts.count()));
+        match parts {
+            Parts::Labels(_) => data.slice(3 * WORD, bits),
+            Parts::Subarrays(grid) => {
+                k.comment("The index of the subarray as a table, in place of a product.");
+                let [row, col] = [0, 1].map(|axis| *self.part[axis].count);
+                let index = |part: usize| {
+                    let (i, j) = (part / grid.cols, part % grid.cols);
+                    ((i << col.bits() | j) as u64, k.constant(bits, part as u64))
+                };
+                let arms: Vec<(u64, Expr)> = (0..count).map(index).collect();
+                k.wire("part", row.concat(col).case(&arms, k.constant(bits, 0)))
+            }
+        }
+    }
+}
+
 fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, parts: Parts) {
-    let (count, grid, summed) = (parts.count(), parts.grid(), parts.summed());
-    let (rows, cols) = (sensor.rows / grid.rows, sensor.cols / grid.cols);
+    let (count, part_bits, summed) = (parts.count(), count_bits(parts.count()), parts.summed());
     let rst = io.rst;
     let (data, valid, last) = (io.s_axis.data, io.s_axis.valid, io.s_axis.last);
     let ready = io.m_axis.ready;
@@ -161,52 +222,13 @@ fn sums<'k>(k: &'k Builder, io: ResultantsPorts<Inside<'k>>, sensor: &Sensor, pa
         *state
     };
 
-    k.comment("The taxel of the next force: row and column in its subarray, and of its subarray.");
-    let col = Lines::new(k, "col", cols, *restart);
-    let part_col = Lines::new(k, "part_col", grid.cols, *restart);
-    let row = Lines::new(k, "row", rows, *restart);
-    let part_row = Lines::new(k, "part_row", grid.rows, *restart);
-    let line_last = k.wire("line_last", col.is_last & part_col.is_last);
-    let last_force = k.wire("last_force", line_last & row.is_last & part_row.is_last);
-    let take = k.wire("take", *counting & valid);
-    let start_of = |lines: usize| 1 - lines as i64;
-    let axis = |name: &str, lines: usize| {
-        let start = start_of(lines) as u64 & ((1 << PLACE) - 1);
-        k.state(name, Type::signed(PLACE), *restart, start)
-    };
-    let (x, y) = (axis("x", sensor.cols), axis("y", sensor.rows));
-    let pitch = k.signed_constant(PLACE, 2);
-    k.when(take, || {
-        col.step(k);
-        x.set(line_last.mux(k.signed_constant(PLACE, start_of(sensor.cols)), (*x + pitch).resize(PLACE)));
-        k.when(col.is_last, || part_col.step(k));
-        k.when(line_last, || {
-            y.set((*y + pitch).resize(PLACE));
-            row.step(k);
-            k.when(row.is_last, || part_row.step(k));
-        });
-        k.when(last_force, || counting.set(zero));
-    });
-
-    let part_bits = count_bits(count);
-    let part = match parts {
-        Parts::Labels(_) => data.slice(3 * WORD, part_bits),
-        Parts::Subarrays(_) => {
-            k.comment("The index of the subarray as a table, in place of a product.");
-            let index = |k_part: usize| {
-                let (i, j) = (k_part / grid.cols, k_part % grid.cols);
-                let at = (i << part_col.count.bits() | j) as u64;
-                (at, k.constant(part_bits, k_part as u64))
-            };
-            let arms: Vec<(u64, Expr)> = (0..count).map(index).collect();
-            k.wire("part", part_row.count.concat(*part_col.count).case(&arms, k.constant(part_bits, 0)))
-        }
-    };
+    let taxel = Taxel::new(k, sensor, parts.grid(), *restart, counting, valid);
+    let part = taxel.part(k, parts, data);
     let part_2 = k.delay("part_2", k.delay("part_1", part));
-    let values = values(k, data, summed, [*x, *y]);
+    let values = values(k, data, summed, taxel.place);
 
-    let adds = later("valid_2", later("valid_1", take));
-    let settling = later("settling_1", take & last_force);
+    let adds = later("valid_2", later("valid_1", taxel.take));
+    let settling = later("settling_1", taxel.take & taxel.is_last);
     let settling = [settling, later("settling_2", settling)];
     let settled = later("settling_3", settling[1]);
     k.comment("The sums of each part; before its first force they are 0.");

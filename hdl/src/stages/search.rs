@@ -11,7 +11,7 @@ use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::spec::quads::Quads;
 
 use crate::block;
-use crate::language::{Block, Builder, Inside};
+use crate::language::{Block, Builder, Expr, Inside, Interface, Outside};
 use crate::primitives::{
     count_bits, largest, position_bits, store_latency, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff,
     LaneMask, PolynomialWord, Score, ScoreBias, SearchSequencer, Store, Sum, Taylor, BUFFER_BITS, CANDIDATES_LATENCY,
@@ -83,8 +83,25 @@ block! {
     }
 }
 
-/// The parts of a search.
-struct Sweeps {
+/// Lists the parts of a search in the order of their instances: the struct `Parts` of their blocks, the struct `Placed` of the
+/// ports of the instances.
+macro_rules! part_list {
+    ($($part:ident: $block:ty),+ $(,)?) => {
+        /// The blocks of the parts.
+        struct Parts { $($part: $block,)+ }
+
+        /// The ports of the instances of the parts.
+        struct Placed<'k> { $($part: <$block as Interface>::Ports<Outside<'k>>,)+ }
+
+        impl Parts {
+            fn place<'k>(&'k self, k: &'k Builder) -> Placed<'k> {
+                Placed { $($part: k.instance(stringify!($part), &self.$part),)+ }
+            }
+        }
+    };
+}
+
+part_list! {
     sequencer: SearchSequencer,
     bias: ScoreBias,
     best: BestCandidate,
@@ -92,18 +109,21 @@ struct Sweeps {
     taylor: Taylor,
     candidates: Candidates,
     scores: Score,
-    lane_mask: LaneMask,
     sum: Sum,
     sum_taylor: Taylor,
     sum_candidates: Candidates,
-    fill_mask: LaneMask,
     quads: CaseCounter,
     period: CaseCounter,
+    counting: Dff,
     began: BitDelay,
     compared_later: BitDelay,
+    go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
+    trial: BitDelay,
+    outcome: BitDelay,
     sum_outcome: BitDelay,
+    scored: BitDelay,
     first: BitDelay,
     bias_start: BitDelay,
     totals: BitDelay,
@@ -111,6 +131,15 @@ struct Sweeps {
     step: Delay,
     target: Delay,
     moved_address: Delay,
+    set_up: Dff,
+    stalled_before: Dff,
+}
+
+/// The parts of a search, and those of which only some scenes have an instance.
+struct Sweeps {
+    parts: Parts,
+    fill_mask: LaneMask,
+    lane_mask: LaneMask,
     scored_address: Delay,
 }
 
@@ -155,7 +184,7 @@ impl Sweeps {
         let sums = PolynomialWord::new(1, &formats.sum_bits);
         // Cycles from the address of a step to its shifted polynomials.
         let moved = store_latency(formats) + TAYLOR_LATENCY;
-        Sweeps {
+        let parts = Parts {
             sequencer: SearchSequencer::new(quads),
             bias: ScoreBias::new(formats, &taxel_counts),
             best: BestCandidate::new(formats, largest(&taxel_counts)),
@@ -163,20 +192,23 @@ impl Sweeps {
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
-            lane_mask: LaneMask::new(&layouts, width),
             sum: Sum::new(&sums, quads, fill_bits),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
-            fill_mask: LaneMask::new(&layouts, Quads::LANES),
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
+            counting: Dff {},
             // The result of a comparison and the move computed from it are registered before a sweep is set up.
             // `set_up` is a register too, because it drives the whole search.
             began: BitDelay::new(SET_UP as usize - 1),
             compared_later: BitDelay::new(SET_UP as usize - 1),
+            go: BitDelay::new(1),
             moved: BitDelay::new(moved - 1),
             sum_moved: BitDelay::new(moved - 1),
+            trial: BitDelay::new(1),
+            outcome: BitDelay::new(1),
             sum_outcome: BitDelay::of_pulse(1 + values_delay(model.first())),
+            scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(moved + CANDIDATES_LATENCY),
             // One cycle after the first step's candidates, so that a sweep is compared before the next is weighted.
             bias_start: BitDelay::new(moved + CANDIDATES_LATENCY + 1),
@@ -186,156 +218,157 @@ impl Sweeps {
             // The target buffer is known one cycle after the set-up and needed one cycle before the write.
             target: Delay::new(BUFFER_BITS, moved - 2),
             moved_address: Delay::new(step, moved),
+            set_up: Dff {},
+            stalled_before: Dff {},
+        };
+        Sweeps {
+            parts,
+            fill_mask: LaneMask::new(&layouts, Quads::LANES),
+            lane_mask: LaneMask::new(&layouts, width),
             scored_address: Delay::new(step, CANDIDATES_LATENCY),
         }
     }
 
     fn build<'k>(&'k self, k: &'k Builder, io: SearchPorts<Inside<'k>>) {
-        let sequencer = k.instance("sequencer", &self.sequencer);
-        let bias = k.instance("bias", &self.bias);
-        let best = k.instance("best", &self.best);
-        let store = k.instance("store", &self.store);
-        let taylor = k.instance("taylor", &self.taylor);
-        let candidates = k.instance("candidates", &self.candidates);
-        let scores = k.instance("scores", &self.scores);
-        let sum = k.instance("sum", &self.sum);
-        let sum_taylor = k.instance("sum_taylor", &self.sum_taylor);
-        let sum_candidates = k.instance("sum_candidates", &self.sum_candidates);
-        let quads = k.instance("quads", &self.quads);
-        let period = k.instance("period", &self.period);
-        let counting = k.instance("counting", Dff {});
-        let began = k.instance("began", &self.began);
-        let compared_later = k.instance("compared_later", &self.compared_later);
-        let go = k.instance("go", BitDelay::new(1));
-        let moved = k.instance("moved", &self.moved);
-        let sum_moved = k.instance("sum_moved", &self.sum_moved);
-        let trial = k.instance("trial", BitDelay::new(1));
-        let outcome = k.instance("outcome", BitDelay::new(1));
-        let sum_outcome = k.instance("sum_outcome", &self.sum_outcome);
-        let scored = k.instance("scored", BitDelay::new(CANDIDATES_LATENCY));
-        let first = k.instance("first", &self.first);
-        let bias_start = k.instance("bias_start", &self.bias_start);
-        let totals = k.instance("totals", &self.totals);
-        let finish = k.instance("finish", &self.finish);
-        let step = k.instance("step", &self.step);
-        let target = k.instance("target", &self.target);
-        let moved_address = k.instance("moved_address", &self.moved_address);
-        let set_up = k.instance("set_up", Dff {});
-        let stalled_before = k.instance("stalled_before", Dff {});
+        let s = &self.parts.place(k);
+        s.bias.which.set(io.which);
+        s.quads.which.set(io.which);
+        s.period.which.set(io.which);
+        self.fill(k, s, &io);
+        set_up(k, s, &io);
+        let quad_end = quads(k, s, io.rst);
+        sum_polynomial(k, s);
+        self.score(k, s, io.which, quad_end);
+        output(k, s, &io, quad_end);
+        k.unused([s.period.value]);
+    }
 
-        bias.which.set(io.which);
-        quads.which.set(io.which);
-        period.which.set(io.which);
-
+    /// The coefficients go to the store and, added up, to the sum polynomial.
+    fn fill<'k>(&'k self, k: &'k Builder, s: &Placed<'k>, io: &SearchPorts<Inside<'k>>) {
         k.comment("Coefficients are written");
-        store.fill.set(io.fill);
-        store.fill_index.set(io.fill_index);
-        store.fill_address.set(io.fill_address);
-        store.fill_quad.set(io.fill_quad);
-        sum.fill.set(io.fill);
-        sum.fill_index.set(io.fill_index);
-        sum.fill_address.set(io.fill_address);
-        sum.fill_mask.set(self.fill_mask.of(k, "fill_mask", io.fill_which, || io.fill_address));
-        sum.fill_quad.set(io.fill_quad);
+        s.store.fill.set(io.fill);
+        s.store.fill_index.set(io.fill_index);
+        s.store.fill_address.set(io.fill_address);
+        s.store.fill_quad.set(io.fill_quad);
+        s.sum.fill.set(io.fill);
+        s.sum.fill_index.set(io.fill_index);
+        s.sum.fill_address.set(io.fill_address);
+        s.sum.fill_mask.set(self.fill_mask.of(k, "fill_mask", io.fill_which, || io.fill_address));
+        s.sum.fill_quad.set(io.fill_quad);
+    }
 
-        k.comment("A sweep is set up and starts one cycle later");
-        sequencer.begin_frame.set(io.start);
-        sequencer.enabled.set(io.enabled);
-        best.begin_frame.set(io.start);
-        began.d.set(io.start);
-        let due = k.wire("due", began.q | compared_later.q | stalled_before.q);
-        let stall = k.wire("stall", due & sequencer.next_last & !io.ready);
-        stalled_before.d.set(stall & !io.rst);
-        io.stalled.set(stall);
-        set_up.d.set(((due & !stall) | (sequencer.chains & period.last)) & !io.rst);
-        compared_later.d.set(best.done & best.closes);
-        period.clear.set(set_up.q);
-        period.enable.set(k.constant(1, 1));
-        sequencer.set_up.set(set_up.q);
-        sequencer.compared.set(best.done);
-        sequencer.improved.set(best.improved);
-        sequencer.compared_sweep.set(best.compared);
-        sequencer.best_x.set(best.best_x);
-        sequencer.best_y.set(best.best_y);
-        best.halve.set(set_up.q & sequencer.next_halves);
-        go.d.set(set_up.q);
-
-        k.comment("Quads pass memory, Taylor shift and candidates");
-        let quad_end = k.wire("quad_end", counting.q & quads.last);
-        counting.d.set((set_up.q | (counting.q & !quads.last)) & !io.rst);
-        quads.clear.set(set_up.q);
-        quads.enable.set(counting.q);
-        step.d.set(sequencer.step);
-        target.d.set(sequencer.target);
-        store.read_buffer.set(sequencer.source);
-        store.begins.set(set_up.q);
-        store.counts.set(counting.q);
-        store.next_base.set(sequencer.next_base);
-        store.read_address.set(quads.value);
-        taylor.word.set(store.read_data);
-        taylor.step.set(step.q);
-        moved.d.set(counting.q);
-        trial.d.set(moved.q & !sequencer.last);
-        outcome.d.set(moved.q & sequencer.last);
-        moved_address.d.set(quads.value);
-        store.write.set(trial.q);
-        store.write_buffer.set(target.q);
-        store.write_address.set(moved_address.q);
-        store.write_data.set(taylor.moved);
-        candidates.word.set(taylor.moved);
-
-        k.comment("The sum polynomial passes the same blocks");
-        sum.read.set(go.q);
-        sum.read_buffer.set(sequencer.source);
-        sum_taylor.word.set(sum.word);
-        sum_taylor.step.set(step.q);
-        sum_moved.d.set(go.q);
-        sum_outcome.d.set(sum_moved.q & sequencer.last);
-        sum.write.set(sum_moved.q & !sequencer.last);
-        sum.write_buffer.set(target.q);
-        sum.write_data.set(sum_taylor.moved);
-        sum_candidates.word.set(sum_taylor.moved);
-
+    /// The candidates of the quads are scored, and compared after the last one.
+    fn score<'k>(&'k self, k: &'k Builder, s: &Placed<'k>, which: Expr<'k>, quad_end: Expr<'k>) {
         k.comment("Scores and their comparison");
-        scored.d.set(trial.q);
-        first.d.set(go.q);
-        scores.first.set(first.q);
-        scores.valid.set(scored.q);
+        s.scored.d.set(s.trial.q);
+        s.first.d.set(s.go.q);
+        s.scores.first.set(s.first.q);
+        s.scores.valid.set(s.scored.q);
         let address = || {
             let scored_address = k.instance("scored_address", &self.scored_address);
-            scored_address.d.set(moved_address.q);
+            scored_address.d.set(s.moved_address.q);
             scored_address.q
         };
-        scores.mask.set(self.lane_mask.of(k, "lane_mask", io.which, address));
-        scores.values.set(candidates.values);
-        scores.sums.set(sum_candidates.values);
-        totals.d.set(quad_end & !sequencer.last);
-        bias_start.d.set(go.q & !sequencer.last);
-        bias.start.set(bias_start.q);
-        bias.sweep.set(sequencer.sweep);
-        bias.radius.set(sequencer.radius);
-        bias.sums.set(sum_candidates.values);
-        best.start.set(totals.q);
-        best.totals.set(scores.totals);
-        best.weights.set(bias.weights);
-        best.eligible.set(bias.eligible);
-        best.sweep.set(bias.weighted_sweep);
-
-        k.comment("The constant terms of the last sweep are the values");
-        io.values.set(taylor.moved.low(io.values.bits()));
-        io.values_valid.set(outcome.q);
-        io.settled.set(go.q & sequencer.last);
-        io.values_begin.set(sum_outcome.q);
-        finish.d.set(quad_end & sequencer.last);
-        io.done.set(finish.q);
-        io.best_x.set(best.best_x);
-        io.best_y.set(best.best_y);
-        io.score.set(best.score);
-        io.found.set(best.found);
-        io.compared.set(best.done);
-        io.taken.set(best.taken);
-        k.unused([period.value]);
+        s.scores.mask.set(self.lane_mask.of(k, "lane_mask", which, address));
+        s.scores.values.set(s.candidates.values);
+        s.scores.sums.set(s.sum_candidates.values);
+        s.totals.d.set(quad_end & !s.sequencer.last);
+        s.bias_start.d.set(s.go.q & !s.sequencer.last);
+        s.bias.start.set(s.bias_start.q);
+        s.bias.sweep.set(s.sequencer.sweep);
+        s.bias.radius.set(s.sequencer.radius);
+        s.bias.sums.set(s.sum_candidates.values);
+        s.best.start.set(s.totals.q);
+        s.best.totals.set(s.scores.totals);
+        s.best.weights.set(s.bias.weights);
+        s.best.eligible.set(s.bias.eligible);
+        s.best.sweep.set(s.bias.weighted_sweep);
     }
+}
+
+/// When a sweep starts and, at the last one, waits.
+fn set_up<'k>(k: &'k Builder, s: &Placed<'k>, io: &SearchPorts<Inside<'k>>) {
+    k.comment("A sweep is set up and starts one cycle later");
+    s.sequencer.begin_frame.set(io.start);
+    s.sequencer.enabled.set(io.enabled);
+    s.best.begin_frame.set(io.start);
+    s.began.d.set(io.start);
+    let due = k.wire("due", s.began.q | s.compared_later.q | s.stalled_before.q);
+    let stall = k.wire("stall", due & s.sequencer.next_last & !io.ready);
+    s.stalled_before.d.set(stall & !io.rst);
+    io.stalled.set(stall);
+    s.set_up.d.set(((due & !stall) | (s.sequencer.chains & s.period.last)) & !io.rst);
+    s.compared_later.d.set(s.best.done & s.best.closes);
+    s.period.clear.set(s.set_up.q);
+    s.period.enable.set(k.constant(1, 1));
+    s.sequencer.set_up.set(s.set_up.q);
+    s.sequencer.compared.set(s.best.done);
+    s.sequencer.improved.set(s.best.improved);
+    s.sequencer.compared_sweep.set(s.best.compared);
+    s.sequencer.best_x.set(s.best.best_x);
+    s.sequencer.best_y.set(s.best.best_y);
+    s.best.halve.set(s.set_up.q & s.sequencer.next_halves);
+    s.go.d.set(s.set_up.q);
+}
+
+/// The quads of a sweep, one step after the other; the last one is read.
+fn quads<'k>(k: &'k Builder, s: &Placed<'k>, rst: Expr<'k>) -> Expr<'k> {
+    k.comment("Quads pass memory, Taylor shift and candidates");
+    let quad_end = k.wire("quad_end", s.counting.q & s.quads.last);
+    s.counting.d.set((s.set_up.q | (s.counting.q & !s.quads.last)) & !rst);
+    s.quads.clear.set(s.set_up.q);
+    s.quads.enable.set(s.counting.q);
+    s.step.d.set(s.sequencer.step);
+    s.target.d.set(s.sequencer.target);
+    s.store.read_buffer.set(s.sequencer.source);
+    s.store.begins.set(s.set_up.q);
+    s.store.counts.set(s.counting.q);
+    s.store.next_base.set(s.sequencer.next_base);
+    s.store.read_address.set(s.quads.value);
+    s.taylor.word.set(s.store.read_data);
+    s.taylor.step.set(s.step.q);
+    s.moved.d.set(s.counting.q);
+    s.trial.d.set(s.moved.q & !s.sequencer.last);
+    s.outcome.d.set(s.moved.q & s.sequencer.last);
+    s.moved_address.d.set(s.quads.value);
+    s.store.write.set(s.trial.q);
+    s.store.write_buffer.set(s.target.q);
+    s.store.write_address.set(s.moved_address.q);
+    s.store.write_data.set(s.taylor.moved);
+    s.candidates.word.set(s.taylor.moved);
+    quad_end
+}
+
+/// The sum polynomial, beside the first step of a sweep.
+fn sum_polynomial<'k>(k: &'k Builder, s: &Placed<'k>) {
+    k.comment("The sum polynomial passes the same blocks");
+    s.sum.read.set(s.go.q);
+    s.sum.read_buffer.set(s.sequencer.source);
+    s.sum_taylor.word.set(s.sum.word);
+    s.sum_taylor.step.set(s.step.q);
+    s.sum_moved.d.set(s.go.q);
+    s.sum_outcome.d.set(s.sum_moved.q & s.sequencer.last);
+    s.sum.write.set(s.sum_moved.q & !s.sequencer.last);
+    s.sum.write_buffer.set(s.target.q);
+    s.sum.write_data.set(s.sum_taylor.moved);
+    s.sum_candidates.word.set(s.sum_taylor.moved);
+}
+
+/// The values, and the position with its score.
+fn output<'k>(k: &'k Builder, s: &Placed<'k>, io: &SearchPorts<Inside<'k>>, quad_end: Expr<'k>) {
+    k.comment("The constant terms of the last sweep are the values");
+    io.values.set(s.taylor.moved.low(io.values.bits()));
+    io.values_valid.set(s.outcome.q);
+    io.settled.set(s.go.q & s.sequencer.last);
+    io.values_begin.set(s.sum_outcome.q);
+    s.finish.d.set(quad_end & s.sequencer.last);
+    io.done.set(s.finish.q);
+    io.best_x.set(s.best.best_x);
+    io.best_y.set(s.best.best_y);
+    io.score.set(s.best.score);
+    io.found.set(s.best.found);
+    io.compared.set(s.best.done);
+    io.taken.set(s.best.taken);
 }
 
 #[cfg(test)]

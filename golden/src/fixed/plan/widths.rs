@@ -75,11 +75,6 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
     let mut quantised = quantised(scene, all, coef_bits)?;
     let composed = composed(scene)?;
-    // The largest of a bound over all cases and others.
-    let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
-        let each = quantised.iter().zip(all).map(|(quantised, shape)| of(quantised, shape.quads().len()));
-        each.max().unwrap_or(0)
-    };
     // The same in all cases: a scene with dead taxels, which break the symmetry, has one case and one subarray.
     let Quantised { inverse, ax, ay, .. } = &quantised[0];
     let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
@@ -92,76 +87,33 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
         !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric() && composed.is_empty();
 
     let input_bits = spec.input_bits + scene.input.longest_average();
-    let fold_bits = input_bits + 2;
-    let input_low_bits = fold_bits.saturating_sub(operand_bits);
-    if input_low_bits >= operand_bits {
-        return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * operand_bits - 1 });
-    }
-    let inverse_low_bits = spec.inverse_bits.saturating_sub(operand_bits);
-    let limb_align = input_low_bits.max(inverse_low_bits);
-    let raw_shift = input_low_bits.min(inverse_low_bits);
-
-    // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
-    // product.
-    let raw_bound = bound(&|quantised, count| {
-        let dropped = (count * flips.inverse.len()) as u64;
-        ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped
-    });
-    let a_bound = bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (data_bits - 1));
-    let acc_bits = signed_bits(raw_bound.max(a_bound));
-    if acc_bits > 48 {
-        return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
-    }
-    // The lanes add up the products of the low limbs and those of the high limbs of v_00 each on their own.
-    let (high_input, products) =
-        (1u64 << (fold_bits - 1 - input_low_bits), |count| (count * flips.inverse.len()) as u64);
-    let high_norm =
-        |quantised: &Quantised, count| (quantised.inverse.norm(count) >> inverse_low_bits) + products(count);
-    let lane_bound = bound(&|quantised, count| {
-        let of_input = if input_low_bits > 0 { high_norm(quantised, count) << limb_align } else { 0 };
-        let of_inverse = if inverse_low_bits > 0 { (products(count) * high_input) << limb_align } else { 0 };
-        (high_norm(quantised, count) * high_input).max(of_input + of_inverse)
-    });
-    let lane_bits = signed_bits(lane_bound.max(a_bound)).min(acc_bits);
+    let limbs = Limbs::new(input_bits, spec.inverse_bits, operand_bits)?;
+    let Limbs { fold_bits, input_low_bits, inverse_low_bits, align: limb_align, raw_shift } = limbs;
+    let counts = all.iter().map(|shape| shape.quads().len());
+    let Sums { raw_bound, acc_bits, lane_bits } =
+        limbs.sums(quantised.iter().zip(counts), flips.inverse.len(), data_bits)?;
     // Scales are the same in all cases.
     let (inverse_exponent, a_exponent) = (quantised[0].inverse.exponent, quantised[0].ax.exponent);
     let vector_bits = data_bits + SEARCH_EXTRA_BITS;
-    let a_shift = if degree == 0 { 0 } else { a_exponent - SEARCH_EXTRA_BITS as i32 };
-    let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
-        what: "scaled A (mu_max too large for this sensor)",
-        needs: SEARCH_EXTRA_BITS,
-        has: a_exponent.max(0) as u32,
-    })?;
+    let a_shift = if degree == 0 { 0 } else { a_shift(a_exponent)? };
 
     let each = quantised.iter().zip(all);
     let growths: Vec<Vec<f64>> =
         each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
     let headroom = if composed.is_empty() { 0 } else { headroom(&growths, degree) };
-    let growth = |k: usize| growths.iter().map(|growth| growth[k]).fold(0.0, f64::max);
-    let taxel_max = 1u64 << (vector_bits + 1);
-    let used = vectors(degree);
-    let coefficients: Vec<u64> = (0..used)
-        .map(|k| {
-            let (i, j) = EXPONENTS[k];
-            ((taxel_max as f64 * growth(k).min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
-        })
-        .collect();
-    let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
     let taxels = (sensor.rows * sensor.cols) as u64;
+    let shifted = shifted(&growths, degree, vector_bits);
     // Without a search p keeps its unfolded width.
-    let search_bits: Vec<u32> = match degree {
-        0 => vec![vector_bits + 2],
-        _ if !composed.is_empty() => vec![vector_bits + 2],
-        _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
+    let search_bits: Vec<u32> = match degree > 0 && composed.is_empty() {
+        true => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
+        false => vec![vector_bits + 2],
     };
     let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
 
     // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.
     // With a network its word holds two ln σ.
     let score_bits = if composed.is_empty() { signed_bits(taxels << (6 + LOG_FRACTION)) } else { 2 * LN_SIGMA_BITS };
-    // 18 bits of μ; fz, with its factor 1, needs no more fraction than that.
-    let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max).log2().floor().min(17.0) as u32;
-    let mu_step = (scene.search.mu_max / MU_STEPS as f64 * 2f64.powi((mu_fraction + MU_ROUND) as i32)).round() as i64;
+    let (mu_fraction, mu_step) = mu_scale(scene.search.mu_max);
 
     let raw_length_max = bit_length(raw_bound);
     let rescale_max = raw_length_max.saturating_sub(vector_bits - 1 - headroom);
@@ -211,6 +163,105 @@ pub fn widths(scene: &Scene, shapes: &[Shape], others: &[Shape], board: &Board) 
     }
     quantised.truncate(shapes.len());
     Ok(Widths { formats, quantised })
+}
+
+/// How the operands of the first pass are cut into limbs.
+struct Limbs {
+    /// Width of the folded input.
+    fold_bits: u32,
+    /// Widths of the low limbs of input and inverse.
+    input_low_bits: u32,
+    inverse_low_bits: u32,
+    /// Left shift of the product of two high limbs.
+    align: u32,
+    /// The sums are in units of 2^`raw_shift`.
+    raw_shift: u32,
+}
+
+/// Bound of v_00, widths of an accumulator and of a lane's sum.
+struct Sums {
+    raw_bound: u64,
+    acc_bits: u32,
+    lane_bits: u32,
+}
+
+impl Limbs {
+    fn new(input_bits: u32, inverse_bits: u32, operand_bits: u32) -> Result<Limbs, FixedError> {
+        let fold_bits = input_bits + 2;
+        let input_low_bits = fold_bits.saturating_sub(operand_bits);
+        if input_low_bits >= operand_bits {
+            return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * operand_bits - 1 });
+        }
+        let inverse_low_bits = inverse_bits.saturating_sub(operand_bits);
+        let [align, raw_shift] = [input_low_bits.max(inverse_low_bits), input_low_bits.min(inverse_low_bits)];
+        Ok(Limbs { fold_bits, input_low_bits, inverse_low_bits, align, raw_shift })
+    }
+
+    /// The largest sums over all cases and others, each with its number of quads; `flips` are those of Cz⁺.
+    fn sums<'a>(
+        &self,
+        each: impl Iterator<Item = (&'a Quantised, usize)> + Clone,
+        flips: usize,
+        data_bits: u32,
+    ) -> Result<Sums, FixedError> {
+        let Limbs { fold_bits, input_low_bits, inverse_low_bits, align, raw_shift } = *self;
+        let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
+            each.clone().map(|(quantised, count)| of(quantised, count)).max().unwrap_or(0)
+        };
+        let products = |count: usize| (count * flips) as u64;
+        // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
+        // product.
+        let raw_bound = bound(&|quantised, count| {
+            ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * products(count)
+        });
+        let a_bound =
+            bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (data_bits - 1));
+        let acc_bits = signed_bits(raw_bound.max(a_bound));
+        if acc_bits > 48 {
+            return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
+        }
+        // The lanes add up the products of the low limbs and those of the high limbs of v_00 each on their own.
+        let high_input = 1u64 << (fold_bits - 1 - input_low_bits);
+        let lane_bound = bound(&|quantised, count| {
+            let products = products(count);
+            let high_norm = (quantised.inverse.norm(count) >> inverse_low_bits) + products;
+            let of_input = if input_low_bits > 0 { high_norm << align } else { 0 };
+            let of_inverse = if inverse_low_bits > 0 { (products * high_input) << align } else { 0 };
+            (high_norm * high_input).max(of_input + of_inverse)
+        });
+        let lane_bits = signed_bits(lane_bound.max(a_bound)).min(acc_bits);
+        Ok(Sums { raw_bound, acc_bits, lane_bits })
+    }
+}
+
+/// Right shift of the products with A, from the exponent of its coefficients.
+fn a_shift(a_exponent: i32) -> Result<u32, FixedError> {
+    u32::try_from(a_exponent - SEARCH_EXTRA_BITS as i32).map_err(|_| FixedError::Format {
+        what: "scaled A (mu_max too large for this sensor)",
+        needs: SEARCH_EXTRA_BITS,
+        has: a_exponent.max(0) as u32,
+    })
+}
+
+/// Fraction bits of a μ word, and μ per step of the search.
+fn mu_scale(mu_max: f64) -> (u32, i64) {
+    // 18 bits of μ; fz, with its factor 1, needs no more fraction than that.
+    let fraction = (f64::from((1 << 17) - 1) / mu_max).log2().floor().min(17.0) as u32;
+    (fraction, (mu_max / MU_STEPS as f64 * 2f64.powi((fraction + MU_ROUND) as i32)).round() as i64)
+}
+
+/// Bounds of the coefficients of a taxel's polynomial wherever its centre is, from the growths of the cases.
+fn shifted(growths: &[Vec<f64>], degree: usize, vector_bits: u32) -> Vec<u64> {
+    let growth = |k: usize| growths.iter().map(|growth| growth[k]).fold(0.0, f64::max);
+    let taxel_max = 1u64 << (vector_bits + 1);
+    let used = vectors(degree);
+    let coefficients: Vec<u64> = (0..used)
+        .map(|k| {
+            let (i, j) = EXPONENTS[k];
+            ((taxel_max as f64 * growth(k).min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
+        })
+        .collect();
+    (0..used).map(|k| reach(&coefficients, k)).collect()
 }
 
 /// The layers of the network that gives μ; none with a search.

@@ -92,7 +92,7 @@ impl<'k> Circuit<'k> {
         let (k, shape) = (self.k, self.shape);
         let one = k.constant(1, 1);
         k.comment("Saddles");
-        let basin = self.steps_out.low(BASIN);
+        let basin = self.memories.steps_out.low(BASIN);
         let stall = k.register("stall", Type::unsigned(2));
         let differs = k.wire("differs", self.is(BORDERS) & order.beside & basin.differs(*self.own));
         stall.set(stall.plus(1) & differs.repeat(2));
@@ -135,7 +135,8 @@ impl<'k> Circuit<'k> {
         let larger = k.wire("larger", list.best.less(saddle));
         let largest = larger.mux(saddle, *list.best) & (!self.is(CLEAR)).repeat(shape.smoothed);
         memory.write(self.is(CLEAR) | differs & stall.all() | self.at(JOIN, MERGED), place, largest);
-        let least = k.delay("is_less", self.difference.top()).mux(self.words_out, *self.base);
+        let least =
+            k.delay("is_less", self.multiplier.difference.top()).mux(self.memories.words_out, *self.multiplier.base);
         k.when(differs & stall.is(1), || list.best.set(least));
         k.when(self.at(JOIN, BEST), || list.best.set(saddle));
 
@@ -143,7 +144,11 @@ impl<'k> Circuit<'k> {
         k.when(self.at(PAIRS, HIGHER) | self.at(JOIN, 1), || list.hold.set(bar));
         let rises = self.at(JOIN, 2) & list.into.any() & bar.less(*list.hold);
         let fresh = order.fresh;
-        self.bars.write(fresh | rises, fresh.mux(order.next, *self.cursor), fresh.mux(self.result, *list.hold));
+        self.bars.write(
+            fresh | rises,
+            fresh.mux(order.next, *self.cursor),
+            fresh.mux(self.multiplier.result, *list.hold),
+        );
         let high = !saddle.less(bar) | !saddle.less(*list.hold);
         let may = list.small.mux(self.cursor.differs(*list.outer), high);
         let may = k.delay("may_take", self.at(PAIRS, SADDLE) & may);
@@ -213,7 +218,7 @@ impl<'k> Circuit<'k> {
         let holds = k.delay("holds", compares | self.is(JOIN));
         let subtracts = k.delay("subtracts", compares);
         let held = *held ^ subtracts.repeat(shape.sum);
-        let addend = holds.mux(held, self.product.resize(shape.sum));
+        let addend = holds.mux(held, self.multiplier.product.resize(shape.sum));
         let total = k.wire("load_total", (load + addend + subtracts).low(shape.sum));
         // A moment is not read again when it is less than what is held.
         self.loads.write(zeros | sums | subtracts, place, total & (!zeros).repeat(shape.sum));
@@ -287,7 +292,7 @@ impl<'k> Circuit<'k> {
             (gone, *list.gone),
             (into, *list.into),
             (settles, self.higher.plus(1)),
-            (labels, self.steps_out.low(BASIN)),
+            (labels, self.memories.steps_out.low(BASIN)),
         ]);
         let cursor = list.follows & follows.repeat(BASIN) | k.wire("other_cursor", cursor);
         k.when(follows | nexts | gone | into | settles | labels | zeros, || self.cursor.set(cursor));

@@ -79,8 +79,9 @@ pub(super) struct Circuit<'k> {
     pub(super) mirror: Net<'k>,
     pub(super) quad: Net<'k>,
     pub(super) lane: Net<'k>,
-    /// The word of the lane is taken; whether it is that of a taxel of its own.
+    /// The word of the lane is taken; the word then; whether it is that of a taxel of its own.
     pub(super) picks: Expr<'k>,
+    pub(super) word: Expr<'k>,
     pub(super) counts: Net<'k>,
     /// Taxel that is read, and one that is written.
     pub(super) point: Net<'k>,
@@ -92,26 +93,8 @@ pub(super) struct Circuit<'k> {
     /// The taxels that are read move on in this cycle.
     pub(super) moves: Net<'k>,
 
-    /// Unsmoothed words; then words smoothed along both axes.
-    pub(super) words: MemoryPort<'k>,
-    /// Words smoothed along the rows; then for each taxel `{1, basin}` or `{0, direction of its step}`.
-    pub(super) steps: MemoryPort<'k>,
-    pub(super) word: Expr<'k>,
-    pub(super) words_out: Expr<'k>,
-    pub(super) steps_out: Expr<'k>,
-    /// The tap that is read, and its flags two cycles later.
-    pub(super) tap: Net<'k>,
-    pub(super) tap_flags: Expr<'k>,
-
-    /// What is subtracted from a word before the multiplication; the difference, the product, rounded sum of products.
-    pub(super) base: Net<'k>,
-    pub(super) difference: Expr<'k>,
-    pub(super) operand: Net<'k>,
-    pub(super) product: Expr<'k>,
-    pub(super) result: Expr<'k>,
-    /// `result` is a smoothed word, the last of a line.
-    pub(super) smoothed: Expr<'k>,
-    pub(super) line_ends: Expr<'k>,
+    pub(super) memories: Memories<'k>,
+    pub(super) multiplier: Multiplier<'k>,
 
     pub(super) count: Net<'k>,
     pub(super) kept: Net<'k>,
@@ -134,6 +117,34 @@ pub(super) struct Circuit<'k> {
     pub(super) bars: MemoryPort<'k>,
 }
 
+/// The memories of the words of the taxels, and that of the taps.
+pub(super) struct Memories<'k> {
+    /// Unsmoothed words; then words smoothed along both axes.
+    pub(super) words: MemoryPort<'k>,
+    /// Words smoothed along the rows; then for each taxel `{1, basin}` or `{0, direction of its step}`.
+    pub(super) steps: MemoryPort<'k>,
+    pub(super) words_out: Expr<'k>,
+    pub(super) steps_out: Expr<'k>,
+    /// The tap that is read, and its flags two cycles later.
+    pub(super) tap: Net<'k>,
+    pub(super) tap_flags: Expr<'k>,
+    /// Weight of the tap, with its flags.
+    weight: Expr<'k>,
+}
+
+/// The multiplier and the sum of its products.
+pub(super) struct Multiplier<'k> {
+    /// What is subtracted from a word before the multiplication; the difference, the product, rounded sum of products.
+    pub(super) base: Net<'k>,
+    pub(super) difference: Expr<'k>,
+    pub(super) operand: Net<'k>,
+    pub(super) product: Expr<'k>,
+    pub(super) result: Expr<'k>,
+    /// `result` is a smoothed word, the last of a line.
+    pub(super) smoothed: Expr<'k>,
+    pub(super) line_ends: Expr<'k>,
+}
+
 impl<'k> SegmentPorts<Inside<'k>> {
     /// The circuit between the ports.
     pub(super) fn circuit(self, k: &'k Builder, shape: &'k Shape) {
@@ -145,66 +156,84 @@ impl<'k> SegmentPorts<Inside<'k>> {
     }
 }
 
-impl<'k> Circuit<'k> {
-    fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
-        let (taxel, quad) = (count_bits(shape.taxels()), count_bits(shape.quad_count()));
-        let (row, col) = (count_bits(shape.rows), count_bits(shape.cols));
-        let rst = io.rst;
-        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
-        let state =
-            STATES.map(|name| k.state(&format!("in_{name}"), Type::unsigned(1), rst, u64::from(name == STATES[IDLE])));
-        let tick = register("tick", 4);
-        let [address, mirror, point, target] =
-            ["address", "mirror", "point", "target"].map(|name| register(name, taxel));
-        let (lane, moves) = (register("lane", 2), k.net("moves", Type::unsigned(1)));
-        let is = |step: usize| *state[step];
-        let later = |name: &str, value| k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value));
+/// A memory of which no word is read in the cycle that writes it.
+fn memory<'k>(k: &'k Builder, name: &str, words: usize, bits: usize, holds: Holds) -> MemoryPort<'k> {
+    k.memory(name, words, bits, Contents::Undefined).unchecked().holds(holds)
+}
 
-        k.comment("Quads of words, each with its sign; the word of a lane");
-        let narrow = |lane: usize| {
-            let value = io.fill_quad.slice(lane * shape.lane, shape.lane).signed();
-            let value = value.resize(value.bits().max(shape.low + WORD + 1)).unsigned();
-            value.top().concat(value.slice(shape.low, WORD))
-        };
-        let quads = k.memory("quads", shape.quad_count(), 4 * (WORD + 1), Contents::Undefined).unchecked();
-        let quads = quads.holds(Holds::SegmentQuads);
-        quads.write(io.fill, io.fill_address, concat(&[3, 2, 1, 0].map(narrow)));
-        let quad = register("quad", quad);
-        let quads_out = later("quads", quads.read(*quad));
-        let lanes: Vec<(u64, Expr)> =
-            (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
-        let signed = lane.case(&lanes[..3], lanes[3].1);
-        let picks =
-            k.wire("picks", is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(3));
-        let word = register("word", WORD);
-        k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
+/// What is read, two cycles later.
+fn later<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
+    k.delay(&format!("{name}_out"), k.delay(&format!("{name}_read"), value))
+}
 
-        let memory = |name: &str, words: usize, bits: usize, holds: Holds| {
-            k.memory(name, words, bits, Contents::Undefined).unchecked().holds(holds)
-        };
-        let words = memory("words", shape.taxels(), shape.smoothed, Holds::Smoothed);
-        let steps = memory("steps", shape.taxels(), shape.smoothed.max(BASIN + 1), Holds::Steps);
+/// The quads that come in: address of the one that is read; whether the word of a `lane` is taken, and that word.
+fn unpack<'k>(
+    k: &'k Builder,
+    shape: &Shape,
+    io: &SegmentPorts<Inside<'k>>,
+    lane: Expr<'k>,
+    picks: Expr<'k>,
+) -> (Net<'k>, Expr<'k>, Expr<'k>) {
+    k.comment("Quads of words, each with its sign; the word of a lane");
+    let narrow = |lane: usize| {
+        let value = io.fill_quad.slice(lane * shape.lane, shape.lane).signed();
+        let value = value.resize(value.bits().max(shape.low + WORD + 1)).unsigned();
+        value.top().concat(value.slice(shape.low, WORD))
+    };
+    let quads = memory(k, "quads", shape.quad_count(), 4 * (WORD + 1), Holds::SegmentQuads);
+    quads.write(io.fill, io.fill_address, concat(&[3, 2, 1, 0].map(narrow)));
+    let quad = k.register("quad", Type::unsigned(count_bits(shape.quad_count())));
+    let quads_out = later(k, "quads", quads.read(*quad));
+    let lanes: Vec<(u64, Expr)> =
+        (0..4).map(|lane| (lane as u64, quads_out.slice(lane * (WORD + 1), WORD + 1))).collect();
+    let signed = lane.case(&lanes[..3], lanes[3].1);
+    let picks = k.wire("picks", picks);
+    let word = k.register("word", Type::unsigned(WORD));
+    k.when(picks, || word.set(signed.low(WORD) & (!signed.top()).repeat(WORD)));
+    (quad, picks, *word)
+}
+
+impl<'k> Memories<'k> {
+    /// Words and steps are read at `point`, where the reading `moves` on.
+    fn new(k: &'k Builder, shape: &Shape, moves: Expr<'k>, point: Expr<'k>) -> Self {
+        let entry = shape.smoothed.max(BASIN + 1);
+        let words = memory(k, "words", shape.taxels(), shape.smoothed, Holds::Smoothed);
+        let steps = memory(k, "steps", shape.taxels(), entry, Holds::Steps);
         let read = |name: &str, memory: &MemoryPort<'k>, bits: usize| {
-            let [read, out] = ["read", "out"].map(|stage| register(&format!("{name}_{stage}"), bits));
-            k.when(*moves, || {
-                read.set(memory.read(*point));
+            let register = |stage: &str| k.register(&format!("{name}_{stage}"), Type::unsigned(bits));
+            let [read, out] = ["read", "out"].map(register);
+            k.when(moves, || {
+                read.set(memory.read(point));
                 out.set(*read);
             });
             *out
         };
         let words_out = read("words", &words, shape.smoothed);
-        let steps_out = read("steps", &steps, shape.smoothed.max(BASIN + 1));
+        let steps_out = read("steps", &steps, entry);
         let (weights, mut flags): (Vec<u64>, Vec<u64>) = shape.taps.concat().into_iter().unzip();
-        let tap = register("tap", count_bits(weights.len()));
+        let tap = k.register("tap", Type::unsigned(count_bits(weights.len())));
         let contents = Contents::Words(weights.iter().copied().enumerate().collect());
         let windows = k.memory("windows", weights.len(), TAP_BITS, contents).style("block");
-        let tap_out = later("tap", windows.holds(Holds::SmoothingWeights).read(*tap));
+        let weight = later(k, "tap", windows.holds(Holds::SmoothingWeights).read(*tap));
         // In logic: a block RAM may be far from what the flags decide in the same cycle.
         flags.resize(1 << tap.bits(), 0);
-        let tap_flags = later("tap_flags", tap.table(3, &flags));
+        let tap_flags = later(k, "tap_flags", tap.table(3, &flags));
+        Memories { words, steps, words_out, steps_out, tap, tap_flags, weight }
+    }
+}
 
-        k.comment("Multiplier and the sum of its products");
-        let (row, col) = (register("row", row), register("col", col));
+impl<'k> Multiplier<'k> {
+    /// Of a `word` or what is in the `memories`, in the state that `is` tells, at the tick, row, column and lane of `place`.
+    fn new(
+        k: &'k Builder,
+        shape: &Shape,
+        is: &dyn Fn(usize) -> Expr<'k>,
+        memories: &Memories<'k>,
+        word: Expr<'k>,
+        [tick, row, col, lane]: [Expr<'k>; 4],
+    ) -> Self {
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        let Memories { words_out, steps_out, tap_flags, weight, .. } = *memories;
         let smooths = k.wire("smooths", is(ALONG_ROWS) | is(ALONG_COLUMNS));
         let base = register("base", shape.smoothed);
         let read = word.extend(shape.smoothed);
@@ -212,8 +241,8 @@ impl<'k> Circuit<'k> {
         let difference = k.wire("difference", (data - *base).unsigned());
         let operand = register("operand", shape.smoothed + 1);
         k.when(!is(BORDERS) | tick.is(3), || operand.set(difference));
-        let weight = k.delay("weight2", k.delay("weight1", tap_out));
-        let factor = k.delay("factor", factor(k, shape, &is, [*tick, weight, *row, *col, *lane]));
+        let weight = k.delay("weight2", k.delay("weight1", weight));
+        let factor = k.delay("factor", factor(k, shape, is, [tick, weight, row, col, lane]));
         let product = register("product", shape.smoothed + 1 + FACTOR);
         product.set((operand.signed() * factor.extend(FACTOR + 1).signed()).low(product.bits()));
         // A tap's flags, when its product is there.
@@ -230,8 +259,31 @@ impl<'k> Circuit<'k> {
         // Not the word that follows the last one of an axis into the next step.
         let smoothed = k.wire("smoothed", ready & tick.any());
         let line_ends = k.delay("line_ends", flags.at(2));
+        Multiplier { base, difference, operand, product: product.get(), result, smoothed, line_ends }
+    }
+}
 
-        let table = |name: &str, bits: usize, holds: Holds| memory(name, TABLE, bits, holds);
+impl<'k> Circuit<'k> {
+    fn new(k: &'k Builder, shape: &'k Shape, io: SegmentPorts<Inside<'k>>) -> Self {
+        let taxel = count_bits(shape.taxels());
+        let rst = io.rst;
+        let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+        let state =
+            STATES.map(|name| k.state(&format!("in_{name}"), Type::unsigned(1), rst, u64::from(name == STATES[IDLE])));
+        let tick = register("tick", 4);
+        let [address, mirror, point, target] =
+            ["address", "mirror", "point", "target"].map(|name| register(name, taxel));
+        let (lane, moves) = (register("lane", 2), k.net("moves", Type::unsigned(1)));
+        let is = |step: usize| *state[step];
+
+        let picks = is(UNPACK) & tick.slice(1, 2).any() & !tick.slice(1, 2).all() | is(LABEL) & tick.is(3);
+        let (quad, picks, word) = unpack(k, shape, &io, *lane, picks);
+        let memories = Memories::new(k, shape, *moves, *point);
+        k.comment("Multiplier and the sum of its products");
+        let (row, col) = (register("row", count_bits(shape.rows)), register("col", count_bits(shape.cols)));
+        let multiplier = Multiplier::new(k, shape, &is, &memories, word, [*tick, *row, *col, *lane]);
+
+        let table = |name: &str, bits: usize, holds: Holds| memory(k, name, TABLE, bits, holds);
         let chain = table("chain", BASIN + 1, Holds::BasinLinks);
         let cursor = register("cursor", BASIN);
         let chain_out = k.wire("chain_out", chain.read(*cursor));
@@ -248,6 +300,7 @@ impl<'k> Circuit<'k> {
             quad,
             lane,
             picks,
+            word,
             counts: register("counts", 1),
             point,
             target,
@@ -255,20 +308,8 @@ impl<'k> Circuit<'k> {
             begun: register("begun", 1),
             ending: register("ending", 1),
             moves,
-            words,
-            steps,
-            word: word.get(),
-            words_out,
-            steps_out,
-            tap,
-            tap_flags,
-            base,
-            difference,
-            operand,
-            product: product.get(),
-            result,
-            smoothed,
-            line_ends,
+            memories,
+            multiplier,
             count: register("basins", BASIN),
             kept: io.count.register(),
             overflow: io.overflow.register(),
