@@ -185,7 +185,7 @@ docs: ## build the documentation, warnings are errors
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: setup ## time a golden reconstruction, kernel simulation against Verilator's, Python against Rust, a start, a stream, an import, the drawing of the live page, how many patches dermis-ros holds, and a frame on CPU, microcontroller and FPGA
-	$(CARGO) bench --locked --package dermis-golden
+	$(CARGO) bench --locked --package dermis-study
 	$(CARGO) bench --locked --package dermis-sim
 	python3 -m venv --clear $(VENV)-release
 	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.in scipy ./python
