@@ -12,7 +12,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use dermis_cosim::drive::{record, InputFrame, Stimulus};
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::scene::Scene;

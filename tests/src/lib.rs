@@ -43,7 +43,8 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::estimate::learned::{self, Training};

@@ -25,6 +25,7 @@ use super::array_frames::{ArrayFrames, ArrayResult};
 use super::board::VerilatedBoard;
 use super::drive::{record, InputFrame, Stimulus};
 use super::scan::ScannedBoard;
+use super::simulator::Simulator;
 use super::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use crate::device_error::device_error;
 use dermis_flow::netlist::netlist;
@@ -42,28 +43,6 @@ pub struct DeviceTimeout {
     pub cycle: u64,
     /// The transfer that was awaited, as text.
     pub rule: String,
-}
-
-/// Simulator of the hardware.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Simulator {
-    /// The generated Verilog, under Verilator.
-    Verilator,
-    /// The same design in kernel simulation.
-    Kernel,
-    /// The netlist synthesised for the scene's board, under Verilator.
-    Netlist,
-}
-
-impl Simulator {
-    /// Name in messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Simulator::Verilator => "verilator",
-            Simulator::Kernel => "kernel",
-            Simulator::Netlist => "netlist",
-        }
-    }
 }
 
 /// A scene's model and the hardware generated from it.

@@ -14,7 +14,8 @@
 //! | [`drive`] | sends frames into a device and records every transfer with its cycle |
 //! | [`run`], [`compare_recording`] | compare a recording with the bit-true model |
 //! | [`array_frames`] | which array each frame is of, and the results in their order |
-//! | [`hardware`] | a scene's generated hardware and its simulators |
+//! | [`hardware`] | a scene's generated hardware in its simulators |
+//! | [`simulator`] | their names |
 //! | [`VerilatedBoard`] | a board's top module under Verilator |
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`faults`] | flips single bits and classifies the effect |
@@ -44,6 +45,7 @@ mod findings;
 pub mod hardware;
 pub mod power;
 pub mod scan;
+pub mod simulator;
 pub mod stress;
 pub mod toggles;
 pub mod verify;

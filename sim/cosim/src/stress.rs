@@ -27,7 +27,8 @@ use dermis_golden::data::frame::Frame;
 pub use outcome::{Outcome, Violation};
 pub(crate) use samples::{shipped_samples, synthetic_samples, Sample};
 
-use super::hardware::{Hardware, Simulator};
+use super::hardware::Hardware;
+use super::simulator::Simulator;
 use handshake_rates::HandshakeRates;
 use testbench::{Burst, Testbench, RESET_CYCLES};
 

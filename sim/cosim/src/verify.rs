@@ -25,7 +25,8 @@ use super::against_model::{run, DeviceUnderTest, Vector};
 use super::array_frames::{ArrayFrames, ArrayResult};
 use super::drive::{Stimulus, Times};
 use super::findings::Findings;
-use super::hardware::{Hardware, Simulator};
+use super::hardware::Hardware;
+use super::simulator::Simulator;
 use crate::compare::{comparable_forces, difference, Difference};
 use dermis_flow::progress::Progress;
 

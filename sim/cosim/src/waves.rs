@@ -29,7 +29,8 @@ use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, VarType, Writer};
 
 use super::against_model::{run, DeviceUnderTest};
 use super::drive::Stimulus;
-use super::hardware::{Hardware, Simulator};
+use super::hardware::Hardware;
+use super::simulator::Simulator;
 use dermis_flow::progress::Progress;
 use dermis_golden::write::write;
 

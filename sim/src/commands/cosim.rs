@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 
 use super::inputs::{resolve_specimen, BoardOverride};
 use super::layout::LayoutArguments;
-use dermis_cosim::hardware::Simulator;
 use dermis_cosim::scan::{verify_scan, Fault};
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify_specimen;
 use dermis_cosim::waves::waves;
 use dermis_report::{self as report, CosimReport, ScanReport};

@@ -9,7 +9,7 @@ use dermis_golden::spec::partition::Case;
 use dermis_golden::spec::scene::Scene;
 
 use super::inputs::scenes_or;
-use dermis_cosim::hardware::Simulator;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::{verify, Verified};
 use dermis_cosim::QUICK_SCENES;
 use dermis_flow::progress::Progress;

@@ -2,7 +2,8 @@
 //! come in any order. Stalls, resets and frames cut short meanwhile are those of `streams.rs`, here with arrays.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::stress::stress;
 use dermis_cosim::{run, DeviceUnderTest, Vector};
 use dermis_golden::data::input::calibration::Calibration;

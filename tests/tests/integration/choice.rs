@@ -4,7 +4,8 @@
 use std::collections::BTreeSet;
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::quantise::quantise;

@@ -2,7 +2,8 @@
 //! speed, back to back and with stalls, wherever the frames go from one stage to the next.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::send::Status;

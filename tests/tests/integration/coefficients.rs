@@ -2,7 +2,8 @@
 //! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
 use dermis_cosim::drive::{record, InputFrame, Stimulus};
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_cosim::{Vector, QUICK_SCENES};
 use dermis_golden::data::frame::Frame;

@@ -4,7 +4,8 @@
 //! `dermis study dead-taxels` prints the table of errors.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::estimate::float::Golden;

@@ -2,7 +2,7 @@
 //! Verilog (full speed, back to back, and with stalls after an interrupted frame) and kernel simulation
 //! against the bit-true model, on every shipped frame, with exact cycle counts, none above those of the committed table.
 
-use dermis_cosim::hardware::Simulator;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::{verify, Verified};
 use dermis_cosim::QUICK_SCENES;
 use dermis_golden::data::frame::Frame;

@@ -2,7 +2,8 @@
 //! Verilog (full speed and with stalls) and kernel simulation, against the bit-true model, to the bit and the cycle.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::Vector;
 use dermis_golden::fixed::Model;
 use dermis_golden::spec::partition::Case;

@@ -2,7 +2,8 @@
 //! stage concerned.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::{Findings, Vector};
 use dermis_golden::fixed::Model;
 use dermis_tests::{build_dir, compare, scene};

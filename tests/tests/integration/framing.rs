@@ -2,7 +2,8 @@
 //! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
 //! `framing`, once.
 
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};

@@ -4,7 +4,8 @@
 
 use std::ops::Deref;
 
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::stages::send::FRAMING;
 use dermis_golden::fixed::{Cycles, Model};

@@ -2,7 +2,8 @@
 //! of the Verilog cannot: a constant whose sign two tools read differently.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::{Findings, Vector};
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;

@@ -1,7 +1,8 @@
 //! Means over time: hardware and bit-true model are equal in every word and cycle over whole presses.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::Vector;
 use dermis_golden::data::generator::presses::{Motion, Press};
 use dermis_golden::fixed::stages::send::{Status, WINDOW};

@@ -2,7 +2,8 @@
 //! with stalls. Resets, frames cut short and tables written meanwhile are in `streams.rs` and `tables.rs`.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::send::Status;

@@ -2,7 +2,8 @@
 //! random frames of small sensors with random gaps and back-pressure on both streams.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_cosim::{run, DeviceUnderTest, Vector};
 use dermis_golden::fixed::Model;

@@ -1,8 +1,8 @@
 //! Scan by the hardware: codes and beats equal the bit-true model to the bit in Verilator and in kernel simulation, with
 //! converters modelled from their data sheet, none of whose times is broken; what faults of the wires do; seeded defects.
 
-use dermis_cosim::hardware::Simulator;
 use dermis_cosim::scan::{expected, simulate, verify_scan, Array, Fault, Image, VerifiedScan, VerilatedScan};
+use dermis_cosim::simulator::Simulator;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;
 use dermis_golden::result::flags::Flag;

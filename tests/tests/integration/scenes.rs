@@ -4,7 +4,8 @@
 //! needs no compiler.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::fixed::Model;

@@ -2,7 +2,8 @@
 //! scenes that it does not support are rejected by field.
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_cosim::Vector;
 use dermis_golden::data::frame::Frame;

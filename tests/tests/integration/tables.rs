@@ -4,7 +4,8 @@
 use std::fs;
 
 use dermis_cosim::drive::Stimulus;
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::Vector;
 use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::fixed::stages::load::{beats, Outcome};

@@ -45,199 +45,247 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let built: Vec<u32> = plan.cases().iter().map(CasePlan::number).collect();
         scene.partition.listed = Some([0, 1, 2, 3].map(|number| built.contains(&number)));
     }
-    let scene = &scene;
-    let input = &scene.input;
-    let with = |change: &dyn Fn(&mut Scene)| {
-        let mut changed = scene.clone();
+    let mut list = List { plan, scene: &scene, all: Vec::new() };
+    list.codes();
+    list.tables();
+    list.means();
+    list.arrays();
+    list.estimate();
+    list.forces();
+    list.all
+}
+
+/// The features that have been listed.
+struct List<'p> {
+    plan: &'p Plan,
+    scene: &'p Scene,
+    all: Vec<Feature>,
+}
+
+/// One of two settings: the scene's `own` if it `has` the feature, else that with which it is added.
+fn set(has: bool, own: String, added: &str) -> String {
+    if has {
+        own
+    } else {
+        added.to_string()
+    }
+}
+
+impl List<'_> {
+    /// The scene after a change.
+    fn with(&self, change: impl FnOnce(&mut Scene)) -> Scene {
+        let mut changed = self.scene.clone();
         change(&mut changed);
         changed
-    };
-    let plain = planned;
-    let of_zeros = |scene: &Scene, gains| Scale::of_tare(scene.hardware.arrays * scene.sensor.taxels(), gains);
-    let scaled = |scene: &Scene, gains| planned_with(scene, of_zeros(scene, gains), None);
-    let full_scale = input.full_scale_MPa.unwrap_or(1.0);
-
-    let mut all = Vec::new();
-    let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Plan, FixedError>| {
-        all.push(Feature { name, setting, with_feature: (!has).then(back), without_feature: None });
-    };
-    let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
-
-    // The plan does not count the scan, which stands before the engine: a scene that has it lists it, without its cost.
-    if let Some(scan) = scene.hardware.adc_scan {
-        let setting = format!("{} {} on one bus", scan.converters, scan.converter.name);
-        add("scan", true, setting, &|| plain(scene));
     }
-    let checking = with(&|s| s.hardware.code_check = CodeCheck::On);
-    if checking.checks_codes() && plan.board.engine == EngineKind::Parallel {
-        add("code check", scene.checks_codes(), "plateaus, repeated rows and columns".into(), &|| plain(&checking));
+
+    /// Adds a feature; where the scene does not have it, its plan.
+    fn add_plan(
+        &mut self,
+        name: &'static str,
+        has: bool,
+        setting: String,
+        plan: impl FnOnce(&Self) -> Result<Plan, FixedError>,
+    ) {
+        let with_feature = (!has).then(|| plan(self));
+        self.all.push(Feature { name, setting, with_feature, without_feature: None });
     }
-    let written = plan.has_writable_tables();
-    let table = input.calibration.is_some() || written;
-    let running = input.running_zero();
-    let tare = table || input.tare.is_some();
-    add("tare frame", tare, "a zero per taxel".into(), &|| {
-        scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
-    });
-    add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
-        scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
-    });
-    add("writable tables", written, "zero, gain, noise floor and threshold".into(), &|| {
-        let writable = (TableStorage::Writable, Some(full_scale));
-        plain(&with(&|s| (s.hardware.tables, s.input.full_scale_MPa) = writable))
-    });
-    let runs = |s: &mut Scene| {
-        let limit_MPa = full_scale * RunningZero::LIMIT_SHARE;
-        s.input.zero = Zero::Running(RunningZero { average: RunningZero::AVERAGE, limit_MPa });
-        s.input.full_scale_MPa = Some(full_scale);
-    };
-    let average = running.map_or(RunningZero::AVERAGE, |running| running.average);
-    add("running zero", running.is_some(), format!("a gain of 2^−{average}"), &|| plain(&with(&runs)));
-    let range = &scene.hardware.table_range;
-    let covers = range.thickness_mm.unwrap_or(OTHER_COVERS.map(|of_own| of_own * scene.sensor.thickness_mm));
-    let own = [
-        range.thickness_mm.map(|[least, most]| format!("covers of {least} to {most} mm")),
-        (range.dead_taxels > 0).then(|| format!("up to {} dead taxels", range.dead_taxels)),
-    ];
-    let own = own.into_iter().flatten().collect::<Vec<_>>().join(", ");
-    let cover = format!("covers of {:.3} to {:.3} mm", covers[0], covers[1]);
-    let coefficients = scene.hardware.has_writable_coefficients();
-    add("writable coefficients", coefficients, set(coefficients, own, &cover), &|| {
-        let writable = |s: &mut Scene| {
-            (s.hardware.tables, s.input.full_scale_MPa) = (TableStorage::Writable, Some(full_scale));
-            s.hardware.table_range.thickness_mm = Some(covers);
+
+    /// Adds a feature that a scene without it has after a change.
+    fn add(&mut self, name: &'static str, has: bool, setting: String, change: impl FnOnce(&mut Scene)) {
+        self.add_plan(name, has, setting, |list| planned(&list.with(change)));
+    }
+
+    /// Adds a feature of the scene that is not added to others.
+    fn add_own(&mut self, name: &'static str, setting: String) {
+        self.add(name, true, setting, |_| ());
+    }
+
+    /// The plan after a change without the feature added last, where the scene has it.
+    fn without(&mut self, change: impl FnOnce(&mut Scene)) {
+        if let Some(feature) = self.all.last_mut().filter(|feature| feature.with_feature.is_none()) {
+            let mut changed = self.scene.clone();
+            change(&mut changed);
+            feature.without_feature = planned(&changed).ok();
+        }
+    }
+
+    /// The scene's full scale, or one for scenes without.
+    fn full_scale_MPa(&self) -> f64 {
+        self.scene.input.full_scale_MPa.unwrap_or(1.0)
+    }
+
+    /// What gives the codes and checks them.
+    fn codes(&mut self) {
+        // The plan does not count the scan, which stands before the engine: a scene that has it lists it, without its cost.
+        if let Some(scan) = self.scene.hardware.adc_scan {
+            self.add_own("scan", format!("{} {} on one bus", scan.converters, scan.converter.name));
+        }
+        let check = |s: &mut Scene| s.hardware.code_check = CodeCheck::On;
+        if self.with(check).checks_codes() && self.plan.board.engine == EngineKind::Parallel {
+            let checks = self.scene.checks_codes();
+            self.add("code check", checks, "plateaus, repeated rows and columns".into(), check);
+            self.without(|s| s.hardware.code_check = CodeCheck::Off);
+        }
+    }
+
+    /// Zeros and gains of the taxels, and what can be written.
+    fn tables(&mut self) {
+        let (scene, input, full_scale) = (self.scene, &self.scene.input, self.full_scale_MPa());
+        let scaled = |scene: &Scene, gains| {
+            planned_with(scene, Scale::of_tare(scene.hardware.arrays * scene.sensor.taxels(), gains), None)
         };
-        plain(&with(&writable))
-    });
-    let adaptive = |s: &mut Scene| {
-        let average = if s.input.mean == MeanKind::Adaptive { s.input.average } else { 0 };
-        (s.input.average, s.input.mean, s.input.template) = (average, MeanKind::Adaptive, false);
-    };
-    let (mean, power) = (input.mean, input.longest_average().max(1));
-    let (slides, adapts) = (mean == MeanKind::Sliding, mean == MeanKind::Adaptive);
-    let frames = if input.slides() { most_frames(power) } else { 1 << power };
-    add("averaging", input.longest_average() > 0, format!("{frames} frames"), &|| {
-        plain(&with(&|s| s.input.average = power))
-    });
-    add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), &|| {
-        plain(&with(&|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding)))
-    });
-    let longest = with(&adaptive).input.longest_average();
-    add("adaptive mean", adapts, format!("the longest of {} frames", most_frames(longest)), &|| {
-        plain(&with(&adaptive))
-    });
-    let several = scene.hardware.arrays > 1;
-    let arrays = if several { scene.hardware.arrays } else { OTHER_ARRAYS };
-    add("several arrays", several, format!("{arrays} arrays"), &|| plain(&with(&|s| s.hardware.arrays = arrays)));
-    let parts = plan.parts().len();
-    let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
-    if plan.chooses() {
-        // The cases built stay the same, whatever else would fit.
-        let cases: Vec<String> = plan.cases().iter().map(|case| case.case.to_string()).collect();
-        add("choice of the case", true, format!("cases {} per frame", cases.join(", ")), &|| plain(scene));
-    } else if parts > 1 {
-        add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
-    } else if let Some(case) = quarters {
-        add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
-    }
-    let degree = plan.formats().degree;
-    let mu_max = SearchSpec::default().mu_max;
-    let own = format!("mu_max = {}", scene.search.mu_max);
-    let back = if degree > 0 { scene.search.mu_max } else { mu_max };
-    add("search", plan.searches(), set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
-        plain(&with(&|s| (s.search.mu_max, s.hardware.estimator) = (back, Some(EstimatorKind::Search))))
-    });
-    if plan.has_network() {
-        let layers: Vec<String> = plan.formats().layers.iter().map(usize::to_string).collect();
-        add("network", true, format!("layers of {} rows", layers.join(", ")), &|| plain(scene));
-    }
-    if plan.contacts() > 0 {
-        add("contacts", true, format!("a μ for each of {} at most", plan.contacts()), &|| plain(scene));
-    }
-    if degree > 0 {
-        let cubic = degree == MAX_DEGREE;
-        add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
-            planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+        let written = self.plan.has_writable_tables();
+        let table = input.calibration.is_some() || written;
+        self.add_plan("tare frame", table || input.tare.is_some(), "a zero per taxel".into(), |list| {
+            let tared = |s: &mut Scene| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
+            scaled(&list.with(tared), false)
         });
-    }
-    let width = plan.formats().search_width;
-    // The serial engine searches one taxel at a time; where the case is chosen per frame, it is four.
-    let chosen = plan.searches() && !plan.chooses() && plan.board.engine == EngineKind::Parallel;
-    if chosen {
-        add("search width", width == Quads::LANES, format!("{} taxels per cycle", Quads::LANES), &|| {
-            plain(&with(&|s| s.hardware.search_width = Some(Quads::LANES)))
+        let setting = format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel");
+        self.add_plan("calibration table", table, setting, |list| {
+            let tabled =
+                |s: &mut Scene| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
+            scaled(&list.with(tabled), true)
         });
-    }
-    // A threshold that is written is there whatever the scene's.
-    let threshold = plan.built_in_threshold() != Some(0);
-    let own = match plan.built_in_threshold() {
-        None if !written => "of each array".to_owned(),
-        _ => format!("{} N", scene.threshold.min_force_N),
-    };
-    add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
-        let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
-        plain(&thresholded)
-    });
-    let dead = input.dead.len();
-    let flips = &plan.formats().flips;
-    let own = format!(
-        "{dead} {}; parity flips: {} of Cz⁺, {} of Ax, {} of Ay",
-        if dead == 1 { "taxel" } else { "taxels" },
-        flips.inverse.len(),
-        flips.ax.len(),
-        flips.ay.len()
-    );
-    // A dead taxel in a corner breaks every symmetry.
-    add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
-        plain(&with(&|s| s.input.dead = vec![[0, 0]]))
-    });
-    add("coefficient check", plan.has_coefficient_check(), "a signature of the words read".into(), &|| {
-        plain(&with(&|s| s.hardware.coefficient_check = CoefficientCheck::Signature))
-    });
-    let resultants = plan.sends_resultants();
-    add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
-        plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
-    });
-    let mut without = |name: &str, change: &dyn Fn(&mut Scene)| {
-        let plan = plain(&with(change)).ok();
-        all.iter_mut().filter(|feature| feature.name == name).for_each(|f| f.without_feature = plan.clone());
-    };
-    if scene.checks_codes() {
-        without("code check", &|s| s.hardware.code_check = CodeCheck::Off);
-    }
-    if running.is_some() {
-        without("running zero", &|s| s.input.zero = Zero::Fixed);
-    }
-    if slides {
-        without("sliding mean", &|s| s.input.mean = MeanKind::Block);
-    }
-    if adapts {
-        without("adaptive mean", &|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding));
-    }
-    if written {
-        without("writable tables", &|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
-    }
-    if several {
-        without("several arrays", &|s| *s = s.of_array(0));
-    }
-    if coefficients {
-        without("writable coefficients", &|s| {
+        let writes = |s: &mut Scene| {
+            (s.hardware.tables, s.input.full_scale_MPa) = (TableStorage::Writable, Some(full_scale));
+        };
+        self.add("writable tables", written, "zero, gain, noise floor and threshold".into(), writes);
+        self.without(|s| (s.hardware.tables, s.hardware.table_range) = Default::default());
+        let running = input.running_zero();
+        let average = running.map_or(RunningZero::AVERAGE, |running| running.average);
+        self.add("running zero", running.is_some(), format!("a gain of 2^−{average}"), |s| {
+            let limit_MPa = full_scale * RunningZero::LIMIT_SHARE;
+            s.input.zero = Zero::Running(RunningZero { average: RunningZero::AVERAGE, limit_MPa });
+            s.input.full_scale_MPa = Some(full_scale);
+        });
+        self.without(|s| s.input.zero = Zero::Fixed);
+        let range = &scene.hardware.table_range;
+        let covers = range.thickness_mm.unwrap_or(OTHER_COVERS.map(|of_own| of_own * scene.sensor.thickness_mm));
+        let own = [
+            range.thickness_mm.map(|[least, most]| format!("covers of {least} to {most} mm")),
+            (range.dead_taxels > 0).then(|| format!("up to {} dead taxels", range.dead_taxels)),
+        ];
+        let own = own.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        let cover = format!("covers of {:.3} to {:.3} mm", covers[0], covers[1]);
+        let coefficients = scene.hardware.has_writable_coefficients();
+        self.add("writable coefficients", coefficients, set(coefficients, own, &cover), |s| {
+            writes(s);
+            s.hardware.table_range.thickness_mm = Some(covers);
+        });
+        self.without(|s| {
             s.hardware.table_range = TableRange { gain: s.hardware.table_range.gain, ..TableRange::default() }
         });
     }
-    if dead > 0 {
-        without("dead taxels", &|s| s.input.dead.clear());
+
+    /// Means over frames.
+    fn means(&mut self) {
+        let input = &self.scene.input;
+        let adaptive = |s: &mut Scene| {
+            let average = if s.input.mean == MeanKind::Adaptive { s.input.average } else { 0 };
+            (s.input.average, s.input.mean, s.input.template) = (average, MeanKind::Adaptive, false);
+        };
+        let (mean, power) = (input.mean, input.longest_average().max(1));
+        let slide = |s: &mut Scene| (s.input.average, s.input.mean) = (power, MeanKind::Sliding);
+        let (slides, adapts) = (mean == MeanKind::Sliding, mean == MeanKind::Adaptive);
+        let frames = if input.slides() { most_frames(power) } else { 1 << power };
+        self.add("averaging", input.longest_average() > 0, format!("{frames} frames"), |s| s.input.average = power);
+        self.add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), slide);
+        self.without(|s| s.input.mean = MeanKind::Block);
+        let longest = self.with(adaptive).input.longest_average();
+        self.add("adaptive mean", adapts, format!("the longest of {} frames", most_frames(longest)), adaptive);
+        self.without(slide);
     }
-    if chosen && width == Quads::LANES {
-        without("search width", &|s| s.hardware.search_width = Some(1));
+
+    /// Several arrays, and the subarrays of each.
+    fn arrays(&mut self) {
+        let (plan, scene) = (self.plan, self.scene);
+        let several = scene.hardware.arrays > 1;
+        let arrays = if several { scene.hardware.arrays } else { OTHER_ARRAYS };
+        self.add("several arrays", several, format!("{arrays} arrays"), |s| s.hardware.arrays = arrays);
+        self.without(|s| *s = s.of_array(0));
+        let parts = plan.parts().len();
+        let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
+        if plan.chooses() {
+            // The cases built stay the same, whatever else would fit.
+            let cases: Vec<String> = plan.cases().iter().map(|case| case.case.to_string()).collect();
+            self.add_own("choice of the case", format!("cases {} per frame", cases.join(", ")));
+        } else if parts > 1 {
+            self.add_own("partition", format!("{parts} subarrays"));
+        } else if let Some(case) = quarters {
+            self.add("partition", false, "2×2 subarrays".into(), |s| s.partition.case = case);
+        }
     }
-    if let Some(push) = plan.push_limit {
-        all.push(Feature {
-            name: "negative pressure",
-            setting: format!("flagged above 1/{} of all", 1 + push),
-            with_feature: None,
-            without_feature: Some(Plan { push_limit: None, ..plan.clone() }),
+
+    /// What gives μ.
+    fn estimate(&mut self) {
+        let (plan, scene) = (self.plan, self.scene);
+        let degree = plan.formats().degree;
+        let mu_max = SearchSpec::default().mu_max;
+        let own = format!("mu_max = {}", scene.search.mu_max);
+        let back = if degree > 0 { scene.search.mu_max } else { mu_max };
+        self.add("search", plan.searches(), set(degree > 0, own, &format!("mu_max = {mu_max}")), |s| {
+            (s.search.mu_max, s.hardware.estimator) = (back, Some(EstimatorKind::Search));
         });
+        if plan.has_network() {
+            let layers: Vec<String> = plan.formats().layers.iter().map(usize::to_string).collect();
+            self.add_own("network", format!("layers of {} rows", layers.join(", ")));
+        }
+        if plan.contacts() > 0 {
+            self.add_own("contacts", format!("a μ for each of {} at most", plan.contacts()));
+        }
+        if degree > 0 {
+            self.add_plan("polynomial of degree 3", degree == MAX_DEGREE, "degree 3".into(), |_| {
+                planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+            });
+        }
+        // The serial engine searches one taxel at a time; where the case is chosen per frame, it is four.
+        if plan.searches() && !plan.chooses() && plan.board.engine == EngineKind::Parallel {
+            let widest = plan.formats().search_width == Quads::LANES;
+            self.add("search width", widest, format!("{} taxels per cycle", Quads::LANES), |s| {
+                s.hardware.search_width = Some(Quads::LANES);
+            });
+            self.without(|s| s.hardware.search_width = Some(1));
+        }
     }
-    all
+
+    /// What becomes of the forces, and their checks.
+    fn forces(&mut self) {
+        let (plan, scene, full_scale) = (self.plan, self.scene, self.full_scale_MPa());
+        // A threshold that is written is there whatever the scene's.
+        let threshold = plan.built_in_threshold() != Some(0);
+        let own = match plan.built_in_threshold() {
+            None if !plan.has_writable_tables() => "of each array".to_owned(),
+            _ => format!("{} N", scene.threshold.min_force_N),
+        };
+        self.add("threshold", threshold, set(threshold, own, "1 mN"), |s| {
+            (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale));
+        });
+        let dead = scene.input.dead.len();
+        let flips = &plan.formats().flips;
+        let own = format!(
+            "{dead} {}; parity flips: {} of Cz⁺, {} of Ax, {} of Ay",
+            if dead == 1 { "taxel" } else { "taxels" },
+            flips.inverse.len(),
+            flips.ax.len(),
+            flips.ay.len()
+        );
+        // A dead taxel in a corner breaks every symmetry.
+        let corner = |s: &mut Scene| s.input.dead = vec![[0, 0]];
+        self.add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), corner);
+        self.without(|s| s.input.dead.clear());
+        self.add("coefficient check", plan.has_coefficient_check(), "a signature of the words read".into(), |s| {
+            s.hardware.coefficient_check = CoefficientCheck::Signature;
+        });
+        let setting = "a force and its moments per subarray".into();
+        self.add("resultants", plan.sends_resultants(), setting, |s| s.output.forces = ForceOutput::Resultants);
+        if let Some(push) = plan.push_limit {
+            self.all.push(Feature {
+                name: "negative pressure",
+                setting: format!("flagged above 1/{} of all", 1 + push),
+                with_feature: None,
+                without_feature: Some(Plan { push_limit: None, ..plan.clone() }),
+            });
+        }
+    }
 }

@@ -17,7 +17,7 @@ use super::array::{volts, Array, Fault, NOISE_LSB};
 use super::converters::Converters;
 use super::device::VerilatedScan;
 use crate::findings::{Findings, FrameComparison, Place};
-use crate::hardware::Simulator;
+use crate::simulator::Simulator;
 use dermis_flow::progress::Progress;
 
 /// Cycles of reset before a run.

@@ -16,7 +16,8 @@ use rustix::termios::{tcgetattr, tcsetattr, OptionalActions};
 
 use super::host_uart::{require_uart, HostUart, UartSymbol};
 use super::noisy_channel::{ChannelFaults, NoisyChannel};
-use dermis_cosim::hardware::{Hardware, Simulator};
+use dermis_cosim::hardware::Hardware;
+use dermis_cosim::simulator::Simulator;
 
 /// Clock cycles simulated between two polls of the pseudo-terminal.
 const SLICE: u64 = 200;

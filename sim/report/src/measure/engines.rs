@@ -14,7 +14,7 @@ use dermis_study::baseline::Baseline;
 
 use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
 use super::timing::Timing;
-use dermis_cosim::hardware::Simulator;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::verify::verify;
 use dermis_cosim::QUICK_SCENES;
 use dermis_flow::jobs::parallel;

@@ -1,6 +1,6 @@
 //! The link over SPI: a controller with rates from 1 MHz to the highest allowed, and transactions that end anywhere.
 
-use dermis_cosim::hardware::Simulator;
+use dermis_cosim::simulator::Simulator;
 use dermis_cosim::VerilatedBoard;
 use dermis_golden::fixed::{Cycles, Model, Plan};
 use dermis_golden::spec::link_kind::LinkKind;
