@@ -20,7 +20,7 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`line`] | a line of bounded length, and the frame in it |
+//! | [`mod@line`] | a line of bounded length, and the frame in it |
 //! | [`queue`] | the queue between the two threads |
 //! | [`source`] | where lines come from |
 //! | [`stop`] | the end that another thread asks for |

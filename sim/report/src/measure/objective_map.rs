@@ -11,7 +11,7 @@ use dermis_golden::fixed::words::formats::{HALVINGS, MU_STEPS};
 use super::measured::{ContactCount, Measured};
 
 /// Grid points from the centre to mu_max along an axis.
-pub const HALF: i32 = 20;
+const HALF: i32 = 20;
 /// Distance from μ*, as a share of mu_max, from which a μ counts as clearly different.
 const APART: f64 = 1.0 / 8.0;
 
@@ -26,7 +26,7 @@ pub struct ObjectiveMap {
     pub contacts: ContactCount,
     /// Largest |μ|.
     pub mu_max: f64,
-    /// Π on a square grid of 2·[`HALF`] + 1 points per axis, row by row, μ2 constant in a row; `None` outside the disc
+    /// Π on a square grid of 2·`HALF` + 1 points per axis, row by row, μ2 constant in a row; `None` outside the disc
     /// or without compression.
     pub values: Vec<Option<f64>>,
     /// Best μ of the bit-true search after the coarse grid and after each refinement; μ* last.
