@@ -59,7 +59,8 @@ struct Error {
 /// done and of all.
 ///
 /// ```
-/// use dermis_golden::{study::noise::measure_deviations, spec::scene::Scene};
+/// use dermis_golden::spec::scene::Scene;
+/// use dermis_study::noise::measure_deviations;
 ///
 /// let table = measure_deviations(&Scene::builtin("eight-by-eight")?, 100, 1, &|_, _| ())?;
 /// // The more noise, the less is known of the shear.

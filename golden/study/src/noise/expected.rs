@@ -62,7 +62,8 @@ impl StatedNoise {
 /// The errors to expect; `progress` is called after every frame with the number of frames done and of all.
 ///
 /// ```
-/// use dermis_golden::{study::noise::expected::{expected, Expectation, StatedNoise}, spec::scene::Scene};
+/// use dermis_golden::spec::scene::Scene;
+/// use dermis_study::noise::expected::{expected, Expectation, StatedNoise};
 ///
 /// let mut scene = Scene::builtin("eight-by-eight")?;
 /// scene.search.noise_floor_MPa = Some(1e-4);

@@ -70,7 +70,8 @@ pub fn sensitivities(
 /// free where it states a layer. As [`sensitivities`].
 ///
 /// ```
-/// use dermis_golden::{spec::scene::Scene, study::noise::{other_medium, Candidate, ShapeStudy}};
+/// use dermis_golden::spec::scene::Scene;
+/// use dermis_study::noise::{other_medium, Candidate, ShapeStudy};
 ///
 /// let study = ShapeStudy { draws: 6, candidates: vec![Candidate::Scene], ..Default::default() };
 /// let rows = other_medium(&Scene::builtin("eight-by-eight-bonded")?, &study, &|_, _| ())?;

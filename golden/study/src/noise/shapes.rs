@@ -240,7 +240,8 @@ pub(super) fn outcomes(
 /// Runs a study; `progress` is called after every frame with the number of frames done and of all.
 ///
 /// ```
-/// use dermis_golden::{study::noise::{shape_study, Candidate, ShapeStudy}, spec::scene::{ObjectiveKind, Scene}};
+/// use dermis_golden::spec::scene::{ObjectiveKind, Scene};
+/// use dermis_study::noise::{shape_study, Candidate, ShapeStudy};
 ///
 /// let candidates = vec![Candidate::Objective(ObjectiveKind::Sparse)];
 /// let small = ShapeStudy { levels: vec![0.0], draws: 10, candidates, ..Default::default() };

@@ -41,7 +41,8 @@ pub struct SlipRow {
 /// kind of slip.
 ///
 /// ```
-/// use dermis_golden::{study::noise::{slip_study, Candidate, ShapeStudy}, spec::scene::{EstimatorKind, Scene}};
+/// use dermis_golden::spec::scene::{EstimatorKind, Scene};
+/// use dermis_study::noise::{slip_study, Candidate, ShapeStudy};
 ///
 /// let candidates = vec![Candidate::Estimator(EstimatorKind::Evidence)];
 /// let small = ShapeStudy { levels: vec![0.0], draws: 5, candidates, ..Default::default() };

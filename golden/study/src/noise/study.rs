@@ -140,7 +140,8 @@ const BOUND_DRAWS: usize = 32;
 /// Runs a study; `progress` is called after every row with the number of rows done and of all rows.
 ///
 /// ```
-/// use dermis_golden::{study::noise::{study, Study}, spec::scene::{ObjectiveKind, Scene}};
+/// use dermis_golden::spec::scene::{ObjectiveKind, Scene};
+/// use dermis_study::noise::{study, Study};
 ///
 /// let small = Study { levels: vec![0.0, 1e-3], draws: 12, seed: 1, objectives: vec![ObjectiveKind::Patch], frames: 1 };
 /// let rows = study(&Scene::builtin("sensor-1")?, &small, &mut |_, _| ())?;

@@ -376,7 +376,8 @@ fn counted(judged: &Judged, carried: &BTreeSet<Flag>) -> Counts {
 /// number of frames done and of all.
 ///
 /// ```
-/// use dermis_golden::{spec::scene::Scene, study::sensor_faults::{sensor_faults, SensorFaults}};
+/// use dermis_golden::spec::scene::Scene;
+/// use dermis_study::sensor_faults::{sensor_faults, SensorFaults};
 ///
 /// let small = SensorFaults { frames: 1, quick: true, only: vec!["sign reversed".to_owned()], ..Default::default() };
 /// let rows = sensor_faults(&[Scene::builtin("eight-by-eight")?], &small, &|_, _| ())?;
