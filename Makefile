@@ -117,7 +117,7 @@ wheel: setup ## build a wheel of the Python package into build/wheels, for machi
 	rm -rf $(BUILD)/wheels
 	MATURIN_PEP517_ARGS='--compatibility pypi' $(VENV)-wheel/bin/pip wheel -q --disable-pip-version-check --no-deps --wheel-dir $(BUILD)/wheels ./python
 
-package: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
+package release: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
 package: NAME = dermis-$(VERSION)-$(shell rustc -vV | sed -n 's/^host: //p')
 package: OF_COMMIT = --sort=name --owner=0 --group=0 --numeric-owner --mtime=@$(shell git log -1 --format=%ct)
 package: program wheel ## write what a release has into build/package: programs for this kind of machine, wheel, source, checksums
@@ -134,7 +134,6 @@ package: program wheel ## write what a release has into build/package: programs 
 	cd $(PACKAGE) && sha256sum *.tar.gz *.whl >SHA256SUMS
 
 # The list of what is left is that of CONTRIBUTING.md.
-release: VERSION = $(shell $(CARGO) pkgid --package dermis-sim | sed 's/.*@//')
 release: ## check that the last commit can be released, run `make package`, and print what is left to do
 	@test -z "$$(git status --porcelain)" || { git status --short; echo 'the working tree is not clean' >&2; exit 1; }
 	@! git rev-parse --quiet --verify refs/tags/v$(VERSION) || { echo 'version $(VERSION) has a tag' >&2; exit 1; }

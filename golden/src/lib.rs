@@ -56,8 +56,6 @@
 //!
 //! Units are mm, N and MPa; compression is positive. Taxel (row, col) has index row·cols + col. x points towards higher
 //! columns, y towards higher rows, both from the array's centre. fx and fy act on the elastic body.
-// Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
-#![allow(non_snake_case)]
 
 pub mod data;
 pub mod engine;

@@ -25,8 +25,6 @@
 //!
 //! The interpreter is released while a model computes. `python/dermis/_dermis.pyi` has the types, which a test compares with
 //! this module.
-// Names carry their unit as SI writes it, here and in Python: `stress_MPa`, `resultant_N`.
-#![allow(non_snake_case)]
 
 pub mod arrays;
 pub mod board;

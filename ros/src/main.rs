@@ -16,8 +16,6 @@
 //! | `messages` | results as messages |
 //! | `diagnostics` | what is known of each patch |
 //! | `node` | the workers, and what they publish |
-// Field names end in their SI unit: `rate_Hz`.
-#![allow(non_snake_case)]
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod carrier;

@@ -14,8 +14,6 @@
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //!
 //! Each crate uses those above it alone.
-// Field names end in their SI unit: `full_scale_MPa`.
-#![allow(non_snake_case)]
 // They panic where nothing takes the text.
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 

@@ -80,7 +80,7 @@ impl Misfit {
     }
 
     /// The μ of each taxel, that of its contact, of the nearest one, or of the array; `None` if the network was not asked.
-    fn mu_of_taxels(&self, result: &Reconstruction) -> Option<Vec<[f64; 2]>> {
+    pub fn mu_of_taxels(&self, result: &Reconstruction) -> Option<Vec<[f64; 2]>> {
         let n = self.sensor.taxels();
         let whole = result.subarrays.iter().find(|own| own.centroid_condition)?;
         // Of records of contacts, whose taxels are only counted, and of contacts that share their taxels.

@@ -61,7 +61,6 @@ pub enum EngineKind {
 /// A board and its device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub struct Board {
     /// Name of the file without its ending.
     #[serde(skip)]

@@ -5,11 +5,10 @@
 //! | [`noise`], [`stability`] | errors with noise against the Cramér–Rao bound; errors against conditioning |
 //! | [`sensor_faults`] | frames spoiled as sensors spoil them: what is flagged, what is silently wrong |
 //! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results |
-// Names carry their unit as SI writes it: `stress_MPa`.
-#![allow(non_snake_case)]
 
 pub mod baseline;
 pub mod noise;
 pub mod paper;
 pub mod sensor_faults;
 pub mod stability;
+mod steps;

@@ -25,6 +25,8 @@ pub mod coverage;
 mod deviations;
 pub mod expected;
 pub mod matching;
+#[cfg(test)]
+mod misfit_tests;
 mod names;
 #[cfg(test)]
 mod network_tests;

@@ -36,7 +36,6 @@ pub fn run_times() -> Vec<RunTime> {
 
 /// A published power.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(non_snake_case)]
 pub struct PublishedPower {
     /// The system.
     pub system: String,
@@ -51,7 +50,6 @@ pub struct PublishedPower {
 const POWER: &str = include_str!("../../data/paper/power.csv");
 
 /// All published figures of power, in the file's order.
-#[allow(non_snake_case)]
 pub fn powers() -> Vec<PublishedPower> {
     let power = |line: &str| {
         let mut fields = line.splitn(4, ',').map(str::to_owned);

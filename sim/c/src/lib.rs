@@ -21,12 +21,10 @@
 //! | [`mod@stream`] | frames in the order of time |
 //! | [`board`] | a board, or a core behind Ethernet, that answers |
 //! | [`mod@link`] | requests to a board as bytes, and its answers |
-// Names carry their unit as SI writes it, here and in C: `stress_MPa`, `fx_N`.
 #![allow(
     unsafe_code,
     reason = "the boundary to C: pointers are checked for null, their targets are the caller's promise"
 )]
-#![allow(non_snake_case)]
 // Types have the names that C gives them.
 #![allow(non_camel_case_types)]
 // The text of a function is also that of the header; what holds for all pointers stands at the header's top.

@@ -27,8 +27,6 @@
 //! | [`waves`] | a run as a waveform file |
 //!
 //! [`compare`] measures differences between two force fields, and [`device_error`] takes errors of devices through an engine.
-// Field names end in their SI unit: `full_scale_MPa`.
-#![allow(non_snake_case)]
 // They panic where nothing takes the text.
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 

@@ -59,7 +59,6 @@ pub struct Toggles {
 
 /// Power at a rate of frames.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[allow(non_snake_case)]
 pub struct Rate {
     /// `1 kHz` or `back to back`.
     pub name: &'static str,
@@ -73,7 +72,6 @@ pub struct Rate {
 
 /// The estimate for an engine on its board.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[allow(non_snake_case)]
 pub struct PowerEstimate {
     /// Name of the scene.
     pub scene: String,

@@ -32,7 +32,6 @@ pub fn path(board: &Board) -> PathBuf {
 /// Result of a scene on a board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub struct Baseline {
     /// Look-up tables.
     pub luts: u64,

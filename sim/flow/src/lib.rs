@@ -14,8 +14,6 @@
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`output`] | standard output and standard error, where either is closed or full |
 //! | [`progress`] | progress lines on a terminal |
-// Field names end in their SI unit: `full_scale_MPa`.
-#![allow(non_snake_case)]
 // They panic where nothing takes the text.
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 

@@ -7,8 +7,6 @@
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`recording`] | frames and results of a stream in an MCAP file, with the message types of ROS 2 |
 //! | [`mod@link`] | the host end of a board's link, of real and of simulated boards |
-// Field names end in their SI unit: `full_scale_MPa`.
-#![allow(non_snake_case)]
 // They panic where nothing takes the text.
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 

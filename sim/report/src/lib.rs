@@ -7,8 +7,6 @@
 //!
 //! Times are total cycles (first input beat to last output beat) divided by the engine's clock; the margin is
 //! [`BUDGET_US`] minus the time. [`drawn_frames`] draws frames of random contacts, [`run_log`] keeps counts of long test runs.
-// Field names end in their SI unit: `full_scale_MPa`.
-#![allow(non_snake_case)]
 // They panic where nothing takes the text.
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
 

@@ -71,29 +71,30 @@ fn set(has: bool, own: String, added: &str) -> String {
     }
 }
 
-impl List<'_> {
-    /// The scene after a change.
-    fn with(&self, change: impl FnOnce(&mut Scene)) -> Scene {
-        let mut changed = self.scene.clone();
-        change(&mut changed);
-        changed
-    }
+/// The scene after a change.
+fn changed(scene: &Scene, change: impl FnOnce(&mut Scene)) -> Scene {
+    let mut scene = scene.clone();
+    change(&mut scene);
+    scene
+}
 
+impl List<'_> {
     /// Adds a feature; where the scene does not have it, its plan.
     fn add_plan(
         &mut self,
         name: &'static str,
         has: bool,
         setting: String,
-        plan: impl FnOnce(&Self) -> Result<Plan, FixedError>,
+        plan: impl FnOnce() -> Result<Plan, FixedError>,
     ) {
-        let with_feature = (!has).then(|| plan(self));
+        let with_feature = (!has).then(plan);
         self.all.push(Feature { name, setting, with_feature, without_feature: None });
     }
 
     /// Adds a feature that a scene without it has after a change.
     fn add(&mut self, name: &'static str, has: bool, setting: String, change: impl FnOnce(&mut Scene)) {
-        self.add_plan(name, has, setting, |list| planned(&list.with(change)));
+        let scene = self.scene;
+        self.add_plan(name, has, setting, || planned(&changed(scene, change)));
     }
 
     /// Adds a feature of the scene that is not added to others.
@@ -104,9 +105,7 @@ impl List<'_> {
     /// The plan after a change without the feature added last, where the scene has it.
     fn without(&mut self, change: impl FnOnce(&mut Scene)) {
         if let Some(feature) = self.all.last_mut().filter(|feature| feature.with_feature.is_none()) {
-            let mut changed = self.scene.clone();
-            change(&mut changed);
-            feature.without_feature = planned(&changed).ok();
+            feature.without_feature = planned(&changed(self.scene, change)).ok();
         }
     }
 
@@ -122,7 +121,7 @@ impl List<'_> {
             self.add_own("scan", format!("{} {} on one bus", scan.converters, scan.converter.name));
         }
         let check = |s: &mut Scene| s.hardware.code_check = CodeCheck::On;
-        if self.with(check).checks_codes() && self.plan.board.engine == EngineKind::Parallel {
+        if changed(self.scene, check).checks_codes() && self.plan.board.engine == EngineKind::Parallel {
             let checks = self.scene.checks_codes();
             self.add("code check", checks, "plateaus, repeated rows and columns".into(), check);
             self.without(|s| s.hardware.code_check = CodeCheck::Off);
@@ -137,15 +136,15 @@ impl List<'_> {
         };
         let written = self.plan.has_writable_tables();
         let table = input.calibration.is_some() || written;
-        self.add_plan("tare frame", table || input.tare.is_some(), "a zero per taxel".into(), |list| {
+        self.add_plan("tare frame", table || input.tare.is_some(), "a zero per taxel".into(), || {
             let tared = |s: &mut Scene| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
-            scaled(&list.with(tared), false)
+            scaled(&changed(scene, tared), false)
         });
         let setting = format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel");
-        self.add_plan("calibration table", table, setting, |list| {
+        self.add_plan("calibration table", table, setting, || {
             let tabled =
                 |s: &mut Scene| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale));
-            scaled(&list.with(tabled), true)
+            scaled(&changed(scene, tabled), true)
         });
         let writes = |s: &mut Scene| {
             (s.hardware.tables, s.input.full_scale_MPa) = (TableStorage::Writable, Some(full_scale));
@@ -192,7 +191,7 @@ impl List<'_> {
         self.add("averaging", input.longest_average() > 0, format!("{frames} frames"), |s| s.input.average = power);
         self.add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), slide);
         self.without(|s| s.input.mean = MeanKind::Block);
-        let longest = self.with(adaptive).input.longest_average();
+        let longest = changed(self.scene, adaptive).input.longest_average();
         self.add("adaptive mean", adapts, format!("the longest of {} frames", most_frames(longest)), adaptive);
         self.without(slide);
     }
@@ -235,7 +234,7 @@ impl List<'_> {
             self.add_own("contacts", format!("a μ for each of {} at most", plan.contacts()));
         }
         if degree > 0 {
-            self.add_plan("polynomial of degree 3", degree == MAX_DEGREE, "degree 3".into(), |_| {
+            self.add_plan("polynomial of degree 3", degree == MAX_DEGREE, "degree 3".into(), || {
                 planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
             });
         }

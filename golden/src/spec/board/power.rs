@@ -10,7 +10,6 @@ use serde::Deserialize;
 /// Energies of the resources of a family, each as [lower, upper].
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub struct Power {
     /// Where the figures come from.
     pub source: String,
@@ -30,7 +29,6 @@ pub struct Power {
 
 impl Power {
     /// Static power of the device of this name, [lower, upper] in mW; `None` for one without a figure.
-    #[allow(non_snake_case)]
     pub fn static_mW(&self, device: &str) -> Option<[f64; 2]> {
         let typical = self.static_mW.get(device)?;
         Some(self.static_range.map(|factor| factor * typical))

@@ -12,6 +12,7 @@
 use super::shapes::{readings, ShapeStudy, PEAK};
 use super::statistic::quantile;
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::draws::{DrawOptions, DrawnFrame, Shape};
 use dermis_golden::engine::Engine;
@@ -25,7 +26,6 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::{EstimatorKind, ForceOutput, InputSpec, Scene, ThresholdSpec};
 use rayon::prelude::*;
 use std::slice::from_ref;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[cfg(test)]
 mod tests;
@@ -161,13 +161,13 @@ fn errors(
     study.check()?;
     let engine = engine(scene)?;
     let drawn = study.frames(scene)?;
-    let done = AtomicUsize::new(0);
+    let step = steps(progress, levels.len() * draws);
     let at = |level: usize| {
         let readings = readings(&drawn, &study.converter(level), scene)?;
         let of = |(drawn, reading): (&DrawnFrame, &Frame)| {
             let reading = reading.clone().mask_dead(&scene.input.dead);
             let own = errors_of(scene, drawn, &reading, &engine.reconstruct(from_ref(&reading))?, levels[level] * PEAK);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, levels.len() * draws);
+            step();
             Ok(own)
         };
         let own: Result<Vec<Vec<Error>>, StudyError> = drawn.par_iter().zip(&readings).map(of).collect();

@@ -1,8 +1,9 @@
-//! Networks that the program carries and small ones: errors, standard deviations, flags, and what is expected of hardware.
+//! Networks that the program carries and small ones: errors, standard deviations, and what is expected of hardware.
 
 use super::expected::{expected, Expectation, StatedNoise};
 use super::*;
 use dermis_golden::data::generator::draws::DrawOptions;
+use dermis_golden::data::input::calibration::Calibration;
 use dermis_golden::estimate::learned::{with_network, Learned, Training};
 use dermis_golden::spec::scene::{EstimatorKind, Medium, Scene};
 use dermis_golden::spec::sensor::Sensor;
@@ -93,37 +94,18 @@ fn standard_deviations_of_regions_are_honest() {
     }
 }
 
-/// The study counts what the engines flag: none of the frames like the training, and all checkerboards.
-#[test]
-fn the_study_counts_flags() {
-    let scene = Scene::builtin("sensor-1-noisy").unwrap();
-    let estimators = [Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware];
-    let rows = unlike_study(&scene, 6, 3, &estimators, &|_, _| ()).unwrap();
-    let of = |name: &'static str| rows.iter().filter(move |row| row.frame.starts_with(name));
-    assert!(of("like the training").count() == 8 && of("checkerboard").count() == 4);
-    for row in of("like the training") {
-        assert!((row.flagged.value, row.flagged_if_stated.value) == (0.0, 0.0), "{row:?}");
-    }
-    for row in of("checkerboard").chain(of("taxels permuted")).chain(of("sign reversed")) {
-        assert!(row.flagged.value == 1.0 && row.misfit.unwrap() > 1.0 && row.any.value == 1.0, "{row:?}");
-    }
-}
-
-/// A network whose file has no limit shows nothing of frames unlike its training.
-#[test]
-fn without_a_limit_no_flags_are_counted() {
-    let scene = Scene::builtin("sensor-1-noisy").unwrap();
-    let (scene, _file) = with_network(scene, &Training::trial(&[8])).unwrap();
-    let refused = unlike_study(&scene, 1, 1, &[Candidate::Scene], &|_, _| ()).unwrap_err().to_string();
-    assert!(refused.starts_with("search.network = ") && refused.contains("--limit-of"), "{refused}");
-}
-
 #[test]
 fn errors_are_expected_of_writable_hardware_too() {
     let text = "name = \"pad\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n\
                 [search]\nnoise_floor_MPa = 0.004\n[input]\nfull_scale_MPa = 1.0\n[hardware]\ntables = \"writable\"\n\
                 [hardware.table_range]\ngain = [0.5, 2.0]\n";
-    let scene = Scene::parse(text, "pad.toml").unwrap();
+    let mut scene = Scene::parse(text, "pad.toml").unwrap();
+    let mut table = Calibration::identity(scene.sensor.taxels());
+    table.offset[1] = -0.125;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("table.csv");
+    std::fs::write(&path, table.to_csv(&scene.sensor)).unwrap();
+    scene.input.calibration = Some(path);
     let asked = Expectation { peak_MPa: None, draws: 2, seed: 1, with_hardware: true };
     let noise = StatedNoise::of(&scene, None).unwrap();
     assert!(expected(&scene, &asked, &noise, &|_, _| ()).is_ok());

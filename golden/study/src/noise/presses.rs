@@ -18,6 +18,7 @@
 use super::statistic::quantile;
 use super::support_bound::{Reading, SupportBound};
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::DrawOptions;
@@ -32,7 +33,6 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::{EstimatorKind, MeanKind, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Time after which frames count: the longest mean has settled.
 const SETTLED_S: f64 = 0.1;
@@ -181,7 +181,7 @@ pub fn press_study(
     super::study::check_parameters(study.presses as usize, 1, &study.levels)?;
     let total =
         study.levels.len() * study.engines.len() * study.means.len() * study.motions.len() * study.presses as usize;
-    let done = AtomicUsize::new(0);
+    let step = steps(progress, total);
     let mut rows = Vec::new();
     for &noise in &study.levels {
         let drawn = draw(scene, study, noise)?;
@@ -199,7 +199,7 @@ pub fn press_study(
             };
             let follow = |own: &Drawn| -> Result<Followed, StudyError> {
                 let followed = follow(&*engine, own, study.press.rate_Hz)?;
-                progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+                step();
                 Ok(followed)
             };
             let all = drawn.par_iter().map(follow).collect::<Result<Vec<Followed>, _>>()?;

@@ -15,10 +15,10 @@
 use super::outcome::Summary;
 use super::shapes::{outcomes, readings, stated, ShapeStudy};
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::generator::draws::DrawnFrame;
 use dermis_golden::spec::scene::{Medium, Scene};
 use serde::Serialize;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Shares by which a quantity is stated wrongly.
 const OFF: [f64; 6] = [-0.10, -0.05, -0.02, 0.02, 0.05, 0.10];
@@ -103,8 +103,7 @@ fn measured(
 ) -> Result<Vec<SensitivityRow>, StudyError> {
     study.check()?;
     let total = settings.len() * study.candidates.len() * study.draws;
-    let done = AtomicUsize::new(0);
-    let step = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    let step = steps(progress, total);
     let mut rows = Vec::new();
     let mut known: Vec<(Medium, Vec<DrawnFrame>)> = Vec::new();
     for setting in settings {

@@ -14,6 +14,7 @@ use super::outcome::{Outcome, Summary};
 use super::statistic::quantile;
 use super::support_bound::{Reading, SupportBound};
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, DrawnFrame, Draws, Shape};
@@ -26,7 +27,6 @@ use dermis_golden::result::reconstruct::Reconstruction;
 use dermis_golden::spec::scene::{EstimatorKind, ObjectiveKind, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// max |b| of every frame in MPa.
 pub(super) const PEAK: f64 = 0.1;
@@ -264,8 +264,7 @@ pub fn shape_study(
     let drawn = study.frames(scene)?;
     let bounds = bounds(scene, &drawn)?;
     let total = study.levels.len() * study.candidates.len() * drawn.len();
-    let done = AtomicUsize::new(0);
-    let step = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    let step = steps(progress, total);
     let mut rows = Vec::new();
     for (level, &noise) in study.levels.iter().enumerate() {
         let converter = study.converter(level);

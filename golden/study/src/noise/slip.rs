@@ -12,11 +12,11 @@ use super::outcome::{Outcome, Summary};
 use super::shapes::{outcomes, readings, stated, ShapeStudy};
 use super::statistic::quantile;
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::generator::draws::DrawOptions;
 use dermis_golden::data::generator::slip::Slip;
 use dermis_golden::spec::scene::Scene;
 use serde::Serialize;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,8 +65,7 @@ pub fn slip_study(
     };
     let drawn = Slip::TABLE.into_iter().map(|slip| Ok((slip, of(slip)?))).collect::<Result<Vec<_>, StudyError>>()?;
     let total = study.levels.len() * study.candidates.len() * Slip::TABLE.len() * study.draws;
-    let done = AtomicUsize::new(0);
-    let step = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    let step = steps(progress, total);
     let mut rows = Vec::new();
     for (level, &noise) in study.levels.iter().enumerate() {
         let converter = study.converter(level);

@@ -35,7 +35,7 @@ pub struct Study {
 impl Default for Study {
     fn default() -> Self {
         let objectives = ObjectiveKind::NAMES.iter().map(|(_, kind)| *kind).collect();
-        Study { levels: vec![0.0, 1e-4, 5e-4, 2e-3, 1e-2], draws: 200, seed: 1, objectives, frames: 64 }
+        Study { levels: vec![0.0, 1e-4, 5e-4, 2e-3, 1e-2], draws: 200, seed: 1, objectives, frames: AVERAGED }
     }
 }
 

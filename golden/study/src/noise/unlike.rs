@@ -21,6 +21,7 @@
 use super::shapes::Candidate;
 use super::statistic::{quantile, Interval};
 use super::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::converter::Converter;
 use dermis_golden::data::generator::draws::{DrawOptions, Draws, Shape};
@@ -34,7 +35,6 @@ use dermis_golden::spec::scene::{EstimatorKind, Scene};
 use dermis_golden::spec::window::Place;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of the frames like the training whose misfit is within the limit.
 const WITHIN: f64 = 0.998;
@@ -258,11 +258,11 @@ pub fn misfit_limit(
     let golden =
         Golden::with(scene, EstimatorKind::Network).or_else(|_| Golden::with(scene, EstimatorKind::EvidenceNetwork))?;
     let (misfit, like) = (Misfit::new(scene, 1.0), Like::new(scene, seed));
-    let done = AtomicUsize::new(0);
+    let step = steps(progress, frames);
     let one = |number: u64| -> Result<Option<f64>, StudyError> {
         let Reading { frame, noise_MPa } = like.any_noise(number)?;
         let own = misfit.of(&golden.run(&frame)?, &frame, noise_MPa);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, frames);
+        step();
         Ok(own)
     };
     let all: Vec<Option<f64>> = (0..frames as u64).into_par_iter().map(one).collect::<Result<_, _>>()?;
@@ -294,7 +294,8 @@ pub fn unlike_study(
         return Err(StudyError::Parameter { field: "search.network", value, allowed });
     };
     let kinds = Kind::all();
-    let (like, done, total) = (Like::new(&scene, seed), AtomicUsize::new(0), kinds.len() * estimators.len() * draws);
+    let like = Like::new(&scene, seed);
+    let step = steps(progress, kinds.len() * estimators.len() * draws);
     let mut rows = Vec::new();
     for &candidate in estimators {
         let named = candidate.stated(&scene);
@@ -304,7 +305,7 @@ pub fn unlike_study(
                 let Reading { frame, noise_MPa } = like.of(kind, number)?;
                 let result = run(&frame)?;
                 let stated = misfit.of(&result, &frame, noise_MPa).is_some_and(|misfit| misfit > 1.0);
-                progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+                step();
                 let flagged = result.flags.contains(&Flag::Misfit);
                 Ok((result.checks.network_misfit, [flagged, stated, !result.flags.is_empty()]))
             };

@@ -2,6 +2,7 @@
 
 use super::faults::{Fault, Kind, Moments, Readings, FAULTS};
 use crate::noise::StudyError;
+use crate::steps::steps;
 use dermis_golden::data::frame::Frame;
 use dermis_golden::data::generator::draws::{DrawOptions, Draws};
 use dermis_golden::data::generator::GeneratorError;
@@ -18,7 +19,6 @@ use dermis_golden::spec::sensor::Sensor;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Largest e_t and e_n of a result that is right, and share of Σ|b|·area below which a force counts as none.
 const RIGHT: (f64, f64, f64) = (0.2, 0.1, 0.01);
@@ -408,10 +408,10 @@ pub fn sensor_faults(
     let noises = if asked.noise == 0.0 { vec![0.0, STATED] } else { vec![asked.noise] };
     let controls: Vec<Task> = noises.into_iter().flat_map(|noise| tasks_of(clean, noise)).collect();
     let tasks: Vec<Task> = lines.iter().flat_map(|(fault, size)| tasks_of(fault, *size)).collect();
-    let (done, total) = (AtomicUsize::new(0), controls.len() + tasks.len());
+    let step = steps(progress, controls.len() + tasks.len());
     let judge = |task: &Task| {
         let judged = engines[task.scene].judge(&presses[task.scene][task.press], task.fault, task.size, asked.noise);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+        step();
         judged
     };
     let judged = |tasks: &[Task]| tasks.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>, StudyError>>();

@@ -1,7 +1,5 @@
 //! The C interface as C calls it: its header, an example that is compiled and run, wrong arguments, the link.
 #![allow(unsafe_code, reason = "calls the C interface as C does")]
-// Names carry their unit, as in the library.
-#![allow(non_snake_case)]
 
 mod batch;
 mod board;

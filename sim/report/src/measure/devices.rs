@@ -78,7 +78,6 @@ pub struct DeviceOptions {
 
 /// One estimator on one device.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[allow(non_snake_case)]
 pub struct DeviceRow {
     /// Name of the scene.
     pub scene: String,
@@ -290,7 +289,6 @@ impl Drop for Load {
 
 /// A frame as the program with SciPy solved it.
 #[derive(Deserialize)]
-#[allow(non_snake_case)]
 struct Solved {
     seconds: f64,
     resultant_N: [f64; 3],
