@@ -17,6 +17,7 @@ use thiserror::Error;
 
 /// Frames averaged in the second half of the table, unless stated.
 pub const AVERAGED: usize = 64;
+
 /// Parameters of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
