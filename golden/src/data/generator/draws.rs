@@ -3,8 +3,7 @@
 //! | drawn | range |
 //! |---|---|
 //! | shape of contact k of frame n | `shapes` in turn, from the (n + k)th |
-//! | first half-axis | s to 2 s, s = h, but the larger pitch where it exceeds 2 h: taxels miss smaller ones |
-//! | second half-axis, angle, place | as [`super::random_contacts`]: ratio 0.7 to 1.35, rim s/2 inside, 2 h apart |
+//! | half-axes, angle, place | as [`super::random_contacts`] |
 //! | inner over outer radius of a ring | 0.3 … 0.7 |
 //! | tilt | 0.3 … 0.8, any direction |
 //! | normal load | `normal_N`, 1 … 12 N |
@@ -37,8 +36,6 @@ use std::f64::consts::TAU;
 const TRIES: usize = 20;
 /// Largest number of contacts of a frame.
 const MOST_CONTACTS: usize = 64;
-/// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
-const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
 pub(super) const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -243,11 +240,8 @@ impl Draws {
                 ..Default::default()
             }
         };
-        let Sensor { pitch_x_mm, pitch_y_mm, thickness_mm, .. } = self.sensor;
-        let pitch_mm = pitch_x_mm.max(pitch_y_mm);
-        let size_mm = if pitch_mm > COARSE * thickness_mm { pitch_mm } else { thickness_mm };
         for _ in 0..TRIES {
-            if let (contacts, true) = placed(&self.sensor, size_mm, &mut random, count, false, shaped) {
+            if let (contacts, true) = placed(&self.sensor, &mut random, count, false, shaped) {
                 return Ok(contacts.into_iter().map(|contact| slip.of(contact, &mut of_slip)).collect());
             }
         }
@@ -293,6 +287,7 @@ impl Draws {
 
 #[cfg(test)]
 mod tests {
+    use super::super::random::{random_contacts, Draw, Shapes};
     use super::*;
     use std::f64::consts::PI;
 
@@ -407,11 +402,14 @@ mod tests {
     #[test]
     fn contacts_are_seen_on_a_coarse_array() {
         let draws = draws("sensor-4", DrawOptions::default());
+        // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
+        let is_seen = |peak_MPa: f64, normal_N: f64| peak_MPa > normal_N / (PI * (2.7f64 * 8.0).powi(2));
         for number in 0..10 {
             let drawn = draws.frame(number).unwrap();
-            // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
-            let least = drawn.total_N[2] / (PI * (2.7f64 * 8.0).powi(2));
-            assert!(drawn.peak_MPa() > least, "{number}");
+            assert!(is_seen(drawn.peak_MPa(), drawn.total_N[2]), "{number}");
+            let draw = Draw { count: 1, shapes: Shapes::Elliptic, slip: Slip::Full, touching: false, seed: number };
+            let frame = generate("random", &draws.sensor, draws.medium, &random_contacts(&draws.sensor, draw)).unwrap();
+            assert!(is_seen(frame.peak_MPa(), frame.resultant_N.unwrap()[2]), "{number}");
         }
     }
 
