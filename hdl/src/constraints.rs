@@ -3,7 +3,8 @@
 //! ```text
 //! clock of the top module, clock of its link ──> <top>.sdc
 //! ```
-//! There is no exception within a clock: all resets are synchronous, and what a register takes in a cycle it has a cycle for.
+//! There is no exception within a clock: the reset is synchronous, and every path has one cycle. The chip select of an SPI resets registers
+//! of its clock at any time, but it is a pin, and no path begins at one without a stated delay.
 
 use std::fmt::Write;
 
@@ -25,15 +26,14 @@ impl Clock<'_> {
     }
 }
 
-/// The constraints of the module `top`, whose clocks are `own` and, where it has a link with a clock, that `of_link`, which comes from
-/// elsewhere.
+/// The constraints of the module `top`, whose clocks are `own` and, where its link has one, `of_link`, which comes from elsewhere.
 pub(crate) fn constraints(top: &str, own: Clock, of_link: Option<Clock>) -> GeneratedFile {
     let mut text = format!(
         "\
 # Generated with {top}.v; do not edit, build it again.
 #
-# Clocks of {top} where it is built alone, for tools that read SDC or XDC. In another design leave this file out: there the
-# clocks of that design count. All resets are synchronous, and no path within a clock is left out.
+# Clocks of {top} where it is built alone, for tools that read SDC or XDC.
+# In another design leave this file out: the clocks of that design count. The reset is synchronous; no path within a clock is left out.
 "
     );
     for clock in [Some(own), of_link].into_iter().flatten() {

@@ -83,7 +83,8 @@ mod tests {
     #[test]
     fn every_file_stands_where_its_kind_belongs() {
         let owned = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
-        let files = owned(&["dermis_a.v", "dermis_a.vlt", "dermis_a.sdc", "manifest.json", "dermis_a__coefficients.hex"]);
+        let files =
+            owned(&["dermis_a.v", "dermis_a.vlt", "dermis_a.sdc", "manifest.json", "dermis_a__coefficients.hex"]);
         let text =
             core_file("dermis_a", "a", Family::Ice40, &files, &owned(&["dermis_a_tb.sv", "dermis_a_tb_codes.hex"]));
         let after = |start: &str| text.split_once(start).map(|(_, rest)| rest.lines().nth(1).unwrap_or_default());

@@ -158,10 +158,8 @@ impl Wrapper {
         let Wrapper { top, hierarchy, header, row, is_board, link_clock } = self;
         let memories = placed(&hierarchy, model)?;
         let styles = (is_board || names_family(model)).then(|| ram_styles(&memories));
-        let verilog = GeneratedFile {
-            name: format!("{top}.v"),
-            text: header + &hierarchy.verilog(&top, styles.as_ref()),
-        };
+        let verilog =
+            GeneratedFile { name: format!("{top}.v"), text: header + &hierarchy.verilog(&top, styles.as_ref()) };
         let own = [verilog, constraints(&top, clock(model, &hierarchy), link_clock)];
         for file in &mut engine.files {
             if let Some(rest) = file.name.strip_prefix(&engine.top) {

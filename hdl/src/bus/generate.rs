@@ -111,7 +111,7 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
     let mut core = wrapper.generated(model, engine)?;
     let design: Vec<&str> = core.files.iter().map(|file| file.name.as_str()).collect();
     let described = component(&core.top, &interfaces, &ports, &design);
-    let what = format!("Forces per taxel from normal stress, {}", scene.sensor);
+    let what = format!("Forces per taxel from normal stress, {} x {} taxels", scene.sensor.rows, scene.sensor.cols);
     let packaged = package::script(&core.top, &command, &what, &interfaces, &ports, &design);
     core.files.extend(own);
     core.files.push(described);

@@ -11,6 +11,11 @@ use super::Bus;
 /// A port of the top module: name, whether it is an output, width in bits, meaning.
 pub(super) type TopPort = (String, bool, usize, String);
 
+/// The clock of a core.
+pub(super) const CLOCK: &str = "aclk";
+/// Its reset, active low.
+pub(super) const RESET: &str = "aresetn";
+
 /// What an interface speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Protocol {
@@ -71,7 +76,8 @@ impl Interface {
 
     /// The interfaces of an arbiter: a stream of each of so many senders, `s0_axis` and so on, and that to the core.
     pub(super) fn of_arbiter(senders: usize) -> Vec<Self> {
-        let stream = |is_master| Interface::new(if is_master { "m_axis" } else { "s_axis" }, Protocol::Stream, is_master);
+        let stream =
+            |is_master| Interface::new(if is_master { "m_axis" } else { "s_axis" }, Protocol::Stream, is_master);
         let sender = |at| Interface { name: format!("s{at}_axis"), part: (at, senders), ..stream(false) };
         (0..senders).map(sender).chain([stream(true)]).collect()
     }

@@ -7,7 +7,7 @@
 
 use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
 
-use super::interfaces::{Interface, TopPort};
+use super::interfaces::{Interface, Protocol, TopPort, CLOCK, RESET};
 use crate::core_file::{LIBRARY, VENDOR};
 use crate::manifest::GeneratedFile;
 
@@ -18,7 +18,11 @@ const LEAST_RANGE: usize = 4096;
 fn call(interface: &Interface, kind: &str, ports: &[TopPort]) -> String {
     let mode = if interface.is_master { "master" } else { "slave" };
     let maps: String = interface.ports(ports).map(|(logical, (port, ..))| format!("  {logical} {port}\n")).collect();
-    format!("interface {} interface:{kind} {mode} {{\n{maps}}}\n", interface.name)
+    let call = format!("interface {} interface:{kind} {mode} {{\n{maps}}}", interface.name);
+    match interface.protocol {
+        Protocol::AxiLite => format!("parameter PROTOCOL AXI4LITE [{call}]\n"),
+        _ => call + "\n",
+    }
 }
 
 /// The script for the core `top`, which `command` generates, for `description`; `None` where an interface has no definition in Vivado.
@@ -83,10 +87,10 @@ proc interface {{name kind mode ports}} {{
 proc parameter {{name value of}} {{
   set_property value $value [ipx::add_bus_parameter $name $of]
 }}
-{calls}set clock [interface aclk signal:clock slave {{CLK aclk}}]
+{calls}set clock [interface {CLOCK} signal:clock slave {{CLK {CLOCK}}}]
 parameter ASSOCIATED_BUSIF {associated} $clock
-parameter ASSOCIATED_RESET aresetn $clock
-parameter POLARITY ACTIVE_LOW [interface aresetn signal:reset slave {{RST aresetn}}]
+parameter ASSOCIATED_RESET {RESET} $clock
+parameter POLARITY ACTIVE_LOW [interface {RESET} signal:reset slave {{RST {RESET}}}]
 set map [ipx::add_memory_map {registers} $core]
 set_property slave_memory_map_ref {registers} [ipx::get_bus_interfaces {registers} -of_objects $core]
 set block [ipx::add_address_block registers $map]

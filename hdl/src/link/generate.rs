@@ -73,8 +73,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         clock = model.board.clock_MHz,
         scan = pins_text(model),
     );
-    let link_clock =
-        (link == LinkKind::Spi).then(|| Clock { port: "spi_sclk", MHz: f64::from(bit_rate) / 1e6 });
+    let link_clock = (link == LinkKind::Spi).then(|| Clock { port: "spi_sclk", MHz: f64::from(bit_rate) / 1e6 });
     let wrapper = Wrapper { top, hierarchy, header, row: "link", is_board: true, link_clock };
     let mut board = wrapper.generated(model, engine)?;
     board.seal();
