@@ -1,6 +1,7 @@
 """The script that packages a core for Vivado, run by an interpreter of Tcl with stand-ins for Vivado's commands (vivado.tcl): the IP has the
 interfaces of the component of IP-XACT, and its files."""
 
+import json
 import subprocess
 
 import pytest
@@ -98,12 +99,32 @@ def check(folder, script):
     assert calls[-2:] == [["saved", "core:own"], ["closed"]]
 
 
+def parameters_of_verilog(folder):
+    """The parameters in the attributes of clock and reset, as Yosys reads them, and what these are said to be."""
+    script = f"read_verilog {TOP}.v; proc; write_json own.json"
+    subprocess.run(["yosys", "-q", "-p", script], check=True, cwd=folder)
+    nets = json.loads((folder / "own.json").read_text(encoding="utf-8"))["modules"][TOP]["netnames"]
+    attributes = {port: nets[port]["attributes"] for port in ["aclk", "aresetn"]}
+    text = {port: own["X_INTERFACE_PARAMETER"].split(", ") for port, own in attributes.items()}
+    parameters = {(port, *own.split(" ")[:1]): own.split(" ")[1] for port, all in text.items() for own in all}
+    return parameters, {port: own["X_INTERFACE_INFO"] for port, own in attributes.items()}
+
+
 def script_of(folder):
     return (folder / f"{TOP}_package.tcl").read_text(encoding="utf-8")
 
 
 def test_the_ip_has_the_interfaces_of_ip_xact_and_the_files(core):
     check(core, script_of(core))
+
+
+def test_the_verilog_has_the_same_parameters(core):
+    parameters, infos = parameters_of_verilog(core)
+    interfaces, stated = packaged(run(core, script_of(core)))
+    assert parameters == {key: value for key, value in stated.items() if key[0] in infos}
+    for port, info in infos.items():
+        ((signal, _),) = interfaces[port]["ports"].items()
+        assert info == f"xilinx.com:{interfaces[port]['kind']}:1.0 {port} {signal}"
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,30 @@ impl Protocol {
     }
 }
 
+/// The definitions in Vivado of clocks and resets: kind of the interface, and name of the port in it.
+pub(super) const SIGNALS: [(&str, &str, &str); 2] = [(CLOCK, "signal:clock", "CLK"), (RESET, "signal:reset", "RST")];
+
+/// Parameters in Vivado of the clock or the reset `port` of a core: name and value. No frequency is among them, because that of the clock
+/// in a design counts.
+pub(super) fn parameters(port: &str, interfaces: &[Interface]) -> Vec<(&'static str, String)> {
+    if port == RESET {
+        return vec![("POLARITY", "ACTIVE_LOW".to_owned())];
+    }
+    let known = interfaces.iter().filter(|own| own.protocol.vivado().is_some());
+    let names: Vec<&str> = known.map(|own| own.name.as_str()).collect();
+    vec![("ASSOCIATED_BUSIF", names.join(":")), ("ASSOCIATED_RESET", RESET.to_owned())]
+}
+
+/// Attributes of clock and reset in the Verilog of a core, for a block design of Vivado that takes the Verilog itself.
+pub(super) fn attributes(interfaces: &[Interface]) -> [(&'static str, String); 2] {
+    SIGNALS.map(|(port, kind, signal)| {
+        let own = parameters(port, interfaces).into_iter().map(|(name, value)| format!("{name} {value}"));
+        let own: Vec<String> = own.collect();
+        let info = format!("X_INTERFACE_INFO = \"xilinx.com:{kind}:1.0 {port} {signal}\"");
+        (port, format!("{info}, X_INTERFACE_PARAMETER = \"{}\"", own.join(", ")))
+    })
+}
+
 /// Ports of a top module that belong together.
 #[derive(Clone, Debug)]
 pub(super) struct Interface {

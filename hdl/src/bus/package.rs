@@ -7,7 +7,7 @@
 
 use dermis_golden::wire::registers::{ADDRESS_BITS, REGISTER_BITS};
 
-use super::interfaces::{Interface, Protocol, TopPort, CLOCK, RESET};
+use super::interfaces::{parameters, Interface, Protocol, TopPort, SIGNALS};
 use crate::core_file::{LIBRARY, VENDOR};
 use crate::manifest::GeneratedFile;
 
@@ -25,6 +25,13 @@ fn call(interface: &Interface, kind: &str, ports: &[TopPort]) -> String {
     }
 }
 
+/// The same for the clock or the reset `port`, which is `signal` there, with its parameters.
+fn signal_call(port: &str, kind: &str, signal: &str, interfaces: &[Interface]) -> String {
+    let own = parameters(port, interfaces);
+    let own: String = own.iter().map(|(name, value)| format!("parameter {name} {value} ${port}\n")).collect();
+    format!("set {port} [interface {port} {kind} slave {{{signal} {port}}}]\n{own}")
+}
+
 /// The script for the core `top`, which `command` generates, for `description`; `None` where an interface has no definition in Vivado.
 pub(super) fn script(
     top: &str,
@@ -36,7 +43,7 @@ pub(super) fn script(
 ) -> Option<GeneratedFile> {
     let calls = interfaces.iter().map(|own| Some(call(own, own.protocol.vivado()?, ports)));
     let calls: String = calls.collect::<Option<_>>()?;
-    let names: Vec<&str> = interfaces.iter().map(|own| own.name.as_str()).collect();
+    let signals: String = SIGNALS.map(|(port, kind, signal)| signal_call(port, kind, signal, interfaces)).concat();
     let registers = interfaces.iter().find(|own| own.has_registers())?;
     let memories: Vec<&str> = files.iter().copied().filter(|name| name.ends_with(".hex")).collect();
     let text = format!(
@@ -87,11 +94,7 @@ proc interface {{name kind mode ports}} {{
 proc parameter {{name value of}} {{
   set_property value $value [ipx::add_bus_parameter $name $of]
 }}
-{calls}set clock [interface {CLOCK} signal:clock slave {{CLK {CLOCK}}}]
-parameter ASSOCIATED_BUSIF {associated} $clock
-parameter ASSOCIATED_RESET {RESET} $clock
-parameter POLARITY ACTIVE_LOW [interface {RESET} signal:reset slave {{RST {RESET}}}]
-set map [ipx::add_memory_map {registers} $core]
+{calls}{signals}set map [ipx::add_memory_map {registers} $core]
 set_property slave_memory_map_ref {registers} [ipx::get_bus_interfaces {registers} -of_objects $core]
 set block [ipx::add_address_block registers $map]
 set_property range {range} $block
@@ -108,7 +111,6 @@ close_project
         major = env!("CARGO_PKG_VERSION_MAJOR"),
         minor = env!("CARGO_PKG_VERSION_MINOR"),
         patch = env!("CARGO_PKG_VERSION_PATCH"),
-        associated = names.join(":"),
         registers = registers.name,
         range = LEAST_RANGE.max(1 << ADDRESS_BITS),
     );
