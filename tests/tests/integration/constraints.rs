@@ -11,6 +11,7 @@ use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::spec::scene::Scene;
 use dermis_hdl::bus::{generate_core, Bus, CoreShape};
 use dermis_hdl::link::generate_board;
+use dermis_hdl::scan::generate_scan;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::tools::{folder_of, yosys};
 use serde_json::Value;
@@ -109,8 +110,13 @@ fn check(generated: &Generated, wanted: &[(&str, &str)]) {
 }
 
 /// A scene whose hardware takes little time.
+const STILL: &str = include_str!("../../soc/still.toml");
+/// What it has besides where the hardware scans the array.
+const SCAN: &str = "[input]\nfull_scale_MPa = 0.5\n[hardware]\nsource = \"adc-scan\"\n[hardware.adc_scan]\n\
+                    converter = \"max11125\"\nsclk_MHz = 12.5\nperiod_us = 1000\n";
+
 fn still() -> Scene {
-    Scene::parse(include_str!("../../soc/still.toml"), "still.toml").unwrap()
+    Scene::parse(STILL, "still.toml").unwrap()
 }
 
 /// A scene for the serial engine on a board of 25.5 MHz, whose SPI has up to 25 MHz.
@@ -128,6 +134,8 @@ fn each_clock_of_a_register_has_its_period() {
     for bus in [Bus::AxiLite, Bus::Wishbone] {
         check(&generate_core(&model, CoreShape { bus, words: 1 }).unwrap(), &[("aclk", "10.000")]);
     }
+    let scanned = Scene::parse(&format!("{STILL}{SCAN}"), "scanned").unwrap();
+    check(&generate_scan(&Model::new(&scanned).unwrap()).unwrap(), &[("clk", "10.000")]);
     // The clock is that of the board.
     let model = serial(LinkKind::Uart);
     check(&generate(&model).unwrap(), &[("clk", "39.215")]);
