@@ -201,7 +201,7 @@ fn names_family(model: &Model) -> bool {
     model.scene.hardware.board.is_some()
 }
 
-/// The attribute `ram_style` of every memory that the model plans.
+/// The kind of RAM of every memory that the model plans.
 fn ram_styles(memories: &[PlacedMemory]) -> RamStyles {
     let style = |memory: &PlacedMemory| {
         let style = match (memory.planned.large_rams, memory.planned.block_rams) {
@@ -470,7 +470,9 @@ mod tests {
         let mut scene = Scene::builtin("eight-by-eight-contacts").unwrap();
         let styles = |scene: &Scene| {
             let generated = generate(&Model::new(scene).unwrap()).unwrap();
-            let lines = generated.files[0].text.lines().map(|line| line.matches("ram_style").count());
+            let kinds = ["ram_style", "rom_style"];
+            let count = |line: &str| kinds.map(|kind| line.matches(kind).count()).iter().sum::<usize>();
+            let lines = generated.files[0].text.lines().map(count);
             (lines.clone().max().unwrap_or(0), lines.sum::<usize>(), generated.memories.len())
         };
         scene.hardware.board = None;
