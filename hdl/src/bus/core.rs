@@ -4,6 +4,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::wire::registers::{constants, REGISTER_BITS};
 
 use super::bundles::id_bits;
+use super::interfaces::{attributes, Interface};
 use super::{
     AxiLite, AxiLitePins, Bus, CoreShape, CoreStream, Registers, StreamIn, StreamOut, TablesIn, Wishbone, WishbonePins,
 };
@@ -147,7 +148,8 @@ pub(super) fn hierarchy(model: &Model, shape: CoreShape) -> Result<Hierarchy, Hd
             what: "a core with several frames per result",
         });
     }
-    let hierarchy = Hierarchy::of_kernel(kernel_of(&Core::new(model, shape)));
+    let hierarchy = Hierarchy::of_kernel(kernel_of(&Core::new(model, shape)))
+        .with_port_attributes(attributes(&Interface::of_core(shape.bus)));
     hierarchy.check()?;
     Ok(hierarchy)
 }

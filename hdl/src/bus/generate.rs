@@ -8,7 +8,9 @@ use serde_json::json;
 
 use super::bundles::id_bits;
 use super::core::hierarchy;
-use super::ip_xact::{component, TopPort};
+use super::interfaces::{Interface, TopPort};
+use super::ip_xact::component;
+use super::package;
 use super::testbench::testbench;
 use super::{Bus, CoreShape, FrameArbiter};
 use crate::error::HdlError;
@@ -17,14 +19,17 @@ use crate::language::{kernel_of, Change, Hierarchy, Kernel};
 use crate::manifest::GeneratedFile;
 use crate::primitives::Arrays;
 
-/// The ports of a top module.
-fn top_ports(top: &Kernel) -> impl Iterator<Item = TopPort> + '_ {
-    top.port_list().map(|(name, is_output, bits, meaning)| (name.to_owned(), is_output, bits, meaning.to_owned()))
+/// The ports of the top module.
+fn top_ports(hierarchy: &Hierarchy) -> Vec<TopPort> {
+    let port = |(name, is_output, bits, meaning): (&str, bool, usize, &str)| {
+        (name.to_owned(), is_output, bits, meaning.to_owned())
+    };
+    hierarchy.top().into_iter().flat_map(Kernel::port_list).map(port).collect()
 }
 
-/// The module `name` beside the core `top` of several arrays, by which each has a stream of its own, in a file of its own; `None` with
-/// one array.
-fn arbiter(model: &Model, name: &str, top: &str) -> Result<Option<GeneratedFile>, HdlError> {
+/// The module `name` beside the core `top` of several arrays, by which each has a stream of its own: its Verilog and its component of
+/// IP-XACT; `None` with one array.
+fn arbiter(model: &Model, name: &str, top: &str) -> Result<Option<[GeneratedFile; 2]>, HdlError> {
     let arrays = Arrays::of_model(model);
     if arrays.bits == 0 {
         return Ok(None);
@@ -40,12 +45,15 @@ fn arbiter(model: &Model, name: &str, top: &str) -> Result<Option<GeneratedFile>
 ",
         count = arrays.count()
     );
-    Ok(Some(GeneratedFile { text: header + &hierarchy.verilog(name, None), name: format!("{name}.v") }))
+    let verilog = GeneratedFile { text: header + &hierarchy.verilog(name, None), name: format!("{name}.v") };
+    let interfaces = Interface::of_arbiter(arrays.count());
+    let component = component(name, &interfaces, &top_ports(&hierarchy), &[&verilog.name]);
+    Ok(Some([verilog, component]))
 }
 
 /// Generates the hardware of `model` as a core for a SoC: the files of [`crate::generate()`] with the core's top module in
-/// place of the engine's, without taps; beside them `dermis_registers.h`, `<top>.h`, `registers.json` and `registers.rdl`, a component of IP-XACT, testbench
-/// and FuseSoC core file.
+/// place of the engine's, without taps; beside them `dermis_registers.h`, `<top>.h`, `registers.json` and `registers.rdl`, a component of IP-XACT,
+/// where the bus is AXI4-Lite a script that packages it for Vivado, testbench and FuseSoC core file.
 ///
 /// # Errors
 /// As [`crate::generate()`]; [`HdlError::Unsupported`] for a scene that averages frames.
@@ -98,16 +106,20 @@ pub fn generate_core_changed(model: &Model, shape: CoreShape, changes: &[Change]
         ("registers.rdl", system_rdl()),
     ];
     let own = own.map(|(name, text)| GeneratedFile { name: name.to_owned(), text });
-    let ports: Vec<TopPort> = hierarchy.top().into_iter().flat_map(top_ports).collect();
-    let wrapper = Wrapper { top, hierarchy, header, row: "bus", is_board: false };
+    let (ports, interfaces) = (top_ports(&hierarchy), Interface::of_core(shape.bus));
+    let wrapper = Wrapper { top, hierarchy, header, row: "bus", is_board: false, link_clock: None };
     let mut core = wrapper.generated(model, engine)?;
-    let xml = component(&core.top, shape.bus, &ports, core.files.iter().map(|file| file.name.as_str()));
+    let design: Vec<&str> = core.files.iter().map(|file| file.name.as_str()).collect();
+    let described = component(&core.top, &interfaces, &ports, &design);
+    let what = format!("Forces per taxel from normal stress, {} x {} taxels", scene.sensor.rows, scene.sensor.cols);
+    let packaged = package::script(&core.top, &command, &what, &interfaces, &ports, &design);
     core.files.extend(own);
-    core.files.push(GeneratedFile { name: format!("{}.xml", core.top), text: xml });
+    core.files.push(described);
+    core.files.extend(packaged);
     let name = format!("{}_arbiter", core.top);
     let arbiter = arbiter(model, &name, &core.top)?;
     let arbiter_name = arbiter.is_some().then_some(name);
-    core.files.extend(arbiter);
+    core.files.extend(arbiter.into_iter().flatten());
     core.add_core_file(model, testbench(model, &core, shape, command));
     core.manifest["core"] = json!({
         "bus": suffix,

@@ -1,66 +1,39 @@
-//! A core as a component of IP-XACT (IEEE 1685-2014), from which tools take ports, bus interfaces, registers and files.
+//! A core, and the arbiter beside one, as components of IP-XACT (IEEE 1685-2014), from which tools take ports, bus interfaces, registers
+//! and files.
 //!
 //! ```text
-//! ports of the top module, map of the registers, names of the files ──> <top>.xml
+//! ports of the top module and their interfaces, map of the registers, names of the files ──> <top>.xml
 //! ```
-//! A port belongs to the bus interface whose name it begins with; its name there is the rest, in capitals for AXI.
 
 use dermis_golden::wire::registers::{Access, Field, Register, ADDRESS_BITS, REGISTERS, REGISTER_BITS};
 
-use super::Bus;
-
-/// A port of the top module: name, whether it is an output, width in bits, meaning.
-pub(super) type TopPort = (String, bool, usize, String);
-
-/// What a port of the top module is for, of those that begin with a name.
-struct Interface {
-    /// With what the names of its ports begin.
-    prefix: &'static str,
-    /// Vendor, library, name and version of its definition.
-    definition: [&'static str; 4],
-    is_master: bool,
-    /// The registers are behind it.
-    has_registers: bool,
-}
-
-/// AMBA's streams.
-const STREAM: [&str; 4] = ["amba.com", "AMBA4", "AXI4Stream", "r0p0_1"];
+use super::interfaces::{Interface, TopPort};
+use crate::core_file::{LIBRARY, VENDOR};
+use crate::manifest::GeneratedFile;
 
 impl Interface {
-    /// The streams, and the bus of the registers.
-    fn all(bus: Bus) -> [Interface; 3] {
-        let stream = |prefix, is_master| Interface { prefix, definition: STREAM, is_master, has_registers: false };
-        let (prefix, definition) = match bus {
-            Bus::AxiLite => ("s_axil", ["amba.com", "AMBA4", "AXI4-Lite", "r0p0_0"]),
-            Bus::Wishbone => ("wb", ["opencores.org", "bus", "wishbone", "b4"]),
-        };
-        let registers = Interface { prefix, definition, is_master: false, has_registers: true };
-        [stream("s_axis", false), stream("m_axis", true), registers]
-    }
-
-    /// The name in the definition of a port of the top module, where it belongs to this interface.
-    fn logical(&self, port: &str) -> Option<String> {
-        let own = port.strip_prefix(self.prefix)?.strip_prefix('_')?;
-        Some(if self.definition[0] == STREAM[0] { own.to_uppercase() } else { own.to_owned() })
-    }
-
     fn xml(&self, ports: &[TopPort]) -> String {
-        let Interface { prefix, definition: [vendor, library, name, version], is_master, has_registers } = self;
+        let [vendor, library, name, version] = self.protocol.definition();
         let reference = |ending: &str| {
             format!("vendor=\"{vendor}\" library=\"{library}\" name=\"{name}{ending}\" version=\"{version}\"")
         };
-        let map = |(port, ..): &TopPort| {
-            let logical = of("logicalPort", text("name", &self.logical(port)?));
-            Some(of("portMap", logical + &of("physicalPort", text("name", port))))
+        let (number, count) = self.part;
+        let part = |bits: usize| match count {
+            1 => String::new(),
+            _ => of("partSelect", range((number + 1) * bits / count - 1, number * bits / count)),
         };
-        let maps: String = ports.iter().filter_map(map).collect();
+        let map = |(logical, (port, _, bits, _)): (String, &TopPort)| {
+            let physical = text("name", port) + &part(*bits);
+            of("portMap", of("logicalPort", text("name", &logical)) + &of("physicalPort", physical))
+        };
+        let maps: String = self.ports(ports).map(map).collect();
         let types = format!("<ipxact:abstractionRef {}/>\n", reference("_rtl")) + &of("portMaps", maps);
-        let mode = match (is_master, has_registers) {
+        let mode = match (self.is_master, self.has_registers()) {
             (true, _) => "<ipxact:master/>\n".to_owned(),
             (false, false) => "<ipxact:slave/>\n".to_owned(),
             (false, true) => of("slave", format!("<ipxact:memoryMapRef memoryMapRef=\"{MAP}\"/>\n")),
         };
-        let own = text("name", prefix)
+        let own = text("name", &self.name)
             + &format!("<ipxact:busType {}/>\n", reference(""))
             + &of("abstractionTypes", of("abstractionType", types))
             + &mode;
@@ -85,6 +58,11 @@ fn text(name: &str, text: &str) -> String {
 /// An element of a number.
 fn number(name: &str, number: usize) -> String {
     text(name, &number.to_string())
+}
+
+/// The bits `left` to `right`.
+fn range(left: usize, right: usize) -> String {
+    of("range", number("left", left) + &number("right", right))
 }
 
 fn field(access: Access, Field { name, low, bits, meaning }: &Field) -> String {
@@ -115,9 +93,22 @@ fn port((name, is_output, bits, meaning): &TopPort) -> String {
     of("port", text("name", name) + &text("description", meaning) + &of("wire", wire))
 }
 
-/// The component of the core whose top module is `top` with these `ports`, and whose Verilog and memory files are among `files`.
-pub(super) fn component<'f>(top: &str, bus: Bus, ports: &[TopPort], files: impl Iterator<Item = &'f str>) -> String {
-    let interfaces = Interface::all(bus).map(|interface| interface.xml(ports)).concat();
+/// A set of files, of those of these endings the names and types.
+fn file_set(name: &str, kinds: &[(&str, &str)], files: &[&str]) -> String {
+    let file = |file: &&str| {
+        let (_, kind) = kinds.iter().find(|(ending, _)| file.ends_with(ending))?;
+        Some(of("file", text("name", file) + kind))
+    };
+    let own: String = files.iter().filter_map(file).collect();
+    if own.is_empty() {
+        return own;
+    }
+    of("fileSet", text("name", name) + &own)
+}
+
+/// The component of the module `top` with these `ports` and `interfaces`. Of `files` those are its own that synthesis reads; the timing
+/// constraints are a set of files for themselves, because in a design around it they do not count.
+pub(super) fn component(top: &str, interfaces: &[Interface], ports: &[TopPort], files: &[&str]) -> GeneratedFile {
     let view = text("name", "rtl") + &text("componentInstantiationRef", "verilog");
     let verilog = text("name", "verilog")
         + &text("language", "verilog")
@@ -126,27 +117,26 @@ pub(super) fn component<'f>(top: &str, bus: Bus, ports: &[TopPort], files: impl 
     let model = of("views", of("view", view))
         + &of("instantiations", of("componentInstantiation", verilog))
         + &of("ports", ports.iter().map(port).collect());
-    let kind = |name: &str| match name.rsplit_once('.')?.1 {
-        "v" => Some(text("fileType", "verilogSource")),
-        "hex" => Some("<ipxact:fileType user=\"memory\">user</ipxact:fileType>\n".to_owned()),
-        _ => None,
-    };
-    let own = |name: &str| {
-        name.strip_prefix(top).is_some_and(|rest| rest.starts_with(['.', '_']) && !rest.starts_with("_tb"))
-    };
-    let file = |name: &str| Some(of("file", text("name", name) + &kind(name)?));
-    let files: String = files.filter(|name| own(name)).filter_map(file).collect();
-    let named = text("vendor", "dermis")
-        + &text("library", "ip")
+    let [verilog, constraints] = ["verilogSource", "SDC"].map(|kind| text("fileType", kind));
+    let memory = "<ipxact:fileType user=\"memory\">user</ipxact:fileType>\n";
+    let sets = file_set("rtl", &[(".v", &verilog), (".hex", memory)], files)
+        + &file_set("constraints", &[(".sdc", &constraints)], files);
+    let named = text("vendor", VENDOR)
+        + &text("library", LIBRARY)
         + &text("name", top)
         + &text("version", env!("CARGO_PKG_VERSION"));
+    let maps = match interfaces.iter().any(Interface::has_registers) {
+        true => of("memoryMaps", memory_map()),
+        false => String::new(),
+    };
     let content = named
-        + &of("busInterfaces", interfaces)
-        + &of("memoryMaps", memory_map())
+        + &of("busInterfaces", interfaces.iter().map(|interface| interface.xml(ports)).collect())
+        + &maps
         + &of("model", model)
-        + &of("fileSets", of("fileSet", text("name", "rtl") + &files));
-    format!(
+        + &of("fileSets", sets);
+    let text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- Generated by `dermis build`; do not edit, build it again. -->\n\
          <ipxact:component xmlns:ipxact=\"http://www.accellera.org/XMLSchema/IPXACT/1685-2014\">\n{content}</ipxact:component>\n"
-    )
+    );
+    GeneratedFile { name: format!("{top}.xml"), text }
 }

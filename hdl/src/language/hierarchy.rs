@@ -31,6 +31,8 @@ pub(crate) fn memory_file(top: &str, name: &str) -> String {
 pub struct Hierarchy {
     /// Kernels by their path: the instances from the top, levels separated by [`SEPARATOR`]; empty for the top.
     blocks: BTreeMap<String, Arc<Kernel>>,
+    /// Attributes of ports of the top module, in the Verilog, by the port's name.
+    port_attributes: BTreeMap<String, String>,
 }
 
 /// Values of the attribute `ram_style` by the path of a memory's block and its name in it.
@@ -46,7 +48,14 @@ impl Hierarchy {
             open.extend(inside.map(|instance| (called(&path, &instance.name), instance.kernel.clone())));
             blocks.insert(path, kernel);
         }
-        Hierarchy { blocks }
+        Hierarchy { blocks, port_attributes: BTreeMap::new() }
+    }
+
+    /// The same blocks, with these attributes of ports of the top module in the Verilog: the port's name, and names and values as Verilog
+    /// has them between its brackets.
+    pub(crate) fn with_port_attributes(self, attributes: impl IntoIterator<Item = (&'static str, String)>) -> Self {
+        let port_attributes = attributes.into_iter().map(|(port, text)| (port.to_owned(), text)).collect();
+        Hierarchy { port_attributes, ..self }
     }
 
     /// The kernel of the top.
@@ -179,7 +188,9 @@ impl Hierarchy {
             let ports = instance.kernel.port_list().map(connect).collect::<Vec<_>>().join(",\n");
             let _ = write!(body, "\n{} {} (\n{ports}\n);", name(&called(path, &instance.name)), instance.name);
         }
-        let mut text = kernel.header(&name(path));
+        let no_attributes = BTreeMap::new();
+        let attributes = if path.is_empty() { &self.port_attributes } else { &no_attributes };
+        let mut text = kernel.header(&name(path), attributes);
         for line in body.trim_start().lines() {
             let _ = write!(text, "\n{}", format!("    {line}").trim_end());
         }
@@ -188,8 +199,8 @@ impl Hierarchy {
 }
 
 impl Kernel {
-    /// The head of a module of this name, the clock first.
-    fn header(&self, name: &str) -> String {
+    /// The head of a module of this name, the clock first, with these attributes of ports.
+    fn header(&self, name: &str, attributes: &BTreeMap<String, String>) -> String {
         let declared = |port: &str| {
             let Some(signal) = self.signal_of(port).map(|id| &self.signals[id]) else {
                 return format!("    input wire {port}");
@@ -201,9 +212,10 @@ impl Kernel {
             };
             format!("    {kind} {}{port}", range(signal.ty.bits))
         };
-        let port = |(port, .., doc): (&str, bool, usize, &str)| match doc {
-            "" => declared(port),
-            doc => format!("    // {doc}\n{}", declared(port)),
+        let port = |(port, .., doc): (&str, bool, usize, &str)| {
+            let doc = if doc.is_empty() { String::new() } else { format!("    // {doc}\n") };
+            let attribute = attributes.get(port).map(|text| format!("    (* {text} *)\n")).unwrap_or_default();
+            doc + &attribute + &declared(port)
         };
         format!("module {name} (\n{}\n);", self.port_list().map(port).collect::<Vec<_>>().join(",\n"))
     }

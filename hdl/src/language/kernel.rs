@@ -213,7 +213,8 @@ pub struct Memory {
     pub bits: usize,
     /// Initial contents.
     pub contents: Contents,
-    /// Value of the attribute `ram_style`: `block`, `distributed`; none leaves the choice to synthesis.
+    /// Value of the attribute `ram_style`, of a memory that nothing writes `rom_style`: `block`, `distributed`; none leaves the choice to
+    /// synthesis.
     pub style: Option<String>,
     /// What is read in the cycle of a write to the same address is not used: attribute `no_rw_check`.
     pub unchecked: bool,

@@ -510,11 +510,12 @@ impl Block for Around {
 #[test]
 fn a_kind_of_ram_is_stated_once_or_not_at_all() {
     let kernel = state();
-    let given = BTreeMap::from([("ram".to_owned(), "block".to_owned())]);
+    let given = BTreeMap::from(["ram", "rom"].map(|name| (name.to_owned(), "block".to_owned())));
     let stated =
-        |text: String| text.lines().filter(|line| line.contains("ram_style")).map(str::to_owned).collect::<Vec<_>>();
+        |text: String| text.lines().filter(|line| line.contains("m_style")).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(stated(kernel.verilog()), ["(* ram_style = \"distributed\" *)"]);
-    assert_eq!(stated(kernel.verilog_with(Some(&given), "")), ["(* ram_style = \"block\" *)"]);
+    let both = ["(* ram_style = \"block\" *)", "(* rom_style = \"block\" *)"];
+    assert_eq!(stated(kernel.verilog_with(Some(&given), "")), both);
     assert_eq!(stated(kernel.verilog_with(None, "")), [""; 0]);
     assert!(kernel.verilog_with(None, "dut__").contains("$readmemh(\"dut__rom.hex\", rom);"));
 }

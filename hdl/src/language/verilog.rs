@@ -108,7 +108,9 @@ impl Printer<'_> {
         let Memory { name, words, bits, .. } = memory;
         let unchecked = memory.unchecked.then(|| "no_rw_check".to_owned());
         let style = self.styles.and_then(|styles| styles.get(name).or(memory.style.as_ref()));
-        let style = style.map(|style| format!("ram_style = \"{style}\""));
+        // Vivado has a name of its own for memories that nothing writes; Yosys takes either.
+        let kind = if memory.is_written() { "ram_style" } else { "rom_style" };
+        let style = style.map(|style| format!("{kind} = \"{style}\""));
         let attributes: Vec<String> = unchecked.into_iter().chain(style).collect();
         if !attributes.is_empty() {
             self.line(&format!("(* {} *)", attributes.join(", ")));

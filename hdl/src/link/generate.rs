@@ -5,6 +5,7 @@ use dermis_golden::spec::link_kind::LinkKind;
 use dermis_golden::wire::link::slip::IDLE;
 
 use super::board_top::board_top;
+use crate::constraints::Clock;
 use crate::error::HdlError;
 use crate::generate::{top_name, Generated, Wrapper};
 use crate::language::Change;
@@ -52,7 +53,8 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     let top = format!("{}_board", top_name(&model.scene.name));
     let hierarchy = board_top(model)?.changed(changes)?;
     let link = model.scene.hardware.link;
-    let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
+    let bit_rate = link.bit_rate(&model.board)?;
+    let (behind, pins) = link_text(link, bit_rate);
     let header = format!(
         "\
 // {top}: {engine_top} behind {behind}, {sensor}.
@@ -71,7 +73,8 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         clock = model.board.clock_MHz,
         scan = pins_text(model),
     );
-    let wrapper = Wrapper { top, hierarchy, header, row: "link", is_board: true };
+    let link_clock = (link == LinkKind::Spi).then(|| Clock { port: "spi_sclk", MHz: f64::from(bit_rate) / 1e6 });
+    let wrapper = Wrapper { top, hierarchy, header, row: "link", is_board: true, link_clock };
     let mut board = wrapper.generated(model, engine)?;
     board.seal();
     Ok(board)

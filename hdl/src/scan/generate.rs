@@ -72,7 +72,7 @@ pub fn generate_scan_changed(model: &Model, changes: &[Change]) -> Result<Genera
         scan = us(timing.scan),
         period = us(timing.period),
     );
-    let wrapper = Wrapper { top, hierarchy, header, row: "scan", is_board: false };
+    let wrapper = Wrapper { top, hierarchy, header, row: "scan", is_board: false, link_clock: None };
     let mut generated = wrapper.generated(model, engine)?;
     generated.manifest["scan"] = json!({
         "converter": scan.converter.name,

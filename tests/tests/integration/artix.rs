@@ -87,6 +87,7 @@ fn the_script_for_vivado_names_files_that_exist_and_no_unknown_command() {
     // Stand-ins that write down how they are called; another command is an error of Tcl, which Yosys has built in.
     let commands = [
         "read_verilog",
+        "read_xdc",
         "synth_design",
         "create_clock",
         "get_ports",
@@ -98,9 +99,12 @@ fn the_script_for_vivado_names_files_that_exist_and_no_unknown_command() {
         "report_timing_summary",
         "write_checkpoint",
     ];
-    let stand_ins: String = commands
-        .map(|name| format!("proc {name} {{args}} {{ puts $::calls [concat {name} $args]; return {name} }}\n"))
-        .concat();
+    // The constraints are read as Vivado reads them.
+    let does = |name| if name == "read_xdc" { "source [lindex $args end]" } else { "" };
+    let stand_in = |name| {
+        format!("proc {name} {{args}} {{ puts $::calls [concat {name} $args]; {}; return {name} }}\n", does(name))
+    };
+    let stand_ins = commands.map(stand_in).concat();
     let run = |script: &str| {
         let text = format!("set calls [open calls.txt w]\n{stand_ins}source {script}\nclose $calls\n");
         fs::write(folder.path().join("run.tcl"), text).unwrap();
@@ -108,8 +112,12 @@ fn the_script_for_vivado_names_files_that_exist_and_no_unknown_command() {
     };
     run(&script).unwrap();
     let calls = fs::read_to_string(folder.path().join("calls.txt")).unwrap();
-    let read = format!("read_verilog {}.v\nsynth_design -top {0} -part xc7a35tcsg324-1 ", generated.top);
-    assert!(calls.starts_with(&read) && calls.contains("create_clock -name clk -period 10.000 get_ports"), "{calls}");
+    let read = format!(
+        "read_verilog {0}.v\nread_xdc -unmanaged -mode out_of_context {0}.sdc\nget_ports clk\ncreate_clock -name clk -period 10.000 \
+         get_ports\nsynth_design -top {0} -part xc7a35tcsg324-1 ",
+        generated.top
+    );
+    assert!(calls.starts_with(&read), "{calls}");
     assert!(folder.path().join(format!("{}.v", generated.top)).exists());
     // A misspelt command is found.
     let text = fs::read_to_string(folder.path().join(&script)).unwrap().replace("opt_design\n", "optimise\n");

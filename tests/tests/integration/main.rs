@@ -14,6 +14,7 @@ mod choice;
 mod circles;
 mod code_check;
 mod coefficients;
+mod constraints;
 mod dead;
 mod equality;
 mod event_driven;
