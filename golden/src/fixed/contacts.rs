@@ -61,11 +61,11 @@ impl Passes<'_> {
             let read = window(formats, &contacts.window, &array, middle, &|taxel| found.labels[taxel] == index + 1);
             self.streams.windows.extend(read.input.iter().chain(&read.mask));
             self.operands.window = [read.input, read.mask];
-            let told = self.ask(network);
+            let estimate = self.evaluate(network);
             let condition = read.own.meets(plan.scene.partition.condition);
-            let position = if condition { told.position } else { [0; 2] };
-            self.tell(position);
-            all.push(Contact { middle, condition, position, ln_sigma: told.ln_sigma });
+            let position = if condition { estimate.position } else { [0; 2] };
+            self.push_position(position);
+            all.push(Contact { middle, condition, position, ln_sigma: estimate.ln_sigma });
         }
         let positions: Vec<[i64; 2]> = all.iter().map(|contact| contact.position.map(i64::from)).collect();
         let values = self.relaxed(first, |passes, operands| {

@@ -284,13 +284,13 @@ impl Model {
         statuses.iter().enumerate().map(raised).fold(FlagSet::default(), FlagSet::bitor)
     }
 
-    /// What a status says of μ.
+    /// μ of a status.
     fn mu_of(&self, status: &Status) -> StatusMu {
         let Status { condition, found, .. } = *status;
         let unit = 1.0 / MU_STEPS as f64;
         let mu = status.position().map(|x| f64::from(x) * unit * self.scene.search.mu_max);
         let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
-        let estimate = (found && self.has_network()).then(|| Estimate::told(mu, sigma, status.position()));
+        let estimate = (found && self.has_network()).then(|| Estimate::of_density(mu, sigma, status.position()));
         StatusMu { condition, found, mu, estimate }
     }
 
@@ -299,7 +299,7 @@ impl Model {
         let StatusMu { condition, mu, estimate, .. } = self.mu_of(status);
         let objective_value = estimate.map(|estimate| estimate.found.objective);
         let own = Region { centroid_condition: condition, mu, objective_value, ..own };
-        own.with_sigma(estimate.and_then(|told| told.sigma))
+        own.with_sigma(estimate.and_then(|estimate| estimate.sigma))
     }
 
     /// The case that a frame's status names; of a scene with one case, that case.

@@ -8,7 +8,7 @@
 //! | in: b | taxels | of its peak |
 //! | out: [`Estimate`] | – | N per MPa of the peak |
 
-mod advice;
+mod network;
 mod outcome;
 mod regions;
 
@@ -232,8 +232,8 @@ impl<'a> Fit<'a> {
             false => Mat::zeros(unknowns, unknowns),
         };
         let mut found = Found { regions, top, covariance };
-        if let Some(adviser) = self.scene.adviser.as_ref().filter(|_| !found.regions.wide) {
-            found = self.advised(adviser, found)?;
+        if let Some(mu_network) = self.scene.mu_network.as_ref().filter(|_| !found.regions.wide) {
+            found = self.with_network(mu_network, found)?;
         }
         self.estimate(&found)
     }

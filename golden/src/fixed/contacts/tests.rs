@@ -35,7 +35,7 @@ fn twin<'a>(region: &Region, of: &'a Reconstruction) -> &'a Region {
     of.extra.regions.iter().flatten().max_by_key(common).unwrap()
 }
 
-/// Every contact has the μ and σ that the network says of the window around its middle, up to rounding.
+/// Every contact has the μ and σ that the network gives for the window around its middle, up to rounding.
 #[test]
 fn a_contact_has_what_the_network_says_of_its_window() {
     let (scene, _file) = scene("[input]\ndead = [[4, 9], [12, 0]]\n", "");

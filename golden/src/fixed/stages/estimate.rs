@@ -23,7 +23,7 @@ pub const REDUCTION_CYCLES: usize = 4;
 /// Right shift of a position to the amount by which it is reduced.
 pub const REDUCTION_SHIFT: u32 = 5;
 
-/// μ as the network knows it.
+/// μ from the network's last layer, in words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Estimate {
     /// Position of μ in mu_max/384, [x, y].

@@ -100,18 +100,18 @@ impl SearchInput<'_> {
 }
 
 impl Estimate {
-    /// What a network says of μ: its mean, standard deviation, and the mean's position on the search grid. The objective is ln
+    /// A normal density of μ: its mean, standard deviation, and the mean's position on the search grid. The objective is ln
     /// of the density at the mean.
-    pub fn told(mu: [f64; 2], sigma: [f64; 2], position: [i32; 2]) -> Estimate {
+    pub fn of_density(mu: [f64; 2], sigma: [f64; 2], position: [i32; 2]) -> Estimate {
         let objective = -sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
         let found = SearchResult { mu, position, objective, evaluations: 1 };
         Estimate { found, load_N: None, sigma: Some(sigma) }
     }
 
-    /// What a network says of μ, at the nearest position of the search grid.
-    pub fn of_network(told: &Gaussian, mu_max: f64) -> Estimate {
-        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / mu_max).round() as i32);
-        Estimate::told(told.mean, told.sigma, position)
+    /// The output of a network, at the nearest position of the search grid.
+    pub fn of_network(output: &Gaussian, mu_max: f64) -> Estimate {
+        let position = output.mean.map(|mu| (mu * f64::from(RADIUS) / mu_max).round() as i32);
+        Estimate::of_density(output.mean, output.sigma, position)
     }
 
     /// Standard deviation of the shear over its size, that of a hundredth of the normal force at least, if σ is known.
